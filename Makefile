@@ -1,0 +1,47 @@
+# make demo | test | lint | docs | bench | smoke | clean
+# Set-up is part of every target: the environment lives in .venv and is made when it is missing or out of date.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+export STICKSLIP_DATA ?= $(abspath ../shared/data)
+
+.PHONY: demo test lint docs bench smoke clean
+
+demo: $(VENV)/.user
+	$(BIN)/stickslip demo --output stickslip-demo
+
+test: $(VENV)/.dev
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+docs: $(VENV)/.docs
+	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+
+bench: $(VENV)/.dev
+	$(BIN)/python benchmarks/run.py
+
+smoke: $(VENV)/.dev
+	$(BIN)/python tests/smoke.py
+
+clean:
+	rm -rf $(VENV) dist build docs/_build stickslip-demo
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.user: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[io]"
+	touch $@
+
+$(VENV)/.dev: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
+	touch $@ $(VENV)/.user
+
+$(VENV)/.docs: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[io,docs]"
+	touch $@

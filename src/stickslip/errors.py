@@ -1,0 +1,50 @@
+"""The errors a user can meet; each one is a sentence: the value, the rule it breaks, the next step."""
+
+from __future__ import annotations
+
+
+class StickslipError(Exception):
+    """Base of every error that stickslip raises on purpose.
+
+    Parameters
+    ----------
+    value : str
+        What was found, with its number ("channel x has 10 samples").
+    rule : str
+        What is needed instead ("friction loops need one full cycle").
+    next_step : str
+        What the user can do now ("give a longer record").
+
+    Examples
+    --------
+    >>> print(RecordError("x has 10 samples", "a loop needs a full cycle", "give a longer record"))
+    x has 10 samples; a loop needs a full cycle; give a longer record.
+    """
+
+    exit_code = 1
+
+    def __init__(self, value: str, rule: str, next_step: str) -> None:
+        super().__init__(value, rule, next_step)
+        self.value, self.rule, self.next_step = value, rule, next_step
+
+    def __str__(self) -> str:
+        sentence = "; ".join(part.strip().rstrip(".;") for part in self.args)
+        return " ".join(sentence.split()) + "."
+
+
+class RecordError(StickslipError):
+    """The record lacks, or contradicts, what was asked of it."""
+
+
+class FormatError(StickslipError):
+    """A file can not be read as the format that it seems, or claims, to be."""
+
+
+class EstimateError(StickslipError):
+    """The data can not support the estimate that was asked for."""
+
+
+class ModelError(StickslipError):
+    """A parameter of a rig or model has no meaning (a negative mass, a typo in a settings file)."""
+
+    exit_code = 2

@@ -1,0 +1,95 @@
+"""An answer that carries how sure it is: value, interval, unit, method, status, checks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+NORMAL_95 = 1.959963984540054  # two-sided 95 % quantile of the normal distribution
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number found in a record, with its 95 % interval.
+
+    Attributes
+    ----------
+    name : str
+        What was estimated, in the field's words ("sliding friction").
+    value : float
+        The estimate, in `unit`.
+    interval : tuple of float
+        Low and high end of the 95 % interval.
+    sd : float
+        Standard deviation of the estimate.
+    unit : str
+        SI unit.
+    method : str
+        How it was found, in words short enough for a table.
+    status : str
+        ``"ok"``, or in words why it should not be trusted.
+    checks : tuple of str
+        What was checked, with the numbers.
+
+    Examples
+    --------
+    >>> print(Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="median of 18 half cycles"))
+    sliding friction 1.318 N (95 %: 1.310 to 1.326)
+    """
+
+    name: str
+    value: float
+    interval: tuple[float, float]
+    sd: float
+    unit: str
+    method: str
+    status: str = "ok"
+    checks: tuple[str, ...] = field(default=())
+
+    @classmethod
+    def normal(
+        cls, name: str, value: float, *, sd: float, unit: str, method: str, quantile: float = NORMAL_95, **more: Any
+    ) -> Estimate:
+        """An estimate whose interval is ``value -+ quantile * sd`` (pass Student's quantile for few samples)."""
+        value, sd = float(value), float(sd)
+        return cls(name, value, (value - quantile * sd, value + quantile * sd), sd, unit, method, **more)
+
+    def scaled(self, factor: float, unit: str, name: str | None = None) -> Estimate:
+        """The same estimate in another unit, or of a quantity proportional to it."""
+        ends = sorted(factor * end for end in self.interval)
+        return Estimate(
+            name or self.name,
+            factor * self.value,
+            (ends[0], ends[1]),
+            abs(factor) * self.sd,
+            unit,
+            self.method,
+            self.status,
+            self.checks,
+        )
+
+    def includes(self, value: float) -> bool:
+        """Whether the 95 % interval holds `value`."""
+        return self.interval[0] <= value <= self.interval[1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; what is not finite becomes ``None``."""
+        numbers = [x if math.isfinite(x) else None for x in (self.value, *self.interval, self.sd)]
+        return {
+            "name": self.name, "value": numbers[0], "interval": numbers[1:3], "sd": numbers[3], "unit": self.unit,
+            "method": self.method, "status": self.status, "checks": list(self.checks),
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        low, high = self.interval
+        digits = decimals(self.sd if self.sd > 0 else high - low, self.value)
+        flag = "" if self.status == "ok" else f" [{self.status}]"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.name} {self.value:.{digits}f}{unit} (95 %: {low:.{digits}f} to {high:.{digits}f}){flag}"
+
+
+def decimals(sd: float, value: float) -> int:
+    """Decimals worth printing: one significant digit of the uncertainty, four of an exact value."""
+    scale = sd if sd > 0 and math.isfinite(sd) else abs(value) * 1e-3
+    return 3 if scale <= 0 or not math.isfinite(scale) else min(12, max(0, -math.floor(math.log10(scale))))

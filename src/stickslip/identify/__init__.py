@@ -1,0 +1,1 @@
+"""One file per question asked of a Record; nothing here looks at a simulator."""

@@ -1,0 +1,1 @@
+"""Figures; they know the results, and no result knows them."""

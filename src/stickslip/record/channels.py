@@ -1,0 +1,88 @@
+"""The channel vocabulary: the names that every question asked of a Record understands."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from stickslip.errors import RecordError
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a channel of the vocabulary measures, and the SI units it may be kept in (the first is usual)."""
+
+    words: str
+    units: tuple[str, ...]
+
+
+VOCABULARY: dict[str, Quantity] = {
+    "x": Quantity("displacement", ("m",)),
+    "z": Quantity("base displacement", ("m",)),
+    "v": Quantity("velocity", ("m/s",)),
+    "a": Quantity("acceleration", ("m/s^2",)),
+    "friction": Quantity("friction force, positive against positive velocity", ("N", "N m")),
+    "load": Quantity("load cell", ("N", "N m")),
+    "force": Quantity("applied force", ("N", "N m")),
+    "normal": Quantity("normal force", ("N",)),
+    "theta": Quantity("angle", ("rad",)),
+    "sound": Quantity("sound pressure (unit 1: not calibrated)", ("Pa", "1")),
+    "y": Quantity("displacement in the normal direction", ("m",)),
+}
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What is known of one channel beside its samples.
+
+    Attributes
+    ----------
+    name : str
+        Key in the Record; a word of the vocabulary, or any other identifier.
+    unit : str
+        SI unit of the samples.
+    quantity : str
+        What it measures, in words.
+    source : str
+        The column it came from, with the arithmetic applied ("vir * 35.1507 [N]"); the function that made it
+        for a computed channel.
+    sensitivity : str
+        The sensor's sensitivity, as given ("500 mV/lbf"); already applied to the samples.
+    delay : float
+        Time [s] by which the samples lag what they measure; not yet applied.
+    noise : float or None
+        Standard deviation [unit] of the channel's noise where known; otherwise estimated when needed.
+    """
+
+    name: str
+    unit: str
+    quantity: str = ""
+    source: str = ""
+    sensitivity: str = ""
+    delay: float = 0.0
+    noise: float | None = None
+
+
+def checked_name(name: str) -> str:
+    """`name`, if it can name a channel."""
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+        raise RecordError(
+            f"channel name '{name}'",
+            "a channel is named by letters, digits and _",
+            f"use one of {', '.join(VOCABULARY)} or a word of your own",
+        )
+    return name
+
+
+def described(name: str, unit: str) -> str:
+    """The quantity in words, after checking that the vocabulary's unit fits the name."""
+    quantity = VOCABULARY.get(name)
+    if quantity is None:
+        return name
+    if unit not in quantity.units:
+        raise RecordError(
+            f"channel {name} is given in {unit}",
+            f"{name} is {quantity.words}, in {' or '.join(quantity.units)}",
+            "correct the unit, or give the channel another name",
+        )
+    return quantity.words

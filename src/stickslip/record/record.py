@@ -1,0 +1,331 @@
+"""Record: channels on one clock, in SI, with the history of how they came to be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.errors import RecordError
+from stickslip.record.channels import Channel, checked_name, described
+from stickslip.units import parse_unit
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from stickslip.record.check import Fault
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing that was done to a record: the function, its arguments, and what came of it in words."""
+
+    action: str
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    outcome: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {"action": self.action, "arguments": dict(self.arguments), "outcome": self.outcome}
+
+    def __str__(self) -> str:
+        arguments = ", ".join(f"{key}={value!r}" for key, value in self.arguments.items())
+        return f"{self.action}({arguments})" + (f": {self.outcome}" if self.outcome else "")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Record:
+    """Measured or simulated channels on one clock.
+
+    Samples are float64 in SI units and read-only; every method returns a new Record.
+
+    Attributes
+    ----------
+    samples : mapping of str to ndarray
+        One array of n samples per channel.
+    channels : mapping of str to Channel
+        Unit, quantity, source, sensitivity and delay of each.
+    fs : float
+        Sampling rate [Hz]; where the clock is broken (`stamps` is kept), the median rate.
+    start : float
+        Time [s] of the first sample.
+    history : tuple of Step
+        What was read (with sha256) and done to it, in order.
+    stamps : ndarray or None
+        The time stamps [s] as read, kept only where they are not uniform; see :meth:`check` and ``repair_clock``.
+    truth : mapping
+        True values behind a simulated record, by name; empty for a measured one.
+
+    Examples
+    --------
+    >>> record = Record.of({"x": [0.0, 1.0, 0.0, -1.0]}, fs=4.0, units={"x": "mm"})
+    >>> record["x"][1], record.fs, record.duration
+    (0.001, 4.0, 1.0)
+    """
+
+    samples: Mapping[str, Array]
+    channels: Mapping[str, Channel]
+    fs: float
+    start: float = 0.0
+    history: tuple[Step, ...] = ()
+    stamps: Array | None = None
+    truth: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.samples:
+            raise RecordError(
+                "a record without channels", "at least one channel is needed", "name a column in channels="
+            )
+        if not (math.isfinite(self.fs) and self.fs > 0 and math.isfinite(self.start)):
+            raise RecordError(
+                f"fs = {self.fs} Hz, start = {self.start} s", "fs is positive and both are finite", "pass fs= in Hz"
+            )
+        frozen = {checked_name(name): _frozen(values) for name, values in self.samples.items()}
+        lengths = {name: len(values) for name, values in frozen.items()}
+        if len(set(lengths.values())) > 1 or (self.stamps is not None and len(self.stamps) not in lengths.values()):
+            counts = ", ".join(f"{name} {length}" for name, length in lengths.items())
+            raise RecordError(
+                f"channels of unequal length ({counts})",
+                "one record has one clock",
+                "read them apart, or cut them to the same rows",
+            )
+        if min(lengths.values()) == 0:
+            raise RecordError("a record without samples", "at least one sample is needed", "check rows= and the file")
+        object.__setattr__(self, "samples", MappingProxyType(frozen))
+        object.__setattr__(self, "channels", MappingProxyType({name: self.channels[name] for name in frozen}))
+        object.__setattr__(self, "history", tuple(self.history))
+        object.__setattr__(self, "truth", MappingProxyType(dict(self.truth)))
+        if self.stamps is not None:
+            object.__setattr__(self, "stamps", _frozen(self.stamps))
+
+    @classmethod
+    def of(
+        cls,
+        samples: Mapping[str, ArrayLike],
+        *,
+        fs: float,
+        units: Mapping[str, str] | None = None,
+        start: float = 0.0,
+        truth: Mapping[str, Any] | None = None,
+    ) -> Record:
+        """A record from arrays in memory.
+
+        Parameters
+        ----------
+        samples : mapping of str to array_like
+            One sequence of n numbers per channel.
+        fs : float
+            Sampling rate [Hz].
+        units : mapping of str to str, optional
+            Unit of each channel as given ("mm"); SI of the vocabulary where left out.
+        start : float
+            Time [s] of the first sample.
+        truth : mapping, optional
+            True values, for a simulated record.
+        """
+        from stickslip.record.channels import VOCABULARY
+
+        units, arrays, channels = dict(units or {}), {}, {}
+        for name, values in samples.items():
+            usual = VOCABULARY[name].units[0] if name in VOCABULARY else "1"
+            unit = parse_unit(
+                units.get(name, usual),
+                expect=usual if name in VOCABULARY and len(VOCABULARY[name].units) == 1 else None,
+            )
+            arrays[name] = np.asarray(values, dtype=float) * unit.scale
+            channels[name] = Channel(name, unit.si, described(name, unit.si), source="array")
+        step = Step(
+            "Record.of",
+            {"fs": fs, "units": {n: c.unit for n, c in channels.items()}},
+            f"{len(arrays)} arrays in memory",
+        )
+        return cls(arrays, channels, float(fs), start, (step,), None, truth or {})
+
+    # ---- reading
+
+    def __getitem__(self, name: str) -> Array:
+        self.require(name)
+        return self.samples[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.samples
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.samples)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.samples.values())))
+
+    @property
+    def time(self) -> Array:
+        """Time [s] of each sample: the stamps as read where the clock is broken, else uniform."""
+        return self.stamps if self.stamps is not None else self.start + np.arange(len(self)) / self.fs
+
+    @property
+    def duration(self) -> float:
+        """Number of samples over the rate [s]."""
+        return len(self) / self.fs
+
+    def require(self, *names: str, question: str = "this question") -> None:
+        """Refuse, in one sentence, if a channel is missing."""
+        missing = [name for name in names if name not in self.samples]
+        if missing:
+            raise RecordError(
+                f"channel {', '.join(missing)} is missing (the record has {', '.join(self.samples)})",
+                f"{question} needs {', '.join(names)}",
+                f'name the column when reading: channels={{"{missing[0]}": "COLUMN [unit]"}}',
+            )
+
+    def require_clean(self, *names: str, question: str = "this question", samples: int = 1) -> None:
+        """Refuse, in one sentence, a missing channel, a broken clock, a value not finite, too few samples."""
+        self.require(*names, question=question)
+        if len(self) < samples:
+            raise RecordError(
+                f"the record has {len(self)} samples", f"{question} needs at least {samples}", "give a longer record"
+            )
+        if self.stamps is not None:
+            raise RecordError(
+                "the time stamps are not uniform",
+                f"{question} needs one sampling rate",
+                "see record.check() and mend the clock with repair_clock(record) or fill_gaps(record)",
+            )
+        for name in names:
+            bad = np.flatnonzero(~np.isfinite(self.samples[name]))
+            if len(bad):
+                raise RecordError(
+                    f"channel {name} has {len(bad)} values that are not numbers, the first at row {bad[0]}",
+                    f"{question} needs numbers throughout",
+                    "see record.check() and fill them with fill_missing(record)",
+                )
+
+    # ---- deriving
+
+    def with_channel(
+        self,
+        name: str,
+        values: ArrayLike,
+        *,
+        unit: str,
+        source: str = "",
+        noise: float | None = None,
+        step: Step | None = None,
+    ) -> Record:
+        """This record with a channel added or replaced; `values` in `unit` (SI)."""
+        channel = Channel(checked_name(name), unit, described(name, unit), source, noise=noise)
+        samples = {**self.samples, name: np.asarray(values, dtype=float)}
+        return replace(
+            self,
+            samples=samples,
+            channels={**self.channels, name: channel},
+            history=(*self.history, *([step] if step else [])),
+        )
+
+    def with_details(self, name: str, **details: Any) -> Record:
+        """This record with details of a channel stated: ``delay``, ``noise``, ``sensitivity``, ``quantity``."""
+        self.require(name)
+        channels = {**self.channels, name: replace(self.channels[name], **details)}
+        return replace(
+            self, channels=channels, history=(*self.history, Step("with_details", {"name": name, **details}))
+        )
+
+    def with_samples(
+        self,
+        samples: Mapping[str, Array],
+        step: Step,
+        *,
+        fs: float | None = None,
+        start: float | None = None,
+        stamps: Array | None = None,
+    ) -> Record:
+        """This record's channels with new samples (all of them, on a new clock if given), logged as `step`."""
+        fs, start = self.fs if fs is None else fs, self.start if start is None else start
+        return Record(samples, self.channels, fs, start, (*self.history, step), stamps, self.truth)
+
+    def rows(self, first: int = 0, last: int | None = None) -> Record:
+        """Rows ``first`` up to, not including, ``last`` (negative from the end, as in a slice)."""
+        part = slice(*slice(first, last).indices(len(self)))
+        samples = {name: values[part] for name, values in self.samples.items()}
+        start = float(self.time[part.start]) if part.start < len(self) else self.start
+        step = Step(
+            "rows", {"first": first, "last": last}, f"{len(range(*part.indices(len(self))))} of {len(self)} rows kept"
+        )
+        return self.with_samples(samples, step, start=start, stamps=None if self.stamps is None else self.stamps[part])
+
+    def between(self, first: float, last: float) -> Record:
+        """The samples with ``first <= time < last`` [s]."""
+        inside = np.flatnonzero((self.time >= first) & (self.time < last))
+        if not len(inside):
+            raise RecordError(
+                f"no sample between {first} s and {last} s",
+                f"the record runs from {self.time[0]:g} s to {self.time[-1]:g} s",
+                "choose times inside it",
+            )
+        return self.rows(int(inside[0]), int(inside[-1]) + 1)
+
+    # ---- looking
+
+    def check(self) -> list[Fault]:
+        """What is wrong with the record, in words, with row numbers; empty when nothing is.
+
+        See :mod:`stickslip.record.check` for what is looked for.
+        """
+        from stickslip.record.check import find_faults
+
+        return find_faults(self)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A DataFrame indexed by time [s]; units and history in ``.attrs``."""
+        from stickslip.record.exchange import to_pandas
+
+        return to_pandas(self)
+
+    def to_xarray(self) -> xr.Dataset:
+        """An xarray Dataset over ``time`` [s] with units and history as attributes."""
+        from stickslip.record.exchange import to_xarray
+
+        return to_xarray(self)
+
+    def to_sep005(self) -> list[dict[str, Any]]:
+        """The list of channel dictionaries of SDyPy's SEP 005."""
+        from stickslip.record.exchange import to_sep005
+
+        return to_sep005(self)
+
+    def equals(self, other: object) -> bool:
+        """Whether another record holds exactly the same samples, channels, clock, history and truth."""
+        if not isinstance(other, Record) or list(self.samples) != list(other.samples):
+            return False
+        pairs = [(self.samples[name], other.samples[name]) for name in self.samples]
+        if (self.stamps is None) != (other.stamps is None):
+            return False
+        if self.stamps is not None and other.stamps is not None:
+            pairs.append((self.stamps, other.stamps))
+        same = all(np.array_equal(mine, theirs, equal_nan=True) for mine, theirs in pairs)
+        details = [
+            (dict(r.channels), r.fs, r.start, [s.to_dict() for s in r.history], dict(r.truth)) for r in (self, other)
+        ]
+        return same and details[0] == details[1]
+
+    def __repr__(self) -> str:
+        names = ", ".join(f"{channel.name} [{channel.unit}]" for channel in self.channels.values())
+        clock = "broken clock, about " if self.stamps is not None else ""
+        return f"Record({names}; {len(self)} samples, {clock}{self.fs:g} Hz, from {self.start:g} s)"
+
+
+def _frozen(values: ArrayLike) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 1:
+        raise RecordError(
+            f"a channel of shape {array.shape}", "a channel is one row of numbers", "pass one-dimensional samples"
+        )
+    view = array.view()
+    view.flags.writeable = False
+    return view

@@ -1,0 +1,188 @@
+"""A unit is parsed once, at the door; inside, everything is SI.
+
+Common laboratory spellings are read from a table, everything else by pint (imported only then).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from dataclasses import dataclass
+
+from stickslip.errors import RecordError
+
+GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
+POUND_FORCE = 4.4482216152605  # N
+INCH = 0.0254  # m
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as written, and what turns its numbers into SI: ``si_value = scale * value``.
+
+    Attributes
+    ----------
+    text : str
+        The unit as the user or the file wrote it.
+    scale : float
+        Factor to SI.
+    si : str
+        Name of the SI unit, spelled in one way throughout ("m/s^2", "N s/m", "1").
+    """
+
+    text: str
+    scale: float
+    si: str
+
+
+def _prefixed(base: str, si: str, scale: float, prefixes: str) -> dict[str, tuple[float, str]]:
+    factors = {"": 1.0, "k": 1e3, "M": 1e6, "c": 1e-2, "d": 1e-1, "m": 1e-3, "u": 1e-6, "n": 1e-9}
+    return {p + base: (factors[p] * scale, si) for p in ["", *prefixes]}
+
+
+_TABLE: dict[str, tuple[float, str]] = {
+    "1": (1.0, "1"), "": (1.0, "1"), "-": (1.0, "1"), "%": (0.01, "1"), "FS": (1.0, "1"),
+    **_prefixed("m", "m", 1.0, "kcdmun"), "micron": (1e-6, "m"), "microns": (1e-6, "m"), "meter": (1.0, "m"),
+    "in": (INCH, "m"), "inch": (INCH, "m"), "mil": (INCH / 1000, "m"), "ft": (12 * INCH, "m"),
+    **_prefixed("m/s", "m/s", 1.0, "kcdmun"), "in/s": (INCH, "m/s"), "inch/s": (INCH, "m/s"), "km/h": (1 / 3.6, "m/s"),
+    **_prefixed("m/s^2", "m/s^2", 1.0, "cmu"),
+    "g0": (GRAVITY, "m/s^2"), "g_0": (GRAVITY, "m/s^2"), "gn": (GRAVITY, "m/s^2"), "gal": (0.01, "m/s^2"),
+    "G": (GRAVITY, "m/s^2"),
+    **_prefixed("N", "N", 1.0, "kMcdmu"), "lbf": (POUND_FORCE, "N"), "kip": (1000 * POUND_FORCE, "N"),
+    "kgf": (GRAVITY, "N"), "gf": (GRAVITY / 1000, "N"),
+    "N/m": (1.0, "N/m"), "N/mm": (1e3, "N/m"), "kN/m": (1e3, "N/m"), "N/um": (1e6, "N/m"),
+    "lbf/in": (POUND_FORCE / INCH, "N/m"),
+    "N s/m": (1.0, "N s/m"), "kN s/m": (1e3, "N s/m"), "N s/mm": (1e3, "N s/m"), "kg/s": (1.0, "N s/m"),
+    **_prefixed("g", "kg", 1e-3, "km"), "t": (1e3, "kg"), "lbm": (0.45359237, "kg"),
+    "rad": (1.0, "rad"), "mrad": (1e-3, "rad"), "deg": (math.pi / 180, "rad"), "degree": (math.pi / 180, "rad"),
+    "degrees": (math.pi / 180, "rad"), "°": (math.pi / 180, "rad"), "rev": (2 * math.pi, "rad"),
+    "rad/s": (1.0, "rad/s"), "deg/s": (math.pi / 180, "rad/s"), "rpm": (math.pi / 30, "rad/s"),
+    "N m": (1.0, "N m"), "Nm": (1.0, "N m"), "mNm": (1e-3, "N m"), "mN m": (1e-3, "N m"), "1/s": (1.0, "1/s"),
+    "V/N": (1.0, "V/N"), "V/m": (1.0, "V/m"), "V/Pa": (1.0, "V/Pa"),
+    "V s^2/m": (1.0, "V s^2/m"), "V s/m": (1.0, "V s/m"),
+    **_prefixed("Pa", "Pa", 1.0, "kMmu"), "bar": (1e5, "Pa"), "mbar": (1e2, "Pa"), "psi": (6894.757293168361, "Pa"),
+    **_prefixed("s", "s", 1.0, "mun"), "sec": (1.0, "s"), "min": (60.0, "s"), "h": (3600.0, "s"),
+    **_prefixed("Hz", "Hz", 1.0, "kM"),
+    **_prefixed("V", "V", 1.0, "mu"), "volt": (1.0, "V"), "volts": (1.0, "V"), **_prefixed("A", "A", 1.0, "m"),
+}  # fmt: skip
+
+# What a bare symbol means depends on what is measured: pint reads "g" as gram, "G" as gauss, "lb" as mass.
+_BY_QUANTITY = {
+    ("g", "m/s^2"): "g0", ("lb", "N"): "lbf", ("lbs", "N"): "lbf", ("kg", "N"): "kgf", ("lb", "kg"): "lbm",
+    ("mg", "m/s^2"): "mg0",
+}  # fmt: skip
+_TABLE["mg0"] = (GRAVITY / 1000, "m/s^2")
+
+
+def _normal(text: str) -> str:
+    text = text.strip().replace("μ", "u").replace("µ", "u").replace("²", "^2").replace("·", " ").replace("**", "^")
+    text = re.sub(r"(?<=[A-Za-z])2\b", "^2", text)  # m/s2
+    text = re.sub(r"\bsec(s|onds?)?\b", "s", text)
+    text = re.sub(r"/\s*s\s*/\s*s\b", "/s^2", text)
+    return re.sub(r"\s*\*\s*|\s+", " ", text).replace(" /", "/").replace("/ ", "/")
+
+
+def parse_unit(text: str, expect: str | None = None) -> Unit:
+    """Read a unit, as an instrument or a person writes it.
+
+    Parameters
+    ----------
+    text : str
+        The unit: ``"mm"``, ``"m/s2"``, ``"g"``, ``"N s/m"``, ``"500 mV/lbf"`` has its own reader,
+        :func:`parse_value`.
+    expect : str, optional
+        The SI unit that the quantity is measured in. It settles symbols with two meanings ("g" is gravity for
+        an acceleration, gram for a mass) and is enforced.
+
+    Returns
+    -------
+    Unit
+
+    Raises
+    ------
+    RecordError
+        The unit is unknown or measures something else than expected.
+
+    Examples
+    --------
+    >>> parse_unit("mm").scale, parse_unit("g", expect="m/s^2").scale
+    (0.001, 9.80665)
+    """
+    name = _normal(text)
+    if expect is not None:
+        name = _BY_QUANTITY.get((name, expect), name)
+    scale, si = _TABLE[name] if name in _TABLE else _by_pint(name, text)
+    if expect is not None and si != expect:
+        raise RecordError(
+            f"unit '{text}' is measured in {si}",
+            f"this quantity is measured in {expect}",
+            "correct the unit or the channel's name",
+        )
+    return Unit(text, scale, si)
+
+
+def parse_value(text: str | float, expect: str) -> float:
+    """Read a number with a unit ("250 g", "1191 N/m") into SI; a bare number is SI already.
+
+    Parameters
+    ----------
+    text : str or float
+        The number, with or without its unit.
+    expect : str
+        The SI unit of the quantity ("kg", "N/m", "N s/m", "V/N").
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    RecordError
+        Not a finite number, or a unit that measures something else.
+
+    Examples
+    --------
+    >>> parse_value("250 g", "kg"), parse_value("1.2 N/mm", "N/m"), parse_value(3, "kg")
+    (0.25, 1200.0, 3.0)
+    """
+    match = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", str(text))
+    if match is None or not math.isfinite(float(match[1])):
+        raise RecordError(
+            f"'{text}' is not a finite number", f"a number in {expect} is needed", f"write it like '2.5 {expect}'"
+        )
+    value, unit = float(match[1]), match[2].strip()
+    return value * parse_unit(unit, expect).scale if unit else value
+
+
+@functools.cache
+def _by_pint(name: str, text: str) -> tuple[float, str]:
+    import pint
+
+    registry = _registry()
+    try:
+        quantity = registry.Quantity(1.0, name.replace(" ", "*")).to_base_units()
+    except (pint.errors.PintError, AttributeError, TypeError, ValueError, AssertionError, KeyError) as error:
+        raise RecordError(
+            f"unit '{text}' is not known",
+            "a unit is written like mm, m/s^2, g, N, lbf or deg",
+            "correct it in the file's header or in channels= or units=",
+        ) from error
+    for si, dimension in _dimensions().items():
+        if dimension == quantity.dimensionality and si != "rad":
+            return float(quantity.magnitude), si
+    return float(quantity.magnitude), f"{quantity.units:~C}".replace("**", "^").replace("*", " ")
+
+
+@functools.cache
+def _registry():  # type: ignore[no-untyped-def]  # pint's registry type exists only once pint is imported
+    import pint
+
+    return pint.UnitRegistry()
+
+
+@functools.cache
+def _dimensions() -> dict[str, object]:
+    registry = _registry()
+    names = dict.fromkeys(si for _, si in _TABLE.values() if si not in ("1", "rad", "rad/s"))
+    return {si: registry.Quantity(1.0, si.replace(" ", "*")).dimensionality for si in names}
