@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     pass
 
 _ROOMS = {
-    "StickslipError": "errors", "RecordError": "errors", "FormatError": "errors", "EstimateError": "errors", "ModelError": "errors",
+    "StickslipError": "errors", "RecordError": "errors", "FormatError": "errors",
+    "EstimateError": "errors", "ModelError": "errors",
     "Estimate": "estimate",
     "Record": "record.record", "Channel": "record.channels", "Step": "record.record", "Fault": "record.check",
     "from_pandas": "record.exchange", "from_xarray": "record.exchange", "from_sep005": "record.exchange",
