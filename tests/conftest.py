@@ -1,0 +1,30 @@
+"""What every test may ask for: the public record sets, where this machine has them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from stickslip import datasets
+from stickslip.errors import StickslipError
+
+# Tests read local copies alone: with the variable set, the room never touches the network.
+os.environ.setdefault("STICKSLIP_DATA", str(Path(__file__).resolve().parents[2] / "shared" / "data"))
+
+
+@pytest.fixture(scope="session")
+def dataset() -> Callable[[str], Path]:
+    """``dataset(name)``: the folder of a public record set, or a skip that says why it is absent."""
+
+    def folder(name: str) -> Path:
+        if name not in datasets.names():
+            raise AssertionError(f"no record set is called '{name}'")
+        try:
+            return datasets.fetch(name).folder
+        except StickslipError as absent:
+            pytest.skip(f"record set {name}: {absent}")
+
+    return folder
