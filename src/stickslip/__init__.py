@@ -26,7 +26,9 @@ _ROOMS = {
     "differentiate": "signals.differentiate", "smooth": "signals.differentiate",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",
-    "analyze": "analysis", "report": "reports.page", "datasets": "datasets",
+    "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
+    "analyze": "analysis", "compare": "analysis", "Findings": "analysis", "Comparison": "analysis",
+    "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder", "datasets": "datasets",
 }  # fmt: skip
 
 __all__ = [*_ROOMS, "__version__"]
