@@ -1,0 +1,210 @@
+"""The channel grammar: ``"-200 * (F + 0.115) [N]"`` is a sum of columns times numbers, plus a number, in a unit."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+import operator
+import re
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from stickslip.errors import RecordError
+from stickslip.record.channels import VOCABULARY
+from stickslip.units import Unit, parse_unit
+
+LONGEST = 500  # characters; a linear combination needs fewer, and the parser's recursion stays shallow
+
+
+@dataclass(frozen=True)
+class Linear:
+    """``offset + sum(scale * column)``."""
+
+    scales: Mapping[str, float]
+    offset: float = 0.0
+
+    def plain(self) -> str | None:
+        """The one column that this is, unscaled and not shifted, or None."""
+        return next(iter(self.scales)) if list(self.scales.values()) == [1.0] and self.offset == 0 else None
+
+    def __add__(self, other: Linear) -> Linear:
+        scales = dict(self.scales)
+        for name, scale in other.scales.items():
+            scales[name] = scales.get(name, 0.0) + scale
+        return Linear(scales, self.offset + other.offset)
+
+    def __mul__(self, factor: float) -> Linear:
+        return Linear({name: scale * factor for name, scale in self.scales.items()}, self.offset * factor)
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A channel as asked for: the arithmetic, the unit of its result, the sensor's sensitivity."""
+
+    text: str
+    arithmetic: str
+    unit: str | None
+    sensitivity: str
+
+
+def split_spec(text: str) -> Spec:
+    """Take ``"ARITHMETIC [UNIT] @ SENSITIVITY"`` apart; unit and sensitivity may be missing."""
+    match = re.fullmatch(r"\s*(.*?)\s*(?:\[([^\[\]]*)\]\s*)?(?:@\s*([^@\[\]]+?)\s*)?", text, re.DOTALL)
+    if match is None or not match[1] or len(text) > LONGEST:
+        raise RecordError(
+            f"'{text[:60]}' names no column",
+            "a channel is written 'COLUMN [unit]', 'COLUMN * 2.5 + 1 [unit]' or 'COLUMN [V] @ 500 mV/lbf'",
+            "correct it in channels=",
+        )
+    return Spec(text, match[1], match[2], match[3] or "")
+
+
+def linear(arithmetic: str, keys: Mapping[str, str], constants: Mapping[str, float]) -> Linear:
+    """Read the arithmetic as a linear combination of columns.
+
+    Parameters
+    ----------
+    arithmetic : str
+        Numbers, column names (in backticks where they hold other characters than letters, digits and _),
+        ``#3`` for the third column, ``+ - * /`` and brackets.
+    keys : mapping of str to str
+        The key of each column under every name that it may be called by.
+    constants : mapping
+        Numbers of the file that may be used by name.
+
+    Raises
+    ------
+    RecordError
+        A name that is neither column nor constant, a product of columns, a division by zero, anything else
+        than arithmetic.
+    """
+    if arithmetic in keys:
+        return Linear({keys[arithmetic]: 1.0})
+    quoted: dict[str, str] = {}
+
+    def placeholder(match: re.Match[str]) -> str:
+        key = f"_column_{len(quoted)}"
+        quoted[key] = match[1] or match[0]
+        return f" {key} "
+
+    source = re.sub(r"`([^`]+)`|#\d+", placeholder, arithmetic).strip()
+
+    def named(placed: str) -> Linear:
+        name = quoted.get(placed, placed)
+        if name in keys:
+            return Linear({keys[name]: 1.0})
+        if name in constants:
+            return Linear({}, float(constants[name]))
+        raise unknown("column", name, [key for key in [*keys, *constants] if not key.startswith("#")])
+
+    result = _walk(_parsed(source, arithmetic), arithmetic, named)
+    if not all(math.isfinite(number) for number in (*result.scales.values(), result.offset)):
+        raise _refusal(arithmetic, "its numbers are too large")
+    if not result.scales:
+        raise _refusal(arithmetic, "it names no column")
+    return result
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> RecordError:
+    """The error for a name that is not there: what there is, and the nearest spelling."""
+    names = list(known)
+    near = difflib.get_close_matches(name, names, 1) or [n for n in names if n.lower() == name.lower()]
+    shown = ", ".join(names[:40]) + (f" and {len(names) - 40} more" if len(names) > 40 else "")
+    return RecordError(
+        f"there is no {kind} '{name}'",
+        f"the file has {shown or 'none'}",
+        f"did you mean '{near[0]}'" if near else "choose one of them, by name or by number as in '#2'",
+    )
+
+
+def channel_unit(text: str, channel: str) -> Unit:
+    """Read a unit for a channel: the vocabulary settles symbols with two meanings, and must be met."""
+    accepted = VOCABULARY[channel].units if channel in VOCABULARY else (None,)
+    refusals = []
+    for expected in accepted:
+        try:
+            return parse_unit(text, expect=expected)
+        except RecordError as error:
+            refusals.append(error)
+    first = refusals[0]
+    raise RecordError(f"channel {channel}: {first.value}", first.rule, first.next_step) from first
+
+
+def apply_sensitivity(text: str, measured: Unit, channel: str) -> Unit:
+    """The unit that a reading in `measured` has after a sensitivity such as "500 mV/lbf" or "2 mm/V"."""
+    match = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^/]+)/\s*(.+)", text)
+    if match is None or not math.isfinite(float(match[1])) or float(match[1]) == 0:
+        raise RecordError(
+            f"channel {channel}: sensitivity '{text}'",
+            "a sensitivity is a number and two units",
+            "write it like '500 mV/lbf' or '100 mV/g'",
+        )
+    value, upper, lower = float(match[1]), match[2].strip(), match[3].strip().strip("()")
+    # A symbol of two meanings ("g", "lb") belongs to the channel, whichever side it stands on.
+    if _measures(upper, measured):
+        output = channel_unit(lower, channel)
+        factor = output.scale / (value * parse_unit(upper).scale)
+    elif _measures(lower, measured):
+        output = channel_unit(upper, channel)
+        factor = value * output.scale / parse_unit(lower).scale
+    else:
+        raise RecordError(
+            f"channel {channel}: a sensitivity of {text} on a reading in {measured.text}",
+            "one of the sensitivity's units is that of the reading",
+            "give the unit of the column before the @, as in 'ch1 [V] @ 500 mV/lbf'",
+        )
+    return Unit(f"{measured.text} @ {text}", measured.scale * factor, output.si)
+
+
+def _measures(unit: str, reading: Unit) -> bool:
+    try:
+        return parse_unit(unit).si == reading.si
+    except RecordError:
+        return False
+
+
+def _parsed(source: str, arithmetic: str) -> ast.expr:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # "1or 2" warns before it fails
+            return ast.parse(source, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise _refusal(arithmetic, "it is not arithmetic; names with spaces go in backticks") from error
+
+
+_OPERATORS: dict[type, Callable[[float, float], float]] = {ast.Mult: operator.mul, ast.Div: operator.truediv}
+
+
+def _walk(node: ast.expr, arithmetic: str, named: Callable[[str], Linear]) -> Linear:
+    match node:
+        case ast.Constant(value=value) if type(value) in (int, float) and abs(value) < 1e300:
+            return Linear({}, float(value))
+        case ast.Name(id=name):
+            return named(name)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return _walk(operand, arithmetic, named) * -1.0
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return _walk(operand, arithmetic, named)
+        case ast.BinOp(left=left, op=ast.Add() | ast.Sub() as sign, right=right):
+            second = _walk(right, arithmetic, named)
+            return _walk(left, arithmetic, named) + (second if isinstance(sign, ast.Add) else second * -1.0)
+        case ast.BinOp(left=left, op=ast.Mult() | ast.Div() as op, right=right):
+            first, second = _walk(left, arithmetic, named), _walk(right, arithmetic, named)
+            if first.scales and second.scales or (isinstance(op, ast.Div) and second.scales):
+                raise _refusal(arithmetic, "it is not linear in the columns")
+            if isinstance(op, ast.Div) and second.offset == 0:
+                raise _refusal(arithmetic, "it divides by zero")
+            if isinstance(op, ast.Div):
+                return first * (1.0 / second.offset)
+            return first * second.offset if first.scales else second * first.offset
+    raise _refusal(arithmetic, f"'{ast.unparse(node)[:40]}' is not arithmetic on columns")
+
+
+def _refusal(arithmetic: str, why: str) -> RecordError:
+    return RecordError(
+        f"'{arithmetic[:60]}' can not be a channel: {why}",
+        "a channel is a sum of columns times numbers, plus a number",
+        "write it like '-200 * (F + 0.115) [N]'",
+    )

@@ -1,0 +1,126 @@
+"""write_record: a Record with its history as CSV, HDF5 or Parquet, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import FormatError
+from stickslip.files.metadata import KEY, record_to_metadata, time_column
+from stickslip.files.table import optional
+from stickslip.record.record import Record
+
+Array = NDArray[np.float64]
+
+ROWS_AT_ONCE = 200_000
+
+
+def write_record(record: Record, path: str | Path) -> Path:
+    """Write a record, with its channels, clock, history and truth, so that read_record gives it back exactly.
+
+    The format follows the suffix: ``.csv`` (a comment line of JSON, then ``name [unit]`` headers),
+    ``.h5``/``.hdf5`` (one dataset a channel) or ``.parquet``. Time [s] is written as a column of its own, for
+    other programs. The file appears whole or not at all; an existing one is replaced.
+
+    Parameters
+    ----------
+    record : Record
+        The record to keep.
+    path : str or Path
+        Where to; the folder exists already.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    FormatError
+        The suffix names no format that can be written, or the folder can not be written to.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import stickslip as ss
+    >>> record = ss.Record.of({"x": [0.1, 0.2, 0.4]}, fs=50.0, units={"x": "mm"})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ss.read_record(ss.write_record(record, folder + "/slide.csv")).equals(record)
+    True
+    """
+    path = Path(path)
+    writer = WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise FormatError(
+            f"'{path.name}' ends in '{path.suffix}'",
+            f"a record is written as {', '.join(WRITERS)}",
+            "choose one of these endings",
+        )
+    columns = {time_column(record): ("s", record.time)}
+    columns |= {name: (record.channels[name].unit, values) for name, values in record.samples.items()}
+    with whole(path) as part:
+        writer(part, columns, json.dumps(record_to_metadata(record)))
+    return path
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A path to write to that becomes `path` when all went well, and vanishes when not."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield part
+        os.replace(part, path)
+    except OSError as error:
+        raise FormatError(
+            f"'{path.name}' can not be written ({error.strerror or error})",
+            "the folder exists and may be written to",
+            "choose another place",
+        ) from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+Columns = dict[str, tuple[str, Array]]
+
+
+def _write_csv(path: Path, columns: Columns, metadata: str) -> None:
+    import pandas as pd
+
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# {KEY} {metadata}\n")
+        file.write(",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items()) + "\n")
+        rows = len(next(iter(columns.values()))[1])
+        for first in range(0, rows, ROWS_AT_ONCE):
+            part = {name: values[first : first + ROWS_AT_ONCE] for name, (_, values) in columns.items()}
+            # pandas writes the shortest digits that give the same float back
+            pd.DataFrame(part).to_csv(file, header=False, index=False, na_rep="nan", lineterminator="\n")
+
+
+def _write_hdf5(path: Path, columns: Columns, metadata: str) -> None:
+    h5py = optional("h5py")
+    with h5py.File(path, "w", libver="latest") as file:  # only this layout lets an attribute pass 64 KiB
+        file.attrs[KEY] = metadata
+        for name, (unit, values) in columns.items():
+            file.create_dataset(name, data=values).attrs["unit"] = unit
+
+
+def _write_parquet(path: Path, columns: Columns, metadata: str) -> None:
+    arrow, parquet = optional("pyarrow"), optional("pyarrow.parquet")
+    fields = [arrow.field(name, arrow.float64(), metadata={"unit": unit}) for name, (unit, _) in columns.items()]
+    schema = arrow.schema(fields, metadata={KEY: metadata})
+    table = arrow.Table.from_arrays([arrow.array(values) for _, values in columns.values()], schema=schema)
+    parquet.write_table(table, path, row_group_size=ROWS_AT_ONCE)
+
+
+WRITERS: dict[str, Callable[[Path, Columns, str], None]] = {
+    ".csv": _write_csv,
+    ".h5": _write_hdf5,
+    ".hdf5": _write_hdf5,
+    ".parquet": _write_parquet,
+}
