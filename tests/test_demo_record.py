@@ -1,0 +1,73 @@
+"""The bundled record is what its maker makes, and its truth is the truth."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from stickslip import datasets
+
+MAKER = Path(__file__).resolve().parents[1] / "tools" / "make_demo_record.py"
+
+
+@pytest.fixture(scope="module")
+def maker() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("make_demo_record", MAKER)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_shipped_record_is_what_the_script_makes(maker) -> None:
+    counts, about = maker.make(maker.Rig())
+    record = datasets.demo()
+    assert record.fs == about["fs"]
+    assert list(record) == list(counts)
+    for name, made in counts.items():
+        shipped = np.rint(record[name] / maker.SENSORS[name].step)
+        # Solvers may differ in the last digits: a value half way between two counts may fall to either.
+        assert np.max(np.abs(shipped - made)) <= 1
+        assert np.mean(shipped != made) < 1e-3
+    for name, value in about["truth"].items():
+        assert record.truth[name] == pytest.approx(np.asarray(value), rel=1e-6, abs=2e-7), name
+    assert dict(record.history[0].arguments) == about["history"][0]["arguments"]
+
+
+def test_the_truth_obeys_the_rig(maker) -> None:
+    """Over a cycle the base feeds in what friction and damper take out, and every stop begins at rest."""
+    rig = maker.Rig()
+    times = 4.0 + np.arange(40_000) / 50_000  # two cycles, finely
+    pieces = maker.simulate(rig, times, 4.0)
+    t, x, v = (np.concatenate(part) for part in zip(*[(p.times, *p.states) for p in pieces], strict=True))
+    assert np.array_equal(t, times)
+    w = 2 * np.pi * rig.frequency
+    spring_force, base_speed = rig.stiffness * (rig.base(t) - x), rig.amplitude * w * np.cos(w * t)
+    fed = np.sum(spring_force * base_speed) / 50_000 / 2
+    damped = np.sum(rig.damping * v**2) / 50_000 / 2
+    assert datasets.demo().truth["energy_per_cycle"] == pytest.approx(fed - damped, rel=2e-4)
+    for piece in pieces:
+        if piece.direction == 0 and len(piece.times):
+            assert np.ptp(piece.states[0]) == 0
+            assert np.max(np.abs(maker.friction(rig, piece))) <= rig.static * (1 + 1e-9)
+        elif len(piece.times):
+            assert np.min(piece.direction * piece.states[1]) > -1e-9
+
+
+def test_the_sensors_noise_is_as_stated(maker) -> None:
+    """At rest nothing moves: what the displacement sensor shows is its noise and its counts."""
+    record = datasets.demo()
+    start, end = record.truth["sticks"][3]
+    still = (record.time > start) & (record.time < end)
+    assert np.sum(still) > 100
+    assert np.std(record["x"][still]) == pytest.approx(np.hypot(1e-6, 2.5e-6 / np.sqrt(12)), rel=0.4)
+    assert np.allclose(record["x"] / 2.5e-6, np.rint(record["x"] / 2.5e-6), atol=1e-6)
+    assert np.std(record["a"][still]) == pytest.approx(0.04, rel=0.25)
+    assert record.truth["stops_per_cycle"] == 2
