@@ -1,0 +1,123 @@
+"""What a file by write_record says of its Record beside the samples: one JSON text, the same in every format."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import FormatError
+from stickslip.record.channels import Channel
+from stickslip.record.record import Record, Step
+
+Array = NDArray[np.float64]
+
+VERSION = 1
+KEY = "stickslip record"  # of the HDF5 attribute and the Parquet entry; begins the CSV comment
+
+
+def record_to_metadata(record: Record) -> dict[str, Any]:
+    """Everything of the record but its samples, as plain data for JSON."""
+    return {
+        "version": VERSION,
+        "fs": record.fs,
+        "start": record.start,
+        "rows": len(record),
+        "time": time_column(record),
+        "stamps": record.stamps is not None,
+        "channels": [_plain(vars(channel)) for channel in record.channels.values()],
+        "history": [_plain(step.to_dict()) for step in record.history],
+        "truth": _plain(record.truth),
+    }
+
+
+def time_column(record: Record) -> str:
+    """The name under which time is written beside the channels."""
+    name = "time"
+    while name in record.samples:
+        name += "_"
+    return name
+
+
+def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array], first: int = 0) -> Record:
+    """The record that `metadata` and the samples tell.
+
+    The samples begin at row `first`, and include the time column where stamps were kept.
+
+    Raises
+    ------
+    FormatError
+        The metadata is of a later version, damaged, or does not fit the samples.
+    """
+    try:
+        if metadata["version"] != VERSION:
+            raise FormatError(
+                f"the file is of version {str(metadata['version'])[:20]}",
+                f"this program reads version {VERSION}",
+                "update stickslip",
+            )
+        channels = {entry["name"]: Channel(**_restored(entry)) for entry in metadata["channels"]}
+        stamps = samples[metadata["time"]] if metadata["stamps"] else None
+        start = float(metadata["start"])
+        if first:
+            start = start + first / float(metadata["fs"]) if stamps is None else float(stamps[0])
+        return Record(
+            {name: samples[name] for name in channels},
+            channels,
+            float(metadata["fs"]),
+            start,
+            metadata_to_history(metadata),
+            stamps,
+            _restored(metadata["truth"]),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise FormatError(
+            f"the description of the record is damaged ({type(error).__name__}: {str(error)[:80]})",
+            "a file written by write_record tells its channels, clock and history",
+            "write the file again from its source",
+        ) from error
+
+
+def metadata_to_history(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
+    """The steps that `metadata` tells."""
+    return tuple(Step(**_restored(step)) for step in metadata["history"])
+
+
+def parse_metadata(text: str | bytes) -> dict[str, Any]:
+    """Read the JSON text; FormatError where it is damaged."""
+    try:
+        metadata = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise FormatError(
+            f"the description of the record is damaged ({str(error)[:80]})",
+            "a file written by write_record carries it as JSON",
+            "write the file again from its source",
+        ) from error
+    return metadata if isinstance(metadata, dict) else {}
+
+
+def _plain(value: Any) -> Any:
+    """JSON has no tuples, and its numbers no numpy type."""
+    match value:
+        case Mapping():
+            return {str(key): _plain(item) for key, item in value.items()}
+        case tuple():
+            return {"__tuple__": [_plain(item) for item in value]}
+        case list():
+            return [_plain(item) for item in value]
+        case np.ndarray() | np.generic():
+            return _plain(value.tolist())
+        case None | bool() | int() | float() | str():
+            return value
+    return str(value)
+
+
+def _restored(value: Any) -> Any:
+    if isinstance(value, dict):
+        if list(value) == ["__tuple__"]:
+            return tuple(_restored(item) for item in value["__tuple__"])
+        return {key: _restored(item) for key, item in value.items()}
+    return [_restored(item) for item in value] if isinstance(value, list) else value
