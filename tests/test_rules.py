@@ -72,6 +72,12 @@ def test_every_public_name_exists(name: str) -> None:
     assert getattr(stickslip, name) is not None
 
 
+@pytest.mark.parametrize("name", stickslip.__all__)
+def test_every_public_name_stands_in_the_reference(name: str) -> None:
+    page = PACKAGE.parents[1] / "docs" / "api" / "index.md"
+    assert name == "__version__" or re.search(rf"^   {name}$", page.read_text("utf-8"), flags=re.MULTILINE)
+
+
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_public_function_is_documented(name: str) -> None:
     function = FUNCTIONS[name]
