@@ -1,0 +1,247 @@
+"""The check-up: what is wrong with a record, in words, with row numbers and the function that mends it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.record import flaws
+from stickslip.record.flaws import Runs
+from stickslip.record.stamps import Stamps, fit_line, inspect
+
+if TYPE_CHECKING:
+    from stickslip.record.record import Record
+
+Array = NDArray[np.float64]
+
+SHORTEST = 32  # samples below which no question about friction can be answered
+DRIFT = 0.3  # rise of the trend, in amplitudes of the oscillation, from which it is told
+SHARP_UNITS = ("m/s", "rad/s", "N", "N m")  # quantities whose plateaus may have corners by nature: sticking, saturation
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with a record.
+
+    Attributes
+    ----------
+    kind : str
+        "short", "clock", "backwards", "repeated stamps", "jitter", "gap", "missing", "constant", "clipped", "frozen",
+        "spike", "drift" or "coarse".
+    channel : str or None
+        The channel it is in; None for the clock.
+    rows : tuple of (first, last)
+        All runs of rows concerned, both ends included, counted from 0.
+    message : str
+        One sentence: what, where, how much, and what mends it.
+    severity : str
+        "error" where questions are refused until it is mended, "warning" where they are answered with less trust.
+
+    Examples
+    --------
+    >>> from stickslip.record.record import Record
+    >>> wave = np.sin(0.2 * np.arange(400))
+    >>> wave[100:103] = np.nan
+    >>> print(Record.of({"x": wave}, fs=100.0).check()[0])
+    channel x has 3 values that are not numbers (rows 100 to 102); fill them with fill_missing(record).
+    """
+
+    kind: str
+    channel: str | None
+    rows: Runs
+    message: str
+    severity: str = "warning"
+
+    def __str__(self) -> str:
+        return self.message
+
+
+def find_faults(record: Record) -> list[Fault]:
+    """What is wrong with a record; empty when nothing is.
+
+    The clock is checked for stamps that stand still and jump, go back, repeat, jitter, are lost, or leave gaps; each
+    channel for values that are not numbers, a constant, clipping, frozen samples, spikes, drift, and too few levels. A
+    plateau of a stuck mass, a friction force's square wave, a sensor's steps, and rest at the end of a decay are
+    no faults.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    list of Fault
+        Errors first, the clock before the channels.
+    """
+    faults = _short(record)
+    if record.stamps is not None:
+        faults += _clock_faults(record.stamps)
+    for name in record:
+        faults += _channel_faults(name, record.channels[name].unit, record[name])
+    return sorted(faults, key=lambda fault: fault.severity != "error")
+
+
+def in_words(runs: Runs, most: int = 5) -> str:
+    """Rows for a sentence: the first few runs, and how many more there are.
+
+    Examples
+    --------
+    >>> in_words(((3, 3), (7, 9)))
+    'rows 3, 7 to 9'
+    """
+    parts = [f"{first}" if first == last else f"{first} to {last}" for first, last in runs[:most]]
+    more = f" and {len(runs) - most} more places" if len(runs) > most else ""
+    single = len(runs) == 1 and runs[0][0] == runs[0][1]
+    return f"{'row' if single else 'rows'} {', '.join(parts)}{more}"
+
+
+def _short(record: Record) -> list[Fault]:
+    if len(record) >= SHORTEST:
+        return []
+    message = f"the record has {len(record)} samples, too few for any question about friction; record for longer."
+    return [Fault("short", None, ((0, len(record) - 1),), message, "error")]
+
+
+# ---- the clock
+
+
+def _clock_faults(stamps: Array) -> list[Fault]:
+    clock = inspect(stamps)
+    faults = []
+    if len(clock.missing):
+        runs = _pairs(clock.missing, 0)
+        faults.append(
+            _clock_fault(
+                "missing", runs, f"{len(clock.missing)} time stamps are not numbers", "repair_clock(record)", "error"
+            )
+        )
+    if clock.held:
+        faults.append(_held(stamps, clock))
+    elif len(clock.repeated):
+        runs = _pairs(clock.repeated)
+        what = f"{len(clock.repeated)} time stamps repeat the one before"
+        faults.append(_clock_fault("repeated stamps", runs, what, "repair_clock(record)", "error"))
+    if len(clock.backward):
+        back = float(np.min(np.diff(stamps)[clock.backward]))
+        what = f"the time goes back {len(clock.backward)} times, by up to {-back:.4g} s"
+        faults.append(_clock_fault("backwards", _pairs(clock.backward), what, "repair_clock(record)", "error"))
+    if len(clock.gaps):
+        lengths = np.diff(stamps)[clock.gaps]
+        lost = int(np.sum(np.maximum(1, np.round(lengths / clock.step) - 1)))
+        what = (
+            f"{len(clock.gaps)} gaps of up to {1e3 * np.max(lengths):.4g} ms where samples come every "
+            f"{1e3 * clock.step:.4g} ms, about {lost} samples lost"
+        )
+        faults.append(_clock_fault("gap", _pairs(clock.gaps), what, "fill_gaps(record)", "error"))
+    if len(clock.uneven):
+        off = np.abs(np.diff(stamps)[clock.uneven] / clock.step - 1)
+        usual = f"{1e3 * clock.step:.4g} ms"
+        what = f"{len(clock.uneven)} intervals are uneven, off by up to {100 * np.max(off):.0f} % of {usual}"
+        cure = "fill_gaps(record)" if len(clock.gaps) else "repair_clock(record)"
+        faults.append(_clock_fault("jitter", _pairs(clock.uneven), what, cure, "error"))
+    return faults
+
+
+def _held(stamps: Array, clock: Stamps) -> Fault:
+    jumps = np.flatnonzero(np.diff(stamps) > 0)
+    block = np.diff(jumps)
+    low, high = np.percentile(block, [10, 90]) if len(block) else (len(stamps), len(stamps))
+    line = fit_line(stamps)
+    what = (
+        f"the time stamps stand still for {low:.0f} to {high:.0f} rows and then jump by "
+        f"{1e3 * float(np.median(np.diff(stamps)[jumps])):.3g} ms; the true rate is about {line.fs:.4g} Hz"
+    )
+    return _clock_fault(
+        "clock", _pairs(np.sort(np.concatenate([clock.repeated]))), what, "repair_clock(record)", "error"
+    )
+
+
+def _clock_fault(kind: str, runs: Runs, what: str, cure: str, severity: str) -> Fault:
+    verb = "relabel them" if kind == "clock" else "mend the clock"
+    return Fault(kind, None, runs, f"{what} ({in_words(runs)}); {verb} with {cure}.", severity)
+
+
+def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
+    """Runs that cover each row and the `width` rows after it, merged where they touch."""
+    if not len(first):
+        return ()
+    mask = np.zeros(int(first[-1]) + width + 1, dtype=bool)
+    for shift in range(width + 1):
+        mask[first + shift] = True
+    return flaws.runs_of(mask)
+
+
+# ---- the channels
+
+
+def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
+    lost = ~np.isfinite(values)
+    faults = []
+    if lost.any():
+        faults.append(
+            _fault(
+                "missing",
+                name,
+                flaws.runs_of(lost),
+                f"{int(lost.sum())} values that are not numbers",
+                "fill them with fill_missing(record)",
+                "error",
+            )
+        )
+    if lost.all() or len(values) < 3:
+        return faults
+    if lost.any():
+        rows = np.arange(len(values))
+        values = np.where(lost, np.interp(rows, rows[~lost], values[~lost]), values)
+    if np.ptp(values) <= 1e-12 * float(np.max(np.abs(values))):
+        message = (
+            f"channel {name} is constant at {values[0]:.6g} {unit} throughout; look at its cable, range and column."
+        )
+        return [*faults, Fault("constant", name, ((0, len(values) - 1),), message)]
+    return faults + [fault for fault in _shape_faults(name, unit, values) if not _inside(fault.rows, lost)]
+
+
+def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
+    faults = []
+    # what is computed as friction has no sensor that could clip
+    cut = flaws.clipped(values, plateaus=unit in SHARP_UNITS) if name != "friction" else ()
+    if cut:
+        level = float(values[cut[0][0]])
+        count = sum(last - first + 1 for first, last in cut)
+        what = f"{count} samples clipped near {level:.4g} {unit}"
+        faults.append(
+            _fault("clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")')
+        )
+    held = flaws.frozen(values)
+    if held:
+        longest = max(last - first + 1 for first, last in held)
+        what = f"samples frozen while the signal moved on, for up to {longest} rows"
+        faults.append(_fault("frozen", name, held, what, f'make them NaN and use fill_missing(record, "{name}")'))
+    spikes = flaws.spikes(values)
+    if spikes:
+        count = sum(last - first + 1 for first, last in spikes)
+        what = f"{count} samples that stand off from their neighbours as spikes"
+        faults.append(_fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")'))
+    rise = flaws.drift(values)
+    if rise > DRIFT:
+        what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"
+        runs = ((0, len(values) - 1),)
+        faults.append(_fault("drift", name, runs, what, f'take it off with remove_drift(record, "{name}")'))
+    few = flaws.levels_used(values)
+    if few is not None:
+        what = f"only {few} steps of the sensor across its whole motion"
+        runs = ((0, len(values) - 1),)
+        faults.append(_fault("coarse", name, runs, what, "choose a finer range of the instrument"))
+    return faults
+
+
+def _fault(kind: str, name: str, runs: Runs, what: str, cure: str, severity: str = "warning") -> Fault:
+    return Fault(kind, name, runs, f"channel {name} has {what} ({in_words(runs)}); {cure}.", severity)
+
+
+def _inside(runs: Runs, lost: NDArray[np.bool_]) -> bool:
+    """Whether all runs lie where values were missing anyway."""
+    return all(lost[first : last + 1].any() for first, last in runs) and bool(runs)

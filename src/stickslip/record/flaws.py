@@ -1,0 +1,276 @@
+"""Where a channel's samples can not be what the sensor met: rows, found from the samples alone.
+
+Each finder takes finite samples, shape (n,), and gives runs of rows, first and last included. They are made for
+records of friction, where a stuck mass rests on plateaus, a friction force is a square wave, a sensor has steps and a
+decay ends at rest: none of these is a fault.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Runs = tuple[tuple[int, int], ...]
+
+EXACT = 1e-9  # relative to the range: equal but for the rounding of a unit's factor
+CUBIC = np.array([1, -4, 6, -4, 1]) / 6  # a sample minus the cubic through its four neighbours
+CUBIC_GAIN = float(np.sqrt(np.sum(CUBIC**2)))
+SHORTEST_TREND = 64  # samples from which a slow trend can be told from the motion
+FEW_LEVELS = 12  # steps of a sensor across the whole motion below which its shape is lost
+
+
+def runs_of(mask: Mask) -> Runs:
+    """First and last row of each stretch where `mask` holds.
+
+    Examples
+    --------
+    >>> runs_of(np.array([True, False, True, True]))
+    ((0, 0), (2, 3))
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return tuple((int(first), int(last) - 1) for first, last in zip(edges[::2], edges[1::2], strict=True))
+
+
+def rows_of(runs: Runs, n: int) -> Mask:
+    """The mask of `n` rows that `runs` cover."""
+    mask = np.zeros(n, dtype=bool)
+    for first, last in runs:
+        mask[first : last + 1] = True
+    return mask
+
+
+def quantum(values: Array) -> float:
+    """Step between the sensor's levels, or 0 where the samples lie on no common grid."""
+    levels = np.unique(values)
+    if len(levels) < 3:
+        return 0.0
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 1e-12 * np.max(np.abs(levels[[0, -1]]))]
+    if not len(gaps):
+        return 0.0
+    step = float(np.median(gaps[gaps < 1.5 * np.min(gaps)]))
+    multiples = gaps / step
+    return step if float(np.max(np.abs(multiples - np.round(multiples)))) < 0.02 else 0.0
+
+
+def roughness(values: Array) -> float:
+    """Standard deviation of the broadband noise, from what a cubic through four neighbours does not explain."""
+    if len(values) < 8:
+        return 0.0
+    rest = np.convolve(values, CUBIC, "valid")
+    return float(1.4826 * np.median(np.abs(rest)) / CUBIC_GAIN)
+
+
+def spikes(values: Array) -> Runs:
+    """Single samples, or pairs, that stand off from both neighbours as nothing around them does.
+
+    A sample is a spike where it differs from the line between its neighbours by 2.5 times the largest step nearby and
+    by eight robust standard deviations, while the neighbours agree with each other.
+    """
+    found = np.zeros(len(values), dtype=bool)
+    for width in (1, 2):
+        found |= _spikes(values, width)
+    return runs_of(found)
+
+
+def _spikes(values: Array, width: int, reach: int = 10) -> Mask:
+    n = len(values)
+    mask = np.zeros(n, dtype=bool)
+    if n < 2 * reach + width + 2:
+        return mask
+    before, after = values[: n - width - 1], values[width + 1 :]
+    inner = np.stack([values[1 + k : n - width + k] for k in range(width)])
+    weight = (np.arange(1, width + 1) / (width + 1))[:, None]
+    offsets = inner - (before + weight * (after - before))
+    height = np.min(np.abs(offsets), axis=0) * (np.ptp(np.sign(offsets), axis=0) == 0)
+    scale = 1.4826 * float(np.median(np.abs(offsets[0] - np.median(offsets[0]))))
+    threshold = max(8 * scale, 1.5 * quantum(values), EXACT * float(np.ptp(values)))
+    steps = np.abs(np.diff(values))
+    for i in np.flatnonzero((height > threshold) & (height > 3 * np.abs(after - before))):
+        near = np.concatenate([steps[max(0, i - reach) : i], steps[i + width + 1 : i + width + 1 + reach]])
+        if len(near) >= reach and height[i] > 2.5 * np.max(near):
+            mask[i + 1 : i + 1 + width] = True
+    return mask
+
+
+def frozen(values: Array, shortest: int = 5) -> Runs:
+    """Runs of one repeated value inside a signal that moves on behind it.
+
+    Two signs, of which one is enough: the run ends with a jump that makes up for the motion missed; or the signal is
+    rough on both sides, its samples seldom repeating, and still inside for longer than chance allows. A stuck mass
+    shows neither: it comes to rest and leaves without a jump, and its noise goes on.
+    """
+    still = np.abs(np.diff(values)) <= EXACT * float(np.ptp(values))
+    candidates = [(first, last + 1) for first, last in runs_of(still) if last + 2 - first >= shortest]
+    if not candidates:
+        return ()
+    step = quantum(values)
+    return tuple(run for run in candidates if _is_frozen(values, still, run, step))
+
+
+def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float) -> bool:
+    first, last = run
+    length = last - first + 1
+    reach = max(8, min(length, 40))
+    before, after = (np.abs(np.diff(side)) for side in (values[:first][-reach - 1 :], values[last + 1 :][: reach + 1]))
+    if len(before) < 8 or len(after) < 8:
+        return False
+    nearest = max(float(np.max(before)), float(np.max(after)))
+    jump = float(abs(values[last + 1] - values[last]))
+    moving = min(float(np.median(before)), float(np.median(after))) > EXACT * float(np.ptp(values))
+    made_up = 0.4 * length * float(np.median(after[:5]))
+    if moving and jump > 5 * step and (jump > 3 * nearest or (jump > made_up and jump > 2.5 * float(np.max(after)))):
+        return True
+    sides = [values[max(0, first - 40) : first], values[last + 1 : last + 41]]
+    turns = min(float(np.mean(np.diff(np.sign(np.diff(side))) != 0)) for side in sides)
+    repeats = np.concatenate([still[max(0, first - 40) : first], still[last + 1 : last + 41]])
+    chance = len(values) * float((np.sum(repeats) + 1) / (len(repeats) + 2)) ** (length - 1)
+    return turns > 0.35 and chance < 1e-6
+
+
+def clipped(values: Array, *, plateaus: bool = False) -> Runs:
+    """Runs at an extreme level that the signal would have passed had the instrument let it.
+
+    A cut top is entered and left with a slope, so that parabolas through the samples before and after it rise above
+    it; a stuck mass arrives at its plateau with the slope gone, and the parabola only just reaches it. In a signal
+    that is mostly noise, a cut top is a level held more often than the next one.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    plateaus : bool
+        Whether the channel may have plateaus with sharp corners by nature (a force that saturates, a velocity
+        that sticks): then both parabolas must also have the same top, in the middle of the run.
+    """
+    span = float(np.ptp(values))
+    if len(values) < 16 or span == 0:
+        return ()
+    noise, step = roughness(values), quantum(values)
+    mask = np.zeros(len(values), dtype=bool)
+    for sign in (1.0, -1.0):
+        mask |= _clipped_top(sign * values, noise, step, plateaus)
+    return runs_of(mask)
+
+
+def _clipped_top(values: Array, noise: float, step: float, plateaus: bool) -> Mask:
+    top, span = float(np.max(values)), float(np.ptp(values))
+    exact = values >= top - EXACT * span
+    nothing = np.zeros(len(values), dtype=bool)
+    count = int(np.sum(exact))
+    if noise > 0.02 * span and count >= 3:
+        next_level = int(np.sum(np.abs(values - (top - step)) < 0.5 * step)) if step else 0
+        if count > 1.5 * next_level + 4 * np.sqrt(next_level + 1.0) - (4 if not step else 0):
+            return exact
+    lengths = [last - first + 1 for first, last in runs_of(exact)]
+    if count >= 3 and max(lengths) >= 3:
+        level, mask, slack = top, exact, max(step, EXACT * span)
+    else:
+        spread = float(np.hypot(noise, step / np.sqrt(12)))
+        level = float(np.median(values[values > top - 6 * spread])) if spread > 0 else top
+        calm = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="edge"), 5), axis=1)
+        mask, slack = calm > level - 3 * spread, 3 * spread
+    held = [run for run in runs_of(mask) if run[1] - run[0] >= 2]
+    verdicts = {run: _was_cut(values, run, level, slack, plateaus) for run in held}
+    judged = [verdict for verdict in verdicts.values() if verdict is not None]
+    if not any(judged) or np.mean(judged) < 0.5:
+        return nothing
+    return mask & rows_of(tuple(run for run in held if verdicts[run] is not False), len(values)) | (
+        exact & mask if count >= 3 else nothing
+    )
+
+
+def _was_cut(values: Array, run: tuple[int, int], level: float, slack: float, plateaus: bool) -> bool | None:
+    """Whether a plateau cuts off a top; None where its approach is not resolved."""
+    first, last = run
+    length = last - first + 1
+    sides = [_extrapolate(values[:first][::-1], level, length), _extrapolate(values[last + 1 :], level, length)]
+    if sides[0] is None or sides[1] is None:
+        return None
+    heights = np.array([side[0] for side in sides if side])
+    errors = np.array([side[1] for side in sides if side])
+    drops = np.array([side[2] for side in sides if side])
+    cut = bool(np.all(heights > np.maximum(2 * slack, 5 * errors)) and np.all(heights > 0.08 * drops))
+    if cut and plateaus:
+        tops = [side[3] for side in sides if side]
+        cut = all(0.2 * length < top < 0.8 * length for top in tops) and bool(np.max(heights) < 2 * np.min(heights))
+    return cut
+
+
+def _extrapolate(approach: Array, level: float, length: int) -> tuple[float, float, float, float] | None:
+    """How far the parabola through the samples next to a plateau, nearest first, rises above it.
+
+    Gives height above the level and its standard error, drop of the level over the samples used, and distance of the
+    parabola's top from the plateau's edge (infinite where it has none).
+    """
+    span = float(np.ptp(approach)) if len(approach) else 0.0
+    near = approach[: max(4, length)]
+    low = np.flatnonzero(near < level - 0.5 * span)
+    near = near[: low[0]] if len(low) else near
+    if len(near) < 3:
+        return None
+    along = -1.0 - np.arange(len(near))  # rows from the plateau's edge
+    scale = float(max(len(near), length))
+    design = np.vander(along / scale, 3)
+    (bend, slope, value), *_ = np.linalg.lstsq(design, near - level, rcond=None)
+    rest = near - level - design @ np.array([bend, slope, value])
+    sd = float(np.sqrt(rest @ rest / max(1, len(near) - 3)))
+    middle = 0.5 * length / scale
+    top = -slope / (2 * bend) if bend < 0 else np.inf
+    reach = np.clip(top, 0.0, middle)
+    point = np.array([reach**2, reach, 1.0])
+    error = sd * float(np.sqrt(point @ np.linalg.pinv(design.T @ design) @ point))
+    return float(point @ (bend, slope, value)), error, float(level - near.min()), float(top * scale)
+
+
+def drift(values: Array) -> float:
+    """Rise of the slow trend over the record, in amplitudes of the oscillation that it carries; 0 where none is.
+
+    Only a channel that oscillates at least eight times can drift: a ramp or a creeping decay is motion. The trend is
+    the mean over one period of the strongest oscillation, and counts where a parabola explains nine tenths of it.
+    """
+    period = _period(values)
+    if period is None or len(values) < 8 * period:
+        return 0.0
+    rows, slow = trend(values)
+    along = np.polynomial.Polynomial.fit(rows, slow, 2)(rows)
+    explained = float(np.var(slow - along)) < 0.1 * float(np.var(slow))
+    amplitude = np.sqrt(2) * float(np.std(values[np.round(rows).astype(int)] - slow))
+    return float(np.ptp(along)) / amplitude if amplitude > 0 and explained else 0.0
+
+
+def trend(values: Array) -> tuple[Array, Array]:
+    """Rows (fractions allowed) and the mean around each over one period, taken twice, of the strongest oscillation."""
+    period = min(_period(values) or max(1, len(values) // 50), len(values) // 4)
+    slow = _running_mean(_running_mean(values, period), period)
+    rows: Array = np.arange(len(slow), dtype=np.float64) + (period - 1)
+    return rows, slow
+
+
+def _period(values: Array) -> int | None:
+    """Period in rows of the strongest oscillation about a parabola, or None where nothing oscillates."""
+    if len(values) < SHORTEST_TREND or np.ptp(values) == 0:
+        return None
+    along = np.linspace(-1, 1, len(values))
+    rest = values - np.polynomial.Polynomial.fit(along, values, 2)(along)
+    power = np.abs(np.fft.rfft(rest * np.hanning(len(rest)))) ** 2
+    peak = int(np.argmax(power[4:])) + 4
+    if np.sum(power[peak - 2 : peak + 3]) < 0.2 * np.sum(power):
+        return None
+    return max(2, round(len(values) / peak))
+
+
+def _running_mean(values: Array, length: int) -> Array:
+    total = np.cumsum(np.concatenate([[0.0], values]))
+    mean: Array = (total[length:] - total[:-length]) / length
+    return mean
+
+
+def levels_used(values: Array) -> int | None:
+    """Steps of the sensor across the whole motion, where they are too few to show its shape; else None."""
+    step = quantum(values)
+    if step == 0 or len(np.unique(values)) < 4:
+        return None
+    steps = round(float(np.ptp(values)) / step)
+    return steps if steps < FEW_LEVELS else None
