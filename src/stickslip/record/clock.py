@@ -74,15 +74,15 @@ def fit_clock(raw: Array, scale: float = 1.0) -> Clock:
         gaps = np.diff(finite)
         accumulated = np.ptp(gaps) < 0.01 * quantum  # a rounded step, added up: it hides the rate's own decimals
         slack = quantum / 2 if accumulated else quantum / (len(finite) - 1)
-        return Clock(_roundest(step * scale, slack * scale), float(finite[0] * scale))
+        return Clock(roundest(step * scale, slack * scale), float(finite[0] * scale))
     gaps = np.diff(finite)
     typical = float(np.median(gaps))
     if typical <= 0:  # constant for many rows, then a jump: the median says nothing
         typical = abs(span) / (len(finite) - 1) or float(np.mean(gaps[gaps > 0]))
-    return Clock(_roundest(typical * scale, 0.0), float(finite[0] * scale), raw * scale)
+    return Clock(roundest(typical * scale, 0.0), float(finite[0] * scale), raw * scale)
 
 
-def _roundest(step: float, slack: float) -> float:
+def roundest(step: float, slack: float) -> float:
     """The rate of fewest digits whose step lies within `slack` of the one measured."""
     fs = 1.0 / step
     if not math.isfinite(fs) or fs <= 0:
