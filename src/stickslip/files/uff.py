@@ -109,7 +109,7 @@ def _columns(name: str, values: dict[str, Any]) -> Iterator[tuple[Column, Array]
 
 def _rate(step: float) -> float:
     """The roundest rate whose interval the format, which has six digits for it, writes as `step` [s]."""
-    return roundest(step, 0.5 * 10.0 ** (math.floor(math.log10(step)) - 5))
+    return roundest(step, 0.500001 * 10.0 ** (math.floor(math.log10(step)) - 5))
 
 
 def _seconds(unit: str) -> float:

@@ -70,12 +70,12 @@ def fit_clock(raw: Array, scale: float = 1.0) -> Clock:
     mean = float(np.mean(finite))
     step = float(np.dot(n, finite - mean) / np.dot(n, n))
     residual = np.max(np.abs(finite - mean - step * n))
-    if len(finite) == len(raw) and step > 0 and residual <= max(1.01 * quantum, NEGLIGIBLE * step):
-        gaps = np.diff(finite)
+    gaps = np.diff(finite)
+    tolerance = max(1.01 * quantum, NEGLIGIBLE * step)  # rounding moves a stamp by half of it, a gap by all of it
+    if len(finite) == len(raw) and step > 0 and residual <= tolerance and np.max(np.abs(gaps - step)) <= tolerance:
         accumulated = np.ptp(gaps) < 0.01 * quantum  # a rounded step, added up: it hides the rate's own decimals
         slack = quantum / 2 if accumulated else quantum / (len(finite) - 1)
         return Clock(roundest(step * scale, slack * scale), float(finite[0] * scale))
-    gaps = np.diff(finite)
     typical = float(np.median(gaps))
     if typical <= 0:  # constant for many rows, then a jump: the median says nothing
         typical = abs(span) / (len(finite) - 1) or float(np.mean(gaps[gaps > 0]))

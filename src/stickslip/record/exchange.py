@@ -21,6 +21,7 @@ from stickslip.errors import FormatError, RecordError
 from stickslip.record.clock import Clock, fit_clock
 from stickslip.record.metadata import (
     KEY,
+    channel_names,
     metadata_to_history,
     metadata_to_record,
     parse_metadata,
@@ -200,7 +201,7 @@ def from_xarray(
             "select along the others first, as in dataset.isel(...)",
         )
     axis = dimensions.pop()
-    clock = dataset.coords.get(axis)
+    clock = dataset.coords[axis] if axis in dataset.indexes else None
     scale = 1.0 if clock is None else parse_unit(str(clock.attrs.get("units", "s")), expect="s").scale
     stated = {
         str(name): str(variable.attrs.get("units", variable.attrs.get("unit")))
@@ -374,6 +375,13 @@ def _received(
             "channels have different names of letters, digits and _",
             "rename the columns",
         )
+    lengths = {len(values) for values in arrays.values()} | ({len(axis)} if axis is not None else set())
+    if len(lengths) > 1:
+        raise RecordError(
+            f"columns and time axis have {', '.join(map(str, sorted(lengths)))} values",
+            "one record has one clock",
+            "cut them to the same rows",
+        )
     clock = _clock(axis, fs)
     record = Record.of(
         {names[column]: values for column, values in arrays.items()},
@@ -397,16 +405,19 @@ def _received(
 
 def _unchanged(metadata: Mapping[str, Any], arrays: Mapping[str, Array], axis: Array | None) -> Record | None:
     """The record that was described, where channels, rows and clock are still its own."""
-    names = [entry["name"] for entry in metadata["channels"]]
     rows = {len(values) for values in arrays.values()}
-    if names != list(arrays) or rows != {metadata["rows"]} or (axis is None and metadata["stamps"]):
+    if channel_names(metadata) != list(arrays) or rows != {metadata.get("rows")}:
         return None
-    record = metadata_to_record(metadata, {**arrays, **({} if axis is None else {metadata["time"]: axis})})
+    if axis is None and metadata.get("stamps"):
+        return None
+    record = metadata_to_record(metadata, {**arrays, **({} if axis is None else {str(metadata.get("time")): axis})})
     return record if axis is None or np.array_equal(record.time, axis, equal_nan=True) else None
 
 
 def _clock(axis: Array | None, fs: float | None) -> Clock:
     if fs is not None:
+        if isinstance(fs, bool) or not isinstance(fs, (int, float, np.number)):
+            raise RecordError(f"fs = {fs!r}", "a sampling rate is a number in Hz", "pass fs= in Hz")
         return Clock(float(fs), 0.0 if axis is None or not len(axis) else float(axis[0]))
     if axis is None:
         raise RecordError(
@@ -469,4 +480,4 @@ def _xarray() -> Any:
 
 
 def _not_a(wanted: str, value: object) -> RecordError:
-    return RecordError(f"a {type(value).__name__} was given", f"this reads {wanted}", "convert it first")
+    return RecordError(f"what was given is of type {type(value).__name__}", f"this reads {wanted}", "convert it first")

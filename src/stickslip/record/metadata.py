@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -52,10 +53,10 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
     FormatError
         The metadata is of a later version, damaged, or does not fit the samples.
     """
-    try:
+    with _trusting():
         if metadata["version"] != VERSION:
             raise FormatError(
-                f"the file is of version {str(metadata['version'])[:20]}",
+                f"the description is of version {str(metadata['version'])[:20]}",
                 f"this program reads version {VERSION}",
                 "update stickslip",
             )
@@ -73,17 +74,31 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
             stamps,
             _restored(metadata["truth"]),
         )
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise FormatError(
-            f"the description of the record is damaged ({type(error).__name__}: {str(error)[:80]})",
-            "a file written by write_record tells its channels, clock and history",
-            "write the file again from its source",
-        ) from error
 
 
 def metadata_to_history(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
     """The steps that `metadata` tells."""
-    return tuple(Step(**_restored(step)) for step in metadata["history"])
+    with _trusting():
+        return tuple(Step(**_restored(step)) for step in metadata["history"])
+
+
+def channel_names(metadata: Mapping[str, Any]) -> list[str]:
+    """The channels that `metadata` tells."""
+    with _trusting():
+        return [str(entry["name"]) for entry in metadata["channels"]]
+
+
+@contextmanager
+def _trusting() -> Iterator[None]:
+    """Around the use of a description: what does not fit becomes one sentence."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise FormatError(
+            f"the description of the record is damaged ({type(error).__name__}: {str(error)[:80]})",
+            "a record that stickslip wrote tells its channels, clock and history",
+            "write it again from its source",
+        ) from error
 
 
 def parse_metadata(text: str | bytes) -> dict[str, Any]:
