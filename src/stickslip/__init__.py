@@ -28,7 +28,8 @@ _ROOMS = {
     "regress_friction": "identify.regression",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
     "analyze": "analysis", "compare": "analysis", "Findings": "analysis", "Comparison": "analysis",
-    "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder", "datasets": "datasets",
+    "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder",
+    "summary": "reports.summary", "datasets": "datasets",
 }  # fmt: skip
 
 __all__ = [*_ROOMS, "__version__"]
