@@ -37,7 +37,7 @@ def resolution(stamps: Array) -> float:
     return float(np.spacing(np.float32(largest))) if np.array_equal(single.astype(float), stamps) else floor
 
 
-def fit_clock(raw: Array, scale: float = 1.0) -> Clock:
+def fit_clock(raw: Array, scale: float = 1.0, fs: float | None = None) -> Clock:
     """The clock behind time stamps.
 
     A line is fitted by least squares, t_n = start + n/fs; where no stamp lies further from it than the stamps' own
@@ -51,6 +51,8 @@ def fit_clock(raw: Array, scale: float = 1.0) -> Clock:
         Stamps in the file's unit.
     scale : float
         Seconds per unit.
+    fs : float, optional
+        A rate [Hz] known already, from earlier rows of the same file; kept where the stamps agree with it.
 
     Raises
     ------
@@ -58,6 +60,11 @@ def fit_clock(raw: Array, scale: float = 1.0) -> Clock:
         Fewer than two stamps that are numbers, or stamps that do not advance.
     """
     finite = raw[np.isfinite(raw)]
+    if fs is not None and len(finite) == len(raw) > 0:
+        quantum = resolution(raw) * scale
+        expected = raw[0] * scale + np.arange(len(raw)) / fs
+        if np.max(np.abs(raw * scale - expected)) <= max(1.01 * quantum, NEGLIGIBLE / fs):
+            return Clock(fs, float(raw[0] * scale))
     span = float(finite[-1] - finite[0]) if len(finite) else 0.0
     if len(finite) < 2 or not np.any(np.diff(finite) > 0) or not math.isfinite(span * scale):
         raise RecordError(

@@ -1,4 +1,4 @@
-"""What a file written by write_record says of its Record beside the samples: one JSON text, the same in every format."""
+"""What a file by write_record says of its Record beside the samples: one JSON text, the same in every format."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ def time_column(record: Record) -> str:
 
 
 def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array], first: int = 0) -> Record:
-    """The record that `metadata` and the samples (from row `first` on, with the time column where stamps were kept) tell.
+    """The record that `metadata` and the samples tell.
+
+    The samples begin at row `first`, and include the time column where stamps were kept.
 
     Raises
     ------
