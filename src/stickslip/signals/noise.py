@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 ORDERS = (2, 3, 4, 6, 8, 10)  # of differencing, tried in turn
 BLOCK = 12  # differences per block: short against the time between two friction events
-SPAN = 9  # blocks over which a varying level is averaged
+SPAN = 5  # blocks over which a varying level is averaged
 LEVELLED = 0.9  # the next order's answer over this one's when the motion no longer shows
 
 
@@ -61,7 +61,7 @@ def local_noise(values: ArrayLike, fs: float) -> Array:
     """How large is the broadband noise of a channel, at each sample?
 
     Many sensors are noisier in motion than at rest (an encoder's interpolation, a jittering clock). The mean squares of
-    blocks as in :func:`noise_level` are followed by a running median of five and a running mean of nine blocks. Where
+    blocks as in :func:`noise_level` are followed by a running median of three and a running mean of five blocks. Where
     they spread no more than a constant level of white noise would let them, that level is returned throughout.
 
     Parameters
@@ -96,8 +96,8 @@ def local_noise(values: ArrayLike, fs: float) -> Array:
     if len(squares) < 2 * SPAN:
         return np.full(samples.size, max(level, floor))
     correction = _median_over_mean(order)
-    padded = np.pad(squares, 2, mode="edge")
-    running = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1) / correction
+    padded = np.pad(squares, 1, mode="edge")
+    running = np.median(np.lib.stride_tricks.sliding_window_view(padded, 3), axis=1) / correction
     padded = np.pad(running, SPAN // 2, mode="edge")
     running = np.convolve(padded, np.full(SPAN, 1 / SPAN), mode="valid")
     spread = np.std(running) / np.mean(running) if running.any() else 0.0
