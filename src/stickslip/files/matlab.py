@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
 from stickslip.files import hdf5
+from stickslip.files.matlab_elements import check_version_5
 from stickslip.files.table import Array, Column, Options, Table, optional, reading, slices
 
 NAME = "MATLAB"
 SUFFIXES = (".mat",)
 
-COMPRESSED = 15  # element type of MAT version 5
 SIZES_V4 = (8, 4, 4, 2, 2, 1)  # bytes of a number, by its type in MAT version 4
 NUMERIC = ("double", "single", "int", "uint", "logical")
 SAVE_PLAIN = (
@@ -53,10 +53,12 @@ def _is_v73(head: bytes) -> bool:
 def _read_v5(path: Path, head: bytes) -> Table:
     from scipy.io import loadmat
 
-    with path.open("rb") as file:
-        ends = _elements_v5(file, head) if head.startswith(b"MATLAB") else _elements_v4(file)
-        for end in ends:
-            _require_end(path, end)
+    if head.startswith(b"MATLAB"):
+        check_version_5(path)
+    else:
+        with path.open("rb") as file:
+            for end in _elements_v4(file):
+                _require_end(path, end)
     with reading(path, NAME), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "duplicate variable name": objects share one; they are reported below
         variables = loadmat(path, struct_as_record=True, squeeze_me=False)
@@ -123,23 +125,6 @@ def _name_of(name: str, value: Any) -> str:
 def _text(value: NDArray[Any]) -> str:
     item = value.ravel()[0] if value.size else ""
     return item.decode("ascii", "replace") if isinstance(item, bytes) else str(item)
-
-
-def _elements_v5(file: BinaryIO, head: bytes) -> Iterator[int]:
-    """Where each top-level element says that it ends."""
-    order = ">" if head[126:128] == b"MI" else "<"
-    file.seek(128)
-    while tag := file.read(8):
-        start = file.tell()
-        if len(tag) < 8:
-            yield start + 8 - len(tag)
-            return
-        kind, size = struct.unpack(f"{order}II", tag)
-        if kind >> 16:  # a small element carries its data inside its tag
-            kind, size = kind & 0xFFFF, 0
-        size += 0 if kind == COMPRESSED else -size % 8
-        yield start + size
-        file.seek(start + size)
 
 
 def _order_v4(header: bytes) -> str | None:

@@ -21,6 +21,7 @@ SUFFIXES = (".tdms",)
 
 LEAD_IN = 28  # bytes: tag, contents, version, length of the segment, length of its description
 BIG_ENDIAN = 1 << 6
+MOST_SCALES = 1000  # of one channel; npTDMS looks for as many as the file states, one by one
 UNFINISHED = 0xFFFFFFFFFFFFFFFF
 
 
@@ -37,6 +38,7 @@ def read(path: Path, options: Options) -> Table:
     left_out: list[str] = []
     with _opened(path, notes) as file:
         channels = [channel for group in file.groups() for channel in group.channels()]
+        _check_scales(path, [file, *file.groups(), *channels])
         names = unique([f"{channel.group_name}/{channel.name}" for channel in channels])
         for name, channel in zip(names, channels, strict=True):
             if len(channel) == 0 or channel.dtype.kind not in "fiubM":
@@ -81,6 +83,16 @@ def _column(name: str, channel: Any) -> Column:
     start = float(offset) if isinstance(offset, (int, float)) and math.isfinite(offset) else 0.0
     rate = float(f"{1.0 / float(step):.12g}") if timed else None  # 1.9999999999999998e-05 s is 50 kHz
     return Column(name, str(unit) if unit else None, len(channel), rate, start)
+
+
+def _check_scales(path: Path, objects: Sequence[Any]) -> None:
+    for stated in (thing.properties.get("NI_Number_Of_Scales", 0) for thing in objects):
+        if not isinstance(stated, (int, np.integer)) or not 0 <= stated <= MOST_SCALES:
+            raise FormatError(
+                f"'{path.name}' states {str(stated)[:20]} scales for a channel",
+                f"a channel has at most {MOST_SCALES}",
+                "the file is damaged: copy it again from its source",
+            )
 
 
 def _positive(step: object) -> bool:
