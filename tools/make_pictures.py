@@ -26,6 +26,11 @@ def main() -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
     plot_velocity_loop(findings, ax=left)
     plot_displacement_loop(findings, ax=right)
+    handles, labels = left.get_legend_handles_labels()
+    for axes in (left, right):
+        if axes.get_legend() is not None:
+            axes.get_legend().remove()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False)
     IMAGES.mkdir(exist_ok=True)
     figure.savefig(IMAGES / "loops.png", dpi=110)
     print(f"{IMAGES / 'loops.png'}: {(IMAGES / 'loops.png').stat().st_size / 1024:.0f} kB; {findings.level}")

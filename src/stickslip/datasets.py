@@ -31,7 +31,15 @@ FOLDER_VARIABLE = "STICKSLIP_DATA"
 
 @dataclass(frozen=True)
 class SetFile:
-    """One file of a set: what it must hash to and, where known, the address of exactly that version."""
+    """One file of a set.
+
+    Attributes
+    ----------
+    sha256 : str
+        What its content must hash to.
+    url : str
+        The address of exactly that version, where one is known.
+    """
 
     sha256: str
     url: str = ""
