@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -204,7 +203,7 @@ def analyze(
         if regression is not None:
             asymmetric = _ask(notes, "Asymmetric regression", lambda: regress_friction(whole, symmetric=False))
     name = record_name(record)
-    if loops is None and sticks is None and regression is None:
+    if all(answer is None for answer in (loops, sticks, regression)):
         raise EstimateError(
             f"{name} answers no question about friction",
             " / ".join(note.rstrip(".") for note in notes) or "displacement or velocity, and a force, are needed",
@@ -236,6 +235,17 @@ def compare(findings: Sequence[Findings]) -> Comparison:
     ------
     EstimateError
         Fewer than two records.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rng, time = np.random.default_rng(1), np.arange(4000) / 500
+    >>> def slide(load):
+    ...     friction = 0.3 * load * np.sign(np.cos(2 * np.pi * time)) + rng.normal(0, 0.01, time.size)
+    ...     x = np.sin(2 * np.pi * time) / (2 * np.pi)
+    ...     return Record.of({"x": x, "friction": friction, "normal": np.full(time.size, load)}, fs=500)
+    >>> round(compare([analyze(slide(load)) for load in (2.0, 4.0, 8.0)]).coefficient.value, 2)
+    0.3
     """
     if len(findings) < 2:
         raise EstimateError(f"{len(findings)} record", "a comparison needs two or more", "give several files")
@@ -258,9 +268,9 @@ def compare(findings: Sequence[Findings]) -> Comparison:
 
 
 def record_name(record: Record) -> str:
-    """The record's file names as its history tells them; "record" for one made in memory."""
-    paths = [str(step.arguments["path"]) for step in record.history if "path" in step.arguments]
-    return " + ".join(dict.fromkeys(PurePath(path).name for path in paths)) or "record"
+    """The record's file names, as its history tells them."""
+    files = [file["name"] for step in record.history for file in step.arguments.get("files", ())]
+    return " + ".join(dict.fromkeys(files)) or ("simulated record" if record.truth else "record")
 
 
 def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:

@@ -114,10 +114,19 @@ def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lin
     lines : iterable of str
         The text they were read from, so that the message can name the line.
 
+    Returns
+    -------
+    RigSettings
+
     Raises
     ------
     ModelError
         An unknown key, or a value that has no meaning.
+
+    Examples
+    --------
+    >>> rig_settings({"mass": "250 g"}).mass
+    0.25
     """
     try:
         return RigSettings.model_validate(dict(values))

@@ -45,7 +45,7 @@ def plot_levels(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
         markersize=5,
     )
     ax.set_yticks(places, [name if len(name) < 44 else f"{name[:41]}..." for name, _ in rows])
-    ax.invert_yaxis()
+    ax.set_ylim(len(rows) - 0.4, -0.6)
     ax.set(xlabel=axis_label("sliding friction, 95 %", unit))
     ax.set_xlim(left=0)
     return ax

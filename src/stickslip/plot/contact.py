@@ -76,7 +76,7 @@ def plot_velocity_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
         yerr=y_factor * np.abs(np.array([curve.friction - curve.low, curve.high - curve.friction])),
         fmt="o", color=INK, markersize=3.2, linewidth=1.0, label="mean in velocity bins, 95 %", zorder=4,
     )  # fmt: skip
-    for value in (loops.level.value, -loops.level.value):
+    for value in (loops.forward.value, -loops.back.value):
         ax.axhline(y_factor * value, color=INK, linewidth=0.9, linestyle=":", zorder=1)
     _legend_above(ax)
     return ax

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import re
 from dataclasses import dataclass
@@ -38,12 +39,13 @@ class Plate:
     title: str
     caption: str
 
-    @styled
     def svg(self) -> str:
-        """The figure as an SVG element, the same for the same data."""
-        drawn = io.StringIO()
-        self.figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
-        return drawn.getvalue()
+        """The figure as an SVG image, the same for the same data."""
+        return self._svg
+
+    @functools.cached_property
+    def _svg(self) -> str:
+        return _svg_of(self.figure)
 
     @styled
     def png(self) -> bytes:
@@ -51,6 +53,14 @@ class Plate:
         drawn = io.BytesIO()
         self.figure.savefig(drawn, format="png", dpi=150, facecolor="white")
         return drawn.getvalue()
+
+
+@styled
+def _svg_of(figure: Figure) -> str:
+    """Hundredths of a point are fine enough for a path, and keep a page small."""
+    drawn = io.StringIO()
+    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+    return re.sub(r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), drawn.getvalue())
 
 
 def figures(result: Findings | Comparison) -> tuple[Plate, ...]:
@@ -65,6 +75,14 @@ def figures(result: Findings | Comparison) -> tuple[Plate, ...]:
     -------
     tuple of Plate
         Each with ``.figure`` (matplotlib), ``.title``, ``.caption``, ``.svg()`` and ``.png()``.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> record = ss.datasets.demo()
+    >>> plates = figures(ss.analyze(record, mass=2.42, stiffness=2310, damping=0.12))
+    >>> [plate.name for plate in plates][:2]
+    ['friction-velocity', 'friction-displacement']
     """
     return tuple(_of_comparison(result) if isinstance(result, Comparison) else _of_findings(result))
 

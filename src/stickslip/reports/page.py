@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from stickslip import __version__
 from stickslip.analysis import Comparison, Findings
@@ -92,7 +93,7 @@ def render(sections: Sequence[Section]) -> str:
         loader=PackageLoader("stickslip.reports"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters["inline_svg"] = inline_svg
+    environment.filters.update(inline_svg=inline_svg, told=told)
     return environment.get_template(TEMPLATE).render(sections=sections, version=__version__)
 
 
@@ -107,3 +108,12 @@ def inline_svg(plate: Plate) -> str:
     for colour, variable in _COLOURS.items():
         rest = rest.replace(colour, variable)
     return f"{opening}>{rest}"
+
+
+def told(value: Any) -> str:
+    """An argument of a step, with its parts spelled out."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {told(item)}" for key, item in value.items())
+    if isinstance(value, (list, tuple)):
+        return "; ".join(told(item) for item in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
