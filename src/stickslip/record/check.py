@@ -29,8 +29,8 @@ class Fault:
     Attributes
     ----------
     kind : str
-        "short", "clock", "backwards", "repeated stamps", "jitter", "gap", "missing", "constant", "clipped", "frozen",
-        "spike", "drift" or "coarse".
+        "short", "clock", "rate", "backwards", "repeated stamps", "jitter", "gap", "missing", "constant", "clipped",
+        "frozen", "spike", "drift" or "coarse".
     channel : str or None
         The channel it is in; None for the clock.
     rows : tuple of (first, last)
@@ -110,7 +110,7 @@ def _short(record: Record) -> list[Fault]:
 
 def _clock_faults(stamps: Array) -> list[Fault]:
     clock = inspect(stamps)
-    faults = []
+    faults: list[Fault] = []
     if len(clock.missing):
         runs = _pairs(clock.missing, 0)
         faults.append(
@@ -128,6 +128,13 @@ def _clock_faults(stamps: Array) -> list[Fault]:
         back = float(np.min(np.diff(stamps)[clock.backward]))
         what = f"the time goes back {len(clock.backward)} times, by up to {-back:.4g} s"
         faults.append(_clock_fault("backwards", _pairs(clock.backward), what, "repair_clock(record)", "error"))
+    if len(clock.slower):
+        slow = float(np.median(np.diff(stamps)[clock.slower]))
+        what = (
+            f"{len(clock.slower)} intervals of {1e3 * slow:.4g} ms where the others are {1e3 * clock.step:.4g} ms long"
+        )
+        cure = f"fill_gaps(record, longest={2 * slow:.2g}), or cut them off with record.rows()"
+        faults.append(_clock_fault("rate", _pairs(clock.slower), what, cure, "error"))
     if len(clock.gaps):
         lengths = np.diff(stamps)[clock.gaps]
         lost = int(np.sum(np.maximum(1, np.round(lengths / clock.step) - 1)))
@@ -154,9 +161,7 @@ def _held(stamps: Array, clock: Stamps) -> Fault:
         f"the time stamps stand still for {low:.0f} to {high:.0f} rows and then jump by "
         f"{1e3 * float(np.median(np.diff(stamps)[jumps])):.3g} ms; the true rate is about {line.fs:.4g} Hz"
     )
-    return _clock_fault(
-        "clock", _pairs(np.sort(np.concatenate([clock.repeated]))), what, "repair_clock(record)", "error"
-    )
+    return _clock_fault("clock", _pairs(clock.repeated), what, "repair_clock(record)", "error")
 
 
 def _clock_fault(kind: str, runs: Runs, what: str, cure: str, severity: str) -> Fault:
@@ -194,8 +199,7 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
     if lost.all() or len(values) < 3:
         return faults
     if lost.any():
-        rows = np.arange(len(values))
-        values = np.where(lost, np.interp(rows, rows[~lost], values[~lost]), values)
+        values = flaws.held_over(values, lost)
     if np.ptp(values) <= 1e-12 * float(np.max(np.abs(values))):
         message = (
             f"channel {name} is constant at {values[0]:.6g} {unit} throughout; look at its cable, range and column."
@@ -205,37 +209,39 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
 
 
 def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
+    everywhere = ((0, len(values) - 1),)
+    few = flaws.levels_used(values)
+    if few is not None:
+        what = f"only {few} steps of the sensor across its whole motion"
+        return [_fault("coarse", name, everywhere, what, "choose a finer range of the instrument")]
     faults = []
-    # what is computed as friction has no sensor that could clip
-    cut = flaws.clipped(values, plateaus=unit in SHARP_UNITS) if name != "friction" else ()
+    spikes = flaws.spikes(values)
+    if spikes:
+        what = f"{_count(spikes)} samples that stand off from their neighbours as spikes"
+        faults.append(_fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")'))
+        values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
+    measured = name != "friction"  # what is computed as friction has no sensor that could clip or freeze
+    cut = flaws.clipped(values, plateaus=unit in SHARP_UNITS) if measured else ()
     if cut:
-        level = float(values[cut[0][0]])
-        count = sum(last - first + 1 for first, last in cut)
-        what = f"{count} samples clipped near {level:.4g} {unit}"
+        what = f"{_count(cut)} samples clipped near {values[cut[0][0]]:.4g} {unit}"
         faults.append(
             _fault("clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")')
         )
-    held = flaws.frozen(values)
+    top = flaws.rows_of(cut, len(values))
+    held = tuple(run for run in flaws.frozen(values) if not top[run[0] : run[1] + 1].any()) if measured else ()
     if held:
         longest = max(last - first + 1 for first, last in held)
         what = f"samples frozen while the signal moved on, for up to {longest} rows"
         faults.append(_fault("frozen", name, held, what, f'make them NaN and use fill_missing(record, "{name}")'))
-    spikes = flaws.spikes(values)
-    if spikes:
-        count = sum(last - first + 1 for first, last in spikes)
-        what = f"{count} samples that stand off from their neighbours as spikes"
-        faults.append(_fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")'))
     rise = flaws.drift(values)
     if rise > DRIFT:
         what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"
-        runs = ((0, len(values) - 1),)
-        faults.append(_fault("drift", name, runs, what, f'take it off with remove_drift(record, "{name}")'))
-    few = flaws.levels_used(values)
-    if few is not None:
-        what = f"only {few} steps of the sensor across its whole motion"
-        runs = ((0, len(values) - 1),)
-        faults.append(_fault("coarse", name, runs, what, "choose a finer range of the instrument"))
+        faults.append(_fault("drift", name, everywhere, what, f'take it off with remove_drift(record, "{name}")'))
     return faults
+
+
+def _count(runs: Runs) -> int:
+    return sum(last - first + 1 for first, last in runs)
 
 
 def _fault(kind: str, name: str, runs: Runs, what: str, cure: str, severity: str = "warning") -> Fault:

@@ -18,6 +18,7 @@ EXACT = 1e-9  # relative to the range: equal but for the rounding of a unit's fa
 CUBIC = np.array([1, -4, 6, -4, 1]) / 6  # a sample minus the cubic through its four neighbours
 CUBIC_GAIN = float(np.sqrt(np.sum(CUBIC**2)))
 SHORTEST_TREND = 64  # samples from which a slow trend can be told from the motion
+TRAVEL = 12.0  # rise in amplitudes from which a trend is travel: eight steps of a pulled block rise by 19
 FEW_LEVELS = 12  # steps of a sensor across the whole motion below which its shape is lost
 
 
@@ -39,6 +40,13 @@ def rows_of(runs: Runs, n: int) -> Mask:
     for first, last in runs:
         mask[first : last + 1] = True
     return mask
+
+
+def held_over(values: Array, lost: Mask) -> Array:
+    """The values with the last one before held over lost ones: one interpolated would leave the sensor's levels."""
+    last = np.maximum.accumulate(np.where(lost, 0, np.arange(len(values))))
+    held: Array = np.where(lost[last], values[~lost][0], values[last])
+    return held
 
 
 def quantum(values: Array) -> float:
@@ -66,8 +74,8 @@ def roughness(values: Array) -> float:
 def spikes(values: Array) -> Runs:
     """Single samples, or pairs, that stand off from both neighbours as nothing around them does.
 
-    A sample is a spike where it differs from the line between its neighbours by 2.5 times the largest step nearby and
-    by eight robust standard deviations, while the neighbours agree with each other.
+    A sample is a spike where it differs from the line between its neighbours by 2.5 times the second largest step
+    nearby and by eight robust standard deviations, while the neighbours agree with each other.
     """
     found = np.zeros(len(values), dtype=bool)
     for width in (1, 2):
@@ -90,7 +98,8 @@ def _spikes(values: Array, width: int, reach: int = 10) -> Mask:
     steps = np.abs(np.diff(values))
     for i in np.flatnonzero((height > threshold) & (height > 3 * np.abs(after - before))):
         near = np.concatenate([steps[max(0, i - reach) : i], steps[i + width + 1 : i + width + 1 + reach]])
-        if len(near) >= reach and height[i] > 2.5 * np.max(near):
+        # the second largest step: one edge of a square wave nearby hides no spike
+        if len(near) >= reach and height[i] > 2.5 * np.partition(near, -2)[-2]:
             mask[i + 1 : i + 1 + width] = True
     return mask
 
@@ -119,15 +128,26 @@ def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float) ->
         return False
     nearest = max(float(np.max(before)), float(np.max(after)))
     jump = float(abs(values[last + 1] - values[last]))
-    moving = min(float(np.median(before)), float(np.median(after))) > EXACT * float(np.ptp(values))
+    span = float(np.ptp(values))
+    moving = min(float(np.mean(before)), float(np.mean(after))) > EXACT * span
+    moving &= abs(float(values[first])) > EXACT * span  # the acceleration of a stuck mass is zero, until it is not
     made_up = 0.4 * length * float(np.median(after[:5]))
+    repeats = np.concatenate([still[max(0, first - 40) : first], still[last + 1 : last + 41]])
+    chance = len(values) * float((np.sum(repeats) + 1) / (len(repeats) + 2)) ** (length - 1)
+    if chance > 1e-3:
+        return False
     if moving and jump > 5 * step and (jump > 3 * nearest or (jump > made_up and jump > 2.5 * float(np.max(after)))):
         return True
     sides = [values[max(0, first - 40) : first], values[last + 1 : last + 41]]
-    turns = min(float(np.mean(np.diff(np.sign(np.diff(side))) != 0)) for side in sides)
-    repeats = np.concatenate([still[max(0, first - 40) : first], still[last + 1 : last + 41]])
-    chance = len(values) * float((np.sum(repeats) + 1) / (len(repeats) + 2)) ** (length - 1)
-    return turns > 0.35 and chance < 1e-6
+    turns = min(_turns(side) for side in sides)
+    return turns > 0.35 and float(np.mean(repeats)) < 0.3 and chance < 1e-6
+
+
+def _turns(values: Array) -> float:
+    """Share of the steps that reverse the one before."""
+    steps = np.diff(values)
+    steps = steps[steps != 0]
+    return float(np.mean(steps[1:] * steps[:-1] < 0)) if len(steps) > 4 else 0.0
 
 
 def clipped(values: Array, *, plateaus: bool = False) -> Runs:
@@ -148,61 +168,75 @@ def clipped(values: Array, *, plateaus: bool = False) -> Runs:
     if len(values) < 16 or span == 0:
         return ()
     noise, step = roughness(values), quantum(values)
-    mask = np.zeros(len(values), dtype=bool)
-    for sign in (1.0, -1.0):
-        mask |= _clipped_top(sign * values, noise, step, plateaus)
-    return runs_of(mask)
+    top, bottom = (_clipped_top(side, noise, step, plateaus) for side in (values, -values))
+    # an instrument that cuts one end off cuts the other too: there, less evidence is enough
+    if top.any() != bottom.any():
+        end = -values if top.any() else values
+        return runs_of(top | bottom | _clipped_top(end, noise, step, plateaus, strictness=0.4))
+    return runs_of(top | bottom)
 
 
-def _clipped_top(values: Array, noise: float, step: float, plateaus: bool) -> Mask:
+def _clipped_top(values: Array, noise: float, step: float, plateaus: bool, strictness: float = 1.0) -> Mask:
     top, span = float(np.max(values)), float(np.ptp(values))
     exact = values >= top - EXACT * span
-    nothing = np.zeros(len(values), dtype=bool)
     count = int(np.sum(exact))
-    if noise > 0.02 * span and count >= 3:
-        next_level = int(np.sum(np.abs(values - (top - step)) < 0.5 * step)) if step else 0
-        if count > 1.5 * next_level + 4 * np.sqrt(next_level + 1.0) - (4 if not step else 0):
-            return exact
-    lengths = [last - first + 1 for first, last in runs_of(exact)]
-    if count >= 3 and max(lengths) >= 3:
+    if count >= 3 and _piled_up(values, count, noise):
+        return exact
+    if count >= 3 and max(last - first for first, last in runs_of(exact)) >= 2:
         level, mask, slack = top, exact, max(step, EXACT * span)
     else:
         spread = float(np.hypot(noise, step / np.sqrt(12)))
-        level = float(np.median(values[values > top - 6 * spread])) if spread > 0 else top
+        level = float(np.median(values[values >= top - 6 * spread]))
         calm = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="edge"), 5), axis=1)
-        mask, slack = calm > level - 3 * spread, 3 * spread
+        # here the noise goes on at the top, as it does on a plateau: only twin parabolas tell
+        mask, slack, plateaus = calm > level - 3 * spread, 3 * spread, True
     held = [run for run in runs_of(mask) if run[1] - run[0] >= 2]
-    verdicts = {run: _was_cut(values, run, level, slack, plateaus) for run in held}
-    judged = [verdict for verdict in verdicts.values() if verdict is not None]
-    if not any(judged) or np.mean(judged) < 0.5:
-        return nothing
-    return mask & rows_of(tuple(run for run in held if verdicts[run] is not False), len(values)) | (
-        exact & mask if count >= 3 else nothing
-    )
+    cut = _were_cut(values, held, level, slack, plateaus, strictness)
+    return mask if cut else np.zeros(len(values), dtype=bool)
 
 
-def _was_cut(values: Array, run: tuple[int, int], level: float, slack: float, plateaus: bool) -> bool | None:
-    """Whether a plateau cuts off a top; None where its approach is not resolved."""
-    first, last = run
-    length = last - first + 1
-    sides = [_extrapolate(values[:first][::-1], level, length), _extrapolate(values[last + 1 :], level, length)]
-    if sides[0] is None or sides[1] is None:
-        return None
-    heights = np.array([side[0] for side in sides if side])
-    errors = np.array([side[1] for side in sides if side])
-    drops = np.array([side[2] for side in sides if side])
-    cut = bool(np.all(heights > np.maximum(2 * slack, 5 * errors)) and np.all(heights > 0.08 * drops))
+def _piled_up(values: Array, count: int, noise: float) -> bool:
+    """Whether noise stops at the top level: no two of its samples should be equal, or fewer than on the next level."""
+    span = float(np.ptp(values))
+    between = values[(values < np.max(values) - EXACT * span) & (values > np.min(values) + EXACT * span)]
+    if len(between) < 0.2 * len(values):
+        return False
+    step = quantum(between)
+    if step == 0:
+        return len(np.unique(between)) > 0.98 * len(between) and _turns(np.diff(values)) > 0.4
+    below = int(np.sum(between > np.max(between) - 0.5 * step))
+    above = float(np.max(values) - np.max(between)) / step
+    off_grid = abs(above - round(above)) > 0.1  # no level of the sensor, but where it was cut
+    return noise > 0.02 * span and (off_grid or count > 1.5 * below + 4 * np.sqrt(below + 1.0))
+
+
+def _were_cut(
+    values: Array, held: list[tuple[int, int]], level: float, slack: float, plateaus: bool, strictness: float
+) -> bool:
+    """Whether plateaus, taken together, cut off tops; no, where their approach is not resolved."""
+    sides = []
+    for first, last in held:
+        length = last - first + 1
+        both = _extrapolate(values[:first][::-1], level, length), _extrapolate(values[last + 1 :], level, length)
+        sides += [side for side in both if side is not None] if None not in both else []
+    if not sides:
+        return False
+    heights, errors, drops, tops = np.array(sides).T
+    height = float(np.median(heights))
+    error = 1.2533 * float(np.sqrt(np.mean(errors**2) / len(heights)))
+    cut = height > strictness * max(2 * slack, 5 * error, 0.08 * float(np.median(drops)))
     if cut and plateaus:
-        tops = [side[3] for side in sides if side]
-        cut = all(0.2 * length < top < 0.8 * length for top in tops) and bool(np.max(heights) < 2 * np.min(heights))
-    return cut
+        before, after = heights[::2], heights[1::2]
+        alike = (np.maximum(before, after) < 2 * np.minimum(before, after)).mean()
+        cut = alike > 0.5 and float(np.mean((tops > 0.2) & (tops < 0.8))) > 0.5
+    return bool(cut)
 
 
 def _extrapolate(approach: Array, level: float, length: int) -> tuple[float, float, float, float] | None:
     """How far the parabola through the samples next to a plateau, nearest first, rises above it.
 
     Gives height above the level and its standard error, drop of the level over the samples used, and distance of the
-    parabola's top from the plateau's edge (infinite where it has none).
+    parabola's top from the plateau's edge in lengths of the plateau (infinite where it has none).
     """
     span = float(np.ptp(approach)) if len(approach) else 0.0
     near = approach[: max(4, length)]
@@ -221,7 +255,7 @@ def _extrapolate(approach: Array, level: float, length: int) -> tuple[float, flo
     reach = np.clip(top, 0.0, middle)
     point = np.array([reach**2, reach, 1.0])
     error = sd * float(np.sqrt(point @ np.linalg.pinv(design.T @ design) @ point))
-    return float(point @ (bend, slope, value)), error, float(level - near.min()), float(top * scale)
+    return float(point @ (bend, slope, value)), error, float(level - near.min()), float(top * scale / length)
 
 
 def drift(values: Array) -> float:
@@ -237,7 +271,8 @@ def drift(values: Array) -> float:
     along = np.polynomial.Polynomial.fit(rows, slow, 2)(rows)
     explained = float(np.var(slow - along)) < 0.1 * float(np.var(slow))
     amplitude = np.sqrt(2) * float(np.std(values[np.round(rows).astype(int)] - slow))
-    return float(np.ptp(along)) / amplitude if amplitude > 0 and explained else 0.0
+    rise = float(np.ptp(along)) / amplitude if amplitude > 0 and explained else 0.0
+    return rise if rise < TRAVEL else 0.0
 
 
 def trend(values: Array) -> tuple[Array, Array]:
@@ -269,8 +304,8 @@ def _running_mean(values: Array, length: int) -> Array:
 
 def levels_used(values: Array) -> int | None:
     """Steps of the sensor across the whole motion, where they are too few to show its shape; else None."""
-    step = quantum(values)
-    if step == 0 or len(np.unique(values)) < 4:
+    step, levels = quantum(values), len(np.unique(values))
+    if step == 0 or levels < 4 or len(values) < 8 * levels:
         return None
     steps = round(float(np.ptp(values)) / step)
     return steps if steps < FEW_LEVELS else None

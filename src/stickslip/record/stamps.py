@@ -14,6 +14,7 @@ Rows = NDArray[np.intp]
 
 GAP = 1.9  # an interval this many times the usual one lost a sample; slower loops of a host stay below
 TOLERANCE = 0.02  # relative deviation of an interval that no analysis of friction would notice
+STEADY = 10  # gaps this close together are no accident
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,9 @@ class Stamps:
         Decimal resolution of the stamps [s]; 0 where they have none.
     held : bool
         Whether a host stamped blocks of samples as they arrived: stamps stand still, or crowd, and then jump.
-    repeated, backward, gaps, uneven : ndarray of int
-        First row of each pair whose stamps are equal, go back, lie `GAP` steps or more apart, or are unevenly spaced.
+    repeated, backward, gaps, slower, uneven : ndarray of int
+        First row of each pair whose stamps are equal, go back, lie `GAP` steps or more apart, do so again and again, or
+        are unevenly spaced.
     missing : ndarray of int
         Rows whose stamp is not a number.
     """
@@ -40,13 +42,17 @@ class Stamps:
     repeated: Rows
     backward: Rows
     gaps: Rows
+    slower: Rows
     uneven: Rows
     missing: Rows
 
     @property
     def sound(self) -> bool:
         """Whether nothing is wrong with the stamps."""
-        return not (self.held or any(map(len, (self.repeated, self.backward, self.gaps, self.missing, self.uneven))))
+        return not (
+            self.held
+            or any(map(len, (self.repeated, self.backward, self.gaps, self.slower, self.uneven, self.missing)))
+        )
 
 
 def inspect(stamps: Array) -> Stamps:
@@ -55,14 +61,13 @@ def inspect(stamps: Array) -> Stamps:
     known = np.flatnonzero(np.isfinite(stamps))
     none = known[:0]
     if len(known) < 3:
-        return Stamps(0.0, 0.0, False, none, none, none, none, missing)
+        return Stamps(0.0, 0.0, False, none, none, none, none, none, missing)
     steps, spanned, first = np.diff(stamps[known]), np.diff(known), known[:-1]
     resolution = _resolution(stamps[known])
     repeated, backward = steps == 0, steps < 0
-    mean = float(stamps[known[-1]] - stamps[known[0]]) / (len(known) - 1)
-    # With samples faster than the stamps' decimals, equal stamps are rounding, not a fault.
-    if 0 < mean < 1.5 * resolution and float(np.max(steps)) <= 2.01 * resolution:
-        return Stamps(mean, resolution, False, none, first[backward], none, none, missing)
+    mean = float(stamps[known[-1]] - stamps[known[0]]) / int(known[-1] - known[0])
+    if mean > 0 and _is_rounding(known, stamps[known], mean, resolution):
+        return Stamps(mean, resolution, False, none, none, none, none, none, missing)
     forward = steps[steps > 0]
     step = _usual(forward, resolution) if len(forward) else 0.0
     share = float(np.mean(repeated))
@@ -74,7 +79,12 @@ def inspect(stamps: Array) -> Stamps:
     uneven &= readable & ~gaps
     if np.mean(uneven) < 0.01:
         uneven[:] = False
-    return Stamps(step, resolution, held, first[repeated], first[backward], first[gaps], first[uneven], missing)
+    # gaps row after row are another rate
+    rate = np.convolve(gaps, np.ones(2 * STEADY - 1), "same") >= STEADY
+    slower, gaps = gaps & rate, gaps & ~rate
+    return Stamps(
+        step, resolution, held, first[repeated], first[backward], first[gaps], first[slower], first[uneven], missing
+    )
 
 
 @dataclass(frozen=True)
@@ -125,8 +135,20 @@ def _resolution(stamps: Array) -> float:
     return 0.0
 
 
+def _is_rounding(rows: Rows, stamps: Array, mean: float, resolution: float) -> bool:
+    """Whether an even clock written with few decimals explains all unevenness, equal stamps included.
+
+    It does so only where the interval is no multiple of the resolution, so that the rounding beats.
+    """
+    if resolution == 0:
+        return False
+    late = stamps - np.polyval(np.polyfit(rows, stamps, 1), rows)
+    beats = abs(mean - resolution * round(mean / resolution)) * len(rows) / resolution
+    return bool(np.ptp(late) < (1.05 if beats > 1 else 0.1) * resolution)
+
+
 def _usual(steps: Array, resolution: float) -> float:
     """The usual step: the median, then the mean of those that differ from it by rounding alone."""
-    middle = float(np.median(steps))
+    middle = float(np.quantile(steps, 0.5, method="lower"))
     near = steps[np.abs(steps - middle) <= max(1.01 * resolution, TOLERANCE * middle)]
     return float(np.mean(near))

@@ -59,9 +59,10 @@ def repair_clock(record: Record, *, fs: float | None = None, trust: str | None =
     if record.stamps is None:
         return _restated(record, fs)
     clock = inspect(record.stamps)
-    if len(clock.gaps) and trust != "samples":
+    gaps = np.sort(np.concatenate([clock.gaps, clock.slower]))
+    if len(gaps) and trust != "samples":
         raise RecordError(
-            f"the clock has {len(clock.gaps)} gaps ({in_words(_runs(clock.gaps))})",
+            f"the clock has {len(gaps)} gaps ({in_words(_runs(gaps))})",
             "a clock is repaired where all samples are there",
             "use fill_gaps(record), or trust='samples' if only the stamps jumped",
         )
