@@ -27,7 +27,7 @@ _ROOMS = {
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
-    "analyze": "analysis", "compare": "analysis", "Findings": "analysis", "Comparison": "analysis",
+    "analyze": "analysis", "compare": "analysis", "mend": "analysis", "Findings": "analysis", "Comparison": "analysis",
     "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder",
     "summary": "reports.summary", "datasets": "datasets",
 }  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -18,6 +18,14 @@ from stickslip.identify.loops import Loops, friction_loops
 from stickslip.identify.regression import Regression, regress_friction
 from stickslip.identify.sticks import Sticks, find_sticks
 from stickslip.record.record import Record, Step
+from stickslip.signals.repair import (
+    fill_gaps,
+    fill_missing,
+    remove_drift,
+    remove_spikes,
+    repair_clock,
+    restore_clipped,
+)
 
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
@@ -190,29 +198,81 @@ def analyze(
     """
     given = {"mass": mass, "stiffness": stiffness, "damping": damping, "damper": damper, "contact": contact}
     rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
-    notes: list[str] = []
+    asked = _Asked([], [])
     faults = tuple(record.check())
-    whole = _with_friction(record, rig, method, notes)
+    whole = _with_friction(record, rig, method, asked)
     loops = sticks = regression = asymmetric = None
     if "friction" in whole and _moves(whole):
-        loops = _ask(notes, "Friction loops", lambda: friction_loops(whole, contact=rig.contact))
+        loops = asked.ask("Friction loops", lambda: friction_loops(whole, contact=rig.contact))
     if _moves(whole):
-        sticks = _ask(notes, "Sticks and slips", lambda: find_sticks(whole, contact=rig.contact))
+        sticks = asked.ask("Sticks and slips", lambda: find_sticks(whole, contact=rig.contact))
     if _moves(whole) and "force" in whole:
-        regression = _ask(notes, "Regression", lambda: regress_friction(whole))
+        regression = asked.ask("Regression", lambda: regress_friction(whole))
         if regression is not None:
-            asymmetric = _ask(notes, "Asymmetric regression", lambda: regress_friction(whole, symmetric=False))
+            asymmetric = asked.ask("Asymmetric regression", lambda: regress_friction(whole, symmetric=False))
     name = record_name(record)
     if all(answer is None for answer in (loops, sticks, regression)):
-        raise EstimateError(
-            f"{name} answers no question about friction",
-            " / ".join(note.rstrip(".") for note in notes) or "displacement or velocity, and a force, are needed",
-            "see record.check(), or name more columns in channels=",
-        )
+        raise _nothing(name, record, asked.refusals)
     return Findings(
         name, whole, faults, loops, sticks, regression, asymmetric,
-        normal=_normal_load(record, rig, name), notes=tuple(notes), settings=_stated(rig, method),
+        normal=_normal_load(record, rig, name), notes=tuple(asked.notes), settings=_stated(rig, method),
     )  # fmt: skip
+
+
+def mend(record: Record, *, repairs: Sequence[str]) -> Record:
+    """The record after repairs, made in the order given and each logged in its history.
+
+    Parameters
+    ----------
+    record : Record
+        As read.
+    repairs : sequence of str
+        ``clock`` (:func:`repair_clock`), ``gaps`` (:func:`fill_gaps`), ``missing`` (:func:`fill_missing`), ``spikes``
+        (:func:`remove_spikes`), ``clipping`` (:func:`restore_clipped`), ``drift`` (:func:`remove_drift`). The last
+        four take a channel, as in ``drift:x``; without one they mend the channels in which the check-up finds
+        that fault.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RecordError
+        A repair that can not be made.
+    ModelError
+        A repair that is not known.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> wave = np.sin(0.2 * np.arange(400))
+    >>> wave[100:103] = np.nan
+    >>> mended = mend(Record.of({"x": wave}, fs=100.0), repairs=["missing"])
+    >>> bool(np.isfinite(mended["x"]).all()), mended.history[-1].action
+    (True, 'fill_missing')
+    """
+    from stickslip.config import rig_settings
+
+    for repair in rig_settings({"repair": list(repairs)}, source="the call").repair:
+        word, _, channel = repair.partition(":")
+        if word in _WHOLE:
+            record = _WHOLE[word](record)
+            continue
+        kind, function = _PER_CHANNEL[word]
+        found = [fault.channel for fault in record.check() if fault.kind == kind and fault.channel is not None]
+        for name in [channel] if channel else dict.fromkeys(found):
+            record = function(record, name)
+    return record
+
+
+_WHOLE: dict[str, Callable[[Record], Record]] = {"clock": repair_clock, "gaps": fill_gaps}
+_PER_CHANNEL: dict[str, tuple[str, Callable[[Record, str], Record]]] = {
+    "missing": ("missing", fill_missing),
+    "spikes": ("spike", remove_spikes),
+    "clipping": ("clipped", restore_clipped),
+    "drift": ("drift", remove_drift),
+}
 
 
 def compare(findings: Sequence[Findings]) -> Comparison:
@@ -262,6 +322,8 @@ def compare(findings: Sequence[Findings]) -> Comparison:
     line = None
     if len(np.unique(loads)) >= 3:
         line = _straight_line(loads, levels)
+        if not line[1].includes(0.0):
+            coefficient = replace(coefficient, status="the line misses the origin: see friction at no load")
     else:
         notes.append("Fewer than three loads: whether the line passes through the origin can not be told.")
     return Comparison(tuple(findings), coefficient, line, tuple(notes))
@@ -271,6 +333,24 @@ def record_name(record: Record) -> str:
     """The record's file names, as its history tells them."""
     files = [file["name"] for step in record.history for file in step.arguments.get("files", ())]
     return " + ".join(dict.fromkeys(files)) or ("simulated record" if record.truth else "record")
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What came of the questions so far: notes in words, and the errors behind those that failed."""
+
+    notes: list[str]
+    refusals: list[StickslipError]
+
+    def ask(self, question: str, answer: Callable[[], Answer]) -> Answer | None:
+        try:
+            return answer()
+        except ModelError:
+            raise
+        except StickslipError as error:
+            self.notes.append(f"{question}: {error}")
+            self.refusals.append(error)
+            return None
 
 
 def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
@@ -284,13 +364,12 @@ def _stated(rig: RigSettings, method: str) -> dict[str, Any]:
     return {**constants, "differentiation": method}
 
 
-def _with_friction(record: Record, rig: RigSettings, method: str, notes: list[str]) -> Record:
+def _with_friction(record: Record, rig: RigSettings, method: str, asked: _Asked) -> Record:
     """The record with its friction force, where there is a way to it."""
     if "friction" in record:
         return record
     if "x" in record and rig.mass is not None and rig.stiffness is not None:
-        balanced = _ask(
-            notes,
+        balanced = asked.ask(
             "Friction force",
             lambda: friction_force(
                 record, mass=rig.mass or 0.0, stiffness=rig.stiffness or 0.0, damping=rig.damping or 0.0,
@@ -298,34 +377,39 @@ def _with_friction(record: Record, rig: RigSettings, method: str, notes: list[st
             ),
         )  # fmt: skip
         if balanced is not None and rig.damping is None:
-            notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
+            asked.notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
         if balanced is not None:
             return balanced
     if "load" in record and "force" not in record:
-        notes.append("The load cell's reading is taken as the friction force; inertia between both is part of it.")
+        asked.notes.append(
+            "The load cell's reading is taken as the friction force; inertia between both is part of it."
+        )
         step = Step("analyze", {"friction": "load"}, "the load cell's reading taken as the friction force")
         return record.with_channel(
             "friction", record["load"], unit=record.channels["load"].unit, source="load", step=step
         )
-    if "force" not in record:
-        lacking = [
-            *([] if "x" in record else ["a displacement x"]),
-            *(key for key in ("mass", "stiffness") if getattr(rig, key) is None),
-        ]
-        notes.append(
+    lacking = _lacking(record, rig)
+    if lacking and "force" not in record:
+        asked.notes.append(
             f"Friction force: without a measured friction or load it needs {' and '.join(lacking)}, not given."
         )
     return record
 
 
-def _ask(notes: list[str], question: str, ask: Callable[[], Answer]) -> Answer | None:
-    try:
-        return ask()
-    except ModelError:
-        raise
-    except StickslipError as error:
-        notes.append(f"{question}: {error}")
-        return None
+def _lacking(record: Record, rig: RigSettings) -> list[str]:
+    missing = [key for key in ("mass", "stiffness") if getattr(rig, key) is None]
+    return missing if "x" in record else ["a displacement x", *missing]
+
+
+def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:
+    value = f"{name} answers no question about friction"
+    if refusals:
+        return EstimateError(f"{value}: {refusals[0].value}", refusals[0].rule, refusals[0].next_step)
+    return EstimateError(
+        f"{value}: its channels are {', '.join(f'{c.name} [{c.unit}]' for c in record.channels.values())}",
+        "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
+        'name the columns, as in channels={"x": "COLUMN [mm]"} or --channels "x=COLUMN [mm]"',
+    )
 
 
 def _moves(record: Record) -> bool:

@@ -31,6 +31,9 @@ class _Commands(click.Group):
         except KeyboardInterrupt:
             click.echo("stickslip: interrupted; nothing was written.", err=True)
             ctx.exit(INTERRUPTED)
+        except click.UsageError as error:
+            click.echo(f"stickslip: {error.format_message().rstrip('.')}; see {ctx.command_path} --help.", err=True)
+            ctx.exit(error.exit_code)
         except ss.StickslipError as error:
             click.echo(f"stickslip: {error}", err=True)
             ctx.exit(error.exit_code)
@@ -72,7 +75,8 @@ def _reading(command: Callable[..., None]) -> Callable[..., None]:
         click.option(
             "--repair",
             metavar="LIST",
-            help="Repairs after reading, in this order, with commas: clock, gaps, missing, clipping, drift.",
+            help="Repairs after reading, in this order, with commas: clock, gaps, missing, spikes, clipping, drift; "
+            "for one channel alone as in drift:x.",
         ),
         click.option(
             "--config",
@@ -259,16 +263,7 @@ def _read(files: Sequence[Path], rig: RigSettings) -> Record:
     record = ss.read_record(
         paths, channels=rig.channels or None, fs=rig.fs, units=rig.units or None, rows=rig.row_range()
     )
-    repairs: dict[str, Callable[[Record], Record]] = {
-        "clock": ss.repair_clock,
-        "gaps": ss.fill_gaps,
-        "missing": ss.fill_missing,
-        "clipping": ss.restore_clipped,
-        "drift": ss.remove_drift,
-    }
-    for word in rig.repair:
-        record = repairs[word](record)
-    return record
+    return ss.mend(record, repairs=rig.repair)
 
 
 @contextlib.contextmanager

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from stickslip.analysis import Comparison, Findings
 from stickslip.estimate import NORMAL_95, Estimate, decimals
 from stickslip.plot.style import prefixed
@@ -145,6 +147,6 @@ def _digits(sd: float, value: float) -> int:
 def _scale(estimate: Estimate) -> tuple[float, str, int]:
     """Factor, unit and decimals in which an estimate reads well."""
     share = "share" in estimate.name and estimate.unit == "1"
-    factor, text = (100.0, "%") if share else prefixed(estimate.value, estimate.unit)
+    factor, text = (100.0, "%") if share else prefixed(np.array([estimate.value, *estimate.interval]), estimate.unit)
     digits = _digits(factor * _sd(estimate), factor * estimate.value)
     return factor, "" if text == "1" else f" {text}", digits
