@@ -109,7 +109,7 @@ def table(
 def datasets(file: Any, notes: list[str]) -> Iterator[tuple[str, Any]]:
     """Each dataset of the file once, by path; links are reported, never followed."""
     h5py = optional("h5py")
-    seen: set[int] = set()
+    seen = {h5py.h5o.get_info(file.id).addr}
 
     def walk(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
         for name in group:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
 from stickslip.files import hdf5
@@ -20,6 +19,7 @@ NAME = "MATLAB"
 SUFFIXES = (".mat",)
 
 SIZES_V4 = (8, 4, 4, 2, 2, 1)  # bytes of a number, by its type in MAT version 4
+AN_OBJECT = "an object, such as a table or datetime"
 NUMERIC = ("double", "single", "int", "uint", "logical")
 SAVE_PLAIN = (
     "in MATLAB save it as plain arrays, for instance t = seconds(T.Time - T.Time(1)); x = T.x; save('run.mat','t','x')"
@@ -53,8 +53,9 @@ def _is_v73(head: bytes) -> bool:
 def _read_v5(path: Path, head: bytes) -> Table:
     from scipy.io import loadmat
 
+    objects: list[str] = []
     if head.startswith(b"MATLAB"):
-        check_version_5(path)
+        objects = check_version_5(path)
     else:
         with path.open("rb") as file:
             for end in _elements_v4(file):
@@ -64,11 +65,11 @@ def _read_v5(path: Path, head: bytes) -> Table:
         variables = loadmat(path, struct_as_record=True, squeeze_me=False)
     arrays: dict[str, Array] = {}
     constants: dict[str, float] = {}
-    left_out: list[str] = []
+    left_out = [f"{name} ({AN_OBJECT})" for name in objects if name]
     for name, value in _flat({key: value for key, value in variables.items() if not key.startswith("__")}):
         reason = _refusal(value)
         if reason is not None:
-            left_out.append(f"{_name_of(name, value)} ({reason})")
+            left_out += [] if name == "None" else [f"{name} ({reason})"]  # scipy's name for all objects together
         elif value.size == 1:
             constants[name] = float(value.item())
         else:
@@ -94,7 +95,7 @@ def _refusal(value: Any) -> str | None:
     from scipy.io.matlab import MatlabFunction, MatlabObject, MatlabOpaque
 
     if isinstance(value, (MatlabOpaque, MatlabObject)):
-        return "an object, such as a table or datetime"
+        return AN_OBJECT
     if isinstance(value, MatlabFunction):
         return "a function"
     if not isinstance(value, np.ndarray):
@@ -114,17 +115,6 @@ def _refusal_of(dtype: np.dtype[Any], shape: tuple[int, ...]) -> str | None:
     if len(shape) == 2 and min(shape) > hdf5.WIDEST:
         return f"a matrix of {shape[0]} x {shape[1]}"
     return None
-
-
-def _name_of(name: str, value: Any) -> str:
-    """scipy files objects under "None"; their own name is inside."""
-    own = value.dtype.names is not None and "s0" in value.dtype.names if isinstance(value, np.ndarray) else False
-    return _text(value["s0"]) or name if own else name
-
-
-def _text(value: NDArray[Any]) -> str:
-    item = value.ravel()[0] if value.size else ""
-    return item.decode("ascii", "replace") if isinstance(item, bytes) else str(item)
 
 
 def _order_v4(header: bytes) -> str | None:
@@ -195,7 +185,7 @@ def _refusal_v73(dataset: Any) -> str | None:
     kind = dataset.attrs.get("MATLAB_class", b"")
     kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
     if "MATLAB_object_decode" in dataset.attrs or "MATLAB_sparse" in dataset.parent.attrs:
-        return "sparse" if "MATLAB_sparse" in dataset.parent.attrs else "an object, such as a table or datetime"
+        return "sparse" if "MATLAB_sparse" in dataset.parent.attrs else AN_OBJECT
     if "MATLAB_empty" in dataset.attrs:
         return "empty"
     if dataset.dtype.kind == "O":

@@ -19,12 +19,11 @@ HEADER = 128
 DEEPEST = 64
 PIECE = 1 << 16
 
-# How many elements of numbers or text stand before the matrices inside an array of each class (after its flags,
-# dimensions and name); None where no matrix follows.
-BEFORE_MATRICES: dict[int, int | None] = {
-    1: 0, 2: 2, 3: 3, 16: 0, 17: 2,  # cell, struct, object, function, opaque
-    **dict.fromkeys(range(4, 16)),  # text, sparse, numbers
-}  # fmt: skip
+OPAQUE = 17
+# How many elements of numbers or text an array of each class holds after its flags, dimensions and name ...
+PLAIN_PARTS = {1: 0, 2: 2, 3: 3, 4: 1, 5: 3, **dict.fromkeys(range(6, 16), 1), 16: 0, OPAQUE: 2}
+HOLDS_ARRAYS = frozenset((1, 2, 3, 16, OPAQUE))  # ... and the classes where arrays follow: cell, struct, object ...
+COMPLEX = 1 << 11  # flag of an array with one more part
 
 
 class _Damaged(Exception):
@@ -85,8 +84,9 @@ class _Inflated:
         self.buffer += data
 
 
-def check_version_5(path: Path) -> None:
-    """Refuse a file whose elements do not fit into each other or into the file."""
+def check_version_5(path: Path) -> list[str]:
+    """Refuse a file whose elements do not fit into each other or into the file; the names of its objects."""
+    objects: list[str] = []
     size = path.stat().st_size
     with path.open("rb") as file:
         order = ">" if file.read(HEADER)[126:] == b"MI" else "<"
@@ -97,29 +97,30 @@ def check_version_5(path: Path) -> None:
                 if kind == COMPRESSED:
                     inside = _Inflated(stream, count)
                     inner, inner_count, _ = _tag(inside, order)
-                    _check(inside, order, inner, inner_count, 0)
+                    _check(inside, order, inner, inner_count, 0, objects)
                     inside.close()
                 else:
-                    _check(stream, order, kind, count, 0)
+                    _check(stream, order, kind, count, 0, objects)
         except _Damaged as damage:
             raise FormatError(
                 f"'{path.name}' {damage}, near byte {min(file.tell(), size)} of {size}",
                 "a MAT file is read whole or not at all",
                 "copy the file again from its source, or save it again in MATLAB",
             ) from damage
+    return objects
 
 
-def _tag(stream: _Plain | _Inflated, order: str) -> tuple[int, int, int]:
-    """Type of the next element, bytes that follow its tag, bytes of data."""
-    kind, count = struct.unpack(f"{order}II", stream.read(8))
-    if kind >> 16:  # a small element carries up to four bytes inside its tag
-        if kind >> 16 > 4:
-            raise _Damaged(f"holds a small element of {kind >> 16} bytes")
-        return kind & 0xFFFF, 0, kind >> 16
-    return kind, count, count
+def _tag(stream: _Plain | _Inflated, order: str) -> tuple[int, int, bytes]:
+    """Type of the next element, bytes that follow its tag, and the data that a small element has inside it."""
+    raw = stream.read(8)
+    kind, count = struct.unpack(f"{order}II", raw)
+    small = kind >> 16
+    if small > 4:
+        raise _Damaged(f"holds a small element of {small} bytes")
+    return (kind & 0xFFFF, 0, raw[4 : 4 + small]) if small else (kind, count, b"")
 
 
-def _check(stream: _Plain | _Inflated, order: str, kind: int, count: int, depth: int) -> None:
+def _check(stream: _Plain | _Inflated, order: str, kind: int, count: int, depth: int, objects: list[str]) -> None:
     """One variable: an array, with the arrays inside it."""
     if kind != MATRIX or depth > DEEPEST:
         raise _Damaged(f"holds an element of type {kind} at depth {depth} where an array belongs")
@@ -128,22 +129,31 @@ def _check(stream: _Plain | _Inflated, order: str, kind: int, count: int, depth:
     flags_kind, flags_count, _ = _tag(stream, order)
     if flags_kind != 6 or flags_count != 8:
         raise _Damaged("holds an array without its class")
-    array_class = struct.unpack(f"{order}II", stream.read(8))[0] & 0xFF
-    if array_class not in BEFORE_MATRICES:
+    flags = struct.unpack(f"{order}II", stream.read(8))[0]
+    array_class = flags & 0xFF
+    if array_class not in PLAIN_PARTS:
         raise _Damaged(f"holds an array of the unknown class {array_class}")
-    before = BEFORE_MATRICES[array_class]
-    names = 1 if array_class == 17 else 2  # dimensions and name; an opaque object has a name alone
-    left, number = count - 16, -names
+    plain, nested = PLAIN_PARTS[array_class], array_class in HOLDS_ARRAYS
+    plain += bool(flags & COMPLEX) and not nested and array_class != 4
+    left, number = count - 16, -1 if array_class == OPAQUE else -2  # dimensions and name; an object has no dimensions
     while left > 0:
-        kind, follows, size = _tag(stream, order)
+        kind, follows, small = _tag(stream, order)
         padded = follows + (-follows % 8)
         left -= 8 + padded
         if left < 0:
             raise _Damaged("holds an element that reaches beyond its array")
-        if before is not None and number >= before:
-            _check(stream, order, kind, follows, depth + 1)
-        elif kind not in NUMBERS or (number == -2 and size % 4):
+        if nested and number >= plain:
+            _check(stream, order, kind, follows, depth + 1, objects)
+        elif kind not in NUMBERS:
             raise _Damaged(f"holds an element of the unknown type {kind}")
+        elif array_class == OPAQUE and number == -1 and depth == 0:
+            objects.append(small.decode("ascii", "replace") + _text(stream, follows, padded))
         else:
             stream.skip(padded)
         number += 1
+    if number < plain or (number > plain and not nested):
+        raise _Damaged(f"holds an array of class {array_class} with {number} parts in place of {plain}")
+
+
+def _text(stream: _Plain | _Inflated, count: int, padded: int) -> str:
+    return stream.read(padded)[:count].decode("ascii", "replace") if count < PIECE else ""

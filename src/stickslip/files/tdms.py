@@ -23,6 +23,7 @@ LEAD_IN = 28  # bytes: tag, contents, version, length of the segment, length of 
 BIG_ENDIAN = 1 << 6
 MOST_SCALES = 1000  # of one channel; npTDMS looks for as many as the file states, one by one
 UNFINISHED = 0xFFFFFFFFFFFFFFFF
+NOT_CLOSED = "the program that wrote the file stopped without closing it; its last values may be lost"
 
 
 def recognise(path: Path, head: bytes) -> bool:
@@ -32,11 +33,12 @@ def recognise(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: Options) -> Table:
     """The numeric channels, with the clock and unit that their waveform properties state."""
-    notes = _check_segments(path)
+    unfinished = _check_segments(path)
+    notes = [NOT_CLOSED] if unfinished else []
     kept: dict[str, tuple[str, str]] = {}
     columns: list[Column] = []
     left_out: list[str] = []
-    with _opened(path, notes) as file:
+    with _opened(path, notes, unfinished) as file:
         channels = [channel for group in file.groups() for channel in group.channels()]
         _check_scales(path, [file, *file.groups(), *channels])
         names = unique([f"{channel.group_name}/{channel.name}" for channel in channels])
@@ -59,7 +61,7 @@ def read(path: Path, options: Options) -> Table:
     def blocks(names: Sequence[str], size: int) -> Iterator[Block]:
         rows = min((lengths[name] for name in names), default=0)
         origins: dict[str, np.datetime64] = {}
-        with _opened(path, []) as file:
+        with _opened(path, [], unfinished) as file:
             for first in range(0, rows, size):
                 count = min(size, rows - first)
                 part = {}
@@ -115,12 +117,12 @@ def _require(path: Path, name: str, whole: bool) -> None:
         )
 
 
-def _check_segments(path: Path) -> list[str]:
-    """Walk the segments by the lengths they state; refuse a file that ends inside one.
+def _check_segments(path: Path) -> bool:
+    """Walk the segments by the lengths they state; refuse a file that ends inside one. Whether the last is open.
 
     npTDMS reads what is left of a truncated file without saying so in its answer.
     """
-    size, position, notes = path.stat().st_size, 0, []
+    size, position = path.stat().st_size, 0
     with path.open("rb") as file:
         while position < size:
             file.seek(position)
@@ -130,12 +132,11 @@ def _check_segments(path: Path) -> list[str]:
             order = ">" if struct.unpack("<I", head[4:8])[0] & BIG_ENDIAN else "<"
             length, description = struct.unpack(f"{order}QQ", head[12:28])
             if length == UNFINISHED and position + LEAD_IN + description < size:
-                notes.append("the program that wrote the file stopped without closing it; its last values may be lost")
-                return notes
+                return True
             if position + LEAD_IN + length > size or description > length:
                 raise _cut_off(path, position, size)
             position += LEAD_IN + length
-    return notes
+    return False
 
 
 def _cut_off(path: Path, position: int, size: int) -> FormatError:
@@ -147,7 +148,7 @@ def _cut_off(path: Path, position: int, size: int) -> FormatError:
 
 
 @contextmanager
-def _opened(path: Path, notes: list[str]) -> Iterator[Any]:
+def _opened(path: Path, notes: list[str], unfinished: bool) -> Iterator[Any]:
     """The file by npTDMS, which logs what it doubts: lost data is refused, the rest becomes notes.
 
     It is given the open file, not the path: an index file beside it might belong to another recording.
@@ -157,13 +158,13 @@ def _opened(path: Path, notes: list[str]) -> Iterator[Any]:
     with doubts, reading(path, NAME), path.open("rb") as handle, nptdms.TdmsFile.open(handle) as file:
         yield file
     for doubt in dict.fromkeys(doubts.said):
-        if "multiple of the chunk size" in doubt or "Cropping" in doubt:
+        if ("multiple of the chunk size" in doubt or "Cropping" in doubt) and not unfinished:
             raise FormatError(
                 f"'{path.name}' is damaged: {doubt}",
                 "a TDMS file is read whole or not at all",
                 "copy the file again from the machine that wrote it",
             )
-        if "less data than expected" not in doubt:
+        if "less data than expected" not in doubt and "multiple of the chunk size" not in doubt:
             notes.append(f"npTDMS: {doubt}")
 
 
