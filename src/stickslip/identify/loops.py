@@ -13,6 +13,7 @@ from stickslip.estimate import Estimate
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
+    NOT_PERIODIC,
     PHASES,
     Cycles,
     Motion,
@@ -263,7 +264,7 @@ def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.in
 def _status(cycles: Cycles, forward: Estimate, back: Estimate, energy: Estimate) -> str:
     words = [] if forward.status == "ok" else [forward.status]
     if not cycles.periodic:
-        words.append("the motion is not periodic: a cycle runs from one onset of forward motion to the next")
+        words.append(NOT_PERIODIC)
     if forward.value + back.value < 0 or energy.value < 0:
         words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
     return "; ".join(words) or "ok"

@@ -21,7 +21,9 @@ LEAST = 32  # samples
 AUDIBLE = 5.0  # a speed of five standard deviations of its noise is motion
 CREEP = 0.04  # share of the typical peak speed below which presliding and creep are not told from sticking
 TURNED = 0.1  # share of the typical peak speed that the motion reaches before it counts as reversed
+NEARLY = 0.02  # of a period: a cycle that lacks no more is complete
 PERIODIC = 0.9  # share of the displacement's variance that repeats from cycle to cycle
+NOT_PERIODIC = "the motion is not periodic: a cycle runs from one onset of motion to the next"
 PHASES = 200  # points of a mean cycle
 ENOUGH = 65536  # samples for the search of a frequency; longer records are averaged in blocks
 
@@ -94,7 +96,7 @@ class Cycles:
 def contact_motion(record: Record, *, contact: str, question: str) -> Motion:
     """How do the two sides of the contact move against each other?
 
-    Against the ground: ``x`` (or ``theta``) and ``v``, differentiated from it where the record has none. Against the
+    Against the ground: ``x`` (or ``theta``) and ``v``, differentiated from it where it was not measured. Against the
     base: ``x - z`` and its derivative.
 
     Parameters
@@ -120,9 +122,9 @@ def contact_motion(record: Record, *, contact: str, question: str) -> Motion:
     if contact not in ("ground", "base"):
         raise EstimateError(f"contact = '{contact}'", "the mass slides on the ground or the base", "choose one of them")
     position = next((name for name in ("x", "theta") if name in record), "x")
-    based, timed = contact == "base", position not in record and "v" in record
+    based, timed = contact == "base", position not in record and is_measured(record, "v")
     names = ["v"] if timed else [position, *(["z"] if based else [])]
-    measured = ["v"] if "v" in record and not based and position == "x" else []
+    measured = ["v"] if is_measured(record, "v") and not based and position == "x" else []
     record.require_clean(*dict.fromkeys([*names, *measured]), question=question, samples=LEAST)
     if timed:
         displacement = np.concatenate([[0.0], np.cumsum((record["v"][1:] + record["v"][:-1]) / 2)]) / record.fs
@@ -157,7 +159,7 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | None = Non
     The forcing frequency is the strongest line of ``z``, ``force`` or the displacement, whichever the record has first,
     refined by least squares; a cycle begins where the fundamental of the displacement passes its mean upwards. If the
     displacement does not repeat (less than 90 % of its variance), a cycle runs from one onset of forward motion to
-    the next.
+    the next; of motion at all, where it never reverses.
 
     Parameters
     ----------
@@ -193,17 +195,19 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | None = Non
             return cycles
     edges = _onsets(motion)
     if len(edges) < 2:
+        edges = _departures(motion)
+    if len(edges) < 2:
         raise EstimateError(
             f"the motion of {len(motion.velocity) / motion.fs:.3g} s holds no complete cycle",
-            "a cycle goes forward, back, and forward again",
+            "a cycle goes forward, back, and forward again, or rests, slips, and slips again",
             "give a longer record, or frequency= if it is known",
         )
-    mean = mean_of_cycles("cycle", np.diff(edges) / motion.fs, unit="s", method="between onsets of forward motion")
+    mean = mean_of_cycles("cycle", np.diff(edges) / motion.fs, unit="s", method="between onsets of motion")
     rate = 1 / mean.value
     average = Estimate(
         "cycle frequency", rate, (max(0.0, rate - (mean.interval[1] - mean.value) * rate**2),
         rate + (mean.interval[1] - mean.value) * rate**2), mean.sd * rate**2, "Hz",
-        "cycles between onsets of forward motion", "the motion is not periodic", mean.checks,
+        "cycles between onsets of motion", "the motion is not periodic", mean.checks,
     )  # fmt: skip
     return Cycles(edges, average, False, _typical_peak(motion.velocity, edges))
 
@@ -245,18 +249,27 @@ def forcing_frequency(values: Array, fs: float) -> Estimate:
     spectrum = np.abs(rfft(level * np.hanning(count), size))
     first = max(1, size // count)  # one cycle in the record
     guess = (first + int(np.argmax(spectrum[first:]))) * rate / size
-    sd = math.inf
+    name, method, sd = "forcing frequency", "least-squares sine", math.inf
     for _ in range(12):
         turn = 2 * np.pi * guess * time
         wave = np.column_stack([np.cos(turn), np.sin(turn), trend])
         a, b = np.linalg.lstsq(wave, short, rcond=None)[0][:2]
         slope = 2 * np.pi * time * (b * wave[:, 0] - a * wave[:, 1])
-        fit = least_squares(np.column_stack([wave, slope]), short)
+        try:
+            fit = least_squares(np.column_stack([wave, slope]), short)
+        except EstimateError:  # about a cycle: a sine is not told from a trend
+            status = "too few cycles to tell the frequency from a trend"
+            return Estimate.normal(name, guess, sd=math.inf, unit="Hz", method=method, status=status)
         step, sd = float(fit.coefficients[-1]), float(fit.sd[-1])
         guess += float(np.clip(step, -0.2 * guess, 0.2 * guess))
         if abs(step) < 1e-3 * sd or abs(step) < 1e-12 * guess:
             break
-    return Estimate.normal("forcing frequency", guess, sd=sd, unit="Hz", method="least-squares sine")
+    return Estimate.normal(name, guess, sd=sd, unit="Hz", method=method)
+
+
+def is_measured(record: Record, name: str) -> bool:
+    """Whether the record has the channel, and not from :func:`friction_force`, which derives what was not measured."""
+    return name in record and record.channels[name].source != "friction_force"
 
 
 def stretches(inside: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -283,24 +296,39 @@ def _periodic_edges(motion: Motion, frequency: float) -> Array:
     phase = np.angle(np.vdot(np.exp(2j * np.pi * frequency * time), centred))  # x ~ cos(2 pi f t + phase)
     period = motion.fs / frequency
     first = ((-np.pi / 2 - phase) / (2 * np.pi)) % 1.0 * period  # rising through zero
-    return np.asarray(first + period * np.arange(math.floor((count - 1 - first) / period) + 1))
+    if period - first < NEARLY * period:
+        first -= period
+    edges = first + period * np.arange(math.floor((count - 1 - first) / period + NEARLY) + 1)
+    return np.asarray(np.clip(edges, 0, count - 1))
 
 
 def _repeats(cycles: Cycles, displacement: Array) -> bool:
     folded = cycles.folded(displacement)
-    if len(folded) < 2:
-        return True
+    if len(folded) < 2:  # all that can be told of one cycle is whether it closes
+        ends = np.interp(cycles.edges, np.arange(len(displacement)), displacement)
+        return bool(abs(ends[1] - ends[0]) <= (1 - PERIODIC) * np.ptp(folded))
     spread = float(np.mean(folded.var(axis=0, ddof=1)))
     return bool(spread <= (1 - PERIODIC) * displacement.var())
 
 
 def _onsets(motion: Motion) -> Array:
     """Where forward motion begins after motion back."""
-    fastest = float(np.quantile(np.abs(motion.velocity), 0.99))
-    direction = np.where(np.abs(motion.velocity) > max(TURNED * fastest, AUDIBLE * motion.noise), 1, 0)
-    moving = np.flatnonzero(direction)
+    moving = np.flatnonzero(np.abs(motion.velocity) > _definite(motion))
     signs = np.sign(motion.velocity[moving])
     return moving[1:][(signs[1:] > 0) & (signs[:-1] < 0)].astype(float)
+
+
+def _departures(motion: Motion) -> Array:
+    """Where motion begins after rest."""
+    speed, definite = np.abs(motion.velocity), _definite(motion)
+    state = np.flatnonzero((speed > definite) | (speed < definite * CREEP / TURNED))
+    fast = speed[state] > definite
+    return state[1:][fast[1:] & ~fast[:-1]].astype(float)
+
+
+def _definite(motion: Motion) -> float:
+    """Speed above which the contact moves without a doubt."""
+    return max(TURNED * float(np.quantile(np.abs(motion.velocity), 0.99)), AUDIBLE * motion.noise)
 
 
 def _typical_peak(velocity: Array, edges: Array) -> float:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
+from stickslip.identify.motion import is_measured
 from stickslip.identify.statistics import FEW_INDEPENDENT, LeastSquares, least_squares
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import Derivative, Filter, differentiate, smooth
@@ -158,17 +159,12 @@ def _signal(record: Record, signal: str | None, question: str) -> str:
     return name
 
 
-def _measured(record: Record, name: str) -> bool:
-    return name in record and record.channels[name].source not in ("friction_force", "differentiate")
-
-
 def _sources(record: Record, name: str, stiffness: bool, question: str) -> dict[str, tuple[Array, int]]:
     """For displacement (if asked for), velocity and acceleration: the channel it comes from and the order to take."""
     position = next((each for each in ("x", "theta") if each in record), "x")
-    if position not in record and "v" not in record:
+    known = [each for each in (position, "v", "a") if is_measured(record, each)]
+    if known in ([], ["a"]):
         record.require(position, question=question)
-    known = [each for each in (position, "v", "a") if each == position or _measured(record, each)]
-    known = [each for each in known if each in record]
     record.require_clean(*known, name, question=question, samples=LEAST)
     for each in known:
         if np.ptp(record[each]) == 0:
@@ -248,8 +244,8 @@ def _refuse_one_way(velocity: Array, rows: int, record: Record) -> None:
 def _noise_share(source: tuple[Array, int], smoother: Filter, fs: float, column: Array) -> float:
     """Share of noise in the power of the acceleration, which lowers the inertia by as much."""
     values, order = source
-    noise = noise_level(values, fs) * smoother.noise_gain(len(values), {order: 1.0})[len(values) // 2]
-    return float(noise**2 / np.mean(column**2))
+    passed = np.abs(smoother.response(np.linspace(0, fs / 2, 8193), {order: 1.0})) ** 2
+    return float(noise_level(values, fs) ** 2 * passed.mean() / np.mean(column**2))
 
 
 UNITS = {"inertia": "kg", "viscous": "N s/m", "coulomb": "N", "offset": "N", "stiffness": "N/m"}

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 FEW_CYCLES = 4  # below this an interval rests on three scatters or less
 FEW_INDEPENDENT = 8.0  # independent samples per coefficient, below which an interval is not to be trusted
+INSEPARABLE = 1e3  # condition number of columns of unit length; a force balance that can be read has less than 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +219,7 @@ def least_squares(design: ArrayLike, data: ArrayLike) -> LeastSquares:
     unit = columns / lengths
     inner = unit.T @ unit
     condition = math.sqrt(float(np.linalg.cond(inner)))
-    if condition > 1e6:
+    if condition > INSEPARABLE:
         raise EstimateError(
             f"the regression's condition number is {condition:.3g}",
             "the columns must be told apart",

@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.identify.motion import AUDIBLE, CREEP, Cycles, Motion, contact_motion, find_cycles, stretches
+from stickslip.identify.motion import (
+    AUDIBLE,
+    CREEP,
+    NOT_PERIODIC,
+    Cycles,
+    Motion,
+    contact_motion,
+    find_cycles,
+    stretches,
+)
 from stickslip.identify.statistics import mean_of_cycles
 from stickslip.record.record import Record
 
@@ -143,7 +152,7 @@ def find_sticks(
         f"velocity noise {motion.noise:.2g} {motion.unit}/s, threshold {limit:.3g} {motion.unit}/s {origin}",
         *_sensitivity(motion, cycles, limit),
     )
-    status = "ok" if cycles.periodic else "the motion is not periodic: a cycle runs between onsets of forward motion"
+    status = "ok" if cycles.periodic else NOT_PERIODIC
     if threshold is not None and threshold < noisy:
         status = f"the threshold is within the velocity's noise ({noisy:.3g} {motion.unit}/s is five deviations)"
     per_cycle = mean_of_cycles(
