@@ -179,7 +179,7 @@ _OPERATORS: dict[type, Callable[[float, float], float]] = {ast.Mult: operator.mu
 
 def _walk(node: ast.expr, arithmetic: str, named: Callable[[str], Linear]) -> Linear:
     match node:
-        case ast.Constant(value=int() | float() as value) if abs(value) < 1e300:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool) and abs(value) < 1e300:
             return Linear({}, float(value))
         case ast.Name(id=name):
             return named(name)

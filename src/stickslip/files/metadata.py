@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -67,7 +67,7 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
             channels,
             float(metadata["fs"]),
             start,
-            tuple(Step(**_restored(step)) for step in metadata["history"]),
+            history_of(metadata),
             stamps,
             _restored(metadata["truth"]),
         )
@@ -77,6 +77,42 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
             "a file written by write_record tells its channels, clock and history",
             "write the file again from its source",
         ) from error
+
+
+def columns_told(metadata: Mapping[str, Any], there: Collection[str]) -> list[str]:
+    """The columns that hold the record's samples, and its stamps where they were kept.
+
+    Raises
+    ------
+    FormatError
+        The metadata names none, or one that is not `there`.
+    """
+    entries = metadata.get("channels")
+    names = [entry.get("name") for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
+    names += [metadata.get("time")] if metadata.get("stamps") else []
+    missing = [str(name)[:40] for name in names if not isinstance(name, str) or name not in there]
+    if missing or not names:
+        raise FormatError(
+            f"the description of the record is damaged (it names {', '.join(missing) or 'no column'})",
+            f"the file has the columns {', '.join(there)}",
+            "write the file again from its source",
+        )
+    return [str(name) for name in names]
+
+
+def require_rows(metadata: Mapping[str, Any], found: int) -> None:
+    """Refuse a file that was cut short: its last number may be cut too."""
+    if metadata.get("rows") != found:
+        raise FormatError(
+            f"{found} rows where the description of the record says {str(metadata.get('rows'))[:20]}",
+            "a file written by write_record is whole",
+            "copy it again, or read what is there by naming channels=",
+        )
+
+
+def history_of(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
+    """The history that the metadata tells; empty where there is none."""
+    return tuple(Step(**_restored(step)) for step in metadata.get("history", ()))
 
 
 def parse_metadata(text: str | bytes) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, RecordError, StickslipError
 from stickslip.files.clock import Clock, fit_clock, resolution
-from stickslip.files.metadata import metadata_to_record
+from stickslip.files.metadata import columns_told, history_of, metadata_to_record, require_rows
 from stickslip.files.select import Columns, Source, TimeColumn, Wanted
 from stickslip.files.table import Block, Options
 from stickslip.record.record import Record, Step
@@ -180,6 +180,7 @@ class _Reading:
                 "check rows= and the file",
             )
         if self.restores:
+            require_rows(self.sources[0].table.record, length)
             return self._restored(data, 0)
         if (first, last) != (0, length):
             data = {key: values[first:last] for key, values in data.items()}
@@ -197,6 +198,8 @@ class _Reading:
                 fs = record.fs if fs is None and record.stamps is None else fs
             first += len(record)
             yield record
+        if self.restores:
+            require_rows(self.sources[0].table.record, first)
         if not first:
             raise RecordError(f"{self._names} has no rows", "at least one is needed", "check the file")
 
@@ -208,15 +211,11 @@ class _Reading:
     def _needed(self) -> list[list[str]]:
         """The columns to read of each file."""
         if self.restores:
-            told = self.sources[0].table.record
-            kept = [told.get("time")] if told.get("stamps") else []
-            entries = told.get("channels")
-            entries = entries if isinstance(entries, list) else []
-            names = [entry.get("name") for entry in entries if isinstance(entry, dict)]
-            there = {column.name for column in self.sources[0].table.columns}
-            return [[name for name in [*names, *kept] if name in there]]
+            table = self.sources[0].table
+            return [columns_told(table.record, [column.name for column in table.columns])]
         keys = [key for wanted in self.wanted for key in wanted.scales]
-        keys += [time.key for time in self.times.values()] if self.fs is None else []
+        if self.fs is None:
+            keys += [key for time in self.times.values() for key in (time.key, *time.twins)]
         return [list(dict.fromkeys(n for number, n in keys if number == i)) for i in range(len(self.sources))]
 
     def _raw(self, size: int) -> Iterator[dict[tuple[int, str], Array]]:
@@ -253,13 +252,15 @@ class _Reading:
         length = len(next(iter(data.values())))
         if self.fs is not None:
             return Clock(self.fs, first / self.fs)
-        found = []
+        found: list[tuple[Clock, float]] = []
         for number in range(len(self.sources)):
             rate = self._stated_rate(number)
             if number in self.times:
                 time = self.times[number]
-                fitted = fit_clock(data[time.key], time.scale, known)
-                found.append((fitted, resolution(_finite(data[time.key])) * time.scale))
+                _require_twins(self.sources[number].path.name, time, data)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    fitted = fit_clock(data[time.key], time.scale, known)
+                    found.append((fitted, resolution(_finite(data[time.key])) * time.scale))
             elif rate is not None:
                 found.append((Clock(rate[0], rate[1] + first / rate[0]), 0.0))
         if not found:
@@ -272,7 +273,8 @@ class _Reading:
         clock, rounding = found[0]
         for other, its_rounding in found[1:]:
             apart = float(np.nanmax(np.abs(_seconds(clock, length) - _seconds(other, length))))
-            if not apart <= max(rounding + its_rounding, 0.01 / clock.fs):
+            # rounding explains a difference, but not one of a tenth of a sample
+            if not apart <= min(max(rounding + its_rounding, 0.01 / clock.fs), 0.1 / clock.fs):
                 raise RecordError(
                     f"the clocks of {self._names} are up to {apart:.3g} s apart",
                     "files that are read together share one clock",
@@ -295,9 +297,11 @@ class _Reading:
         length = len(next(iter(samples.values())))
         outcome = f"{length} samples at {clock.fs:g} Hz"
         outcome += "" if clock.stamps is None else ", the time stamps not uniform and kept"
+        outcome += f", the time stamps within {clock.wander:.2g} s of uniform" if clock.wander else ""
         step = Step(action, arguments, "; ".join([outcome, *self.notes]))
         channels = {wanted.channel.name: wanted.channel for wanted in self.wanted}
-        return Record(samples, channels, clock.fs, clock.start, (step,), clock.stamps)
+        told = self.sources[0].table.record if len(self.sources) == 1 else {}
+        return Record(samples, channels, clock.fs, clock.start, (*history_of(told), step), clock.stamps)
 
 
 def _open(
@@ -440,6 +444,19 @@ def _combined(wanted: Wanted, data: Mapping[tuple[int, str], Array]) -> Array:
         values += wanted.offset
         values *= wanted.scale
     return values
+
+
+def _require_twins(file: str, time: TimeColumn, data: Mapping[tuple[int, str], Array]) -> None:
+    """Refuse a file whose columns of time differ from each other."""
+    mine = data[time.key]
+    for twin in time.twins:
+        apart = float(np.max(np.abs(data[twin] - mine)))
+        if apart > 0.1 * np.ptp(mine) / len(mine):
+            raise RecordError(
+                f"columns {time.key[1]} and {twin[1]} of '{file}' are up to {apart * time.scale:.3g} s apart",
+                "one record has one clock",
+                "name the one meant in time= and read the columns of the other apart",
+            )
 
 
 def _finite(values: Array) -> Array:

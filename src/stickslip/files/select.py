@@ -50,10 +50,11 @@ class Wanted:
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """The time column of a file and the seconds in its unit."""
+    """The time column of a file, the seconds in its unit, and columns of the same title that must agree with it."""
 
     key: Key
     scale: float
+    twins: tuple[Key, ...] = ()
 
 
 class Columns:
@@ -144,8 +145,8 @@ class Columns:
     def _title(self, column: Column, units: Mapping[str, str]) -> str:
         """A channel name for a column: a word of the vocabulary where name and unit fit one."""
         last = re.split(r"[/\\]", column.name)[-1]
-        word = last.lower() if len(last) > 1 else last
         unit = units.get(column.name, column.unit)
+        word = last.lower() if len(last) > 1 and unit else last  # "Friction" without unit may be a coefficient
         if word in VOCABULARY:
             try:
                 described(word, channel_unit(unit, word).si if unit else VOCABULARY[word].units[0])
@@ -194,12 +195,17 @@ class Columns:
                 named = [column for column in source.table.columns if is_time(column)]
                 best = min(named, key=_time_rank, default=None)
                 unit = units.get(best.name, best.unit or "s") if best else "s"
-                found = TimeColumn((number, best.name), parse_unit(unit, expect="s").scale) if best else None
+                found = self._time_column(number, best, named, unit) if best else None
             if found:
                 times[number] = found
         if asked is not None and not times:
             raise unknown("time column", asked, [name for _, name in self.columns])
         return times
+
+    def _time_column(self, number: int, best: Column, named: Sequence[Column], unit: str) -> TimeColumn:
+        twins = [column.name for column in named if re.fullmatch(re.escape(best.name) + r"_\d+", column.name)]
+        scale = parse_unit(unit, expect="s").scale
+        return TimeColumn((number, best.name), scale, tuple((number, name) for name in twins))
 
     def _asked_time(self, number: int, asked: str, units: Mapping[str, str]) -> TimeColumn | None:
         spec = split_spec(asked)

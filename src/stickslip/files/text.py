@@ -159,7 +159,7 @@ def _first_fault(path: Path, layout: Layout, indexes: Sequence[int]) -> tuple[in
             cells = split(text, layout.delimiter)
             wanted = [cells[index] for index in indexes if index < len(cells)]
             fits = all(is_number(c, layout.decimal) or is_missing(c) or CLOCK.fullmatch(c) for c in wanted)
-            if not fits or any(cells[len(layout.names) :]):
+            if not fits or any(cells[len(layout.names) :]) or line.count('"') % 2:
                 return number, line.strip()[:60]
     return None
 
@@ -170,6 +170,7 @@ class _Seconds:
     def __init__(self, file: str, column: str) -> None:
         self.file, self.column = file, column
         self.first: float | None = None
+        self.day: float | None = None
         self.last = -np.inf
         self.days = 0.0
 
@@ -182,7 +183,10 @@ class _Seconds:
         if len(wrong):
             raise ValueError(f"'{text.iloc[wrong[0]]}' is no clock time")
         if parts[0].notna().any():
-            seconds = seconds + DAY * parts[0].map(_day_number, na_action="ignore").to_numpy(dtype=np.float64)
+            days = parts[0].map(_day_number, na_action="ignore").to_numpy(dtype=np.float64)
+            if self.day is None:
+                self.day = float(days[np.isfinite(days)][0])
+            seconds = seconds + DAY * (days - self.day)
         else:
             seconds = self._past_midnight(seconds)
         if self.first is None:
