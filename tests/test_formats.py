@@ -360,6 +360,15 @@ def test_matlab_shapes(tmp_path: Path) -> None:
         assert word in table.notes[0]
 
 
+@pytest.mark.parametrize(("word", "number"), [("fs", 250.0), ("Fs", 250.0), ("dt", 0.004)])
+def test_a_rate_beside_the_vectors_is_taken(tmp_path: Path, word: str, number: float) -> None:
+    old, new = tmp_path / "rate.mat", tmp_path / "rate.h5"
+    scipy.io.savemat(old, {"x": X[:, 0], word: number})
+    with h5py.File(new, "w") as file:
+        file["x"], file[word] = X[:, 0], number
+    assert [column.fs for path in (old, new) for column in read(path).columns] == [250.0, 250.0]
+
+
 def opaque(name: str, of: str) -> bytes:
     """An object of MATLAB (table, datetime), as version 5 files hold it."""
 

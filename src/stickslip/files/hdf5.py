@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +103,7 @@ def table(
                 part = slice(first, min(first + size, rows))
                 yield {name: sources[name].read(file, part) for name in names}
 
-    return Table(tuple(columns), blocks, dict(constants), tuple(notes), record or {})
+    return Table(with_rate(columns, constants), blocks, dict(constants), tuple(notes), record or {})
 
 
 def datasets(file: Any, notes: list[str]) -> Iterator[tuple[str, Any]]:
@@ -200,10 +200,18 @@ def _unit(attributes: Any) -> str | None:
 
 def _rate(dataset: Any) -> float | None:
     """Sampling rate [Hz] from the attributes of the dataset, its group, or the file."""
-    for place in (dataset, dataset.parent, dataset.file):
-        stated = _numbers(place.attrs)
-        rates = [stated[word] for word in RATE_WORDS if word in stated]
-        rates += [1 / stated[word] for word in STEP_WORDS if stated.get(word, 0.0) > 0]
-        if rates and np.isfinite(rates[0]) and rates[0] > 0:
-            return rates[0]
-    return None
+    places = (dataset, dataset.parent, dataset.file)
+    return next((rate for place in places if (rate := stated_rate(_numbers(place.attrs)))), None)
+
+
+def stated_rate(numbers: Mapping[str, float]) -> float | None:
+    """The sampling rate [Hz] among named numbers, by the names in use."""
+    rates = [numbers[word] for word in RATE_WORDS if word in numbers]
+    rates += [1 / numbers[word] for word in STEP_WORDS if numbers.get(word, 0.0) > 0]
+    return next((rate for rate in rates if np.isfinite(rate) and rate > 0), None)
+
+
+def with_rate(columns: Sequence[Column], constants: Mapping[str, float]) -> tuple[Column, ...]:
+    """The columns, those without a rate at the one that stands among the file's constants."""
+    rate = stated_rate(constants)
+    return tuple(replace(column, fs=rate) if column.fs is None else column for column in columns)

@@ -76,7 +76,7 @@ def _read_v5(path: Path, head: bytes) -> Table:
             for column, axis, line, _ in hdf5.matrix_lines(name, value.shape, square=0):
                 lines = value if axis == 0 else value.T
                 arrays[column] = np.asarray(lines if line is None else lines[:, line], dtype=np.float64)
-    columns = tuple(Column(name, rows=len(values)) for name, values in arrays.items())
+    columns = hdf5.with_rate([Column(name, rows=len(values)) for name, values in arrays.items()], constants)
     _require_columns(path, columns, left_out)
     return Table(columns, slices(arrays), constants, _notes(left_out))
 
