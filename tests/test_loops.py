@@ -142,6 +142,9 @@ def test_a_contact_on_the_base_is_measured_against_it():
     work = friction_loops(carried, contact="base").energy_per_cycle.value
     assert work == pytest.approx(4 * 1.5 * REACH, rel=0.01)
     assert friction_loops(carried).energy_per_cycle.value > 1.5 * work  # the ground moves more than the base
+    balanced = friction_force(carried, mass=1.0, stiffness=100.0, contact="base")
+    told = friction_loops(balanced)
+    assert np.array_equal(told.displacement, friction_loops(balanced, contact="base").displacement)
 
 
 def test_wrong_sign_is_said():

@@ -74,8 +74,9 @@ def test_a_frequency_out_of_range_or_a_line_is_refused():
         cycles_of({"x": x}, frequency=400)
     with pytest.raises(EstimateError, match="no complete cycle"):
         cycles_of({"x": t})
-    with pytest.raises(EstimateError, match="no complete cycle"):
-        cycles_of({"x": x}, frequency=0.05)
+    for frequency in (0.05, 0.0, -1.0, math.nan):
+        with pytest.raises(EstimateError, match=r"gives no complete cycle in 10 s"):
+            cycles_of({"x": x}, frequency=frequency)
 
 
 def test_stretches_and_margins():

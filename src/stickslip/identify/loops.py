@@ -101,7 +101,9 @@ class Loops:
     status: str
 
 
-def friction_loops(record: Record, *, contact: str = "ground", frequency: float | None = None, bins: int = 40) -> Loops:
+def friction_loops(
+    record: Record, *, contact: str | None = None, frequency: float | None = None, bins: int = 40
+) -> Loops:
     r"""How much friction, forward and back, over each cycle, and how does it change with speed?
 
     Per cycle, sliding forward (back), the level is the median of the friction in which every sample counts by its
@@ -115,8 +117,9 @@ def friction_loops(record: Record, *, contact: str = "ground", frequency: float 
     ----------
     record : Record
         With ``friction`` and ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base.
-    contact : {"ground", "base"}
-        What the mass slides on: the loops are over the displacement against it.
+    contact : {"ground", "base"}, optional
+        What the mass slides on, the loops being over the displacement against it; as :func:`friction_force` was told,
+        or the ground, when not given.
     frequency : float, optional
         Forcing frequency [Hz]; found from the record when not given.
     bins : int

@@ -93,7 +93,7 @@ class Cycles:
         return np.interp(at, np.arange(len(values)), values)
 
 
-def contact_motion(record: Record, *, contact: str, question: str) -> Motion:
+def contact_motion(record: Record, *, contact: str | None, question: str) -> Motion:
     """How do the two sides of the contact move against each other?
 
     Against the ground: ``x`` (or ``theta``) and ``v``, differentiated from it where it was not measured. Against the
@@ -103,8 +103,8 @@ def contact_motion(record: Record, *, contact: str, question: str) -> Motion:
     ----------
     record : Record
         With ``x`` or ``theta``, or ``v`` alone, whose integral is then the displacement.
-    contact : {"ground", "base"}
-        What the mass slides on.
+    contact : {"ground", "base"}, optional
+        What the mass slides on; as :func:`friction_force` was told, or the ground, when not given.
     question : str
         Who asks, for the errors.
 
@@ -119,6 +119,9 @@ def contact_motion(record: Record, *, contact: str, question: str) -> Motion:
     EstimateError
         Nothing moves.
     """
+    if contact is None:
+        told = [step.arguments.get("contact") for step in record.history if step.action == "friction_force"]
+        contact = str(told[-1]) if told else "ground"
     if contact not in ("ground", "base"):
         raise EstimateError(f"contact = '{contact}'", "the mass slides on the ground or the base", "choose one of them")
     position = next((name for name in ("x", "theta") if name in record), "x")
@@ -179,37 +182,23 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | None = Non
     EstimateError
         Not one complete cycle.
     """
-    if frequency is not None and not 0 < frequency < motion.fs / 2:
-        raise EstimateError(
-            f"frequency = {frequency} Hz", f"it lies between 0 and half the rate, {motion.fs / 2:g} Hz", "give it in Hz"
-        )
-    if frequency is not None:
-        found = Estimate.normal("forcing frequency", frequency, sd=0.0, unit="Hz", method="given")
-    else:
+    if frequency is None:
         reference = next((name for name in ("z", "force") if name in record and _moves(record[name])), "")
         found = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
-    edges = _periodic_edges(motion, found.value)
-    if len(edges) >= 2:
-        cycles = Cycles(edges, found, True, _typical_peak(motion.velocity, edges))
-        if frequency is not None or _repeats(cycles, motion.displacement):
-            return cycles
-    edges = _onsets(motion)
-    if len(edges) < 2:
-        edges = _departures(motion)
-    if len(edges) < 2:
+        cycles = _periodic(motion, found)
+        return cycles if cycles is not None and _repeats(cycles, motion.displacement) else _aperiodic(motion)
+    duration = len(motion.displacement) / motion.fs
+    cycles = None
+    if 1 / duration <= frequency < motion.fs / 2:
+        given = Estimate.normal("forcing frequency", frequency, sd=0.0, unit="Hz", method="given")
+        cycles = _periodic(motion, given)
+    if cycles is None:
         raise EstimateError(
-            f"the motion of {len(motion.velocity) / motion.fs:.3g} s holds no complete cycle",
-            "a cycle goes forward, back, and forward again, or rests, slips, and slips again",
-            "give a longer record, or frequency= if it is known",
+            f"frequency = {frequency} Hz gives no complete cycle in {duration:.3g} s",
+            f"it lies between one cycle in the record and half the rate, {motion.fs / 2:g} Hz",
+            "give it in Hz, or leave it out",
         )
-    mean = mean_of_cycles("cycle", np.diff(edges) / motion.fs, unit="s", method="between onsets of motion")
-    rate = 1 / mean.value
-    average = Estimate(
-        "cycle frequency", rate, (max(0.0, rate - (mean.interval[1] - mean.value) * rate**2),
-        rate + (mean.interval[1] - mean.value) * rate**2), mean.sd * rate**2, "Hz",
-        "cycles between onsets of motion", "the motion is not periodic", mean.checks,
-    )  # fmt: skip
-    return Cycles(edges, average, False, _typical_peak(motion.velocity, edges))
+    return cycles
 
 
 def forcing_frequency(values: Array, fs: float) -> Estimate:
@@ -289,17 +278,37 @@ def _moves(values: Array) -> bool:
     return bool(np.isfinite(values).all() and np.ptp(values) > 0)
 
 
-def _periodic_edges(motion: Motion, frequency: float) -> Array:
+def _periodic(motion: Motion, frequency: Estimate) -> Cycles | None:
+    """Cycles of one length, from where the displacement's fundamental passes its mean upwards."""
     count = len(motion.displacement)
     time = np.arange(count) / motion.fs
     centred = motion.displacement - motion.displacement.mean()
-    phase = np.angle(np.vdot(np.exp(2j * np.pi * frequency * time), centred))  # x ~ cos(2 pi f t + phase)
-    period = motion.fs / frequency
-    first = ((-np.pi / 2 - phase) / (2 * np.pi)) % 1.0 * period  # rising through zero
+    phase = np.angle(np.vdot(np.exp(2j * np.pi * frequency.value * time), centred))  # x ~ cos(2 pi f t + phase)
+    period = motion.fs / frequency.value
+    first = ((-np.pi / 2 - phase) / (2 * np.pi)) % 1.0 * period
     if period - first < NEARLY * period:
         first -= period
     edges = first + period * np.arange(math.floor((count - 1 - first) / period + NEARLY) + 1)
-    return np.asarray(np.clip(edges, 0, count - 1))
+    edges = np.clip(edges, 0, count - 1)
+    return Cycles(edges, frequency, True, _typical_peak(motion.velocity, edges)) if len(edges) >= 2 else None
+
+
+def _aperiodic(motion: Motion) -> Cycles:
+    """Cycles between onsets of forward motion, or of motion where it never reverses."""
+    edges = next((found for found in (_onsets(motion), _departures(motion)) if len(found) >= 2), None)
+    if edges is None:
+        raise EstimateError(
+            f"the motion of {len(motion.velocity) / motion.fs:.3g} s holds no complete cycle",
+            "a cycle goes forward, back, and forward again, or rests, slips, and slips again",
+            "give a longer record, or frequency= if it is known",
+        )
+    mean = mean_of_cycles("cycle", np.diff(edges) / motion.fs, unit="s", method="")
+    longest, shortest = mean.interval[1], mean.interval[0]
+    average = Estimate(
+        "cycle frequency", 1 / mean.value, (1 / longest, 1 / shortest if shortest > 0 else math.inf),
+        mean.sd / mean.value**2, "Hz", "cycles between onsets of motion", "the motion is not periodic", mean.checks,
+    )  # fmt: skip
+    return Cycles(edges, average, False, _typical_peak(motion.velocity, edges))
 
 
 def _repeats(cycles: Cycles, displacement: Array) -> bool:

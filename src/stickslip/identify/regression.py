@@ -33,7 +33,7 @@ class Regression:
     ----------
     inertia : Estimate
         Moving mass [kg], or moment of inertia [kg m^2] where the motion is an angle.
-    viscous, coulomb : Estimate or None
+    viscous, coulomb : Estimate
         Force per speed [N s/m], and dry friction [N]; the mean of both directions where they were let differ.
     offset : Estimate or None
         Constant force [N]; None in the asymmetric regression, which can not tell it from uneven dry friction.

@@ -85,7 +85,7 @@ class Sticks:
 
 
 def find_sticks(
-    record: Record, *, contact: str = "ground", threshold: float | None = None, frequency: float | None = None
+    record: Record, *, contact: str | None = None, threshold: float | None = None, frequency: float | None = None
 ) -> Sticks:
     """When does the contact stick, for what share of the time, how often per cycle?
 
@@ -100,8 +100,9 @@ def find_sticks(
     ----------
     record : Record
         With ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base.
-    contact : {"ground", "base"}
-        What the mass slides on: the speed is against it.
+    contact : {"ground", "base"}, optional
+        What the mass slides on, the speed being that against it; as :func:`friction_force` was told, or the ground,
+        when not given.
     threshold : float, optional
         Speed [m/s or rad/s] below which the contact may stick; found from the record when not given.
     frequency : float, optional
