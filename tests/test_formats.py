@@ -431,6 +431,56 @@ def test_real_tdms_clocks(dataset: Formats) -> None:
     assert np.allclose(sine, np.sin(2 * np.pi * np.arange(128) / 128), atol=1e-12)
 
 
+def test_scenarios_of_nptdms(tmp_path: Path) -> None:
+    """Every layout that npTDMS tests itself with: interleaved, text between, cut by a crash, reused headers."""
+    scenarios = pytest.importorskip("nptdms.test.scenarios").get_scenarios()
+    assert len(scenarios) > 20
+    path = tmp_path / "scenario.tdms"
+    for scenario in scenarios:
+        generated, expected = scenario.values
+        path.write_bytes(generated.get_bytes_io_file().read())
+        plain = {f"{group}/{name}": np.asarray(values) for (group, name), values in expected.items()}
+        plain = {name: values for name, values in plain.items() if values.dtype.kind in "fiub" and len(values)}
+        if not plain:  # text and complex numbers alone
+            continue
+        table = read(path)
+        for name, values in plain.items():
+            got = np.concatenate([block[name] for block in table.blocks([name], 3)])
+            assert np.array_equal(got, values.astype(float)), scenario.id
+        if "less_data" in scenario.id or "incomplete" in scenario.id:
+            assert table.notes, scenario.id
+
+
+def test_daqmx_with_and_without_its_scaling(tmp_path: Path) -> None:
+    daqmx, made = pytest.importorskip("nptdms.test.test_daqmx"), pytest.importorskip("nptdms.test.util")
+
+    def text(words: str) -> tuple[int, str]:
+        return 0x20, made.hexlify_value("<I", len(words)) + made.string_hexlify(words)
+
+    scaling = {
+        "NI_Number_Of_Scales": (3, made.hexlify_value("<i", 2)),
+        "NI_Scale[1]_Scale_Type": text("Linear"),
+        "NI_Scale[1]_Linear_Slope": (10, made.hexlify_value("<d", 0.5)),
+        "NI_Scale[1]_Linear_Y_Intercept": (10, made.hexlify_value("<d", -1.0)),
+        "NI_Scale[1]_Linear_Input_Source": (3, made.hexlify_value("<i", 0)),
+    }
+    path = tmp_path / "daqmx.tdms"
+    for properties in (scaling, None):
+        channels = [
+            daqmx.daqmx_channel_metadata(f"ai{n}", 4, [4], [daqmx.daqmx_scaler_metadata(0, 3, 2 * n)], properties)
+            for n in (0, 1)
+        ]
+        file = made.GeneratedFile()
+        metadata = made.segment_objects_metadata(made.root_metadata(), made.group_metadata(), *channels)
+        file.add_segment(daqmx.segment_toc(), metadata, "01 00 11 00 02 00 12 00 03 00 13 00 04 00 14 00")
+        path.write_bytes(file.get_bytes_io_file().read())
+        if properties:
+            assert np.array_equal(whole(read(path), size=3)["Group/ai1"], 0.5 * np.arange(17, 21) - 1)
+        else:
+            with pytest.raises(FormatError, match="raw DAQmx data without its scaling"):
+                read(path)
+
+
 def test_tdms_dates_become_seconds_and_text_is_left_out(tmp_path: Path) -> None:
     path = tmp_path / "dates.tdms"
     dates = np.datetime64("2024-01-24T01:48:43.068614") + np.arange(6) * np.timedelta64(2500, "us")

@@ -33,18 +33,18 @@ def recognise(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: Options) -> Table:
     """The numeric channels, with the clock and unit that their waveform properties state."""
-    unfinished = _check_segments(path)
-    notes = [NOT_CLOSED] if unfinished else []
+    notes = [NOT_CLOSED] if _check_segments(path) else []
     kept: dict[str, tuple[str, str]] = {}
     columns: list[Column] = []
     left_out: list[str] = []
-    with _opened(path, notes, unfinished) as file:
+    with _opened(path, notes) as file:
         channels = [channel for group in file.groups() for channel in group.channels()]
         _check_scales(path, [file, *file.groups(), *channels])
         names = unique([f"{channel.group_name}/{channel.name}" for channel in channels])
         for name, channel in zip(names, channels, strict=True):
             if len(channel) == 0 or channel.dtype.kind not in "fiubM":
-                left_out.append(f"{name} ({'empty' if len(channel) == 0 else channel.dtype})")
+                reason = "raw DAQmx data without its scaling" if channel.dtype.kind == "V" else channel.dtype
+                left_out.append(f"{name} ({reason if len(channel) else 'empty'})")
                 continue
             kept[name] = (channel.group_name, channel.name)
             columns.append(_column(name, channel))
@@ -61,7 +61,7 @@ def read(path: Path, options: Options) -> Table:
     def blocks(names: Sequence[str], size: int) -> Iterator[Block]:
         rows = min((lengths[name] for name in names), default=0)
         origins: dict[str, np.datetime64] = {}
-        with _opened(path, [], unfinished) as file:
+        with _opened(path, []) as file:
             for first in range(0, rows, size):
                 count = min(size, rows - first)
                 part = {}
@@ -148,8 +148,8 @@ def _cut_off(path: Path, position: int, size: int) -> FormatError:
 
 
 @contextmanager
-def _opened(path: Path, notes: list[str], unfinished: bool) -> Iterator[Any]:
-    """The file by npTDMS, which logs what it doubts: lost data is refused, the rest becomes notes.
+def _opened(path: Path, notes: list[str]) -> Iterator[Any]:
+    """The file by npTDMS; what it doubts, as a last chunk with fewer values than it states, becomes notes.
 
     It is given the open file, not the path: an index file beside it might belong to another recording.
     """
@@ -157,15 +157,7 @@ def _opened(path: Path, notes: list[str], unfinished: bool) -> Iterator[Any]:
     doubts = _Doubts()
     with doubts, reading(path, NAME), path.open("rb") as handle, nptdms.TdmsFile.open(handle) as file:
         yield file
-    for doubt in dict.fromkeys(doubts.said):
-        if ("multiple of the chunk size" in doubt or "Cropping" in doubt) and not unfinished:
-            raise FormatError(
-                f"'{path.name}' is damaged: {doubt}",
-                "a TDMS file is read whole or not at all",
-                "copy the file again from the machine that wrote it",
-            )
-        if "less data than expected" not in doubt and "multiple of the chunk size" not in doubt:
-            notes.append(f"npTDMS: {doubt}")
+    notes += [f"npTDMS: {doubt}" for doubt in dict.fromkeys(doubts.said)]
 
 
 class _Doubts(logging.Handler):
