@@ -84,9 +84,12 @@ class Findings:
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number found, in the order of asking."""
         level = [self.coefficient] if self.coefficient is not None else []
-        answers = (self.loops, self.sticks, self.regression, self.asymmetric)
+        answers = (self.loops, self.regression, self.asymmetric, self.sticks)
         found = [*level, *(estimate for answer in answers for estimate in _estimates_of(answer))]
-        return tuple({estimate.name: estimate for estimate in reversed(found)}.values())[::-1]
+        first: dict[str, Estimate] = {}
+        for estimate in found:
+            first.setdefault(estimate.name, estimate)
+        return tuple(first.values())
 
     def true_value(self, estimate: Estimate) -> float | None:
         """The true value of what was estimated, where the record is simulated and tells it."""

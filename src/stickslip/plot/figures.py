@@ -89,7 +89,8 @@ def figures(result: Findings | Comparison) -> tuple[Plate, ...]:
 
 def _of_findings(findings: Findings) -> list[Plate]:
     plates, near = [], close_up(findings)
-    stuck = " Grey: the contact sticks." if findings.sticks is not None and findings.sticks.events else ""
+    sticks = findings.sticks is not None and any(event.kind == "stick" for event in findings.sticks.events)
+    stuck = " Grey: the contact sticks." if sticks else ""
     if findings.loops is not None:
         plates += [
             _plate(
@@ -105,6 +106,14 @@ def _of_findings(findings: Findings) -> list[Plate]:
                 "between cycles.",
             ),
         ]  # fmt: skip
+    if findings.regression is not None:
+        plates.append(
+            _plate(
+                "regression", plot_regression(findings), "Does the friction model explain the force?",
+                "Top: the measured force and the force that inertia, viscous and dry friction together give. Bottom: "
+                "what is left over; a pattern there is friction that the model does not hold.",
+            )
+        )  # fmt: skip
     plates.append(
         _plate("record", plot_traces(findings), "The record", f"Every channel used, over the whole time.{stuck}")
     )
@@ -121,18 +130,10 @@ def _of_findings(findings: Findings) -> list[Plate]:
                 + stuck,
             )
         )  # fmt: skip
-    if findings.sticks is not None and findings.sticks.events:
+    if sticks:
         plates.append(
             _plate("sticks", plot_sticks(findings), "How long it sticks and slips",
                    "Each mark is one stretch of sticking or slipping; the bars count how often each duration occurred.")
-        )  # fmt: skip
-    if findings.regression is not None:
-        plates.append(
-            _plate(
-                "regression", plot_regression(findings), "Does the friction model explain the force?",
-                "Top: the measured force and the force that inertia, viscous and dry friction together give. Bottom: "
-                "what is left over; a pattern there is friction that the model does not hold.",
-            )
         )  # fmt: skip
     return plates
 

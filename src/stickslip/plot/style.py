@@ -20,11 +20,11 @@ Drawn = TypeVar("Drawn")
 # Okabe and Ito's palette, told apart by the colour blind; ink and grid follow the page's colours in a report.
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#b0559b", "#56b4e9"
 INK, FAINT, SHADE = "#1f2933", "#9aa5b1", "#c8d0da"
-WIDTH = 7.2  # inch: the report's text width
+WIDTH = 6.2  # inch: narrow enough that the letters stay readable on a phone
 COLUMNS = 1200  # of a min-max envelope: beyond the pixels of a figure
 STYLE: Any = {
-    "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"], "font.size": 10,
-    "axes.labelsize": 10, "axes.titlesize": 11, "xtick.labelsize": 9, "ytick.labelsize": 9, "legend.fontsize": 9,
+    "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"], "font.size": 9,
+    "axes.labelsize": 9, "axes.titlesize": 10, "xtick.labelsize": 8, "ytick.labelsize": 8, "legend.fontsize": 8,
     "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "xtick.color": INK, "ytick.color": INK,
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": FAINT, "grid.alpha": 0.3,
     "grid.linewidth": 0.6, "axes.axisbelow": True, "lines.linewidth": 1.3, "legend.frameon": False,

@@ -93,7 +93,7 @@ def render(sections: Sequence[Section]) -> str:
         loader=PackageLoader("stickslip.reports"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters.update(inline_svg=inline_svg, told=told)
+    environment.filters.update(inline_svg=inline_svg, told=told, spelled=style.spelled)
     return environment.get_template(TEMPLATE).render(sections=sections, version=__version__)
 
 

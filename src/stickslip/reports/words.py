@@ -70,8 +70,6 @@ def cautions(findings: Findings) -> list[str]:
 def _of_findings(findings: Findings) -> Iterator[str]:
     if findings.loops is not None:
         yield from _of_loops(findings)
-    if findings.sticks is not None:
-        yield from _of_sticks(findings)
     found = findings.regression
     if found is not None and found.viscous is not None and found.coulomb is not None:
         share = f"; {100 * found.residual:.1f} % of it is left unexplained" if math.isfinite(found.residual) else ""
@@ -79,6 +77,8 @@ def _of_findings(findings: Findings) -> Iterator[str]:
             f"An inertia of {value_of(found.inertia)}, viscous friction of {value_of(found.viscous)} and dry friction "
             f"of {value_of(found.coulomb)} explain the measured force{share}."
         )
+    if findings.sticks is not None:
+        yield from _of_sticks(findings)
 
 
 def _of_loops(findings: Findings) -> Iterator[str]:
