@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import stickslip as ss
-from stickslip.files.clock import fit_clock
 from stickslip.files.expression import linear, split_spec
+from stickslip.record.clock import fit_clock
 from stickslip.units import POUND_FORCE
 
 AUDIO = (

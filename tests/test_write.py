@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import stickslip as ss
-from stickslip.files.metadata import KEY
+from stickslip.record.metadata import KEY
 
 SUFFIXES = [".csv", ".h5", ".hdf5", ".parquet"]
 

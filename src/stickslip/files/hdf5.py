@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import FormatError
-from stickslip.files.metadata import KEY, parse_metadata
 from stickslip.files.table import Array, Block, Column, Options, Table, optional, reading
+from stickslip.record.metadata import KEY, parse_metadata
 
 NAME = "HDF5"
 SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5", ".nc")

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, RecordError, StickslipError
-from stickslip.files.clock import Clock, fit_clock, resolution
-from stickslip.files.metadata import columns_told, history_of, metadata_to_record, require_rows
 from stickslip.files.select import Columns, Source, TimeColumn, Wanted
 from stickslip.files.table import Block, Options
+from stickslip.record.clock import Clock, fit_clock, resolution
+from stickslip.record.metadata import columns_told, history_of, metadata_to_record, require_rows
 from stickslip.record.record import Record, Step
 
 Array = NDArray[np.float64]

@@ -110,6 +110,12 @@ def reading(path: Path, kind: str) -> Iterator[None]:
         yield
     except StickslipError:
         raise
+    except MemoryError as error:
+        raise FormatError(
+            f"'{path.name}' asks for more memory than there is",
+            "columns are held whole unless they are read in blocks; a damaged file may state absurd sizes",
+            "name fewer channels=, or go through the file with read_blocks()",
+        ) from error
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
         raise FormatError(

@@ -26,8 +26,8 @@ from stickslip.files.layout import (
     is_number,
     split,
 )
-from stickslip.files.metadata import KEY, parse_metadata
 from stickslip.files.table import Block, Column, Options, Table
+from stickslip.record.metadata import KEY, parse_metadata
 
 if TYPE_CHECKING:
     import pandas as pd

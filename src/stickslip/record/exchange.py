@@ -22,7 +22,7 @@ from stickslip.record.clock import Clock, fit_clock
 from stickslip.record.metadata import (
     KEY,
     channel_names,
-    metadata_to_history,
+    history_of,
     metadata_to_record,
     parse_metadata,
     record_to_metadata,
@@ -394,7 +394,7 @@ def _received(
     outcome = f"{len(arrays)} channels of {len(record)} samples at {record.fs:g} Hz"
     if clock.stamps is not None:
         outcome += "; the time stamps are not uniform and were kept"
-    before = metadata_to_history(metadata) if metadata else ()
+    before = history_of(metadata) if metadata else ()
     return replace(
         record,
         channels={name: replace(channel, source=sources[name]) for name, channel in record.channels.items()},

@@ -1,9 +1,9 @@
-"""What a file by write_record says of its Record beside the samples: one JSON text, the same in every format."""
+"""What a Record says of itself beside its samples: one JSON text, the same in every file and exchange format."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -37,9 +37,10 @@ def record_to_metadata(record: Record) -> dict[str, Any]:
 
 def time_column(record: Record) -> str:
     """The name under which time is written beside the channels."""
-    name = "time"
+    name, number = "time", 1
     while name in record.samples:
-        name += "_"
+        number += 1
+        name = f"time_{number}"
     return name
 
 
@@ -54,12 +55,7 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
         The metadata is of a later version, damaged, or does not fit the samples.
     """
     with _trusting():
-        if metadata["version"] != VERSION:
-            raise FormatError(
-                f"the description is of version {str(metadata['version'])[:20]}",
-                f"this program reads version {VERSION}",
-                "update stickslip",
-            )
+        _require_version(metadata)
         channels = {entry["name"]: Channel(**_restored(entry)) for entry in metadata["channels"]}
         stamps = samples[metadata["time"]] if metadata["stamps"] else None
         start = float(metadata["start"])
@@ -70,22 +66,63 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
             channels,
             float(metadata["fs"]),
             start,
-            metadata_to_history(metadata),
+            history_of(metadata),
             stamps,
             _restored(metadata["truth"]),
         )
 
 
-def metadata_to_history(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
-    """The steps that `metadata` tells."""
+def columns_told(metadata: Mapping[str, Any], there: Collection[str]) -> list[str]:
+    """The columns that hold the record's samples, and its stamps where they were kept.
+
+    Raises
+    ------
+    FormatError
+        The metadata names none, or one that is not `there`.
+    """
+    entries = metadata.get("channels")
+    names = [entry.get("name") for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
+    names += [metadata.get("time")] if metadata.get("stamps") else []
+    missing = [str(name)[:40] for name in names if not isinstance(name, str) or name not in there]
+    if missing or not names:
+        raise FormatError(
+            f"the description of the record is damaged (it names {', '.join(missing) or 'no column'})",
+            f"the file has the columns {', '.join(there)}",
+            "write the file again from its source",
+        )
+    return [str(name) for name in names]
+
+
+def require_rows(metadata: Mapping[str, Any], found: int) -> None:
+    """Refuse a file that was cut short: its last number may be cut too."""
+    if metadata.get("rows") != found:
+        raise FormatError(
+            f"{found} rows where the description of the record says {str(metadata.get('rows'))[:20]}",
+            "a file written by write_record is whole",
+            "copy it again, or read what is there by naming channels=",
+        )
+
+
+def history_of(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
+    """The history that the metadata tells; empty where there is none."""
     with _trusting():
-        return tuple(Step(**_restored(step)) for step in metadata["history"])
+        return tuple(Step(**_restored(step)) for step in metadata.get("history", ()))
 
 
 def channel_names(metadata: Mapping[str, Any]) -> list[str]:
-    """The channels that `metadata` tells."""
+    """The channels that the metadata tells."""
     with _trusting():
+        _require_version(metadata)
         return [str(entry["name"]) for entry in metadata["channels"]]
+
+
+def _require_version(metadata: Mapping[str, Any]) -> None:
+    if metadata["version"] != VERSION:
+        raise FormatError(
+            f"the file is of version {str(metadata['version'])[:20]}",
+            f"this program reads version {VERSION}",
+            "update stickslip",
+        )
 
 
 @contextmanager
