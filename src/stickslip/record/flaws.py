@@ -17,6 +17,7 @@ Runs = tuple[tuple[int, int], ...]
 EXACT = 1e-9  # relative to the range: equal but for the rounding of a unit's factor
 CUBIC = np.array([1, -4, 6, -4, 1]) / 6  # a sample minus the cubic through its four neighbours
 CUBIC_GAIN = float(np.sqrt(np.sum(CUBIC**2)))
+ENOUGH = 400  # plateaus looked at: more of them make a verdict no surer
 SHORTEST_TREND = 64  # samples from which a slow trend can be told from the motion
 TRAVEL = 12.0  # rise in amplitudes from which a trend is travel: eight steps of a pulled block rise by 19
 FEW_LEVELS = 12  # steps of a sensor across the whole motion below which its shape is lost
@@ -75,7 +76,8 @@ def spikes(values: Array) -> Runs:
     """Single samples, or pairs, that stand off from both neighbours as nothing around them does.
 
     A sample is a spike where it differs from the line between its neighbours by 2.5 times the second largest step
-    nearby and by eight robust standard deviations, while the neighbours agree with each other.
+    nearby, by eight robust standard deviations and by three times what one sample in twenty does, while the neighbours
+    agree with each other.
     """
     found = np.zeros(len(values), dtype=bool)
     for width in (1, 2):
@@ -94,7 +96,8 @@ def _spikes(values: Array, width: int, reach: int = 10) -> Mask:
     offsets = inner - (before + weight * (after - before))
     height = np.min(np.abs(offsets), axis=0) * (np.ptp(np.sign(offsets), axis=0) == 0)
     scale = 1.4826 * float(np.median(np.abs(offsets[0] - np.median(offsets[0]))))
-    threshold = max(8 * scale, 1.5 * quantum(values), EXACT * float(np.ptp(values)))
+    common = 3 * float(np.quantile(np.abs(offsets[0]), 0.95))  # a sensor's steps, also where a repair blurred them
+    threshold = max(8 * scale, common, 1.5 * quantum(values), EXACT * float(np.ptp(values)))
     steps = np.abs(np.diff(values))
     for i in np.flatnonzero((height > threshold) & (height > 3 * np.abs(after - before))):
         near = np.concatenate([steps[max(0, i - reach) : i], steps[i + width + 1 : i + width + 1 + reach]])
@@ -214,10 +217,12 @@ def _were_cut(
     values: Array, held: list[tuple[int, int]], level: float, slack: float, plateaus: bool, strictness: float
 ) -> bool:
     """Whether plateaus, taken together, cut off tops; no, where their approach is not resolved."""
-    sides = []
-    for first, last in held:
+    floor, sides = level - 0.5 * float(np.ptp(values)), []
+    for first, last in held[:: 1 + len(held) // ENOUGH]:
         length = last - first + 1
-        both = _extrapolate(values[:first][::-1], level, length), _extrapolate(values[last + 1 :], level, length)
+        reach = max(4, length)
+        before, after = values[max(0, first - reach) : first][::-1], values[last + 1 :][:reach]
+        both = [_extrapolate(side, level, floor, length) for side in (before, after)]
         sides += [side for side in both if side is not None] if None not in both else []
     if not sides:
         return False
@@ -226,21 +231,21 @@ def _were_cut(
     error = 1.2533 * float(np.sqrt(np.mean(errors**2) / len(heights)))
     cut = height > strictness * max(2 * slack, 5 * error, 0.08 * float(np.median(drops)))
     if cut and plateaus:
-        before, after = heights[::2], heights[1::2]
-        alike = (np.maximum(before, after) < 2 * np.minimum(before, after)).mean()
+        pairs = heights.reshape(-1, 2)
+        alike = float(np.mean(pairs.max(axis=1) < 2 * pairs.min(axis=1)))
         cut = alike > 0.5 and float(np.mean((tops > 0.2) & (tops < 0.8))) > 0.5
     return bool(cut)
 
 
-def _extrapolate(approach: Array, level: float, length: int) -> tuple[float, float, float, float] | None:
+def _extrapolate(near: Array, level: float, floor: float, length: int) -> tuple[float, float, float, float] | None:
     """How far the parabola through the samples next to a plateau, nearest first, rises above it.
 
-    Gives height above the level and its standard error, drop of the level over the samples used, and distance of the
-    parabola's top from the plateau's edge in lengths of the plateau (infinite where it has none).
+    Samples count up to the first below `floor`, and no more of them than a parabola can follow: where what it leaves
+    is no noise but a curve, half of them are used. Gives height above the level and its standard error, drop of the
+    level over the samples used, and distance of the parabola's top from the plateau's edge in lengths of the plateau
+    (infinite where it has none).
     """
-    span = float(np.ptp(approach)) if len(approach) else 0.0
-    near = approach[: max(4, length)]
-    low = np.flatnonzero(near < level - 0.5 * span)
+    low = np.flatnonzero(near < floor)
     near = near[: low[0]] if len(low) else near
     if len(near) < 3:
         return None
@@ -249,13 +254,15 @@ def _extrapolate(approach: Array, level: float, length: int) -> tuple[float, flo
     design = np.vander(along / scale, 3)
     (bend, slope, value), *_ = np.linalg.lstsq(design, near - level, rcond=None)
     rest = near - level - design @ np.array([bend, slope, value])
-    sd = float(np.sqrt(rest @ rest / max(1, len(near) - 3)))
+    sd, drop = float(np.sqrt(rest @ rest / max(1, len(near) - 3))), float(level - near.min())
+    if len(near) >= 12 and sd > 0.01 * drop and float(np.std(np.diff(rest))) < 0.5 * sd:
+        return _extrapolate(near[: len(near) // 2], level, floor, length)
     middle = 0.5 * length / scale
     top = -slope / (2 * bend) if bend < 0 else np.inf
     reach = np.clip(top, 0.0, middle)
     point = np.array([reach**2, reach, 1.0])
     error = sd * float(np.sqrt(point @ np.linalg.pinv(design.T @ design) @ point))
-    return float(point @ (bend, slope, value)), error, float(level - near.min()), float(top * scale / length)
+    return float(point @ (bend, slope, value)), error, drop, float(top * scale / length)
 
 
 def drift(values: Array) -> float:

@@ -150,5 +150,7 @@ def _is_rounding(rows: Rows, stamps: Array, mean: float, resolution: float) -> b
 def _usual(steps: Array, resolution: float) -> float:
     """The usual step: the median, then the mean of those that differ from it by rounding alone."""
     middle = float(np.quantile(steps, 0.5, method="lower"))
-    near = steps[np.abs(steps - middle) <= max(1.01 * resolution, TOLERANCE * middle)]
+    near = steps[np.abs(steps - middle) <= TOLERANCE * middle]
+    if len(near) < 0.9 * len(steps):
+        near = steps[np.abs(steps - middle) <= max(1.01 * resolution, TOLERANCE * middle)]
     return float(np.mean(near))
