@@ -119,14 +119,13 @@ def _refusal_of(dtype: np.dtype[Any], shape: tuple[int, ...]) -> str | None:
 
 def _order_v4(header: bytes) -> str | None:
     """Byte order of a version 4 header, or None if it is not one."""
-    for order in "<>":
-        if len(header) < 20:
-            return None
+    if len(header) < 20:
+        return None
+    for order, kinds in (("<", range(100)), (">", range(1000, 1100))):
         kind, rows, columns, imaginary, name = struct.unpack(f"{order}5i", header)
-        known = (order == "<" and kind < 100) or (order == ">" and 1000 <= kind < 1100)
-        if known and kind >= 0 and kind // 10 % 10 < 6 and kind % 10 < 3:  # noqa: SIM102
-            if rows >= 0 and columns >= 0 and imaginary in (0, 1) and 0 < name < 1000:
-                return order
+        known = kind in kinds and kind // 10 % 10 < len(SIZES_V4) and kind % 10 < 3
+        if known and rows >= 0 and columns >= 0 and imaginary in (0, 1) and 0 < name < 1000:
+            return order
     return None
 
 

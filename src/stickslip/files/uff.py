@@ -206,12 +206,8 @@ def _binary_bytes(line: bytes) -> int:
 
 def _closing(data: bytes, expected: int, body: int) -> re.Match[bytes] | None:
     """The closing line where the stated length puts it; some writers state another length: then the next one."""
-    mark = re.compile(rb" {4}-1[ \t]*(\r?\n|\r?$)")
-    here = re.compile(rb"\s{0,3}?").match(data, expected)
-    for skip in range(4 if here else 0):
-        if found := mark.match(data, expected + skip):
-            return found
-    return mark.search(data, body)
+    mark = re.compile(rb"[\r\n]{0,2} {4}-1[ \t]*(?:\r?\n|\r?\Z)")
+    return mark.match(data, expected) or mark.search(data, body)
 
 
 def _damaged(path: Path, position: int, what: str) -> FormatError:
