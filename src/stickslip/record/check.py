@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 SHORTEST = 32  # samples below which no question about friction can be answered
 DRIFT = 0.3  # rise of the trend, in amplitudes of the oscillation, from which it is told
-SHARP_UNITS = ("m/s", "rad/s", "N", "N m")  # quantities whose plateaus may have corners by nature: sticking, saturation
+SHARP_UNITS = ("m/s", "rad/s", "N", "N m")  # what may have plateaus with corners by nature: sticking, saturation
 
 
 @dataclass(frozen=True)

@@ -112,14 +112,24 @@ def frozen(values: Array, shortest: int = 5) -> Runs:
 
     Two signs, of which one is enough: the run ends with a jump that makes up for the motion missed; or the signal is
     rough on both sides, its samples seldom repeating, and still inside for longer than chance allows. A stuck mass
-    shows neither: it comes to rest and leaves without a jump, and its noise goes on.
+    shows neither: it comes to rest and leaves without a jump, and its noise goes on. Nor is a level frozen to which
+    the signal returns, as Coulomb's friction does, with either sign.
     """
     still = np.abs(np.diff(values)) <= EXACT * float(np.ptp(values))
     candidates = [(first, last + 1) for first, last in runs_of(still) if last + 2 - first >= shortest]
     if not candidates:
         return ()
     step = quantum(values)
-    return tuple(run for run in candidates if _is_frozen(values, still, run, step))
+    found = [run for run in candidates if _is_frozen(values, still, run, step)]
+    levels = np.array([abs(values[first]) for first, _ in candidates])
+    lengths = np.array([last - first + 1 for first, last in candidates])
+    near = max(0.5 * step, EXACT * float(np.ptp(values)))
+
+    def recurs(run: tuple[int, int]) -> bool:
+        alike = (np.abs(levels - abs(values[run[0]])) <= near) & (lengths >= 0.5 * (run[1] - run[0] + 1))
+        return int(np.sum(alike)) > 1
+
+    return tuple(run for run in found if not recurs(run))
 
 
 def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float) -> bool:
