@@ -75,6 +75,12 @@ def find_faults(record: Record) -> list[Fault]:
     -------
     list of Fault
         Errors first, the clock before the channels.
+
+    Examples
+    --------
+    >>> from stickslip.record.record import Record
+    >>> [fault.kind for fault in find_faults(Record.of({"x": [1.0] * 100}, fs=50.0))]
+    ['constant']
     """
     faults = _short(record)
     if record.stamps is not None:
@@ -115,18 +121,22 @@ def _clock_faults(stamps: Array) -> list[Fault]:
         runs = _pairs(clock.missing, 0)
         faults.append(
             _clock_fault(
-                "missing", runs, f"{len(clock.missing)} time stamps are not numbers", "repair_clock(record)", "error"
+                "missing",
+                runs,
+                _several(len(clock.missing), "time stamp is not a number", "time stamps are not numbers"),
+                "repair_clock(record)",
+                "error",
             )
         )
     if clock.held:
         faults.append(_held(stamps, clock))
     elif len(clock.repeated):
         runs = _pairs(clock.repeated)
-        what = f"{len(clock.repeated)} time stamps repeat the one before"
+        what = _several(len(clock.repeated), "time stamp repeats", "time stamps repeat") + " the one before"
         faults.append(_clock_fault("repeated stamps", runs, what, "repair_clock(record)", "error"))
     if len(clock.backward):
         back = float(np.min(np.diff(stamps)[clock.backward]))
-        what = f"the time goes back {len(clock.backward)} times, by up to {-back:.4g} s"
+        what = f"the time goes back {_several(len(clock.backward), 'time', 'times')}, by up to {-back:.4g} s"
         faults.append(_clock_fault("backwards", _pairs(clock.backward), what, "repair_clock(record)", "error"))
     if len(clock.slower):
         slow = float(np.median(np.diff(stamps)[clock.slower]))
@@ -139,8 +149,8 @@ def _clock_faults(stamps: Array) -> list[Fault]:
         lengths = np.diff(stamps)[clock.gaps]
         lost = int(np.sum(np.maximum(1, np.round(lengths / clock.step) - 1)))
         what = (
-            f"{len(clock.gaps)} gaps of up to {1e3 * np.max(lengths):.4g} ms where samples come every "
-            f"{1e3 * clock.step:.4g} ms, about {lost} samples lost"
+            f"{_several(len(clock.gaps), 'gap', 'gaps')} of up to {1e3 * np.max(lengths):.4g} ms where samples come every "
+            f"{1e3 * clock.step:.4g} ms, about {_several(lost, 'sample', 'samples')} lost"
         )
         faults.append(_clock_fault("gap", _pairs(clock.gaps), what, "fill_gaps(record)", "error"))
     if len(clock.uneven):
@@ -191,7 +201,7 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
                 "missing",
                 name,
                 flaws.runs_of(lost),
-                f"{int(lost.sum())} values that are not numbers",
+                _several(int(lost.sum()), "value that is not a number", "values that are not numbers"),
                 "fill them with fill_missing(record)",
                 "error",
             )
@@ -217,13 +227,13 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
     faults = []
     spikes = flaws.spikes(values)
     if spikes:
-        what = f"{_count(spikes)} samples that stand off from their neighbours as spikes"
+        what = _several(_count(spikes), "sample that stands off as a spike", "samples that stand off as spikes")
         faults.append(_fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")'))
         values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
     measured = name != "friction"  # what is computed as friction has no sensor that could clip or freeze
     cut = flaws.clipped(values, plateaus=unit in SHARP_UNITS) if measured else ()
     if cut:
-        what = f"{_count(cut)} samples clipped near {values[cut[0][0]]:.4g} {unit}"
+        what = _several(_count(cut), "sample", "samples") + f" clipped near {values[cut[0][0]]:.4g} {unit}"
         faults.append(
             _fault("clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")')
         )
@@ -238,6 +248,10 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
         what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"
         faults.append(_fault("drift", name, everywhere, what, f'take it off with remove_drift(record, "{name}")'))
     return faults
+
+
+def _several(count: int, one: str, many: str) -> str:
+    return f"{count} {one if count == 1 else many}"
 
 
 def _count(runs: Runs) -> int:

@@ -164,6 +164,14 @@ def fill_gaps(record: Record, *, fs: float | None = None, longest: float | None 
     ------
     RecordError
         The stamps stand still and jump (use :func:`repair_clock`).
+
+    Examples
+    --------
+    >>> kept = np.delete(np.arange(500), [100, 101, 102])
+    >>> dropped = Record.of({"x": np.sin(0.1 * kept)}, fs=100.0)
+    >>> dropped = Record(dropped.samples, dropped.channels, 100.0, stamps=kept / 100)
+    >>> len(fill_gaps(dropped)), fill_gaps(dropped).fs
+    (500, 100.0)
     """
     if record.stamps is None:
         step = Step("fill_gaps", {"fs": record.fs, "longest": longest}, "the clock was uniform already")
@@ -241,6 +249,13 @@ def fill_missing(record: Record, *channels: str, longest: int | None = None) -> 
     ------
     RecordError
         A channel without any number.
+
+    Examples
+    --------
+    >>> wave = np.sin(0.1 * np.arange(500))
+    >>> wave[200:205] = np.nan
+    >>> print(fill_missing(Record.of({"x": wave}, fs=100.0)).history[-1].outcome)
+    5 values of x filled (rows 200 to 204)
     """
     names = channels or tuple(record)
     record.require(*names, question="fill_missing")
@@ -279,6 +294,18 @@ def remove_spikes(record: Record, *channels: str) -> Record:
     record : Record
     *channels : str
         Which channels; all where left out.
+
+    Raises
+    ------
+    RecordError
+        A channel is missing or holds values that are not numbers.
+
+    Examples
+    --------
+    >>> wave = np.sin(0.1 * np.arange(500))
+    >>> wave[77] = 9.0
+    >>> bool(abs(remove_spikes(Record.of({"x": wave}, fs=100.0))["x"][77] - np.sin(7.7)) < 1e-6)
+    True
     """
     names = channels or tuple(record)
     record.require_clean(*names, question="remove_spikes")
@@ -314,6 +341,19 @@ def restore_clipped(record: Record, channel: str, *, method: str = "rebuild", le
     Returns
     -------
     Record
+
+    Raises
+    ------
+    RecordError
+        Values that are not numbers, or a method that is none.
+
+    Examples
+    --------
+    >>> wave = np.sin(0.05 * np.arange(2000))
+    >>> clipped = Record.of({"x": np.clip(wave, -0.8, 0.8)}, fs=100.0)
+    >>> rebuilt = restore_clipped(clipped, "x")
+    >>> bool(np.std(rebuilt["x"] - wave) < 0.3 * np.std(clipped["x"] - wave))
+    True
     """
     record.require_clean(channel, question="restore_clipped")
     if method not in ("rebuild", "mark"):
@@ -352,6 +392,18 @@ def remove_drift(record: Record, channel: str, *, order: int | None = None) -> R
     Returns
     -------
     Record
+
+    Raises
+    ------
+    RecordError
+        Values that are not numbers, a record too short, or an order outside 1 to 6.
+
+    Examples
+    --------
+    >>> rows = np.arange(4000)
+    >>> drifting = Record.of({"x": np.sin(0.05 * rows) + 5e-4 * rows}, fs=100.0)
+    >>> bool(np.std(remove_drift(drifting, "x")["x"] - np.sin(0.05 * rows)) < 0.01)
+    True
     """
     record.require_clean(channel, question="remove_drift", samples=flaws.SHORTEST_TREND)
     values, unit = record[channel], record.channels[channel].unit
@@ -396,6 +448,17 @@ def resample(record: Record, fs: float) -> Record:
     Returns
     -------
     Record
+
+    Raises
+    ------
+    RecordError
+        Values that are not numbers, a record too short, or a rate that is none.
+
+    Examples
+    --------
+    >>> record = Record.of({"x": np.sin(0.1 * np.arange(1000))}, fs=1000.0)
+    >>> resample(record, 500.0)
+    Record(x [m]; 500 samples, 500 Hz, from 0 s)
     """
     record.require_clean(*record, question="resample")
     if not (np.isfinite(fs) and fs > 0):

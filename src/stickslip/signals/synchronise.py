@@ -61,7 +61,33 @@ def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] = "x") -> Es
 
 
 def clock_rate(a: Record, b: Record, *, on: str | tuple[str, str] = "x") -> Estimate:
-    """How many seconds of a's clock pass in one second of b's? See :func:`clock_offset`."""
+    """How many seconds of a's clock pass in one second of b's?
+
+    The stretch between the two smoothed motions by least squares, about the middle of b's record.
+
+    Parameters
+    ----------
+    a, b : Record
+    on : str or (str, str)
+        As for :func:`clock_offset`, which tells where the rates differ.
+
+    Returns
+    -------
+    Estimate
+        Without unit; 1 for clocks of one rate.
+
+    Raises
+    ------
+    EstimateError
+        The channels do not look like one motion, or overlap too little.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) / 1000
+    >>> a, b = (Record.of({"x": np.sin(9 * s) + np.sin(23 * s)}, fs=1000.0) for s in (t, 1.001 * t))
+    >>> round(clock_rate(a, b).value, 4)
+    1.001
+    """
     return _match(a, b, on).rate
 
 
@@ -97,6 +123,14 @@ def synchronise(
         No offset can be found.
     RecordError
         The records do not overlap.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) / 1000
+    >>> a = Record.of({"x": np.sin(9 * t) + np.sin(23 * t)}, fs=1000.0)
+    >>> b = Record.of({"v": 9 * np.cos(9 * t + 0.9) + 23 * np.cos(23 * t + 2.3)}, fs=1000.0)
+    >>> sorted(synchronise(a, b, on=("x", "v")))
+    ['v', 'x']
     """
     a.require_clean(*a, question="synchronise")
     b.require_clean(*b, question="synchronise")
