@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import subprocess
@@ -125,6 +126,15 @@ def test_a_record_converted_is_the_same_record() -> None:
     assert result.exit_code == 0, result.output
     expected = ss.read_record("run.csv", channels={"x": "pos [mm]", "friction": "fr [N]"})
     assert np.array_equal(ss.read_record("run.parquet")["x"], expected["x"])
+
+
+def test_a_record_that_comes_back_whole_is_named_by_its_file() -> None:
+    slide("run.csv")
+    run("convert", "run.csv", "kept.parquet", *MAP)
+    told = json.loads(run("analyze", "kept.parquet", "--normal", "kept*=3", "--json").stdout)
+    assert (told["name"], told["normal_load"]) == ("kept.parquet", 3.0)
+    digests = [file["sha256"] for step in told["history"] for file in step["arguments"].get("files", ())]
+    assert hashlib.sha256(Path("kept.parquet").read_bytes()).hexdigest() in digests
 
 
 def test_the_sets_are_listed_with_licence_and_fetched_by_name(dataset: Callable[[str], Path]) -> None:

@@ -68,6 +68,12 @@ def slid(friction: float, normal: float, name: str = "run.csv") -> Findings:
     return replace(analyze(ss.Record.of(samples, fs=500.0)), name=name)
 
 
+@pytest.fixture(scope="module")
+def light(demo: Findings) -> Findings:
+    """Findings of one figure, quick to draw."""
+    return replace(demo, loops=None, sticks=None, settings={})
+
+
 def everything(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
 
@@ -186,34 +192,35 @@ def test_a_folder_holds_all_and_only_what_it_lists(demo: Findings, tmp_path: Pat
     assert everything(tmp_path / "deep") == {"results", *(f"results/{name}" for name in everything(place))}
 
 
-def test_an_earlier_result_is_replaced_and_a_stranger_left_alone(demo: Findings, tmp_path: Path) -> None:
-    place = publish(compare([slid(1.0, 2.0), slid(2.0, 4.0)]), folder=tmp_path / "results")
-    publish(demo, folder=place)
-    assert "figures/friction-velocity.svg" in everything(place)
-    assert not [name for name in everything(place) if "compared" in name]
+def test_an_earlier_result_is_replaced_and_a_stranger_left_alone(light: Findings, tmp_path: Path) -> None:
+    place = publish(compare([replace(light, name="one"), light]), folder=tmp_path / "results")
+    assert "figures/1-one-record.svg" in everything(place)
+    publish(light, folder=place)
+    assert "figures/record.svg" in everything(place)
+    assert not [name for name in everything(place) if "one" in name]
     (place / "notes.txt").write_text("mine", encoding="utf-8")
     before = everything(tmp_path)
     with pytest.raises(ModelError, match=r"notes\.txt"):
-        publish(demo, folder=place)
+        publish(light, folder=place)
     assert everything(tmp_path) == before
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(ModelError, match="it is a file"):
-        publish(demo, folder=tmp_path / "file")
+        publish(light, folder=tmp_path / "file")
     with pytest.raises(StickslipError, match="can not be written"):
-        publish(demo, folder=tmp_path / "file" / "below")
+        publish(light, folder=tmp_path / "file" / "below")
 
 
 @pytest.mark.parametrize("trouble", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_nothing_stays_of_a_folder_that_was_not_finished(
-    demo: Findings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
+    light: Findings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
 ) -> None:
     def fails(*args: object) -> Iterator[None]:
         raise trouble
 
-    publish(demo, folder=tmp_path / "earlier")
+    publish(light, folder=tmp_path / "earlier")
     before = everything(tmp_path)
     monkeypatch.setattr(folder_module, "_write_figures", fails)
     for name in ("new", "earlier"):
         with pytest.raises((StickslipError, KeyboardInterrupt)):
-            publish(demo, folder=tmp_path / name)
+            publish(light, folder=tmp_path / name)
     assert everything(tmp_path) == before

@@ -333,9 +333,11 @@ def compare(findings: Sequence[Findings]) -> Comparison:
 
 
 def record_name(record: Record) -> str:
-    """The record's file names, as its history tells them."""
-    files = [file["name"] for step in record.history for file in step.arguments.get("files", ())]
-    return " + ".join(dict.fromkeys(files)) or ("simulated record" if record.truth else "record")
+    """The names of the files that the record was last read from, as its history tells them."""
+    reads = [step.arguments["files"] for step in record.history if step.arguments.get("files")]
+    if reads:
+        return " + ".join(file["name"] for file in reads[-1])
+    return "simulated record" if record.truth else "record"
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import glob
+import hashlib
 import json
 import sys
 import threading
@@ -263,7 +265,17 @@ def _read(files: Sequence[Path], rig: RigSettings) -> Record:
     record = ss.read_record(
         paths, channels=rig.channels or None, fs=rig.fs, units=rig.units or None, rows=rig.row_range()
     )
-    return ss.mend(record, repairs=rig.repair)
+    return ss.mend(_with_source(record, files), repairs=rig.repair)
+
+
+def _with_source(record: Record, files: Sequence[Path]) -> Record:
+    """The record with its files in the history; one that write_record kept comes back without."""
+    known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
+    if {path.name for path in files} <= known:
+        return record
+    sources = [{"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()} for path in files]
+    step = ss.Step("read_record", {"files": sources}, "a record as it was written")
+    return dataclasses.replace(record, history=(*record.history, step))
 
 
 @contextlib.contextmanager

@@ -149,8 +149,7 @@ def _cycles(findings: Findings, abscissa: str) -> list[tuple[Array, Array]]:
     """Displacement (or velocity) across the contact and friction of at most thirty cycles, thinned."""
     record, loops, drawn = findings.record, findings.loops, []
     assert loops is not None
-    motion = contact_motion(record, contact=findings.settings.get("contact", "ground"), question="the figure")
-    across: Array = getattr(motion, abscissa)
+    across = _across(findings, abscissa)
     rows = round(record.fs / loops.frequency.value)
     for start in np.asarray(loops.cycles)[thinned(len(loops.cycles), MOST_CYCLES)]:
         first = round((float(start) - record.start) * record.fs)
@@ -159,3 +158,13 @@ def _cycles(findings: Findings, abscissa: str) -> list[tuple[Array, Array]]:
         if len(some):
             drawn.append((across[part][some], record["friction"][part][some]))
     return drawn
+
+
+def _across(findings: Findings, abscissa: str) -> Array:
+    """Displacement or velocity of the mass against what it slides on."""
+    record, contact = findings.record, findings.settings.get("contact", "ground")
+    name = {"displacement": "x", "velocity": "v"}[abscissa]
+    if contact == "ground" and name in record:
+        return record[name]
+    across: Array = getattr(contact_motion(record, contact=contact, question="the figure"), abscissa)
+    return across

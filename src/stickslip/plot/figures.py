@@ -13,7 +13,7 @@ from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.contact import plot_displacement_loop, plot_sticks, plot_velocity_loop
 from stickslip.plot.regression import plot_regression
 from stickslip.plot.style import styled
-from stickslip.plot.traces import close_up, plot_force_balance, plot_traces
+from stickslip.plot.traces import MOST_SHADES, close_up, plot_force_balance, plot_traces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,8 +89,10 @@ def figures(result: Findings | Comparison) -> tuple[Plate, ...]:
 
 def _of_findings(findings: Findings) -> list[Plate]:
     plates, near = [], close_up(findings)
-    sticks = findings.sticks is not None and any(event.kind == "stick" for event in findings.sticks.events)
+    events = findings.sticks.events if findings.sticks is not None else ()
+    sticks = [event for event in events if event.kind == "stick"]
     stuck = " Grey: the contact sticks." if sticks else ""
+    shaded = stuck if len(sticks) <= MOST_SHADES else ""
     if findings.loops is not None:
         plates += [
             _plate(
@@ -115,7 +117,7 @@ def _of_findings(findings: Findings) -> list[Plate]:
             )
         )  # fmt: skip
     plates.append(
-        _plate("record", plot_traces(findings), "The record", f"Every channel used, over the whole time.{stuck}")
+        _plate("record", plot_traces(findings), "The record", f"Every channel used, over the whole time.{shaded}")
     )
     if near is not None:
         plates.append(
@@ -153,9 +155,12 @@ def _of_comparison(comparison: Comparison) -> list[Plate]:
     return plates
 
 
+@styled
 def _plate(name: str, drawn: Figure | Axes, title: str, caption: str) -> Plate:
     from matplotlib.figure import Figure
 
     figure = drawn if isinstance(drawn, Figure) else drawn.get_figure(root=True)
     assert isinstance(figure, Figure)
+    figure.draw_without_rendering()  # lays the axes out, once for both formats
+    figure.set_layout_engine("none")
     return Plate(re.sub(r"\W+", "-", name), figure, title, caption)

@@ -92,7 +92,7 @@ def shade_sticks(ax: Axes, findings: Findings, record: Record) -> None:
         for event in findings.sticks.events
         if event.kind == "stick" and event.time < last and event.time + event.duration > first
     ]
-    if not spans or len(spans) > MOST_SHADES:
+    if not 0 < len(spans) <= MOST_SHADES:
         return
     low, high = ax.get_ylim()
     ax.broken_barh(spans, (low, high - low), color=SHADE, alpha=0.55, linewidth=0, zorder=0)
