@@ -149,8 +149,8 @@ def _clock_faults(stamps: Array) -> list[Fault]:
         lengths = np.diff(stamps)[clock.gaps]
         lost = int(np.sum(np.maximum(1, np.round(lengths / clock.step) - 1)))
         what = (
-            f"{_several(len(clock.gaps), 'gap', 'gaps')} of up to {1e3 * np.max(lengths):.4g} ms where samples come every "
-            f"{1e3 * clock.step:.4g} ms, about {_several(lost, 'sample', 'samples')} lost"
+            f"{_several(len(clock.gaps), 'gap', 'gaps')} of up to {1e3 * np.max(lengths):.4g} ms "
+            f"where samples come every {1e3 * clock.step:.4g} ms, about {_several(lost, 'sample', 'samples')} lost"
         )
         faults.append(_clock_fault("gap", _pairs(clock.gaps), what, "fill_gaps(record)", "error"))
     if len(clock.uneven):
