@@ -100,6 +100,16 @@ def test_options_go_before_the_file_of_the_rig() -> None:
     assert told["history"][0]["arguments"]["rows"] == [500, None]
 
 
+def test_a_bare_text_file_is_read_as_told() -> None:
+    lines = slide("run.csv").read_text().splitlines()[1:]
+    Path("bare.txt").write_text("\n".join(line.replace(".", ";").replace(",", "|").replace(";", ",") for line in lines))
+    channels = ["--channels", "x=#2 [mm]", "--channels", "friction=#3 [N]"]
+    result = run("analyze", "bare.txt", *channels, "--time", "#1 [s]", "--delimiter", "|", "--decimal", ",", "--json")
+    assert result.exit_code == 0, result.stderr
+    levels = {estimate["name"]: estimate["value"] for estimate in json.loads(result.stdout)["estimates"]}
+    assert levels["sliding friction"] == pytest.approx(1.5, rel=0.01)
+
+
 def test_repairs_are_made_in_order_and_logged() -> None:
     path = slide("run.csv")
     lines = path.read_text().splitlines()

@@ -73,6 +73,9 @@ def _reading(command: Callable[..., None]) -> Callable[..., None]:
             help="Unit of a column whose header states none. Repeatable.",
         ),
         click.option("--fs", metavar="HZ", help="Sampling rate, for a file that states none."),
+        click.option("--time", metavar="COLUMN", help="Column that holds the time, where its header does not say."),
+        click.option("--delimiter", metavar="SIGN", help="Delimiter of a text file, where it can not be told."),
+        click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file."),
         click.option("--rows", metavar="FIRST:LAST", help="Rows to keep of each file."),
         click.option(
             "--repair",
@@ -262,9 +265,8 @@ def _default_folder(groups: Sequence[Sequence[Path]]) -> Path:
 
 def _read(files: Sequence[Path], rig: RigSettings) -> Record:
     paths: Any = files[0] if len(files) == 1 else list(files)
-    record = ss.read_record(
-        paths, channels=rig.channels or None, fs=rig.fs, units=rig.units or None, rows=rig.row_range()
-    )
+    given = {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
+    record = ss.read_record(paths, rows=rig.row_range(), **given)
     return ss.mend(_with_source(record, files), repairs=rig.repair)
 
 

@@ -70,6 +70,10 @@ class RigSettings(BaseModel):
     repair : tuple of str
         Repairs made to every record after reading, in the order given: clock, gaps, missing, spikes, clipping,
         drift; see :func:`mend`.
+    time : str or None
+        The column that holds the time, where its header does not say so.
+    delimiter, decimal : str or None
+        Of text files, where they can not be told from the file.
     rows : str or None
         Rows to keep of each file, as "FIRST:LAST".
 
@@ -94,6 +98,9 @@ class RigSettings(BaseModel):
         default_factory=dict
     )
     repair: tuple[Annotated[str, BeforeValidator(_repair)], ...] = ()
+    time: str | None = None
+    delimiter: str | None = None
+    decimal: Literal[".", ","] | None = None
     rows: Annotated[str, BeforeValidator(_row_range)] | None = None
 
     def normal_load(self, name: str) -> float | None:

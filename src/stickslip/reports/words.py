@@ -56,11 +56,11 @@ def headline(result: Findings | Comparison) -> list[str]:
 
 def cautions(findings: Findings) -> list[str]:
     """What should keep the reader from trusting a number."""
-    flagged = [
-        f"{estimate.name.capitalize()}: {estimate.status}."
-        for estimate in findings.estimates
-        if estimate.status != "ok"
-    ]
+    doubts: dict[str, list[str]] = {}
+    for estimate in findings.estimates:
+        if estimate.status != "ok":
+            doubts.setdefault(estimate.status, []).append(estimate.name)
+    flagged = [_sentence(f"{', '.join(names)}: {status}.") for status, names in doubts.items()]
     if findings.faults:
         many = len(findings.faults)
         flagged.append(f"The check-up found {many} fault{'s' * (many > 1)} in the record, listed below.")
@@ -131,6 +131,10 @@ def _of_comparison(comparison: Comparison) -> Iterator[str]:
         yield f"Against the normal load the friction coefficient is {value_of(mu)} (95 % sure: {interval_of(mu)})."
         if mu.interval[1] - mu.interval[0] > TOO_WIDE * abs(mu.value):
             yield "The interval is wide because few records fix it; more loads would narrow it."
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _sd(estimate: Estimate) -> float:
