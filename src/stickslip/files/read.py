@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import FormatError, RecordError, StickslipError
+from stickslip.errors import FormatError, RecordError
 from stickslip.files.select import Columns, Source, TimeColumn, Wanted
-from stickslip.files.table import Block, Options
+from stickslip.files.table import Block, Options, reading
 from stickslip.record.clock import Clock, fit_clock, resolution
 from stickslip.record.metadata import columns_told, history_of, metadata_to_record, require_rows
 from stickslip.record.record import Record, Step
@@ -94,8 +94,15 @@ def read_record(
     >>> record
     Record(x [m], load [N]; 3 samples, 250 Hz, from 0 s)
     """
-    reading = _open(path, channels, fs, units, time, rows, Options(delimiter, decimal))
-    return reading.whole()
+    asked = _open(path, channels, fs, units, time, rows, Options(delimiter, decimal))
+    try:
+        return asked.whole()
+    except MemoryError as error:
+        raise RecordError(
+            f"{asked.names} does not fit in memory",
+            "a Record holds all its samples",
+            "name fewer channels=, or go through the file with read_blocks()",
+        ) from error
 
 
 def read_blocks(
@@ -175,7 +182,7 @@ class _Reading:
         first, last, _ = slice(*self.rows).indices(length)
         if first >= last:
             raise RecordError(
-                f"rows {self.rows} of {self._names} hold nothing" if length else f"{self._names} has no rows",
+                f"rows {self.rows} of {self.names} hold nothing" if length else f"{self.names} has no rows",
                 f"the file has {length} rows and at least one is needed",
                 "check rows= and the file",
             )
@@ -201,10 +208,11 @@ class _Reading:
         if self.restores:
             require_rows(self.sources[0].table.record, first)
         if not first:
-            raise RecordError(f"{self._names} has no rows", "at least one is needed", "check the file")
+            raise RecordError(f"{self.names} has no rows", "at least one is needed", "check the file")
 
     @property
-    def _names(self) -> str:
+    def names(self) -> str:
+        """The files' names, for sentences."""
         return ", ".join(source.path.name for source in self.sources)
 
     @cached_property
@@ -233,7 +241,7 @@ class _Reading:
             rows = [before + more for before, more in zip(rows, lengths, strict=True)]
             if len(set(lengths)) > 1:
                 raise RecordError(
-                    f"the files {self._names} differ in rows, after {min(rows)} of them",
+                    f"the files {self.names} differ in rows, after {min(rows)} of them",
                     "files that are read together share one clock, row by row",
                     "read them apart and join them with synchronise()",
                 )
@@ -266,7 +274,7 @@ class _Reading:
         if not found:
             names = [column.name for source in self.sources for column in source.table.columns]
             raise RecordError(
-                f"{self._names} tells neither time nor sampling rate",
+                f"{self.names} tells neither time nor sampling rate",
                 "a record has a clock",
                 f"pass fs= in Hz, or the time column in time= (columns: {', '.join(names[:20])})",
             )
@@ -276,7 +284,7 @@ class _Reading:
             # rounding explains a difference, but not one of a tenth of a sample
             if not apart <= min(max(rounding + its_rounding, 0.01 / clock.fs), 0.1 / clock.fs):
                 raise RecordError(
-                    f"the clocks of {self._names} are up to {apart:.3g} s apart",
+                    f"the clocks of {self.names} are up to {apart:.3g} s apart",
                     "files that are read together share one clock",
                     "read them apart and join them with synchronise()",
                 )
@@ -367,7 +375,7 @@ def _source(path: Path, options: Options) -> Source:
     for name in FORMATS:
         room = importlib.import_module(f"stickslip.files.{name}")
         if room.recognise(path, head):
-            with _as_format_error(path, room.NAME):
+            with _quietly(path, room.NAME):
                 return Source(path, room.NAME, room.read(path, options), digest, size)
     raise FormatError(
         f"'{path.name}' is of no known format",
@@ -381,29 +389,19 @@ def _room(name: str) -> ModuleType:
 
 
 @contextmanager
-def _as_format_error(path: Path, format_name: str) -> Iterator[None]:
-    """Parsers of other people fail on damaged files in every possible way; the user gets one sentence."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what they warn of either fails or shows in the numbers
-            yield
-    except StickslipError:
-        raise
-    except Exception as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-        raise FormatError(
-            f"'{path.name}' can not be read as {format_name} ({reason})",
-            "the file is whole and of that format",
-            "copy or export it again",
-        ) from error
+def _quietly(source: Path, kind: str) -> Iterator[None]:
+    """Damage as one sentence, without the parser's warnings: what they warn of either fails or shows in the numbers."""
+    with warnings.catch_warnings(), reading(source, kind):
+        warnings.simplefilter("ignore")
+        yield
 
 
 def _blocks(source: Source, names: Sequence[str], size: int) -> Iterator[Block]:
     """The table's blocks, its failures as FormatError."""
-    with _as_format_error(source.path, source.format):
+    with _quietly(source.path, source.format):
         blocks = source.table.blocks(names, size)
     while True:
-        with _as_format_error(source.path, source.format):
+        with _quietly(source.path, source.format):
             try:
                 block = next(blocks)
             except StopIteration:
