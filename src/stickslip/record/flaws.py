@@ -52,6 +52,19 @@ def held_over(values: Array, lost: Mask) -> Array:
 
 def quantum(values: Array) -> float:
     """Step between the sensor's levels, or 0 where the samples lie on no common grid."""
+    few = values[:: 1 + len(values) // 20_000]
+    step = _grid(few)
+    # samples off any grid in part are so in all; a grid seen in part must hold in all, or be looked for there
+    if len(few) == len(values) or (step == 0 and len(np.unique(few)) >= 3):
+        return step
+    if step > 0:
+        multiples = (values - values[0]) / step
+        if float(np.max(np.abs(multiples - np.round(multiples)))) < 0.02:
+            return step
+    return _grid(values)
+
+
+def _grid(values: Array) -> float:
     levels = np.unique(values)
     if len(levels) < 3:
         return 0.0
@@ -115,15 +128,16 @@ def frozen(values: Array, shortest: int = 5) -> Runs:
     shows neither: it comes to rest and leaves without a jump, and its noise goes on. Nor is a level frozen to which
     the signal returns, as Coulomb's friction does, with either sign.
     """
-    still = np.abs(np.diff(values)) <= EXACT * float(np.ptp(values))
+    span = float(np.ptp(values))
+    still = np.abs(np.diff(values)) <= EXACT * span
     candidates = [(first, last + 1) for first, last in runs_of(still) if last + 2 - first >= shortest]
     if not candidates:
         return ()
     step = quantum(values)
-    found = [run for run in candidates if _is_frozen(values, still, run, step)]
+    found = [run for run in candidates if _is_frozen(values, still, run, step, span)]
     levels = np.array([abs(values[first]) for first, _ in candidates])
     lengths = np.array([last - first + 1 for first, last in candidates])
-    near = max(0.5 * step, EXACT * float(np.ptp(values)))
+    near = max(0.5 * step, EXACT * span)
 
     def recurs(run: tuple[int, int]) -> bool:
         alike = (np.abs(levels - abs(values[run[0]])) <= near) & (lengths >= 0.5 * (run[1] - run[0] + 1))
@@ -132,7 +146,7 @@ def frozen(values: Array, shortest: int = 5) -> Runs:
     return tuple(run for run in found if not recurs(run))
 
 
-def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float) -> bool:
+def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float, span: float) -> bool:
     first, last = run
     length = last - first + 1
     reach = max(8, min(length, 40))
@@ -141,7 +155,6 @@ def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float) ->
         return False
     nearest = max(float(np.max(before)), float(np.max(after)))
     jump = float(abs(values[last + 1] - values[last]))
-    span = float(np.ptp(values))
     moving = min(float(np.mean(before)), float(np.mean(after))) > EXACT * span
     moving &= abs(float(values[first])) > EXACT * span  # the acceleration of a stuck mass is zero, until it is not
     made_up = 0.4 * length * float(np.median(after[:5]))
@@ -321,8 +334,9 @@ def _running_mean(values: Array, length: int) -> Array:
 
 def levels_used(values: Array) -> int | None:
     """Steps of the sensor across the whole motion, where they are too few to show its shape; else None."""
-    step, levels = quantum(values), len(np.unique(values))
-    if step == 0 or levels < 4 or len(values) < 8 * levels:
+    step = quantum(values)
+    levels = len(np.unique(values)) if 0 < float(np.ptp(values)) < 2 * FEW_LEVELS * step else 0
+    if levels < 4 or len(values) < 8 * levels:
         return None
     steps = round(float(np.ptp(values)) / step)
     return steps if steps < FEW_LEVELS else None
