@@ -32,8 +32,8 @@ STYLE: Any = {
     "svg.hashsalt": "stickslip", "text.parse_math": False, "path.simplify": True, "axes.formatter.useoffset": False,
 }  # fmt: skip
 _PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-_PREFIXED = ("m", "m/s", "N", "N m", "s", "Pa", "J", "V")
-_READABLE = ("N", "N m", "V")  # a few hundredths of these are read more easily than thousandths
+_PREFIXED = ("m", "m/s", "N", "N m", "N s/m", "s", "Pa", "J", "V")
+_READABLE = ("N", "N m", "N s/m", "V")  # a few hundredths of these are read more easily than thousandths
 
 
 def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:

@@ -11,6 +11,7 @@ from stickslip.analysis import Comparison, Findings
 from stickslip.estimate import NORMAL_95, Estimate, decimals
 from stickslip.plot.style import prefixed
 
+RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 FIGURES = 6  # significant figures at most: what is surer than that still reads well
 TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
@@ -111,6 +112,9 @@ def _of_sticks(findings: Findings) -> Iterator[str]:
     assert sticks is not None
     if not any(event.kind == "stick" for event in sticks.events):
         yield "The contact never sticks."
+        return
+    if sticks.share.value < RARELY:
+        yield "The contact hardly ever sticks."
         return
     beat = f" of {value_of(findings.loops.frequency)}" if findings.loops is not None else ""
     often = sticks.per_cycle.value
