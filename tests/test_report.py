@@ -179,6 +179,8 @@ def test_the_headline_names_the_direction_of_a_slope(demo: Findings) -> None:
     falling = Estimate.normal("slope", -3.0, sd=0.1, unit="N s/m", method="")
     sentences = " ".join(headline(replace(demo, loops=replace(demo.loops, slope=falling))))
     assert "falls with speed" in sentences
+    doubted = replace(falling, status="the sliding speed hardly varies")
+    assert "with speed" not in " ".join(headline(replace(demo, loops=replace(demo.loops, slope=doubted))))
     assert "2 stops in each cycle" in sentences
 
 

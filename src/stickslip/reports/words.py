@@ -101,6 +101,8 @@ def _of_loops(findings: Findings) -> Iterator[str]:
             "offset of a sensor or a sloping rig looks the same."
         )
     low, high = loops.slope.interval
+    if loops.slope.status != "ok":
+        return
     if low > 0 or high < 0:
         yield f"Friction {'rises' if low > 0 else 'falls'} with speed, by {value_of(loops.slope)}."
     elif math.isfinite(low + high):
