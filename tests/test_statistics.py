@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from stickslip.errors import EstimateError
-from stickslip.identify.statistics import correlation_time, least_squares, mean_of_cycles, mean_uncertainty, student
+from stickslip.statistics import correlation_time, least_squares, mean_of_cycles, mean_uncertainty, student
 
 
 def autoregression(rng, count, rho):

@@ -6,9 +6,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 NORMAL_95 = 1.959963984540054  # two-sided 95 % quantile of the normal distribution
 
 
@@ -96,41 +93,3 @@ def decimals(sd: float, value: float) -> int:
     """Decimals worth printing: one significant digit of the uncertainty, four of an exact value."""
     scale = sd if sd > 0 and math.isfinite(sd) else abs(value) * 1e-3
     return 3 if scale <= 0 or not math.isfinite(scale) else min(12, max(0, -math.floor(math.log10(scale))))
-
-
-def correlated_covariance(design: NDArray[np.float64], residual: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Covariance of least-squares coefficients when the residuals are correlated in time.
-
-    Newey and West's estimator, ``(J'J)^-1 S (J'J)^-1`` with Bartlett weights in S (Econometrica 55, 1987, eq. 5);
-    the number of lags follows Andrews (Econometrica 59, 1991, eq. 6.2 and 6.4) from the residuals' own first
-    autocorrelation, and the result is scaled by ``n / (n - p)``.
-
-    Parameters
-    ----------
-    design : ndarray, shape (n, p)
-        Derivative of the model by each coefficient.
-    residual : ndarray, shape (n,)
-        Data minus model.
-
-    Returns
-    -------
-    ndarray, shape (p, p)
-
-    Examples
-    --------
-    >>> noise = np.random.default_rng(0).normal(size=4000)
-    >>> float(np.sqrt(correlated_covariance(np.ones((4000, 1)), noise)[0, 0])).__round__(3)
-    0.016
-    """
-    n, p = design.shape
-    power = float(residual @ residual)
-    rho = min(0.97, abs(float(residual[1:] @ residual[:-1])) / power) if power > 0 else 0.0
-    lags = min(n // 4, math.ceil(1.1447 * (4 * rho**2 * n / (1 - rho**2) ** 2) ** (1 / 3)))
-    scores = design * residual[:, None]
-    middle = scores.T @ scores
-    for lag in range(1, lags + 1):
-        cross = scores[lag:].T @ scores[:-lag]
-        middle += (1 - lag / (lags + 1)) * (cross + cross.T)
-    bread = np.linalg.pinv(design.T @ design)
-    covariance: NDArray[np.float64] = n / max(1, n - p) * bread @ middle @ bread
-    return covariance

@@ -21,8 +21,8 @@ from stickslip.identify.motion import (
     contact_motion,
     find_cycles,
 )
-from stickslip.identify.statistics import mean_of_cycles, mean_uncertainty, student
 from stickslip.record.record import Record
+from stickslip.statistics import mean_of_cycles, mean_uncertainty, student
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.identify.statistics import least_squares, mean_of_cycles
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import differentiate
 from stickslip.signals.noise import noise_level
+from stickslip.statistics import least_squares, mean_of_cycles
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.identify.motion import is_measured
-from stickslip.identify.statistics import FEW_INDEPENDENT, LeastSquares, least_squares
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import Derivative, Filter, differentiate, smooth
 from stickslip.signals.noise import noise_level
+from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, least_squares
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def regress_friction(
     taken off, and no wider than gives the acceleration with the least error. The sign is that of the velocity at its
     own best bandwidth.
 
-    The intervals hold for correlated residuals (see :func:`stickslip.identify.statistics.mean_uncertainty`).
+    The intervals hold for correlated residuals (see :func:`stickslip.statistics.mean_uncertainty`).
 
     Parameters
     ----------

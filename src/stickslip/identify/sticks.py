@@ -20,8 +20,8 @@ from stickslip.identify.motion import (
     find_cycles,
     stretches,
 )
-from stickslip.identify.statistics import mean_of_cycles
 from stickslip.record.record import Record
+from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.estimate import NORMAL_95, correlated_covariance
+from stickslip.statistics import least_squares, student
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -100,7 +100,7 @@ class Line:
 def fit_line(stamps: Array) -> Line:
     """Fit the uniform clock ``start + k / fs`` to stamps [s], robustly, as a host that stamps late requires.
 
-    Huber's M-estimate of the line (weight 1 up to 1.345 robust standard deviations), with a covariance that allows
+    Huber's M-estimate of the line (weight 1 up to 1.345 robust standard deviations), with an interval that allows
     for the correlation of the lateness from row to row.
     """
     rows = np.flatnonzero(np.isfinite(stamps)).astype(float)
@@ -110,8 +110,8 @@ def fit_line(stamps: Array) -> Line:
     weights = np.ones_like(rows)
     for _ in range(30):
         root = np.sqrt(weights)
-        line, *_ = np.linalg.lstsq(design * root[:, None], times * root, rcond=None)
-        late = times - design @ line
+        coefficients, *_ = np.linalg.lstsq(design * root[:, None], times * root, rcond=None)
+        late = times - design @ coefficients
         scale = 1.4826 * float(np.median(np.abs(late))) + 1e-15
         fresh = np.minimum(1.0, 1.345 * scale / np.maximum(np.abs(late), 1e-300))
         settled = float(np.max(np.abs(fresh - weights))) < 1e-6
@@ -119,10 +119,11 @@ def fit_line(stamps: Array) -> Line:
         if settled:
             break
     root = np.sqrt(weights)
-    sd = float(np.sqrt(correlated_covariance(design * root[:, None], late * root)[1, 1]))
-    step = float(line[1])
-    interval = (1 / (step + NORMAL_95 * sd), 1 / max(step - NORMAL_95 * sd, 1e-300))
-    return Line(1 / step, interval, float(line[0] - step * centre), late)
+    line = least_squares(design * root[:, None], times * root)
+    start, step = (float(value) for value in line.coefficients)
+    reach = student(float(line.freedom[1])) * float(line.sd[1])
+    interval = (1 / (step + reach), 1 / max(step - reach, 1e-300))
+    return Line(1 / step, interval, start - step * centre, late)
 
 
 def _resolution(stamps: Array) -> float:

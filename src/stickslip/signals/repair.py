@@ -295,6 +295,11 @@ def remove_spikes(record: Record, *channels: str) -> Record:
     *channels : str
         Which channels; all where left out.
 
+    Returns
+    -------
+    Record
+        With the spikes replaced, and the history saying how many and how high.
+
     Raises
     ------
     RecordError

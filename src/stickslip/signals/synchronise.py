@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Estimate, correlated_covariance
+from stickslip.estimate import Estimate
 from stickslip.record.record import Record, Step
 from stickslip.signals.interpolate import band_limited
+from stickslip.statistics import least_squares, student
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,7 @@ def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] = "x") -> Es
     displacement is differentiated by that kernel's derivative where the other instrument has the velocity. The
     correlation over all lags gives a first offset; least squares of ``A(t) = g B(t - offset) + c`` refines it.
     Smoothed signals are interpolated without losing noise between samples, so that nothing pulls the offset towards
-    half samples. The interval allows for correlated residuals (Newey and West).
+    half samples. The interval allows for correlated residuals.
 
     Parameters
     ----------
@@ -284,35 +285,35 @@ def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> _Matc
         if abs(shift / gain) < 1e-10:
             break
     design, data, along = linearised(offset)
-    (gain, constant, _), *_ = np.linalg.lstsq(design, data, rcond=None)
-    residual = data - design @ np.array([gain, constant, 0.0])
-    sd = float(np.sqrt(correlated_covariance(design, residual)[2, 2]) / abs(gain))
-    stretched = np.column_stack([design, design[:, 2] * along])
-    found, *_ = np.linalg.lstsq(stretched, data, rcond=None)
-    rate_sd = float(np.sqrt(correlated_covariance(stretched, data - stretched @ found)[3, 3]) / abs(gain))
+    fit = least_squares(design, data)
+    gain, residual = float(fit.coefficients[0]), fit.residual
+    found = Estimate.normal(
+        "clock offset", offset, sd=float(fit.sd[2]) / abs(gain), quantile=student(float(fit.freedom[2])), unit="s",
+        method="least squares between the smoothed motions",
+    )  # fmt: skip
+    stretch = least_squares(np.column_stack([design, design[:, 2] * along]), data)
     rate = Estimate.normal(
-        "clock rate ratio", 1 + float(found[3] / gain), sd=rate_sd, unit="1",
+        "clock rate ratio", 1 + float(stretch.coefficients[3]) / gain, sd=float(stretch.sd[3]) / abs(gain), unit="1",
+        quantile=student(float(stretch.freedom[3])),
         method="least squares of the stretch between the smoothed motions",
     )  # fmt: skip
     rest = float(np.std(residual) / np.std(data))
-    return _Match(_offset(offset, sd, float(gain), rest, rate, len(data) * a.step, others), rate)
+    return _Match(_judged(found, gain, rest, rate, len(data) * a.step, others), rate)
 
 
-def _offset(
-    value: float, sd: float, gain: float, rest: float, rate: Estimate, overlap: float, others: list[float]
+def _judged(
+    offset: Estimate, gain: float, rest: float, rate: Estimate, overlap: float, others: list[float]
 ) -> Estimate:
+    """The offset with what was checked, and in words why it may be wrong."""
     words = []
     if others:
         nearest = ", ".join(f"{other:.4g} s" for other in sorted(others, key=abs)[:3])
         words.append(f"the motion repeats: {nearest} fit about as well, and the longest overlap was taken")
-    if not rate.includes(1.0) and abs(rate.value - 1) * overlap > 4 * sd:
+    if not rate.includes(1.0) and abs(rate.value - 1) * overlap > 4 * offset.sd:
         words.append(f"the clocks run at different rates, {rate.value:.6f} to 1: pass rate=clock_rate(a, b)")
     checks = (
         f"residual {100 * rest:.2g} % of the motion over {overlap:.3g} s",
         f"gain {gain:.4f}",
         f"rate ratio {rate.value:.6f} (95 %: {rate.interval[0]:.6f} to {rate.interval[1]:.6f})",
     )
-    return Estimate.normal(
-        "clock offset", value, sd=sd, unit="s", method="least squares between the smoothed motions",
-        status="; ".join(words) or "ok", checks=checks,
-    )  # fmt: skip
+    return replace(offset, status="; ".join(words) or "ok", checks=checks)

@@ -174,7 +174,7 @@ def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, chec
     status = "ok" if count >= FEW_CYCLES else f"only {count} cycle{'s' if count > 1 else ''}: the interval is crude"
     return Estimate.normal(
         name, present.mean(), sd=sd, unit=unit, method=method, quantile=student(freedom), status=status,
-        checks=(f"{count} cycles, scatter between them {scatter:.3g} {unit}", *checks),
+        checks=(f"{count} cycles, scatter between them {scatter:.3g}{'' if unit == '1' else ' ' + unit}", *checks),
     )  # fmt: skip
 
 
