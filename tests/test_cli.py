@@ -175,6 +175,10 @@ def damaged(kind: str) -> list[str]:
     if kind == "unequal columns":
         scipy.io.savemat("uneven.mat", {"x": wave, "f": wave[:1000]})
         return ["uneven.mat", "--fs", "500", "--channels", "x=x [m]", "--channels", "force=f [N]"]
+    if kind == "unequal columns of text":
+        cells = [f"{t:.3f},{x:.4f},{'' if t > 2 else round(x, 3)}" for t, x in zip(TIME, wave, strict=False)]
+        Path("uneven.csv").write_text("t [s],x [mm],force [N]\n" + "\n".join(cells), encoding="utf-8")
+        return ["uneven.csv"]
     text = {
         "prose": "It was the best of times,\nit was the worst of times,\n" * 30,
         "empty": "",
@@ -189,7 +193,7 @@ def damaged(kind: str) -> list[str]:
 @pytest.mark.parametrize(
     "kind",
     ["wrong unit", "unknown unit", "missing channel", "prose", "empty", "truncated TDMS", "truncated MAT",
-     "unequal columns", "all NaN", "constant", "ten samples"],
+     "unequal columns", "unequal columns of text", "all NaN", "constant", "ten samples"],
 )  # fmt: skip
 def test_bad_data_end_in_one_sentence_and_nothing_is_written(kind: str) -> None:
     arguments = damaged(kind)

@@ -86,4 +86,4 @@ def test_the_commands_run(folder: Path, line: str) -> None:
         run = subprocess.run(program, cwd=folder, capture_output=True, text=True, timeout=120, env=os.environ)
         assert run.returncode == 0, run.stderr
         return
-    assert command[:3] == ["pip", "install", "stickslip[io]"], f"a command that no test runs: {line}"
+    assert command[:3] == ["pip", "install", ".[io]"], f"a command that no test runs: {line}"

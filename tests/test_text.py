@@ -96,16 +96,18 @@ def test_clock_times_become_seconds(tmp_path: Path, cells: list[str], seconds: l
 
 def test_no_reading_is_nan_and_check_may_speak(tmp_path: Path) -> None:
     path = tmp_path / "holes.csv"
-    path.write_text("t,x [m],load [N]\n0,1,5\n1,,OL\n2,nan,\n3,4,Overload\n4,5,----\n")
+    path.write_text("t,x [m],load [N]\n0,1,5\n1,,OL\n2,nan,\n3,4,Overload\n4,5,----\n5,6,7\n")
     record = ss.read_record(path)
-    np.testing.assert_array_equal(record["x"], [1, np.nan, np.nan, 4, 5])
-    np.testing.assert_array_equal(np.isnan(record["load"]), [False, True, True, True, True])
+    np.testing.assert_array_equal(record["x"], [1, np.nan, np.nan, 4, 5, 6])
+    np.testing.assert_array_equal(np.isnan(record["load"]), [False, True, True, True, True, False])
 
 
-def test_columns_of_unequal_length_end_in_nan(tmp_path: Path) -> None:
+def test_columns_of_unequal_length_are_refused_with_the_rows_that_all_have(tmp_path: Path) -> None:
     path = tmp_path / "short.csv"
     path.write_text("t,x [m],load [N]\n0,1,5\n1,2,6\n2,3\n3,4\n")
-    np.testing.assert_array_equal(ss.read_record(path)["load"], [5, 6, np.nan, np.nan])
+    with pytest.raises(ss.RecordError, match=r"column load has values in 2 rows, others in 4; .* rows=\(0, 2\)"):
+        ss.read_record(path)
+    np.testing.assert_array_equal(ss.read_record(path, rows=(0, 2))["load"], [5, 6])
 
 
 @pytest.mark.parametrize(

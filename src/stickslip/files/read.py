@@ -191,6 +191,7 @@ class _Reading:
             return self._restored(data, 0)
         if (first, last) != (0, length):
             data = {key: values[first:last] for key, values in data.items()}
+        _require_equal_ends(data, first)
         return self._record(data, self._clock(data, first), "read_record")
 
     def blocks(self, size: int) -> Iterator[Record]:
@@ -455,6 +456,22 @@ def _require_twins(file: str, time: TimeColumn, data: Mapping[tuple[int, str], A
                 "one record has one clock",
                 "name the one meant in time= and read the columns of the other apart",
             )
+
+
+def _require_equal_ends(data: Mapping[tuple[int, str], Array], first: int) -> None:
+    """Refuse columns of unequal length, which a table fills up with empty cells at its end."""
+    ends = {}
+    for (_, name), values in data.items():
+        backwards = np.isfinite(values[::-1])
+        if backwards.any():
+            ends[name] = first + len(values) - int(np.argmax(backwards))
+    if ends and min(ends.values()) < max(ends.values()):
+        shortest = min(ends, key=lambda name: ends[name])
+        raise RecordError(
+            f"column {shortest} has values in {ends[shortest]} rows, others in {max(ends.values())}",
+            "the columns of one record are equally long",
+            f"keep the rows that all have with rows=({first}, {ends[shortest]})",
+        )
 
 
 def _finite(values: Array) -> Array:
