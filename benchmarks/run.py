@@ -181,7 +181,7 @@ def bench_start(rounds: int) -> None:
     commands = {
         "python -c pass": ["-c", "pass"],
         "import stickslip": ["-c", "import stickslip"],
-        "stickslip --help": ["-m", "stickslip.cli", "--help"],
+        "stickslip --help": ["-m", "stickslip", "--help"],
     }
     peers = {
         name: lambda command=command: subprocess.run([sys.executable, *command], capture_output=True, check=True)
