@@ -1,6 +1,7 @@
 """stickslip: dry friction in oscillators, from a rig's record to its friction law, and back.
 
-The public names; each is imported when it is first used, so that ``import stickslip`` stays light.
+The public names; each is imported when it is first used, so that ``import stickslip`` stays light. They stand here
+twice: for type-checkers and editors, and for that import.
 """
 
 from __future__ import annotations
@@ -11,7 +12,56 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    pass
+    from stickslip import datasets as datasets
+    from stickslip.analysis import (
+        Comparison as Comparison,
+        Findings as Findings,
+        analyze as analyze,
+        compare as compare,
+        mend as mend,
+    )
+    from stickslip.config import RigSettings as RigSettings, read_rig as read_rig, rig_settings as rig_settings
+    from stickslip.errors import (
+        EstimateError as EstimateError,
+        FormatError as FormatError,
+        ModelError as ModelError,
+        RecordError as RecordError,
+        StickslipError as StickslipError,
+    )
+    from stickslip.estimate import Estimate as Estimate
+    from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
+    from stickslip.files.write import write_record as write_record
+    from stickslip.identify.force import friction_force as friction_force
+    from stickslip.identify.loops import friction_loops as friction_loops
+    from stickslip.identify.regression import regress_friction as regress_friction
+    from stickslip.identify.sticks import find_sticks as find_sticks
+    from stickslip.plot.figures import figures as figures
+    from stickslip.record.channels import Channel as Channel
+    from stickslip.record.check import Fault as Fault
+    from stickslip.record.exchange import (
+        from_pandas as from_pandas,
+        from_sep005 as from_sep005,
+        from_xarray as from_xarray,
+    )
+    from stickslip.record.record import Record as Record, Step as Step
+    from stickslip.reports.folder import publish as publish
+    from stickslip.reports.page import report as report
+    from stickslip.reports.summary import summary as summary
+    from stickslip.signals.differentiate import differentiate as differentiate, smooth as smooth
+    from stickslip.signals.repair import (
+        fill_gaps as fill_gaps,
+        fill_missing as fill_missing,
+        remove_drift as remove_drift,
+        remove_spikes as remove_spikes,
+        repair_clock as repair_clock,
+        resample as resample,
+        restore_clipped as restore_clipped,
+    )
+    from stickslip.signals.synchronise import (
+        clock_offset as clock_offset,
+        clock_rate as clock_rate,
+        synchronise as synchronise,
+    )
 
 _ROOMS = {
     "StickslipError": "errors", "RecordError": "errors", "FormatError": "errors",
