@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import EstimateError
+from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import differentiate
@@ -18,6 +18,7 @@ from stickslip.statistics import least_squares, mean_of_cycles
 Array = NDArray[np.float64]
 
 LEAST = 32  # samples
+FORCES = {"m": "N", "rad": "N m"}  # what does work on a displacement, or an angle
 AUDIBLE = 5.0  # a speed of five standard deviations of its noise is motion
 CREEP = 0.04  # share of the typical peak speed below which presliding and creep are not told from sticking
 TURNED = 0.1  # share of the typical peak speed that the motion reaches before it counts as reversed
@@ -259,6 +260,18 @@ def forcing_frequency(values: Array, fs: float) -> Estimate:
 def is_measured(record: Record, name: str) -> bool:
     """Whether the record has the channel, and not from :func:`friction_force`, which derives what was not measured."""
     return name in record and record.channels[name].source != "friction_force"
+
+
+def require_fit(record: Record, *forces: str, length: str, question: str) -> None:
+    """Refuse, in one sentence, a torque with a displacement or a force with an angle (`length` "m" or "rad")."""
+    for name in forces:
+        unit = record.channels[name].unit
+        if unit != FORCES[length]:
+            raise RecordError(
+                f"channel {name} is in {unit}, the motion in {length}",
+                f"{question} needs a force in N with a displacement, or a torque in N m with an angle",
+                "give both in units that belong together, as in a lever's x = r theta or force = torque / r",
+            )
 
 
 def stretches(inside: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
