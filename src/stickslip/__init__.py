@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from stickslip.reports.folder import publish as publish
     from stickslip.reports.page import report as report
     from stickslip.reports.summary import summary as summary
+    from stickslip.signals.delay import without_delays as without_delays
     from stickslip.signals.differentiate import differentiate as differentiate, smooth as smooth
     from stickslip.signals.repair import (
         fill_gaps as fill_gaps,
@@ -72,7 +73,7 @@ _ROOMS = {
     "read_record": "files.read", "read_blocks": "files.read", "write_record": "files.write",
     "repair_clock": "signals.repair", "fill_gaps": "signals.repair", "fill_missing": "signals.repair",
     "restore_clipped": "signals.repair", "remove_drift": "signals.repair", "resample": "signals.repair",
-    "remove_spikes": "signals.repair",
+    "remove_spikes": "signals.repair", "without_delays": "signals.delay",
     "synchronise": "signals.synchronise", "clock_offset": "signals.synchronise", "clock_rate": "signals.synchronise",
     "differentiate": "signals.differentiate", "smooth": "signals.differentiate",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
