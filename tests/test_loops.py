@@ -131,6 +131,7 @@ def test_velocity_alone_or_an_angle_will_do():
     turning = Record.of({"theta": record["x"], "friction": record["friction"]}, fs=FS, units={"friction": "N m"})
     assert friction_loops(turning).level.unit == "N m"
     assert friction_loops(turning).slope.unit == "N m s/rad"
+    assert friction_loops(turning).unit == "rad"
 
 
 def test_a_contact_on_the_base_is_measured_against_it():
@@ -145,6 +146,26 @@ def test_a_contact_on_the_base_is_measured_against_it():
     balanced = friction_force(carried, mass=1.0, stiffness=100.0, contact="base")
     told = friction_loops(balanced)
     assert np.array_equal(told.displacement, friction_loops(balanced, contact="base").displacement)
+
+
+@pytest.mark.parametrize("late", ["x", "friction"])
+def test_a_stated_delay_is_taken_out(late):
+    record, rows = sliding(slope=4.0, seconds=12), 40
+    other = "x" if late == "friction" else "friction"
+    shifted = Record.of({late: record[late][:-rows], other: record[other][rows:]}, fs=FS)
+    assert abs(friction_loops(shifted).level.value - 1.5) > 0.05
+    told = friction_loops(shifted.with_details(late, delay=rows / FS))
+    direct = friction_loops(record.rows(rows))
+    assert told.level.value == pytest.approx(direct.level.value, rel=5e-3)
+    assert told.energy_per_cycle.value == pytest.approx(direct.energy_per_cycle.value, rel=5e-3)
+
+
+@pytest.mark.parametrize(("position", "unit"), [("x", "N m"), ("theta", "N")])
+def test_a_torque_with_a_displacement_is_refused(position, unit):
+    record = sliding()
+    mixed = Record.of({position: record["x"], "friction": record["friction"]}, fs=FS, units={"friction": unit})
+    with pytest.raises(RecordError, match=f"friction is in {unit}, the motion in"):
+        friction_loops(mixed)
 
 
 def test_wrong_sign_is_said():
@@ -193,6 +214,10 @@ def test_bad_input_ends_in_a_sentence():
         friction_loops(record, frequency=-1.0)
     with pytest.raises(EstimateError, match="bins = 1"):
         friction_loops(record, bins=1)
+    with pytest.raises(EstimateError, match=r"bins = 2\.5"):
+        friction_loops(record, bins=2.5)
+    with pytest.raises(RecordError, match="'often'"):
+        friction_loops(record, frequency="often")
     with pytest.raises(EstimateError, match="forward, back, and forward again"):
         friction_loops(Record.of({"x": np.arange(5000) * 1e-4, "friction": friction}, fs=FS))
 

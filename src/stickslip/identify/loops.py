@@ -20,8 +20,11 @@ from stickslip.identify.motion import (
     away_from,
     contact_motion,
     find_cycles,
+    motion_channels,
+    require_fit,
 )
 from stickslip.record.record import Record
+from stickslip.signals.delay import without_delays
 from stickslip.statistics import mean_of_cycles, mean_uncertainty, student
 
 Array = NDArray[np.float64]
@@ -80,6 +83,8 @@ class Loops:
         Friction against velocity.
     cycles : ndarray, shape (m,)
         Time [s] at which each cycle begins.
+    unit : str
+        Of the displacement, "m" or "rad".
     status : str
         "ok", or in words what to beware of.
     """
@@ -98,11 +103,12 @@ class Loops:
     scatter: Array
     curve: Curve
     cycles: Array
+    unit: str
     status: str
 
 
 def friction_loops(
-    record: Record, *, contact: str | None = None, frequency: float | None = None, bins: int = 40
+    record: Record, *, contact: str | None = None, frequency: float | str | None = None, bins: int = 40
 ) -> Loops:
     r"""How much friction, forward and back, over each cycle, and how does it change with speed?
 
@@ -116,11 +122,12 @@ def friction_loops(
     Parameters
     ----------
     record : Record
-        With ``friction`` and ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base.
+        With ``friction`` and ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base. Delays stated for them
+        are taken out first.
     contact : {"ground", "base"}, optional
         What the mass slides on, the loops being over the displacement against it; as :func:`friction_force` was told,
         or the ground, when not given.
-    frequency : float, optional
+    frequency : float or str, optional
         Forcing frequency [Hz]; found from the record when not given.
     bins : int
         Bins of velocity, over both directions.
@@ -132,7 +139,7 @@ def friction_loops(
     Raises
     ------
     RecordError
-        A channel is missing, broken or too short.
+        A channel is missing, broken or too short, or the units of friction and motion do not belong together.
     EstimateError
         No motion, no complete cycle, or no sliding in one of the directions.
 
@@ -148,9 +155,11 @@ def friction_loops(
     """
     question = "friction loops"
     record.require_clean("friction", question=question)
-    if bins < 2:
-        raise EstimateError(f"bins = {bins}", "a curve has two bins at least", "leave it at 40")
+    if not isinstance(bins, (int, np.integer)) or bins < 2:
+        raise EstimateError(f"bins = {bins}", "a curve has two bins at least, a whole number", "leave it at 40")
+    record = without_delays(record, *motion_channels(record, contact), "friction", question=question)
     motion = contact_motion(record, contact=contact, question=question)
+    require_fit(record, "friction", length=motion.unit, question=question)
     cycles = find_cycles(record, motion, frequency=frequency)
     friction, unit = record["friction"], record.channels["friction"].unit
     sliding = _sliding(motion, cycles)
@@ -178,6 +187,7 @@ def friction_loops(
         scatter=folded.std(axis=0, ddof=1) if len(folded) > 1 else np.zeros(PHASES),
         curve=_curve(friction, motion, cycles, label, bins),
         cycles=motion.start + cycles.edges[:-1] / motion.fs,
+        unit=motion.unit,
         status=_status(cycles, forward, back, energy),
     )
 
