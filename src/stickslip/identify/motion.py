@@ -95,14 +95,19 @@ class Cycles:
         return np.interp(at, np.arange(len(values)), values)
 
 
-def motion_channels(record: Record, contact: str | None) -> list[str]:
-    """The channels that tell the motion of the contact, its position first."""
+def slid_on(record: Record, contact: str | None) -> str:
+    """What the mass slides on: as said, or as :func:`friction_force` was told, or the ground."""
     if contact is None:
         told = [step.arguments.get("contact") for step in record.history if step.action == "friction_force"]
         contact = str(told[-1]) if told else "ground"
     if contact not in ("ground", "base"):
         raise EstimateError(f"contact = '{contact}'", "the mass slides on the ground or the base", "choose one of them")
-    if contact == "base":
+    return contact
+
+
+def motion_channels(record: Record, contact: str | None) -> list[str]:
+    """The channels that tell the motion of the contact, its position first."""
+    if slid_on(record, contact) == "base":
         return ["x", "z"]
     velocity = ["v"] if is_measured(record, "v") else []
     if "x" in record:
