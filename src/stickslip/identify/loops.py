@@ -13,7 +13,6 @@ from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
-    NOT_PERIODIC,
     PHASES,
     Cycles,
     Motion,
@@ -320,8 +319,8 @@ def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.in
 
 def _status(cycles: Cycles, forward: Estimate, back: Estimate, energy: Estimate) -> str:
     words = [] if forward.status == "ok" else [forward.status]
-    if not cycles.periodic:
-        words.append(NOT_PERIODIC)
+    if cycles.status != "ok":
+        words.append(cycles.status)
     if forward.value + back.value < 0 or energy.value < 0:
         words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
     return "; ".join(words) or "ok"

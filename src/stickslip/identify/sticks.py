@@ -13,7 +13,6 @@ from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
-    NOT_PERIODIC,
     Cycles,
     Motion,
     contact_motion,
@@ -163,7 +162,7 @@ def find_sticks(
         f"the velocity's noise is {_words(motion.noise, motion)}",
         *_sensitivity(motion, cycles, limit),
     )
-    status = "ok" if cycles.periodic else NOT_PERIODIC
+    status = cycles.status
     if limit < noisy:
         status = f"the threshold is within the velocity's noise ({_words(noisy, motion)} is five deviations)"
     per_cycle = mean_of_cycles(
