@@ -233,6 +233,16 @@ def test_results_are_plain_data() -> None:
     assert isinstance(findings, Findings)
 
 
+def test_answers_print_as_their_estimates() -> None:
+    findings = analyze(sliding(normal=3.0))
+    assert findings.loops is not None
+    for answer in (findings, findings.loops, findings.sticks, compare([findings, findings])):
+        assert len(repr(answer)) < 1500
+        assert "array" not in repr(answer)
+    assert str(findings.loops).startswith("Loops:\n  sliding friction 1.49")
+    assert str(findings).startswith("record:\n  friction coefficient 0.5")
+
+
 def test_mending_is_asked_for_and_logged() -> None:
     wave = np.sin(0.2 * np.arange(2000))
     wave[100:103] = np.nan

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, ModelError, StickslipError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.identify.force import friction_force
 from stickslip.identify.loops import Loops, friction_loops
 from stickslip.identify.motion import is_measured, slid_on
@@ -39,8 +39,8 @@ USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels th
 CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
 
 
-@dataclass(frozen=True, eq=False)
-class Findings:
+@dataclass(frozen=True, eq=False, repr=False)
+class Findings(Result):
     """What a record says about its friction.
 
     Attributes
@@ -91,7 +91,7 @@ class Findings:
         """Every number found, in the order of asking."""
         level = [self.coefficient] if self.coefficient is not None else []
         answers = (self.loops, self.regression, self.asymmetric, self.sticks)
-        found = [*level, *(estimate for answer in answers for estimate in _estimates_of(answer))]
+        found = [*level, *(estimate for answer in answers if answer is not None for estimate in answer.estimates)]
         first: dict[str, Estimate] = {}
         for estimate in found:
             first.setdefault(estimate.name, estimate)
@@ -118,8 +118,8 @@ class Findings:
         return {key: _plain(value) for key, value in told.items()}
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
     """Several records side by side.
 
     Attributes
@@ -449,17 +449,12 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
     return EstimateError(
         f"{value}: its channels are {', '.join(f'{c.name} [{c.unit}]' for c in record.channels.values())}",
         "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
-        'name the columns, as in channels={"x": "COLUMN [mm]"} or --channels "x=COLUMN [mm]"',
+        'name the columns, as in channels={"x": "COLUMN [mm]"}',
     )
 
 
 def _moves(record: Record) -> bool:
     return any(name in record for name in ("x", "v", "theta"))
-
-
-def _estimates_of(result: object | None) -> Iterator[Estimate]:
-    if result is not None:
-        yield from (value for value in vars(result).values() if isinstance(value, Estimate))
 
 
 def _normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
@@ -56,8 +56,8 @@ class Curve:
     count: NDArray[np.intp]
 
 
-@dataclass(frozen=True, eq=False)
-class Loops:
+@dataclass(frozen=True, eq=False, repr=False)
+class Loops(Result):
     """Friction over the cycles of a motion.
 
     Attributes

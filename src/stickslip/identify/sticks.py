@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
@@ -54,8 +54,8 @@ class StickEvent:
     whole: bool = True
 
 
-@dataclass(frozen=True, eq=False)
-class Sticks:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sticks(Result):
     """Sticks and slips of a contact.
 
     Attributes
