@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from stickslip.errors import RecordError
 from stickslip.record import flaws
 from stickslip.record.check import SHARP_UNITS, in_words
+from stickslip.record.clock import Line, fit_line, inspect
 from stickslip.record.record import Record, Step
-from stickslip.record.stamps import Line, fit_line, inspect
 from stickslip.signals.interpolate import band_limited, bridge
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ def repair_clock(record: Record, *, fs: float | None = None, trust: str | None =
     """Give a record one sampling rate where its stamps stand still and jump, repeat, go back or jitter.
 
     An instrument samples evenly; the host stamps late. The uniform clock ``start + k / fs`` is fitted to the stamps
-    (Huber's line, see :func:`stickslip.record.stamps.fit_line`) and the samples are kept as they are, on that clock.
+    (Huber's line, see :func:`stickslip.record.clock.fit_line`) and the samples are kept as they are, on that clock.
     Where intervals jitter, the stamps may be right and the sampling uneven: the record itself tells, by which of the
     two clocks makes its channels smoother, and then the samples are interpolated from the stamps onto a uniform clock.
 
