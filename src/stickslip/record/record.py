@@ -273,10 +273,15 @@ class Record:
         fs: float | None = None,
         start: float | None = None,
         stamps: Array | None = None,
+        filtered: bool = False,
     ) -> Record:
-        """This record's channels with new samples (all of them, on a new clock if given), logged as `step`."""
+        """This record's channels with new samples (all of them, on a new clock if given), logged as `step`.
+
+        Samples that were `filtered` have no longer the noise that was stated.
+        """
         fs, start = self.fs if fs is None else fs, self.start if start is None else start
-        return Record(samples, self.channels, fs, start, (*self.history, step), stamps, self.truth)
+        channels = {n: replace(c, noise=None) for n, c in self.channels.items()} if filtered else self.channels
+        return Record(samples, channels, fs, start, (*self.history, step), stamps, self.truth)
 
     def rows(self, first: int = 0, last: int | None = None) -> Record:
         """Rows ``first`` up to, not including, ``last`` (negative from the end, as in a slice)."""
