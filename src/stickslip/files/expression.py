@@ -97,7 +97,7 @@ def linear(arithmetic: str, keys: Mapping[str, str], constants: Mapping[str, flo
             return Linear({keys[name]: 1.0})
         if name in constants:
             return Linear({}, float(constants[name]))
-        raise unknown("column", name, [key for key in [*keys, *constants] if not key.startswith("#")])
+        raise unknown("column", name, dict.fromkeys([*keys.values(), *constants]))
 
     result = _walk(_parsed(source, arithmetic), arithmetic, named)
     if not all(math.isfinite(number) for number in (*result.scales.values(), result.offset)):
@@ -111,6 +111,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> RecordError:
     """The error for a name that is not there: what there is, and the nearest spelling."""
     names = list(known)
     near = difflib.get_close_matches(name, names, 1) or [n for n in names if n.lower() == name.lower()]
+    near = [one if kind != "column" or one.isidentifier() else f"`{one}`" for one in near]
     shown = ", ".join(names[:40]) + (f" and {len(names) - 40} more" if len(names) > 40 else "")
     return RecordError(
         f"there is no {kind} '{name}'",

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
-from stickslip.files.layout import split_name
 from stickslip.files.table import Column, Options, Table, slices, unique
 
 NAME = "JSON"
@@ -46,19 +45,17 @@ def read(path: Path, options: Options) -> Table:
             "name the arrays in one object: {'t': [...], 'x': [...]}",
         )
     fs = _rate(about)
-    parts = {key: split_name(key) for key in arrays}
-    names = unique([name for name, _ in parts.values()])
     stated = about.get("units")
     units = stated if isinstance(stated, Mapping) else {}
     columns = []
-    for name, (key, (_, unit)) in zip(names, parts.items(), strict=True):
-        written = unit or units.get(key) or about.get(f"{key}_unit") or about.get(f"{key} unit")
-        columns.append(Column(name, str(written) if written else None, len(arrays[key]), fs))
+    for key, values in arrays.items():
+        written = units.get(key) or about.get(f"{key}_unit") or about.get(f"{key} unit")
+        columns.append(Column(key, str(written) if written else None, len(values), fs))
     notes = tuple(f"{key}: {value}" for key, value in about.items() if "unit" in key.lower() and isinstance(value, str))
     constants = {
         key: float(value) for key, value in about.items() if type(value) in (int, float) and abs(value) < 1e300
     }
-    return Table(tuple(columns), slices(dict(zip(names, arrays.values(), strict=True))), constants, notes)
+    return Table(tuple(columns), slices(arrays), constants, notes)
 
 
 def _columns(contents: Any, about: Mapping[str, Any]) -> dict[str, Array]:

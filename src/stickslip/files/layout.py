@@ -9,9 +9,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from stickslip.errors import FormatError, StickslipError
+from stickslip.errors import FormatError
 from stickslip.files.table import Options, unique
-from stickslip.units import parse_unit
+from stickslip.files.titles import is_unit, split_name
 
 NOT_NUMBERS = ("OL", "Ol", "overload", "Overload", "OVERLOAD", "over", "----", "--", "-", "?", "*", "INVALID")
 WHITESPACE = r"\s+"
@@ -271,7 +271,7 @@ def _paired(rows: Sequence[list[str]]) -> tuple[list[str], list[str | None]]:
 def _stacked(upper: Sequence[str], lower: Sequence[str]) -> tuple[list[str], list[str | None]]:
     """Headers of one row of names, or of names over units; a unit may stand in the name's own cell."""
     named = [cell for cell in lower if cell]
-    unit_row = any(upper) and all(_is_unit(_bare(cell)) for cell in named)
+    unit_row = any(upper) and all(is_unit(_bare(cell)) for cell in named)
     names: list[str] = []
     units: list[str | None] = []
     for above, below in zip(upper, lower, strict=True):
@@ -287,26 +287,3 @@ def _stacked(upper: Sequence[str], lower: Sequence[str]) -> tuple[list[str], lis
 
 def _bare(cell: str) -> str:
     return cell.strip().strip("[]()").strip()
-
-
-def split_name(text: str) -> tuple[str, str | None]:
-    """Part ``"x [mm]"``, ``"x (mm)"`` or ``"x, mm"`` into name and unit."""
-    match = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]\s*", text)
-    if match and match[1]:
-        return match[1], match[2].strip()
-    match = re.fullmatch(r"(.*?)\s*(?:\(([^()]*(?:\([^()]*\))?[^()]*)\)|,\s*([^,]+))\s*", text)
-    if match and match[1]:
-        unit = (match[2] or match[3] or "").strip()
-        if _is_unit(unit):
-            return match[1], unit
-    return text.strip(), None
-
-
-def _is_unit(text: str) -> bool:
-    if not text or len(text) > 20:
-        return False
-    try:
-        parse_unit(text)
-    except StickslipError:
-        return False
-    return True

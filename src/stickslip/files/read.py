@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from stickslip.errors import FormatError, RecordError
 from stickslip.files.select import Columns, Source, TimeColumn, Wanted
 from stickslip.files.table import Block, Options, reading
+from stickslip.files.titles import titled
 from stickslip.record.clock import Clock, fit_clock, resolution
 from stickslip.record.metadata import (
     Digests,
@@ -398,7 +399,7 @@ def _source(path: Path, options: Options) -> Source:
         room = importlib.import_module(f"stickslip.files.{name}")
         if room.recognise(path, head):
             with _quietly(path, room.NAME):
-                return Source(path, room.NAME, room.read(path, options), digest, size)
+                return Source(path, room.NAME, titled(room.read(path, options)), digest, size)
     raise FormatError(
         f"'{path.name}' is of no known format",
         f"these are read: {', '.join(_room(name).NAME for name in FORMATS)}",

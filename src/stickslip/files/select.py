@@ -11,6 +11,7 @@ from pathlib import Path
 from stickslip.errors import RecordError
 from stickslip.files.expression import Linear, Spec, apply_sensitivity, channel_unit, linear, split_spec, unknown
 from stickslip.files.table import Column, Table, unique
+from stickslip.files.titles import last_part
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
 from stickslip.units import Unit, parse_unit
 
@@ -75,7 +76,9 @@ class Columns:
             else:
                 qualified = [(f"{source.path.name}:{name}", key) for name, key in exact if key[0] == number]
                 self._admit(qualified + [(f"{source.path.name}:{name}", key) for name, key in numbered])
-        self._admit([(re.split(r"[/\\]", name)[-1], key) for name, key in exact])
+        self._admit([(last_part(name), key) for name, key in exact])
+        self._admit([(f"{name} [{self.columns[key].unit}]", key) for name, key in exact])
+        self._admit([(_word_of(last_part(name)), key) for name, key in exact])  # as a check-up shows it
         self.constants = {name: value for source in sources for name, value in source.table.constants.items()}
 
     def _admit(self, pairs: Iterable[tuple[str, Key]]) -> None:
@@ -91,7 +94,8 @@ class Columns:
 
     def combination(self, arithmetic: str) -> tuple[dict[Key, float], Linear]:
         """The arithmetic as numbers times columns."""
-        names = {name: name for name in self._by_name}
+        first: dict[Key, str] = {}
+        names = {name: first.setdefault(key, name) for name, key in self._by_name.items()}
         found = linear(arithmetic, names, self.constants)
         scales: dict[Key, float] = {}
         for name, scale in found.scales.items():
@@ -144,7 +148,7 @@ class Columns:
 
     def _title(self, column: Column, units: Mapping[str, str]) -> str:
         """A channel name for a column: a word of the vocabulary where name and unit fit one."""
-        last = re.split(r"[/\\]", column.name)[-1]
+        last = last_part(column.name)
         unit = units.get(column.name, column.unit)
         word = last.lower() if len(last) > 1 and unit else last  # "Friction" without unit may be a coefficient
         if word in VOCABULARY:
@@ -153,8 +157,7 @@ class Columns:
                 return word
             except RecordError:
                 last = f"{last}_{unit}"
-        name = re.sub(r"[^A-Za-z0-9_]+", "_", last).strip("_")
-        name = name if name and not name[0].isdigit() else f"c_{name}".rstrip("_")
+        name = _word_of(last)
         return f"{name}_" if name in VOCABULARY else name
 
     def _channel(self, name: str, spec: Spec, stated: str | None) -> tuple[Channel, float]:
@@ -211,7 +214,7 @@ class Columns:
         spec = split_spec(asked)
         table = self.sources[number].table
         by_name = {f"#{n}": column for n, column in enumerate(table.columns, 1)}
-        by_name |= {re.split(r"[/\\]", column.name)[-1]: column for column in table.columns}
+        by_name |= {last_part(column.name): column for column in table.columns}
         by_name |= {column.name: column for column in table.columns}
         column = by_name.get(spec.arithmetic.strip("`"))
         if column is None:
@@ -227,6 +230,12 @@ class Columns:
                 raise unknown("channel or column", name, known)
 
 
+def _word_of(title: str) -> str:
+    """A title as one word that can name a channel."""
+    name = re.sub(r"[^A-Za-z0-9_]+", "_", title).strip("_")
+    return name if name and not name[0].isdigit() else f"c_{name}".rstrip("_")
+
+
 def is_time(column: Column) -> bool:
     """Whether a column is time by its name, and its unit does not contradict."""
     if column.unit is not None:
@@ -239,7 +248,7 @@ def is_time(column: Column) -> bool:
 
 
 def _word(column: Column) -> str:
-    last = re.split(r"[/\\]", column.name)[-1].lower()
+    last = last_part(column.name).lower()
     return re.sub(r"(_\d+$|[^a-z])", "", last)
 
 
