@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _ROOMS = {
     "StickslipError": "errors", "RecordError": "errors", "FormatError": "errors",
-    "EstimateError": "errors", "ModelError": "errors",
+    "EstimateError": "errors", "ModelError": "errors", "SolveError": "errors",
     "Estimate": "estimate",
     "Record": "record.record", "Channel": "record.channels", "Step": "record.record", "Fault": "record.check",
     "from_pandas": "record.exchange", "from_xarray": "record.exchange", "from_sep005": "record.exchange",
@@ -28,6 +28,10 @@ _ROOMS = {
     "regress_friction": "identify.regression",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
     "analyze": "analysis", "compare": "analysis", "Findings": "analysis", "Comparison": "analysis",
+    "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant",
+    "Release": "drives", "HarmonicBase": "drives", "HarmonicForce": "drives", "MultiTone": "drives",
+    "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives",
+    "Oscillator": "oscillator", "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
     "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder", "datasets": "datasets",
 }  # fmt: skip
 

@@ -1,0 +1,197 @@
+"""Run a system through its events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import ModelError, SolveError
+from stickslip.oscillator import Oscillator
+from stickslip.solve import kernel
+from stickslip.solve.automaton import DEGREE, Array, Automaton, automaton
+from stickslip.solve.phasors import blank_past, fast_tables
+from stickslip.solve.trajectory import Trajectory
+
+CHUNK = 16384  # pieces between two looks at the clock and the keyboard
+
+
+def simulate(
+    system: Oscillator,
+    *,
+    duration: float | None = None,
+    cycles: float | None = None,
+    start: Mapping[str, float | str] | None = None,
+    budget: int = 10_000,
+) -> Trajectory:
+    """How does the system move?
+
+    Every mode is linear, so the motion between events is a closed form, and the first exit of each mode is found with
+    a certificate that none was jumped over.
+
+    Parameters
+    ----------
+    system : Oscillator
+        What moves.
+    duration : float, optional
+        Time to simulate [s]. Give this or `cycles`.
+    cycles : float, optional
+        Time in periods of the drive; without a periodic drive, in natural periods.
+    start : mapping, optional
+        State at time 0: "x" [m], "v" [m/s], memory of the law by name, "mode". At rest at 0 where left out.
+    budget : int
+        Most events in one period; more is taken for chatter.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    ModelError
+        The time or the start has no meaning.
+    SolveError
+        More events than the budget, or transitions that chase each other; the message names the state.
+
+    Examples
+    --------
+    >>> from stickslip.laws.coulomb import Coulomb
+    >>> slider = Oscillator(mass=1, stiffness=4, law=Coulomb(1.0))
+    >>> run = simulate(slider, duration=10, start={"x": 1.25})
+    >>> [(round(event.time, 6), event.kind) for event in run.events]
+    [(1.570796, 'reversal'), (3.141593, 'stick')]
+    >>> run.status, run.state(10)["x"]
+    ('at rest', 0.25)
+    """
+    table = automaton(system)
+    laps, offset = _end(system, table, duration, cycles)
+    state, mode = opening(table, start or {})
+    return run(system, table, state, mode, laps=laps, offset=offset, budget=budget)
+
+
+def _end(system: Oscillator, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
+    """The time to simulate, as full periods of the drive and a rest [s]."""
+    if (duration is None) == (cycles is None):
+        raise ModelError(f"duration = {duration}, cycles = {cycles}", "one of the two is given", "give one of them")
+    given = duration if cycles is None else cycles
+    assert given is not None
+    if not (math.isfinite(given) and given > 0):
+        raise ModelError(
+            f"{'duration' if cycles is None else 'cycles'} = {given}", "the time is finite and positive", "give more"
+        )
+    period = table.motion.period
+    if math.isfinite(period):
+        count = given if cycles is not None else given / period
+        laps = math.floor(count)
+        return float(laps), (count - laps) * period if cycles is not None else max(0.0, given - laps * period)
+    if cycles is None:
+        return 0.0, given
+    if system.stiffness == 0:
+        raise ModelError(f"cycles = {cycles}", "a system without period has no cycles", "give duration= [s]")
+    return 0.0, given / system.frequency
+
+
+def opening(table: Automaton, start: Mapping[str, float | str]) -> tuple[Array, int]:
+    """The state at time 0 and its mode, before any exit that is due at once."""
+    state = np.zeros(len(table.names))
+    state[table.names.index("1")] = 1.0
+    for name, value in table.motion.start.items():
+        state[table.names.index(name)] = value
+    given: dict[str, Any] = dict(start)
+    mode_name = given.pop("mode", None)
+    memory = table.names[2 : table.physical]
+    for name in given:
+        if name not in table.names[: table.physical]:
+            raise ModelError(
+                f"start has '{name}'", f"it may have {', '.join(table.names[: table.physical])} and mode", "correct it"
+            )
+        if not math.isfinite(given[name]):
+            raise ModelError(f"start has {name} = {given[name]}", "a start is finite", f"correct {name}")
+    state[0] = given.get("x", 0.0)
+    state[1] = given.get("v", table.outputs["face_rate"] @ state)
+    for j, name in enumerate(memory):
+        state[2 + j] = given.get(name, table.opening[j] @ state)
+    slip = table.outputs["slip"] @ state
+    return state, table.index(mode_name) if mode_name is not None else table.entry[int(np.sign(slip)) + 1]
+
+
+def run(
+    system: Oscillator, table: Automaton, state: Array, mode: int, *, laps: float, offset: float, budget: int
+) -> Trajectory:
+    """March from a state at time 0 to the end of the time, in chunks."""
+    size = len(table.names)
+    work = np.zeros((15, max(size, DEGREE + 1)))
+    fast, past = fast_tables(table), blank_past()
+    clock, state = np.zeros(3), state.copy()
+    period = table.motion.period
+    total = offset + (laps * period if math.isfinite(period) else 0.0)
+    scale = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total
+    chunks: list[tuple[Array, ...]] = []
+    status = "complete"
+    try:
+        for at, (signals, values) in _stops(table, laps, offset):
+            state[signals] = values
+            cell = min(table.cell[mode], total)
+            mode = kernel.settle(table.tables, mode, state, cell, work[:2, :size], work[4, : DEGREE + 1],
+                                 work[5, : DEGREE + 1])  # fmt: skip
+            _refuse_chatter(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock, mode)
+            outcome = kernel.FULL
+            while outcome == kernel.FULL:
+                capacity = 256 if not chunks else CHUNK
+                out = (
+                    np.empty(capacity), np.empty(capacity), np.empty(capacity, np.int64), np.empty(capacity),
+                    np.empty((capacity, size)), np.empty(capacity, np.int64),
+                )  # fmt: skip
+                before = clock.copy()
+                outcome, count, mode = kernel.march(table.tables, fast, clock, state, mode, at, period, past, out, work)
+                if count:
+                    chunks.append(tuple(column[:count] for column in out))
+                _refuse_chatter(outcome, table, state, clock, mode)
+                passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
+                if outcome == kernel.FULL and count > budget * max(1.0, passed / scale):
+                    raise SolveError(
+                        f"{count} events within {passed:g} s at {_named(table, state)}",
+                        f"a period of {scale:g} s has at most {budget} events",
+                        "check the law there (chatter), or raise budget=",
+                    )
+    except KeyboardInterrupt:
+        status = "interrupted"
+        total = clock[1] + (clock[0] * period if math.isfinite(period) else 0.0)
+        if not chunks:
+            raise
+    columns = [np.concatenate(column) for column in zip(*chunks, strict=True)]
+    if status == "complete" and _at_rest(table, columns[4][-1], int(columns[2][-1])):
+        status = "at rest"
+    return Trajectory(system, table, *columns, duration=total, status=status)  # type: ignore[arg-type]
+
+
+def _stops(table: Automaton, laps: float, offset: float) -> Any:
+    """The times to which the march goes in turn, with the signals that take new values at each start."""
+    knots = table.motion.knots
+    if knots is None:
+        yield (laps, offset), ([], [])
+        return
+    places = [table.names.index(name) for name in table.motion.knotted]
+    ends = np.append(knots[1:, 0], np.inf)
+    for row, end in zip(knots, ends, strict=True):
+        if row[0] < offset:
+            yield (0.0, min(end, offset)), (places, row[1:])
+
+
+def _at_rest(table: Automaton, state: Array, mode: int) -> bool:
+    return bool(np.all(table.flow[mode] @ state == 0.0))
+
+
+def _refuse_chatter(outcome: int, table: Automaton, state: Array, clock: Array, mode: int) -> None:
+    if outcome in (kernel.CHATTER, kernel.LOST):
+        raise SolveError(
+            f"transitions without time between them, lap {clock[0]:g}, {clock[1]:g} s, at {_named(table, state)}",
+            "a law leaves every state in one direction",
+            "check the law's exits there",
+        )
+
+
+def _named(table: Automaton, state: Array) -> str:
+    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(table.names[: table.physical], state, strict=False))

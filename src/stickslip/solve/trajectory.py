@@ -1,0 +1,201 @@
+"""What a simulation is: pieces of closed-form motion, the events between them, and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.errors import SolveError
+from stickslip.oscillator import Oscillator
+from stickslip.record.channels import Channel, described
+from stickslip.record.record import Record, Step
+from stickslip.solve.automaton import Array, Automaton
+from stickslip.solve.kernel import sample
+
+
+class Event(NamedTuple):
+    """One change of mode: when [s], what it is called, the mode it leads to and that mode's side."""
+
+    time: float
+    kind: str
+    mode: str
+    side: int
+
+
+class Piece(NamedTuple):
+    """One stretch in one mode: start [s], duration [s], mode, and the state at its start by name."""
+
+    start: float
+    duration: float
+    mode: str
+    state: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory:
+    """A simulated motion, exact at every instant.
+
+    Attributes
+    ----------
+    system : Oscillator
+        What moved.
+    table : Automaton
+        Its flat mode tables.
+    laps, offsets : ndarray (n,)
+        Start of each piece: full periods of the drive, and time [s] within the period. Kept apart, so that long runs
+        lose no digits.
+    modes : ndarray (n,)
+        Number of each piece's mode.
+    durations : ndarray (n,)
+        Length of each piece [s].
+    states : ndarray (n, N)
+        State at the start of each piece.
+    exits : ndarray (n,)
+        Number of the exit that ended each piece; -1 where the time was over.
+    duration : float
+        Simulated time [s].
+    status : str
+        "complete", "at rest" (nothing more will happen), or "interrupted".
+    """
+
+    system: Oscillator
+    table: Automaton
+    laps: Array
+    offsets: Array
+    modes: NDArray[np.int64]
+    durations: Array
+    states: Array
+    exits: NDArray[np.int64]
+    duration: float
+    status: str
+
+    @cached_property
+    def starts(self) -> Array:
+        """Start of each piece [s]."""
+        period = self.table.motion.period
+        return self.offsets + (self.laps * period if np.isfinite(period) else 0.0)
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The stretches between events."""
+        names, modes = self.table.names, self.table.modes
+        return tuple(
+            Piece(float(t), float(d), modes[m].name, dict(zip(names, map(float, s), strict=True)))
+            for t, d, m, s in zip(self.starts, self.durations, self.modes, self.states, strict=True)
+        )
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The changes of mode, in order of time.
+
+        Kinds: the kind of the mode that begins ("stick", "slip", "microstick"), or "reversal" where a slip goes
+        straight over into a slip to the other side.
+        """
+        return tuple(self._events())
+
+    def _events(self) -> Iterator[Event]:
+        modes = self.table.modes
+        for j in range(1, len(self.modes)):
+            if self.exits[j - 1] < 0:
+                continue
+            before, after = modes[self.modes[j - 1]], modes[self.modes[j]]
+            turned = before.side * after.side < 0
+            yield Event(float(self.starts[j]), "reversal" if turned else after.kind, after.name, after.side)
+
+    def state(self, time: float) -> dict[str, float]:
+        """The exact state at one instant: x [m], v [m/s], the law's memory, a [m/s^2], friction [N], and the mode.
+
+        Parameters
+        ----------
+        time : float
+            Instant [s] within the simulated time; at an event, the state after it.
+
+        Returns
+        -------
+        dict of str to float
+            By name; "mode" is the number of the piece's mode in ``table.modes``.
+
+        Raises
+        ------
+        SolveError
+            The instant lies outside the simulated time.
+        """
+        names = self.table.names[: self.table.physical]
+        values, piece = self.sample([time], ("state", "a", "friction"))
+        named = dict(zip((*names, "a", "friction"), map(float, values[:, 0]), strict=True))
+        return {**named, "mode": int(self.modes[piece[0]])}
+
+    def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, NDArray[np.int64]]:
+        """Exact values at increasing instants.
+
+        Parameters
+        ----------
+        times : array_like
+            T instants [s], increasing, within the simulated time.
+        outputs : tuple of str
+            Of "x", "v", "a", "friction", "z", "slip" (velocity relative to the counter-face), "force", the names of
+            the law's memory, and "state" (all physical entries of the state).
+
+        Returns
+        -------
+        values : ndarray (R, T)
+        piece : ndarray (T,)
+            Number of the piece each instant falls in.
+        """
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        if len(times) and not (times[0] >= 0 and times[-1] <= self.duration * (1 + 1e-12)):
+            raise SolveError(
+                f"instants from {times[0]:g} to {times[-1]:g} s",
+                f"the motion is known from 0 to {self.duration:g} s",
+                "simulate longer, or ask within it",
+            )
+        rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
+        out, piece = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
+        work = np.empty((4, self.states.shape[1]))
+        sample(self.table.tables, self.starts, self.modes, self.states, times, rows, piece, out, work)
+        return out, piece
+
+    def rows(self, name: str) -> Array:
+        """An output as linear forms of the state, by mode: (M, R, N)."""
+        table = self.table
+        count, size = len(table.modes), len(table.names)
+        if name == "a":
+            return table.flow[:, 1:2]
+        if name == "friction":
+            return table.friction[:, None]
+        if name in table.outputs:
+            return np.broadcast_to(table.outputs[name], (count, 1, size))
+        places = list(range(table.physical)) if name == "state" else [table.names.index(name)]
+        return np.broadcast_to(np.eye(size)[places], (count, len(places), size))
+
+    def record(self, *, fs: float) -> Record:
+        """The motion sampled at a rate, as a Record.
+
+        Parameters
+        ----------
+        fs : float
+            Sampling rate [Hz].
+
+        Returns
+        -------
+        Record
+            Channels x, v, a, friction, and z where the base moves, force where a force acts.
+        """
+        count = int(np.floor(self.duration * fs * (1 + 1e-12))) + 1
+        times = np.minimum(np.arange(count) / fs, self.duration)
+        names = ["x", "v", "a", "friction"]
+        names += ["z"] * bool(self.table.motion.base) + ["force"] * bool(self.table.motion.force)
+        values, _ = self.sample(times, tuple(names))
+        units = {"x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N"}
+        channels = {name: Channel(name, units[name], described(name, units[name]), source="simulate") for name in names}
+        step = Step("simulate", {"system": repr(self.system), "fs": fs}, f"{len(self.modes)} pieces, {self.status}")
+        samples: Mapping[str, Array] = dict(zip(names, values, strict=True))
+        return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(self.system)})
+
+    def __repr__(self) -> str:
+        return f"Trajectory({self.duration:g} s, {len(self.modes)} pieces, {self.status})"
