@@ -51,4 +51,4 @@ class ModelError(StickslipError):
 
 
 class SolveError(StickslipError):
-    """A simulation can not go on, or can not be trusted (too many events in one period, a transition that chases itself)."""
+    """A simulation can not go on, or can not be trusted (too many events, transitions that chase each other)."""

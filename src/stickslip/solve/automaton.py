@@ -1,8 +1,8 @@
 """From a system to flat mode tables: everything the compiled kernels read.
 
-The state is one vector S: displacement, velocity, the law's memory, the constant 1 and the drive's signals. In each mode
-it obeys S' = A S; each exit is a row q that ends the mode when q S rises above zero, and a matrix R that carries the
-state over: S -> R S. All closed forms, certificates and Jacobians follow from A, q and R.
+The state is one vector S: displacement, velocity, the law's memory, the constant 1 and the drive's signals. In each
+mode it obeys S' = A S; each exit is a row q that ends the mode when q S rises above zero, and a matrix R that carries
+the state over: S -> R S. All closed forms, certificates and Jacobians follow from A, q and R.
 """
 
 from __future__ import annotations
@@ -46,6 +46,8 @@ class Automaton:
         Mode that follows; whether only a crossing counts.
     reset : ndarray (E, N, N)
         R of each exit, with the stuck velocity set where the next mode holds the mass.
+    leap : ndarray (M, M, N, N)
+        What carries the state from a mode to another through modes in which no time passes.
     first : ndarray (M + 1,)
         Exits of mode j are ``first[j]`` to ``first[j + 1]``.
     friction : ndarray (M, N)
@@ -73,6 +75,7 @@ class Automaton:
     target: NDArray[np.int64]
     crossing: NDArray[np.bool_]
     reset: Array
+    leap: Array
     first: NDArray[np.int64]
     friction: Array
     outputs: Mapping[str, Array]
@@ -83,7 +86,7 @@ class Automaton:
     tones: Array
 
     @property
-    def tables(self) -> tuple[Array, ...]:
+    def tables(self) -> tuple[NDArray[Any], ...]:
         """The arrays that the kernels read, in their order."""
         return (self.flow, self.cell, self.hop, self.series, self.target, self.crossing, self.reset, self.first,
                 self.tones)  # fmt: skip
@@ -176,7 +179,9 @@ class _Builder:
                     series.append(series[-1] @ flow)
                 rows.append(series)
                 targets.append(target)
-                resets.append(self.carry(exit_, friction, self.modes[target].friction is None))
+                # an exit at zero velocity leaves exactly none: rounding must not decide what follows
+                stopped = set(exit_.quantity) == {"v"}
+                resets.append(self.carry(exit_, friction, stopped or self.modes[target].friction is None))
             first.append(len(rows))
         entry = system.law.entry
         opening = [self.relative(form, np.zeros(self.size)) for form in system.law.memory.values()]
@@ -191,6 +196,7 @@ class _Builder:
             target=np.array(targets, dtype=np.int64),
             crossing=np.array([e.crossing for mode in self.modes for e in mode.exits], dtype=np.bool_),
             reset=np.array(resets).reshape(len(rows), self.size, self.size),
+            leap=_leaps(len(self.modes), first, targets, resets, self.size),
             first=np.array(first, dtype=np.int64),
             friction=np.array(frictions),
             outputs={
@@ -206,6 +212,22 @@ class _Builder:
             opening=np.array(opening).reshape(len(opening), self.size),
             tones=np.array(tones).reshape(len(tones), 4),
         )
+
+
+def _leaps(count: int, first: list[int], targets: list[int], resets: list[Array], size: int) -> Array:
+    """The products of resets along the shortest way from each mode to each other one."""
+    leaps = np.zeros((count, count, size, size))
+    for begin in range(count):
+        leaps[begin, begin] = np.eye(size)
+        seen, queue = {begin}, [begin]
+        while queue:
+            mode = queue.pop(0)
+            for e in range(first[mode], first[mode + 1]):
+                if targets[e] not in seen:
+                    seen.add(targets[e])
+                    queue.append(targets[e])
+                    leaps[begin, targets[e]] = resets[e] @ leaps[begin, mode]
+    return leaps
 
 
 def _cell(flow: Array) -> float:

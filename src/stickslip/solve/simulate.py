@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.oscillator import Oscillator
@@ -128,7 +129,7 @@ def run(
     period = table.motion.period
     total = offset + (laps * period if math.isfinite(period) else 0.0)
     scale = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total
-    chunks: list[tuple[Array, ...]] = []
+    pieces = _Pieces(size, CHUNK)
     status = "complete"
     try:
         for at, (signals, values) in _stops(table, laps, offset):
@@ -139,17 +140,13 @@ def run(
             _refuse_chatter(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock, mode)
             outcome = kernel.FULL
             while outcome == kernel.FULL:
-                capacity = 256 if not chunks else CHUNK
-                out = (
-                    np.empty(capacity), np.empty(capacity), np.empty(capacity, np.int64), np.empty(capacity),
-                    np.empty((capacity, size)), np.empty(capacity, np.int64),
-                )  # fmt: skip
                 before = clock.copy()
-                outcome, count, mode = kernel.march(table.tables, fast, clock, state, mode, at, period, past, out, work)
-                if count:
-                    chunks.append(tuple(column[:count] for column in out))
-                _refuse_chatter(outcome, table, state, clock, mode)
+                outcome, count, mode = kernel.march(
+                    table.tables, fast, clock, state, mode, at, period, past, pieces.room(), work
+                )
                 passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
+                pieces.keep(count, passed, total)
+                _refuse_chatter(outcome, table, state, clock, mode)
                 if outcome == kernel.FULL and count > budget * max(1.0, passed / scale):
                     raise SolveError(
                         f"{count} events within {passed:g} s at {_named(table, state)}",
@@ -159,12 +156,47 @@ def run(
     except KeyboardInterrupt:
         status = "interrupted"
         total = clock[1] + (clock[0] * period if math.isfinite(period) else 0.0)
-        if not chunks:
+        if not pieces.count:
             raise
-    columns = [np.concatenate(column) for column in zip(*chunks, strict=True)]
-    if status == "complete" and _at_rest(table, columns[4][-1], int(columns[2][-1])):
+    laps_, offsets, modes, durations, states, exits = pieces.done()
+    if status == "complete" and _at_rest(table, states[-1], int(modes[-1])):
         status = "at rest"
-    return Trajectory(system, table, *columns, duration=total, status=status)  # type: ignore[arg-type]
+    return Trajectory(system, table, laps_, offsets, modes, durations, states, exits, total, status)
+
+
+class _Pieces:
+    """Room for the pieces of a run; grows by what the run so far foretells."""
+
+    def __init__(self, size: int, room: int) -> None:
+        self.count, self.passed, self.least = 0, 0.0, room
+        self.columns = _columns(256, size)
+
+    def room(self) -> tuple[NDArray[Any], ...]:
+        """The part that is free, at most one chunk."""
+        return tuple(column[self.count : self.count + self.least] for column in self.columns)
+
+    def keep(self, count: int, passed: float, total: float) -> None:
+        """Take the pieces just written, and make room for those to come."""
+        self.count += count
+        self.passed += passed
+        if self.count < len(self.columns[0]):
+            return
+        foretold = self.count * min(64.0, 1.05 * total / self.passed) if self.passed > 0 else 0.0
+        grown = _columns(max(int(foretold), self.count + self.least), self.columns[4].shape[1])
+        for new, old in zip(grown, self.columns, strict=True):
+            new[: self.count] = old[: self.count]
+        self.columns = grown
+
+    def done(self) -> tuple[NDArray[Any], ...]:
+        """The pieces alone."""
+        return tuple(column[: self.count] for column in self.columns)
+
+
+def _columns(room: int, size: int) -> tuple[NDArray[Any], ...]:
+    return (
+        np.empty(room), np.empty(room), np.empty(room, np.int64), np.empty(room), np.empty((room, size)),
+        np.empty(room, np.int64),
+    )  # fmt: skip
 
 
 def _stops(table: Automaton, laps: float, offset: float) -> Any:
