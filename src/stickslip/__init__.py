@@ -28,10 +28,14 @@ _ROOMS = {
     "regress_friction": "identify.regression",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
     "analyze": "analysis", "compare": "analysis", "Findings": "analysis", "Comparison": "analysis",
-    "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant",
+    "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",
+    "Tabulated": "laws.tabulated", "StateVariable": "laws.state_variable", "InertialContact": "laws.inertial",
+    "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load",
     "Release": "drives", "HarmonicBase": "drives", "HarmonicForce": "drives", "MultiTone": "drives",
     "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives",
     "Oscillator": "oscillator", "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
+    "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
+    "scenarios": "scenarios",
     "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder", "datasets": "datasets",
 }  # fmt: skip
 

@@ -134,11 +134,12 @@ class _Builder:
             row[self.names.index(name)] += value
         return row
 
-    def relative(self, form: Mapping[str, float], friction: Array) -> Array:
-        """A law's linear form: its x and v are relative to the counter-face, its f is the friction of the mode."""
-        own = {name: value for name, value in form.items() if name != "f"}
+    def relative(self, form: Mapping[str, float], friction: Array, slope: Array | None = None) -> Array:
+        """A law's linear form: x and v relative to the counter-face, f the friction of the mode, df its rate."""
+        own = {name: value for name, value in form.items() if name not in ("f", "df")}
         row = self.row(own) - own.get("x", 0.0) * self.face[0] - own.get("v", 0.0) * self.face[1]
-        return row + form.get("f", 0.0) * friction
+        row += form.get("f", 0.0) * friction
+        return row if slope is None else row + form.get("df", 0.0) * slope
 
     def held(self) -> Array:
         """The state with the mass's velocity set to the counter-face's."""
@@ -166,7 +167,7 @@ class _Builder:
                 friction = self.relative(mode.friction, np.zeros(self.size))
                 flow[1] = (self.push - friction) / system.mass
             for name, rate in mode.rates.items():
-                flow[self.names.index(name)] = self.relative(rate, friction)
+                flow[self.names.index(name)] = self.relative(rate, friction, friction @ flow)
             frictions.append(friction)
             flows.append(flow)
         cells = np.array([_cell(flow) for flow in flows])
@@ -174,7 +175,7 @@ class _Builder:
         for mode, flow, friction in zip(self.modes, flows, frictions, strict=True):
             for exit_ in mode.exits:
                 target = order[exit_.to]
-                series = [self.relative(exit_.quantity, friction)]
+                series = [self.relative(exit_.quantity, friction, friction @ flow)]
                 for _ in range(DEGREE):
                     series.append(series[-1] @ flow)
                 rows.append(series)

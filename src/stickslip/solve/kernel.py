@@ -60,22 +60,24 @@ def advance(flow, state, time, work):
 
 
 @njit(**OPTIONS)
-def expand(series, state, cell, c, noise):
-    """Coefficients of an exit in the cell ahead, with the rounding noise of each."""
+def expand(series, state, scale, cell, c, noise):
+    """Coefficients of an exit in the cell ahead, with the rounding noise of each.
+
+    An entry of the state carries the rounding of what it was a moment ago (`scale`), though it be next to zero now.
+    """
     power = 1.0
     for k in range(series.shape[0]):
         total, size = 0.0, 0.0
         for j in range(state.shape[0]):
-            term = series[k, j] * state[j]
-            total += term
-            size += abs(term)
+            total += series[k, j] * state[j]
+            size += abs(series[k, j]) * max(scale[j], abs(state[j]))
         c[k] = total * power
         noise[k] = NOISE * size * power
         power *= cell / (k + 1)
 
 
 @njit(**OPTIONS)
-def settle(tables, mode, state, cell, work, c, noise):
+def settle(tables, mode, state, scale, cell, work, c, noise):
     """Take every exit that is due at once; returns the mode in which time passes, or -1 if the chain does not end."""
     _, _, _, series, target, crossing, reset, first, _ = tables
     for _ in range(CHAIN):
@@ -83,7 +85,7 @@ def settle(tables, mode, state, cell, work, c, noise):
         for e in range(first[mode], first[mode + 1]):
             if crossing[e]:
                 continue
-            expand(series[e], state, cell, c, noise)
+            expand(series[e], state, scale, cell, c, noise)
             order = opening_order(c, noise, c.shape[0])
             if order < c.shape[0] and c[order] > 0.0:
                 fired = e
@@ -98,7 +100,7 @@ def settle(tables, mode, state, cell, work, c, noise):
 
 
 @njit(**OPTIONS)
-def next_exit(tables, mode, state, opened, armed, span, c, noise):
+def next_exit(tables, mode, state, scale, opened, armed, span, c, noise):
     """The first exit within `span` [s] of the cell ahead: (time, exit, armed), or (-1, -1, armed).
 
     `opened` is true in the first cell of a piece, where roots at the very start are the way in, not the way out.
@@ -109,7 +111,7 @@ def next_exit(tables, mode, state, opened, armed, span, c, noise):
     best, which = NONE, -1
     count = c.shape[0]
     for e in range(first[mode], first[mode + 1]):
-        expand(series[e], state, cell, c, noise)
+        expand(series[e], state, scale, cell, c, noise)
         low = opening_order(c, noise, count) if opened else 0
         if low == count:
             continue
@@ -170,7 +172,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
     n = state.shape[0]
     c, noise = work[4], work[5]
     scratch = work[:2, :n]
-    held = work[2, :n]
+    held, scale = work[2, :n], work[3, :n]
     count, capacity = 0, laps.shape[0]
     quick = fast[5].shape[0] > 0
     past_mode, past_exit, past_time, ring = past
@@ -178,7 +180,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
         if quick:
             count, mode = glide(fast, tables, clock, state, mode, limit, period, past, out, count, work[6:])
             if mode < 0:
-                mode = settle(tables, -2 - mode, state, cells[-2 - mode], scratch, c, noise)
+                mode = settle(tables, -2 - mode, state, scale, cells[-2 - mode], scratch, c, noise)
                 if mode < 0:
                     return CHATTER, count, mode
         if count == capacity:
@@ -192,12 +194,13 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
         for i in range(n):
             states[count, i] = state[i]
             held[i] = state[i]
+            scale[i] = max(abs(state[i]), 0.5 * scale[i])
         gone, leaving, armed = 0.0, -1, 0
         opened = True
         while True:
             span = left - gone
             cell = cells[mode]
-            dt, leaving, armed = next_exit(tables, mode, held, opened, armed, span, c, noise)
+            dt, leaving, armed = next_exit(tables, mode, held, scale, opened, armed, span, c, noise)
             opened = False
             if leaving >= 0:
                 advance(flow[mode], held, dt, scratch)
@@ -240,7 +243,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
         for i in range(n):
             state[i] = held[i]
         cell = cells[target[leaving]]
-        mode = settle(tables, target[leaving], state, min(cell, left), scratch, c, noise)
+        mode = settle(tables, target[leaving], state, scale, min(cell, left), scratch, c, noise)
         if mode < 0:
             return CHATTER, count, target[leaving]
         if gone <= 0.0:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import Array, Automaton, automaton
+from stickslip.solve.automaton import Array, Automaton, automaton, exponential
 from stickslip.solve.simulate import opening, run
 from stickslip.solve.tangent import carry_tangents
 from stickslip.solve.trajectory import Event, Trajectory
@@ -184,6 +184,8 @@ def steady_state(
         laps += count
         sizes.append(size)
         found = _closed(system, table, state, mode, orders)
+        if found is None and _repeats_freely(table):
+            found = _family(system, table, state, mode, size, orders)
         if found is not None:
             return found
         count = laps
@@ -197,7 +199,7 @@ def _lap(system: Oscillator, table: Automaton, state: Array, mode: int, laps: in
     return run(system, table, state, mode, laps=float(laps), offset=0.0, budget=10_000)
 
 
-def _end(orbit: Trajectory) -> tuple[Array, int]:
+def end_of(orbit: Trajectory) -> tuple[Array, int]:
     """State and mode at the end of whole laps, the event that falls on it included."""
     from stickslip.solve.kernel import follow
 
@@ -215,7 +217,7 @@ def _iterate(
     system: Oscillator, table: Automaton, state: Array, mode: int, laps: int
 ) -> tuple[Array, int, float]:
     orbit = _lap(system, table, state, mode, laps)
-    return *_end(orbit), float(np.max(np.abs(orbit.states[-64:, 0])))
+    return *end_of(orbit), float(np.max(np.abs(orbit.states[-64:, 0])))
 
 
 def _closed(system: Oscillator, table: Automaton, state: Array, mode: int, orders: int) -> SteadyState | None:
@@ -225,7 +227,7 @@ def _closed(system: Oscillator, table: Automaton, state: Array, mode: int, order
         point, where = state, mode
         for _ in range(12):
             orbit = _lap(system, table, point, where, order)
-            end, after = _end(orbit)
+            end, after = end_of(orbit)
             size = np.max(np.abs(orbit.states), axis=0)[: table.physical]
             gap = (end - point)[: table.physical]
             relative = float(np.max(np.abs(gap) / np.maximum(size, 1e-300), initial=0.0, where=size > 0))
@@ -240,6 +242,27 @@ def _closed(system: Oscillator, table: Automaton, state: Array, mode: int, order
             point[: table.physical] += step
         if best[0] <= CLOSED and best[1] is not None:
             return _judged(best[1], order, *_jacobian(best[1], best[2]))
+    return None
+
+
+def _repeats_freely(table: Automaton) -> bool:
+    """Whether free motion in every slip mode repeats after one period of the drive: b = 1/2n without damping."""
+    free = [flow[:2, :2] for flow, mode in zip(table.flow, table.modes, strict=True) if mode.kind == "slip"]
+    turns = [exponential(flow, table.motion.period) for flow in free]
+    return bool(turns) and all(np.allclose(turn, np.eye(2), rtol=0, atol=1e-9) for turn in turns)
+
+
+def _family(
+    system: Oscillator, table: Automaton, state: Array, mode: int, size: float, orders: int
+) -> SteadyState | None:
+    """An orbit inside a family whose edge is approached forever: a push off the edge closes at once."""
+    for push in (0.05, 0.1, 0.2):
+        pushed = state.copy()
+        pushed[0] += math.copysign(push * size, state[0])
+        point, where, _ = _iterate(system, table, pushed, mode, 32)
+        found = _closed(system, table, point, where, orders)
+        if found is not None and found.status == "not unique":
+            return found
     return None
 
 

@@ -1,0 +1,70 @@
+"""The state-variable law of chapter 4: friction follows Coulomb's law with a lag."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from stickslip.laws.base import Exit, Mode, Row, finite
+
+
+@dataclass(frozen=True)
+class StateVariable:
+    r"""Friction that tracks Coulomb's: :math:`\dot\theta = -f_k\gamma(\theta - f_k\,\mathrm{sgn}\,v)`.
+
+    Thesis, equations 4.1 and 4.2, where the backbone lacks its factor :math:`f_k`; `printed` keeps it out, which
+    limits friction to 1 N. The product :math:`f_k\gamma` is the rate. Where velocity and acceleration vanish together
+    the mass may be held: :math:`\mathrm{sgn}\,0` takes whatever value between -1 and 1 keeps it at rest.
+
+    Attributes
+    ----------
+    kinetic : float
+        f_k [N].
+    rate : float
+        gamma [1/(N s)].
+    printed : bool
+        Backbone of 1 N, as printed.
+
+    Examples
+    --------
+    >>> StateVariable(1.1, rate=100.0).modes()[0].rates["theta"]["1"]
+    -121.00000000000001
+    """
+
+    kinetic: float
+    rate: float
+    printed: bool = False
+
+    def __post_init__(self) -> None:
+        finite("kinetic", self.kinetic, unit="N", positive=True)
+        finite("rate", self.rate, unit="1/(N s)", positive=True)
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """The friction force [N], zero at the start."""
+        return {"theta": {}}
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, by the sign of the velocity."""
+        return "back", "held", "forward"
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Slip on either side, and the rest in which friction follows the load."""
+        decay = self.kinetic * self.rate
+        pull = decay * (1.0 if self.printed else self.kinetic)
+        held = (
+            Exit({"f": 1.0, "theta": -1.0}, "forward"),
+            Exit({"f": -1.0, "theta": 1.0}, "back"),
+            Exit({"df": 1.0, "theta": decay, "1": -pull}, "forward"),
+            Exit({"df": -1.0, "theta": -decay, "1": -pull}, "back"),
+        )
+        return (
+            self._slip("back", -1, decay, pull),
+            Mode("held", "stick", 0, None, held, {"theta": {"df": 1.0}}),
+            self._slip("forward", 1, decay, pull),
+        )
+
+    def _slip(self, name: str, side: int, decay: float, pull: float) -> Mode:
+        rates = {"theta": {"theta": -decay, "1": side * pull}}
+        return Mode(name, "slip", side, {"theta": 1.0}, (Exit({"v": float(-side)}, "held"),), rates)
