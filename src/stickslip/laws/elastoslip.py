@@ -36,12 +36,16 @@ class ElastoSlip:
     def __post_init__(self) -> None:
         if len(self.stiffnesses) != len(self.forces) or not self.forces:
             raise ModelError(
-                f"{len(self.stiffnesses)} stiffnesses, {len(self.forces)} forces", "one of each an element", "complete it"
+                f"{len(self.stiffnesses)} stiffnesses, {len(self.forces)} forces",
+                "one of each an element",
+                "complete it",
             )
         for k, f in zip(self.stiffnesses, self.forces, strict=True):
             finite("stiffnesses", k, unit="N/m", positive=True)
             finite("forces", f, unit="N", positive=True)
-        pairs = sorted(zip(map(float, self.stiffnesses), map(float, self.forces), strict=True), key=lambda p: p[1] / p[0])
+        pairs = sorted(
+            zip(map(float, self.stiffnesses), map(float, self.forces), strict=True), key=lambda p: p[1] / p[0]
+        )
         object.__setattr__(self, "stiffnesses", tuple(k for k, _ in pairs))
         object.__setattr__(self, "forces", tuple(f for _, f in pairs))
 
@@ -85,9 +89,7 @@ class ElastoSlip:
         return held, *sliding
 
     def _slide(self, side: int, count: int) -> Mode:
-        anchors = {
-            f"anchor{j}": {"x": 1.0, "1": -side * self.forces[j] / self.stiffnesses[j]} for j in range(count)
-        }
+        anchors = {f"anchor{j}": {"x": 1.0, "1": -side * self.forces[j] / self.stiffnesses[j]} for j in range(count)}
         back = Exit({"v": float(-side)}, "held", anchors, crossing=True)
         onward = (self._yield(side, count),) if count < len(self.forces) else ()
         return Mode(_name(side, count), "slip", side, self._force(side, count), (back, *onward))

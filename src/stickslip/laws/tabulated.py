@@ -45,10 +45,14 @@ class Tabulated:
         speeds, forces = tuple(map(float, self.speeds)), tuple(map(float, self.forces))
         if len(speeds) < 2 or len(speeds) != len(forces):
             raise ModelError(
-                f"{len(speeds)} speeds, {len(forces)} forces", "two points at least, a force for each speed", "complete it"
+                f"{len(speeds)} speeds, {len(forces)} forces",
+                "two points at least, a force for each speed",
+                "complete it",
             )
         if speeds[0] != 0 or not all(a < b for a, b in zip(speeds, speeds[1:], strict=False)):
-            raise ModelError("the speeds do not increase from 0", "a friction curve starts at 0 and is sorted", "sort it")
+            raise ModelError(
+                "the speeds do not increase from 0", "a friction curve starts at 0 and is sorted", "sort it"
+            )
         for force in forces:
             finite("forces", force, unit="N")
         finite("speeds", speeds[-1], unit="m/s")

@@ -213,9 +213,7 @@ def end_of(orbit: Trajectory) -> tuple[Array, int]:
     return last, mode
 
 
-def _iterate(
-    system: Oscillator, table: Automaton, state: Array, mode: int, laps: int
-) -> tuple[Array, int, float]:
+def _iterate(system: Oscillator, table: Automaton, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
     orbit = _lap(system, table, state, mode, laps)
     return *end_of(orbit), float(np.max(np.abs(orbit.states[-64:, 0])))
 
