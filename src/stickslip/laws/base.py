@@ -72,6 +72,10 @@ class Law(Protocol):
         """The law's own state, with its value at the start as a linear form of "x", "v" and "1"."""
 
     @property
+    def places(self) -> tuple[str, ...]:
+        """Memory that is a place on the counter-face [m] and moves with it."""
+
+    @property
     def entry(self) -> tuple[str, str, str]:
         """Names of the modes in which motion starts: with v < 0, v = 0 and v > 0."""
 

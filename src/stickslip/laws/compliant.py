@@ -67,6 +67,11 @@ class CompliantContact:
         return {"anchor": {"x": 1.0}}
 
     @property
+    def places(self) -> tuple[str, ...]:
+        """The anchor."""
+        return ("anchor",)
+
+    @property
     def entry(self) -> tuple[str, str, str]:
         """Motion starts in microstick, whatever the velocity: the contact is relaxed."""
         return "microstuck", "microstuck", "microstuck"

@@ -34,7 +34,7 @@ class ElastoSlip:
     forces: Sequence[float]
 
     def __post_init__(self) -> None:
-        if len(self.stiffnesses) != len(self.forces) or not self.forces:
+        if len(self.stiffnesses) != len(self.forces) or len(self.forces) == 0:
             raise ModelError(
                 f"{len(self.stiffnesses)} stiffnesses, {len(self.forces)} forces",
                 "one of each an element",
@@ -76,6 +76,11 @@ class ElastoSlip:
     def memory(self) -> Mapping[str, Row]:
         """Where each slider holds [m]; under the mass at the start."""
         return {f"anchor{j}": {"x": 1.0} for j in range(len(self.forces))}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """All anchors."""
+        return tuple(self.memory)
 
     @property
     def entry(self) -> tuple[str, str, str]:

@@ -53,6 +53,11 @@ class InertialContact:
         return {"y": {"x": 1.0}, "u": {}}
 
     @property
+    def places(self) -> tuple[str, ...]:
+        """The contact's displacement."""
+        return ("y",)
+
+    @property
     def entry(self) -> tuple[str, str, str]:
         """The contact starts held."""
         return "stuck", "stuck", "stuck"

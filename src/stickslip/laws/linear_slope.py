@@ -43,6 +43,11 @@ class LinearSlope:
         return {}
 
     @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
     def entry(self) -> tuple[str, str, str]:
         """Modes in which motion starts, by the sign of the velocity."""
         return "back", "stuck", "forward"

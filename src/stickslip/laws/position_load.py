@@ -40,6 +40,11 @@ class PositionLoad:
         return {}
 
     @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
     def entry(self) -> tuple[str, str, str]:
         """Modes in which motion starts, by the sign of the velocity."""
         return "back", "stuck", "forward"

@@ -24,6 +24,10 @@ class StateVariable:
         gamma [1/(N s)].
     printed : bool
         Backbone of 1 N, as printed.
+    steepness : float or None
+        alpha [s/m]: the backbone rises as :math:`\alpha v` to its full level instead of jumping, a polygon for the
+        thesis's :math:`\tanh\alpha v`. None: it jumps. The jump makes a strongly damped rest tremble ever faster,
+        without end; a steepness ends that.
 
     Examples
     --------
@@ -34,10 +38,13 @@ class StateVariable:
     kinetic: float
     rate: float
     printed: bool = False
+    steepness: float | None = None
 
     def __post_init__(self) -> None:
         finite("kinetic", self.kinetic, unit="N", positive=True)
         finite("rate", self.rate, unit="1/(N s)", positive=True)
+        if self.steepness is not None:
+            finite("steepness", self.steepness, unit="s/m", positive=True)
 
     @property
     def memory(self) -> Mapping[str, Row]:
@@ -45,14 +52,28 @@ class StateVariable:
         return {"theta": {}}
 
     @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
     def entry(self) -> tuple[str, str, str]:
         """Modes in which motion starts, by the sign of the velocity."""
-        return "back", "held", "forward"
+        return ("back", "held", "forward") if self.steepness is None else ("slow", "slow", "slow")
 
     def modes(self) -> tuple[Mode, ...]:
         """Slip on either side, and the rest in which friction follows the load."""
         decay = self.kinetic * self.rate
         pull = decay * (1.0 if self.printed else self.kinetic)
+        if self.steepness is not None:
+            edge = 1 / self.steepness
+            slow = (Exit({"v": 1.0, "1": -edge}, "forward"), Exit({"v": -1.0, "1": -edge}, "back"))
+            rates = {"theta": {"theta": -decay, "v": pull * self.steepness}}
+            return (
+                self._slip("back", -1, decay, pull, edge),
+                Mode("slow", "microstick", 0, {"theta": 1.0}, slow, rates),
+                self._slip("forward", 1, decay, pull, edge),
+            )
         held = (
             Exit({"f": 1.0, "theta": -1.0}, "forward"),
             Exit({"f": -1.0, "theta": 1.0}, "back"),
@@ -65,6 +86,7 @@ class StateVariable:
             self._slip("forward", 1, decay, pull),
         )
 
-    def _slip(self, name: str, side: int, decay: float, pull: float) -> Mode:
+    def _slip(self, name: str, side: int, decay: float, pull: float, edge: float = 0.0) -> Mode:
         rates = {"theta": {"theta": -decay, "1": side * pull}}
-        return Mode(name, "slip", side, {"theta": 1.0}, (Exit({"v": float(-side)}, "held"),), rates)
+        stop = Exit({"v": float(-side), "1": edge}, "slow") if edge else Exit({"v": float(-side)}, "held")
+        return Mode(name, "slip", side, {"theta": 1.0}, (stop,), rates)

@@ -89,6 +89,11 @@ class Tabulated:
         return {}
 
     @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
     def entry(self) -> tuple[str, str, str]:
         """Modes in which motion starts, by the sign of the velocity."""
         return "back 0", "stuck", "forward 0"

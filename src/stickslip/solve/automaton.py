@@ -109,7 +109,7 @@ class _Builder:
 
     def __init__(self, system: Oscillator) -> None:
         self.system, self.motion, self.modes = system, system.drive.motion(), system.law.modes()
-        self.memory = tuple(system.law.memory)
+        self.memory, self.places = tuple(system.law.memory), system.law.places
         self.names = ("x", "v", *self.memory, "1", *self.motion.rates)
         self.size = len(self.names)
         motion = self.motion
@@ -135,11 +135,19 @@ class _Builder:
         return row
 
     def relative(self, form: Mapping[str, float], friction: Array, slope: Array | None = None) -> Array:
-        """A law's linear form: x and v relative to the counter-face, f the friction of the mode, df its rate."""
+        """A law's linear form: x and v relative to the counter-face, f the friction of the mode, df its rate.
+
+        The law's places are kept in the frame of x, so that x less a place loses no digits however far a belt runs.
+        """
         own = {name: value for name, value in form.items() if name not in ("f", "df")}
-        row = self.row(own) - own.get("x", 0.0) * self.face[0] - own.get("v", 0.0) * self.face[1]
+        carried = sum(value for name, value in own.items() if name == "x" or name in self.places)
+        row = self.row(own) - carried * self.face[0] - own.get("v", 0.0) * self.face[1]
         row += form.get("f", 0.0) * friction
         return row if slope is None else row + form.get("df", 0.0) * slope
+
+    def moved(self, name: str, order: int) -> Array:
+        """What a place owes to the counter-face: its displacement (order 0) or velocity (1)."""
+        return self.face[order] if name in self.places else np.zeros(self.size)
 
     def held(self) -> Array:
         """The state with the mass's velocity set to the counter-face's."""
@@ -151,7 +159,7 @@ class _Builder:
         """R of an exit."""
         carry = np.eye(self.size)
         for name, form in exit_.reset.items():
-            carry[self.names.index(name)] = self.relative(form, friction)
+            carry[self.names.index(name)] = self.relative(form, friction) + self.moved(name, 0)
         return self.held() @ carry if held else carry
 
     def build(self) -> Automaton:
@@ -166,8 +174,10 @@ class _Builder:
             else:
                 friction = self.relative(mode.friction, np.zeros(self.size))
                 flow[1] = (self.push - friction) / system.mass
-            for name, rate in mode.rates.items():
-                flow[self.names.index(name)] = self.relative(rate, friction, friction @ flow)
+            slope = friction @ flow
+            for name in self.memory:
+                rate = self.relative(mode.rates.get(name, {}), friction, slope)
+                flow[self.names.index(name)] = rate + self.moved(name, 1)
             frictions.append(friction)
             flows.append(flow)
         cells = np.array([_cell(flow) for flow in flows])
@@ -185,7 +195,8 @@ class _Builder:
                 resets.append(self.carry(exit_, friction, stopped or self.modes[target].friction is None))
             first.append(len(rows))
         entry = system.law.entry
-        opening = [self.relative(form, np.zeros(self.size)) for form in system.law.memory.values()]
+        none = np.zeros(self.size)
+        opening = [self.relative(form, none) + self.moved(name, 0) for name, form in system.law.memory.items()]
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
         return Automaton(
             names=self.names,

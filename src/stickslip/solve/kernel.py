@@ -18,11 +18,20 @@ CHAIN = 64  # transitions without time in between before a run is given up
 
 @njit(**OPTIONS)
 def set_tones(tones, state, time):
-    """Put the turning signals of the drive where they are at `time`: no drift from one piece to the next."""
+    """Keep the turning signals of the drive true.
+
+    One tone is put where it is at `time`, which stays within its period. Several have no period in common: each is
+    only brought back to unit length, because far from zero a time no longer tells its phase to the last digit.
+    """
     for j in range(tones.shape[0]):
-        angle = tones[j, 2] * time + tones[j, 3]
-        state[int(tones[j, 0])] = math.cos(angle)
-        state[int(tones[j, 1])] = math.sin(angle)
+        c, s = int(tones[j, 0]), int(tones[j, 1])
+        if tones.shape[0] == 1:
+            angle = tones[j, 2] * time + tones[j, 3]
+            state[c], state[s] = math.cos(angle), math.sin(angle)
+        else:
+            length = 1.5 - 0.5 * (state[c] * state[c] + state[s] * state[s])
+            state[c] *= length
+            state[s] *= length
 
 
 @njit(**OPTIONS)
@@ -121,8 +130,8 @@ def next_exit(tables, mode, state, scale, opened, armed, span, c, noise):
         if c[low] < -noise[low]:
             armed |= bit
         elif c[low] > 0.0:
-            if crossing[e] and not armed & bit:
-                # above zero by the rule of the crossing: wait for it to fall first
+            if opened or (crossing[e] and not armed & bit):
+                # above zero by the rule of the crossing, or by rounding on the tie: wait for it to fall first
                 start = first_rise(c, noise, count, low, -1.0, 0.0, limit)
                 if start == NONE:
                     continue
@@ -194,7 +203,6 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
         for i in range(n):
             states[count, i] = state[i]
             held[i] = state[i]
-            scale[i] = max(abs(state[i]), 0.5 * scale[i])
         gone, leaving, armed = 0.0, -1, 0
         opened = True
         while True:
@@ -242,6 +250,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
         multiply(reset[leaving], state, held)
         for i in range(n):
             state[i] = held[i]
+            scale[i] = max(abs(state[i]), 0.5 * scale[i])
         cell = cells[target[leaving]]
         mode = settle(tables, target[leaving], state, scale, min(cell, left), scratch, c, noise)
         if mode < 0:
