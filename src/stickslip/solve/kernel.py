@@ -167,7 +167,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
     past : tuple of arrays
         Ring of pieces gone by, see :func:`stickslip.solve.phasors.glide`.
     out : tuple of arrays
-        Laps, times, modes, durations, states, exits of the pieces.
+        Laps, times, modes, durations, states, exits of the pieces; of the state as many entries as there is room.
     work : ndarray (15, N or more)
         Scratch.
 
@@ -184,14 +184,13 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
     held, scale = work[2, :n], work[3, :n]
     count, capacity = 0, laps.shape[0]
     quick = fast[5].shape[0] > 0
-    past_mode, past_exit, past_time, ring = past
+    past_mode, past_exit, past_time, past_parts, ring = past
     while True:
         if quick:
-            count, mode = glide(fast, tables, clock, state, mode, limit, period, past, out, count, work[6:])
+            count, came = glide(fast, tables, clock, state, mode, limit, period, past, out, count, work[6:])
+            mode = settle(tables, came, state, scale, cells[came], scratch, c, noise)
             if mode < 0:
-                mode = settle(tables, -2 - mode, state, scale, cells[-2 - mode], scratch, c, noise)
-                if mode < 0:
-                    return CHATTER, count, mode
+                return CHATTER, count, came
         if count == capacity:
             return FULL, count, mode
         left = (limit[0] - clock[0]) * period if limit[0] != clock[0] else 0.0
@@ -200,8 +199,9 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
             return DONE, count, mode
         set_tones(tones, state, clock[1])
         laps[count], times[count], modes[count] = clock[0], clock[1], mode
-        for i in range(n):
+        for i in range(states.shape[1]):
             states[count, i] = state[i]
+        for i in range(n):
             held[i] = state[i]
         gone, leaving, armed = 0.0, -1, 0
         opened = True
@@ -221,14 +221,15 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
             multiply(hop[mode], held, scratch[0])
             for i in range(n):
                 held[i] = scratch[0, i]
+                scale[i] = max(scale[i], abs(held[i]))
             gone += cell
         durations[count] = gone
         exits[count] = leaving
         count += 1
         slot = ring[0]
-        past_mode[slot], past_exit[slot], past_time[slot] = mode, leaving, gone
-        ring[0] = (slot + 1) % HISTORY
-        ring[1] = (ring[1] + 1) % HISTORY
+        past_mode[slot], past_exit[slot], past_time[slot], past_parts[slot] = mode, leaving, gone, 1
+        ring[0] = (slot + 1) & (HISTORY - 1)
+        ring[1] = (ring[1] + 1) & (HISTORY - 1)
         # compensated clock, wrapped at the period
         step = gone - clock[2]
         now = clock[1] + step

@@ -326,7 +326,7 @@ def _between(motion: Trajectory, first: int, last: int) -> SteadyState:
     part = slice(first, last)
     begin = motion.starts[first]
     orbit = Trajectory(
-        motion.system, motion.table, np.zeros(last - first), motion.starts[part] - begin, motion.modes[part],
+        motion.system, motion.table, np.zeros(last - first, np.int32), motion.starts[part] - begin, motion.modes[part],
         motion.durations[part], motion.states[part], motion.exits[part],
         float(motion.starts[last] - begin), "complete",
     )  # fmt: skip

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -21,7 +22,8 @@ from numpy.typing import NDArray
 from stickslip.solve.automaton import Array, Automaton
 from stickslip.solve.roots import NOISE, OPTIONS
 
-FAST = {**OPTIONS, "fastmath": {"contract"}}
+FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
+KEEPS, STOPS, CARRIES = 0.0, 1.0, 2.0  # what an exit does to velocity and memory
 HALF_STEP = 0.09  # rad between a node and the edge of its polynomial; degree 9 leaves 1e-17
 LONGEST = 8192  # nodes of one table
 HISTORY = 4096  # pieces remembered; the guess is one lap old
@@ -36,18 +38,19 @@ class Phasors:
     Attributes
     ----------
     drive : ndarray (4,)
-        Angular frequency [rad/s], phase [rad], node distance [s] and number of nodes of the drive's table.
-    mode : ndarray (M, 10)
-        Kind, real and imaginary part of l, real and imaginary part of the forced amplitude, 1 / (k/m), |l|, node
-        distance, first node, number of nodes.
+        Angular frequency [rad/s], phase [rad], nodes per second and number of nodes of the drive's table.
+    mode : ndarray (M, 12)
+        Kind, real and imaginary part of l, real and imaginary part of the forced amplitude, 1 / (k/m), |l|, nodes
+        per second, first node, number of nodes, 1 / (imaginary part of l), modulus sum of the forced amplitude.
     level : ndarray (M, C)
         Constant forcing of each mode as a linear form of what rests.
-    exit : ndarray (E, 7)
-        Coefficient of x and v, D (complex), W per unit of free amplitude (complex), velocity coefficient's modulus.
+    exit : ndarray (E, 9)
+        Coefficient of x and v, D (complex), W per unit of free amplitude (complex), its modulus, modulus of D, what it
+        does to velocity and memory.
     rest : ndarray (E, C)
         G of each exit as a linear form of what rests.
-    nodes : ndarray (K, 2)
-        e^{i w t} and, mode by mode, e^{l t} at their nodes.
+    nodes : ndarray (K, 3)
+        e^{i w t} and, mode by mode, e^{l t} at their nodes, and the node's time.
     """
 
     drive: Array
@@ -74,15 +77,16 @@ def phasors(table: Automaton) -> Phasors | None:
     nodes = [_nodes(1j * omega, period)]
     if nodes[0] is None:
         return None
+    times = [_times(omega, len(nodes[0]))]
     modes, levels, exits, rests = [], [], [], []
     for j, flow in enumerate(table.flow):
         if np.any(flow[resting]):
             return None
         rows = table.series[table.first[j] : table.first[j + 1], 0]
         if not np.any(flow[:2]):
-            modes.append([HELD, *[0.0] * 9])
+            modes.append([HELD, *[0.0] * 11])
             levels.append(np.zeros(resting.stop - 2))
-            exits += [[q[0], q[1], q[-2], -q[-1], 0.0, 0.0, 0.0] for q in rows]
+            exits += [[q[0], q[1], q[-2], -q[-1], 0.0, 0.0, 0.0, math.hypot(q[-2], q[-1])] for q in rows]
             rests += [q[resting] for q in rows]
             continue
         stiffness, damping = -flow[1, 0], -flow[1, 1]
@@ -97,22 +101,24 @@ def phasors(table: Automaton) -> Phasors | None:
             return None
         offset = sum(len(values) for values in nodes)
         nodes.append(grid)
+        times.append(_times(abs(free), len(grid)))
         modes.append([SLIDING, free.real, free.imag, forced.real, forced.imag, 1 / stiffness, abs(free),
-                      2 * HALF_STEP / abs(free), offset, len(grid)])  # fmt: skip
+                      abs(free) / (2 * HALF_STEP), offset, len(grid), 1 / free.imag,
+                      abs(forced.real) + abs(forced.imag)])  # fmt: skip
         levels.append(flow[1, resting])
         for q in rows:
             drive = complex(q[-2], -q[-1]) + (q[0] + 1j * omega * q[1]) * forced
             weight = q[0] + q[1] * free
-            exits.append([q[0], q[1], drive.real, drive.imag, weight.real, weight.imag, abs(weight)])
+            exits.append([q[0], q[1], drive.real, drive.imag, weight.real, weight.imag, abs(weight), abs(drive)])
             rests.append(q[resting] + q[0] * flow[1, resting] / stiffness)
     values = np.concatenate(nodes)
     return Phasors(
-        np.array([omega, phase, 2 * HALF_STEP / omega, len(nodes[0])]),
+        np.array([omega, phase, omega / (2 * HALF_STEP), len(nodes[0])]),
         np.array(modes),
         np.array(levels),
-        np.array(exits),
+        np.column_stack([np.array(exits), [_deed(reset, table.physical) for reset in table.reset]]),
         np.array(rests),
-        np.ascontiguousarray(np.column_stack([values.real, values.imag])),
+        np.ascontiguousarray(np.column_stack([values.real, values.imag, np.concatenate(times)])),
     )
 
 
@@ -121,13 +127,13 @@ def fast_tables(table: Automaton) -> tuple[Array, ...]:
     found = phasors(table)
     if found is not None:
         return found.tables
-    return np.zeros(4), np.zeros((1, 10)), np.zeros((1, 1)), np.zeros((1, 7)), np.zeros((1, 1)), np.zeros((0, 2))
+    return np.zeros(4), np.zeros((1, 12)), np.zeros((1, 1)), np.zeros((1, 9)), np.zeros((1, 1)), np.zeros((0, 3))
 
 
-def blank_past() -> tuple[NDArray[np.int64], NDArray[np.int64], Array, NDArray[np.int64]]:
+def blank_past() -> tuple[NDArray[Any], ...]:
     """The ring of pieces before the first one."""
     return (np.full(HISTORY, -1, np.int64), np.full(HISTORY, -1, np.int64), np.zeros(HISTORY),
-            np.zeros(3, np.int64))  # fmt: skip
+            np.ones(HISTORY, np.int64), np.zeros(3, np.int64))  # fmt: skip
 
 
 def _nodes(rate: complex, period: float) -> NDArray[np.complex128] | None:
@@ -135,27 +141,42 @@ def _nodes(rate: complex, period: float) -> NDArray[np.complex128] | None:
     count = int(period * abs(rate) / (2 * HALF_STEP)) + 3
     if count > LONGEST:
         return None
-    steps = np.arange(count, dtype=np.longdouble) * (2 * HALF_STEP / abs(rate))
+    steps = np.asarray(_times(abs(rate), count), dtype=np.longdouble)
     turned = np.exp(np.longdouble(rate.real) * steps)
     angle = np.longdouble(rate.imag) * steps
     return np.asarray(turned * np.cos(angle), np.float64) + 1j * np.asarray(turned * np.sin(angle), np.float64)
 
 
+def _deed(reset: Array, physical: int) -> float:
+    """Whether an exit keeps velocity and memory, only stops the mass, or carries them over in another way."""
+    inner = reset[1:physical]
+    if np.array_equal(inner, np.eye(len(reset))[1:physical]):
+        return KEEPS
+    stopped = np.eye(len(reset))[1:physical]
+    stopped[0] = 0.0
+    return STOPS if np.array_equal(inner, stopped) else CARRIES
+
+
+def _times(rate: float, count: int) -> Array:
+    """Times of the nodes, as the compiled code sees them."""
+    return np.arange(count) * (2 * HALF_STEP / rate)
+
+
 @njit(**FAST)
-def _turn(nodes, first, count, distance, decay, turn, t):
+def _turn(nodes, first, count, density, decay, turn, t):
     """e^{(decay + i turn) t} from the nearest node."""
-    j = int(t / distance + 0.5)
-    if j >= count:
-        j = count - 1
-    r = t - j * distance
+    j = min(count - 1, int(t * density + 0.5))
+    r = t - nodes[first + j, 2]
     z = turn * r
     q = z * z
     c = 1.0 + q * (-0.5 + q * (1 / 24 + q * (-1 / 720 + q * (1 / 40320))))
     s = z * (1.0 + q * (-1 / 6 + q * (1 / 120 + q * (-1 / 5040 + q * (1 / 362880)))))
     if decay != 0.0:
         y = decay * r
-        e = 1.0 + y * (1.0 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720 + y * (1 / 5040 + y * (
-            1 / 40320 + y * (1 / 362880)))))))))  # fmt: skip
+        e = 1 / 120
+        if abs(y) > 5e-4:
+            e += y * (1 / 720 + y * (1 / 5040 + y * (1 / 40320 + y * (1 / 362880))))
+        e = 1.0 + y * (1.0 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * e))))
         c *= e
         s *= e
     a, b = nodes[first + j, 0], nodes[first + j, 1]
@@ -167,14 +188,54 @@ def _below(g, d, h, j, fourth, length):
     """Whether g + d t + h t^2/2 + j t^3/6 + fourth t^4/24 stays below zero on (0, length]: Bernstein coefficients."""
     a, b, c = d * length, h * length * length, j * length * length * length
     e = fourth * length * length * length * length
-    last = g + a + 0.5 * b + c / 6 + e / 24
     return (
-        g <= 0.0
-        and g + a / 4 <= 0.0
-        and g + a / 2 + b / 12 <= 0.0
-        and g + 0.75 * a + b / 4 + c / 24 <= 0.0
-        and last < 0.0
+        (g <= 0.0)
+        & (g + 0.25 * a <= 0.0)
+        & (g + 0.5 * a + b * (1 / 12) <= 0.0)
+        & (g + 0.75 * a + 0.25 * b + c * (1 / 24) <= 0.0)
+        & (g + a + 0.5 * b + c * (1 / 6) + e * (1 / 24) < 0.0)
     )
+
+
+@njit(**FAST)
+def _certified(grid, piece, exits, leaving, w, lr, li, t, end, parts, nodes):
+    """Whether every exit stays below zero on (0, t): quartic bounds from both ends of `parts` intervals.
+
+    `grid` holds number and density of the drive's nodes, then first, number and density of the mode's (0: held).
+    """
+    half = 0.5 * t / parts
+    cr, ci, yr, yi = end
+    for j in range(parts, -1, -1):
+        if j == parts:
+            nr, ni, mr, mi = cr, ci, yr, yi
+        elif j > 0:
+            at = t * j / parts
+            nr, ni = _turn(nodes, 0, grid[0], grid[1], 0.0, w, at)
+            mr, mi = 0.0, 0.0
+            if grid[3] > 0:
+                mr, mi = _turn(nodes, grid[2], grid[3], grid[4], lr, li, at)
+        else:
+            nr, ni, mr, mi = 0.0, 0.0, 0.0, 0.0
+        for q in range(exits):
+            fourth = piece[q, 9]
+            if j == 0:
+                if not _below(piece[q, 5], piece[q, 6], piece[q, 7], piece[q, 8], fourth, half):
+                    return False
+                continue
+            dr, di = piece[q, 1] * nr - piece[q, 2] * ni, piece[q, 1] * ni + piece[q, 2] * nr
+            wr, wi = piece[q, 3] * mr - piece[q, 4] * mi, piece[q, 3] * mi + piece[q, 4] * mr
+            ar, ai = lr * wr - li * wi, lr * wi + li * wr
+            br, bi = lr * ar - li * ai, lr * ai + li * ar
+            g, d = piece[q, 0] + dr + wr, ar - w * di
+            h, jerk = br - w * w * dr, w * w * w * di + lr * br - li * bi
+            if j == parts:
+                if q == leaving:
+                    g = 0.0
+            elif not _below(g, d, h, jerk, fourth, half):
+                return False
+            if not _below(g, -d, h, -jerk, fourth, half):
+                return False
+    return True
 
 
 @njit(**FAST)
@@ -190,7 +251,8 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
     clock, state, mode, limit, period, out
         As in :func:`stickslip.solve.kernel.march`.
     past : tuple of arrays
-        Modes, exits and durations of the pieces gone by, in a ring, and (newest, guess, start of lap) within it.
+        Modes, exits, durations and certificate parts of the pieces gone by, in a ring, and (newest, guess, start of
+        the lap) within it.
     begun : int
         Pieces already in `out`.
     work : ndarray (9, 16 or more)
@@ -199,38 +261,29 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
     Returns
     -------
     tuple of int
-        Number of pieces in `out`, and the mode; the general march takes the next piece.
+        Number of pieces in `out`, and the mode; the general march settles it and takes the next piece.
     """
     drive, modes, level, exits, rest, nodes = fast
-    target, reset, first = tables[4], tables[6], tables[7]
+    target, crossing, reset, first = tables[4], tables[5], tables[6], tables[7]
     laps_out, times_out, modes_out, durations_out, states_out, exits_out = out
-    past_mode, past_exit, past_time, ring = past
+    past_mode, past_exit, past_time, past_parts, ring = past
     size = state.shape[0]
     resting = level.shape[1]
-    w, phase, spacing, turns = drive[0], drive[1], drive[2], int(drive[3])
-    # rows of `piece`: G, D, D, W, W, then g and two derivatives at the start; eight columns on: the third, a bound of
-    # the fourth
+    w, phase, density, turns = drive[0], drive[1], drive[2], int(drive[3])
+    # a row per exit: G, D, D, W, W, g and three derivatives at the start, a bound of the fourth
     piece, fresh = work[:8], work[8]
     count, capacity = begun, laps_out.shape[0]
     x, v = state[0], state[1]
     ec, es = state[size - 2], state[size - 1]
-    since = 0
-    while count < capacity:
-        slot = ring[1]
-        if past_mode[slot] != mode or past_exit[slot] < 0:
-            break
-        guess, leaving = past_time[slot], past_exit[slot]
-        left = (limit[0] - clock[0]) * period if limit[0] != clock[0] else 0.0
-        left += limit[1] - clock[1]
-        if not guess < 0.999 * min(left, period):
-            break
+    since, chain = 0, 0
+    while count < capacity and chain < 8:
         sliding = modes[mode, 0] == SLIDING
-        lr, li = modes[mode, 1], modes[mode, 2]
-        lam = modes[mode, 6]
-        low, high = first[mode], first[mode + 1]
-        zr, zi, centre, free_noise = 0.0, 0.0, 0.0, 0.0
+        lr, li, lam = modes[mode, 1], modes[mode, 2], modes[mode, 6]
         hr, hi = modes[mode, 3], modes[mode, 4]
-        if high - low > 8:
+        low = first[mode]
+        number = first[mode + 1] - low
+        zr, zi, centre, free, free_noise = 0.0, 0.0, 0.0, 0.0, 0.0
+        if number > 8:
             break
         if sliding:
             force = 0.0
@@ -238,16 +291,15 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
                 force += level[mode, i] * state[2 + i]
             centre = force * modes[mode, 5]
             fr, fi = hr * ec - hi * es, hr * es + hi * ec
-            p = x - centre - fr
-            dp = v + w * fi
-            zr = p
-            zi = -(dp - lr * p) / li
-            reach = abs(x) + abs(centre) + abs(hr) + abs(hi)
-            free_noise = NOISE * (reach + (abs(v) + w * (abs(hr) + abs(hi)) - lr * reach) / li)
-        grow = math.exp(lr * guess) if lr > 0.0 else 1.0
-        sure = True
-        for e in range(low, high):
-            k = e - low
+            zr = x - centre - fr
+            zi = -(v + w * fi - lr * zr) * modes[mode, 10]
+            free = math.sqrt(zr * zr + zi * zi)
+            reach = abs(x) + abs(centre) + modes[mode, 11]
+            free_noise = NOISE * (reach + (abs(v) + w * modes[mode, 11] + abs(lr) * reach) * modes[mode, 10])
+        # an exit due at once is taken; one too close to call goes to the general march
+        fired, doubtful = -1, False
+        for q in range(number):
+            e = low + q
             g, scale = 0.0, 0.0
             for i in range(resting):
                 term = rest[e, i] * state[2 + i]
@@ -258,127 +310,108 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
                 scale += abs(exits[e, 0] * x)
             dr, di = exits[e, 2] * ec - exits[e, 3] * es, exits[e, 2] * es + exits[e, 3] * ec
             wr, wi = exits[e, 4] * zr - exits[e, 5] * zi, exits[e, 4] * zi + exits[e, 5] * zr
-            size_d, size_w = math.sqrt(dr * dr + di * di), math.sqrt(wr * wr + wi * wi) * grow
             # derivatives at the start: (i w)^k D and l^k W
-            g0 = g + dr + wr
             ar, ai = lr * wr - li * wi, lr * wi + li * wr
-            g1 = -w * di + ar
             br, bi = lr * ar - li * ai, lr * ai + li * ar
-            g2 = -w * w * dr + br
-            g3 = w * w * w * di + lr * br - li * bi
+            g0, g1, g2 = g + dr + wr, ar - w * di, br - w * w * dr
             doubt = exits[e, 6] * free_noise
-            if abs(g0) <= NOISE * (scale + size_d) + doubt:
-                g0 = 0.0
-                if abs(g1) <= NOISE * size_d * w + doubt * lam:
-                    g1 = 0.0
-                    if g2 >= 0.0:
-                        sure = False
-                elif g1 > 0.0:
-                    sure = False
-            elif g0 > 0.0:
-                sure = False
-            piece[0, k], piece[1, k], piece[2, k], piece[3, k], piece[4, k] = g, dr, di, wr, wi
-            piece[5, k], piece[6, k] = g0, g1
-            piece[7, k] = g2
-            piece[0, 8 + k] = g3
-            piece[1, 8 + k] = size_d * w * w * w * w + size_w * lam * lam * lam * lam
-        if not sure:
+            sure = g0
+            if abs(g0) <= NOISE * (scale + exits[e, 7]) + doubt:
+                g0, sure = 0.0, g1
+                if abs(g1) <= NOISE * exits[e, 7] * w + doubt * lam:
+                    g1, sure = 0.0, g2
+                    if abs(g2) <= NOISE * exits[e, 7] * w * w + doubt * lam * lam:
+                        doubtful = True
+                        break
+            if sure > 0.0:
+                doubtful = crossing[e]
+                fired = e
+                break
+            piece[q, 0], piece[q, 1], piece[q, 2], piece[q, 3], piece[q, 4] = g, dr, di, wr, wi
+            piece[q, 5], piece[q, 6], piece[q, 7] = g0, g1, g2
+            piece[q, 8] = w * w * w * di + lr * br - li * bi
+            piece[q, 9] = exits[e, 7] * w * w * w * w + exits[e, 6] * free * lam * lam * lam * lam
+        if doubtful:
             break
-        # polish the guess
+        if fired >= 0:
+            if exits[fired, 8] == STOPS:
+                v = 0.0
+            elif exits[fired, 8] == CARRIES:
+                state[0], state[1], state[size - 2], state[size - 1] = x, v, ec, es
+                _carry(reset[fired], state, fresh, size)
+                v = state[1]
+            mode = target[fired]
+            chain += 1
+            continue
+        # the same piece one lap ago is the guess
+        slot = ring[1]
+        if past_mode[slot] != mode or past_exit[slot] < 0:
+            break
+        t, leaving = past_time[slot], past_exit[slot]
+        left = (limit[0] - clock[0]) * period if limit[0] != clock[0] else 0.0
+        left += limit[1] - clock[1]
+        if not t < 0.999 * min(left, period):
+            break
+        first_node, mode_nodes, mode_density = int(modes[mode, 8]), int(modes[mode, 9]), modes[mode, 7]
+        if lr > 0.0:
+            grown = math.exp(1.1 * lr * t)
+            for q in range(number):
+                piece[q, 9] *= grown
         k = leaving - low
-        t = guess
         done = False
-        cr, ci, yr, yi = 1.0, 0.0, 1.0, 0.0
+        cr, ci, yr, yi = 1.0, 0.0, 0.0, 0.0
         for _ in range(6):
-            cr, ci = _turn(nodes, 0, turns, spacing, 0.0, w, t)
-            dr, di = piece[1, k] * cr - piece[2, k] * ci, piece[1, k] * ci + piece[2, k] * cr
-            wr, wi = 0.0, 0.0
+            cr, ci = _turn(nodes, 0, turns, density, 0.0, w, t)
             if sliding:
-                yr, yi = _turn(nodes, int(modes[mode, 8]), int(modes[mode, 9]), modes[mode, 7], lr, li, t)
-                wr, wi = piece[3, k] * yr - piece[4, k] * yi, piece[3, k] * yi + piece[4, k] * yr
-            g = piece[0, k] + dr + wr
+                yr, yi = _turn(nodes, first_node, mode_nodes, mode_density, lr, li, t)
+            dr, di = piece[k, 1] * cr - piece[k, 2] * ci, piece[k, 1] * ci + piece[k, 2] * cr
+            wr, wi = piece[k, 3] * yr - piece[k, 4] * yi, piece[k, 3] * yi + piece[k, 4] * yr
             ar, ai = lr * wr - li * wi, lr * wi + li * wr
-            d = -w * di + ar
-            h = -w * w * dr + lr * ar - li * ai
+            g, d, h = piece[k, 0] + dr + wr, ar - w * di, lr * ar - li * ai - w * w * dr
             step = -2.0 * g * d / (2.0 * d * d - g * h)
             if not (d > 0.0 and abs(step) < 0.2 * t):
                 break
             t += step
             if abs(step) * max(w, lam) < 2e-6:
-                done = True
-                # the state follows the last correction by its Taylor polynomial
+                # the phasors follow the last correction by their Taylor polynomials
                 z = w * step
                 cr, ci = cr - z * ci - 0.5 * z * z * cr, ci + z * cr - 0.5 * z * z * ci
-                if sliding:
-                    a, b = lr * step, li * step
-                    a, b = a + 0.5 * (a * a - b * b), b + a * b
-                    yr, yi = yr + a * yr - b * yi, yi + a * yi + b * yr
+                p, q = lr * step, li * step
+                p, q = p + 0.5 * (p * p - q * q), q + p * q
+                yr, yi = yr + p * yr - q * yi, yi + p * yi + q * yr
+                done = True
                 break
-        if not done or t >= left or t >= period:
+        if not done or t >= 0.9999 * left or t >= period:
             break
-        # certify: no exit before t
-        parts = 1
-        certified = False
-        while parts <= SPLITS and not certified:
-            certified = True
-            half = 0.5 * t / parts
-            for j in range(parts, -1, -1):
-                if j == parts:
-                    nr, ni, mr, mi = cr, ci, yr, yi
-                elif j > 0:
-                    at = t * j / parts
-                    nr, ni = _turn(nodes, 0, turns, spacing, 0.0, w, at)
-                    mr, mi = 0.0, 0.0
-                    if sliding:
-                        mr, mi = _turn(nodes, int(modes[mode, 8]), int(modes[mode, 9]), modes[mode, 7], lr, li, at)
-                for q in range(high - low):
-                    fourth = piece[1, 8 + q]
-                    if j == 0:
-                        if not _below(piece[5, q], piece[6, q], piece[7, q], piece[0, 8 + q], fourth, half):
-                            certified = False
-                            break
-                        continue
-                    dr, di = piece[1, q] * nr - piece[2, q] * ni, piece[1, q] * ni + piece[2, q] * nr
-                    g, d, h, jerk = piece[0, q] + dr, -w * di, -w * w * dr, w * w * w * di
-                    if sliding:
-                        wr, wi = piece[3, q] * mr - piece[4, q] * mi, piece[3, q] * mi + piece[4, q] * mr
-                        ar, ai = lr * wr - li * wi, lr * wi + li * wr
-                        br, bi = lr * ar - li * ai, lr * ai + li * ar
-                        g, d, h, jerk = g + wr, d + ar, h + br, jerk + lr * br - li * bi
-                    if j == parts and q == leaving - low:
-                        g = 0.0
-                    if not _below(g, -d, h, -jerk, fourth, half) or (
-                        j < parts and not _below(g, d, h, jerk, fourth, half)
-                    ):
-                        certified = False
-                        break
-                if not certified:
-                    break
+        parts = past_parts[slot]
+        grid = (turns, density, first_node, mode_nodes, mode_density)
+        end = (cr, ci, yr, yi)
+        while parts <= SPLITS and not _certified(grid, piece, number, k, w, lr, li, t, end, parts, nodes):
             parts *= 2
-        if not certified:
+        if parts > SPLITS:
             break
         # the piece stands: write it, carry the state over
         laps_out[count], times_out[count], modes_out[count] = clock[0], clock[1], mode
         durations_out[count], exits_out[count] = t, leaving
         states_out[count, 0], states_out[count, 1] = x, v
-        for i in range(2, size - 2):
+        for i in range(2, states_out.shape[1]):
             states_out[count, i] = state[i]
-        states_out[count, size - 2], states_out[count, size - 1] = ec, es
         count += 1
-        past_mode[ring[0]], past_exit[ring[0]], past_time[ring[0]] = mode, leaving, t
-        ring[0] = (ring[0] + 1) % HISTORY
-        ring[1] = (ring[1] + 1) % HISTORY
+        slot = ring[0]
+        past_mode[slot], past_exit[slot], past_time[slot], past_parts[slot] = mode, leaving, t, parts
+        ring[0] = (slot + 1) & (HISTORY - 1)
+        ring[1] = (ring[1] + 1) & (HISTORY - 1)
         ec, es = ec * cr - es * ci, ec * ci + es * cr
         gap = t - clock[2]
         now = clock[1] + gap
         clock[2] = (now - clock[1]) - gap
-        since += 1
         if now >= period:
             now -= period
             clock[0] += 1.0
             ring[1] = ring[2]
             ring[2] = ring[0]
         clock[1] = now
+        since += 1
         if since >= 64:
             ec, es = math.cos(w * now + phase), math.sin(w * now + phase)
             since = 0
@@ -387,79 +420,25 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
             ar, ai = zr * yr - zi * yi, zr * yi + zi * yr
             x = centre + fr + ar
             v = -w * fi + lr * ar - li * ai
-        state[0], state[1], state[size - 2], state[size - 1] = x, v, ec, es
-        # transitions that are due at once: told by value, or by the first derivatives at a tie
-        for _ in range(8):
-            for i in range(1, size - 2):
-                total = 0.0
-                for q in range(size):
-                    total += reset[leaving, i, q] * state[q]
-                fresh[i] = total
-            for i in range(1, size - 2):
-                state[i] = fresh[i]
+        if exits[leaving, 8] == STOPS:
+            v = 0.0
+        elif exits[leaving, 8] == CARRIES:
+            state[0], state[1], state[size - 2], state[size - 1] = x, v, ec, es
+            _carry(reset[leaving], state, fresh, size)
             v = state[1]
-            mode = target[leaving]
-            leaving = _due(fast, tables, mode, state)
-            if leaving < 0:
-                break
-        if leaving != -1:
-            mode = -2 - mode  # the general march settles what is in doubt
-            break
+        mode = target[leaving]
+        chain = 0
     state[0], state[1], state[size - 2], state[size - 1] = x, v, ec, es
     return count, mode
 
 
 @njit(**FAST)
-def _due(fast, tables, mode, state):
-    """The exit that is due at once in a mode just entered; -1: none; -2: too close to call by three derivatives."""
-    drive, modes, level, exits, rest, _ = fast
-    crossing, first = tables[5], tables[7]
-    size = state.shape[0]
-    w = drive[0]
-    x, v, ec, es = state[0], state[1], state[size - 2], state[size - 1]
-    sliding = modes[mode, 0] == SLIDING
-    lr, li, hr, hi = modes[mode, 1], modes[mode, 2], modes[mode, 3], modes[mode, 4]
-    zr, zi, free_noise = 0.0, 0.0, 0.0
-    if sliding:
-        force = 0.0
-        for i in range(level.shape[1]):
-            force += level[mode, i] * state[2 + i]
-        centre = force * modes[mode, 5]
-        fr, fi = hr * ec - hi * es, hr * es + hi * ec
-        zr = x - centre - fr
-        zi = -(v + w * fi - lr * zr) / li
-        reach = abs(x) + abs(centre) + abs(hr) + abs(hi)
-        free_noise = NOISE * (reach + (abs(v) + w * (abs(hr) + abs(hi)) - lr * reach) / li)
-    for e in range(first[mode], first[mode + 1]):
-        if crossing[e]:
-            continue
-        g, scale = 0.0, 0.0
-        for i in range(level.shape[1]):
-            term = rest[e, i] * state[2 + i]
-            g += term
-            scale += abs(term)
-        if not sliding:
-            g += exits[e, 0] * x + exits[e, 1] * v
-            scale += abs(exits[e, 0] * x)
-        dr, di = exits[e, 2] * ec - exits[e, 3] * es, exits[e, 2] * es + exits[e, 3] * ec
-        wr, wi = exits[e, 4] * zr - exits[e, 5] * zi, exits[e, 4] * zi + exits[e, 5] * zr
-        size_d = abs(exits[e, 2]) + abs(exits[e, 3])
-        doubt = exits[e, 6] * free_noise
-        g += dr + wr
-        if abs(g) > NOISE * (scale + size_d) + doubt:
-            if g > 0.0:
-                return e
-            continue
-        ar, ai = lr * wr - li * wi, lr * wi + li * wr
-        d = -w * di + ar
-        if abs(d) > NOISE * size_d * w + doubt * modes[mode, 6]:
-            if d > 0.0:
-                return e
-            continue
-        h = -w * w * dr + lr * ar - li * ai
-        if abs(h) > NOISE * size_d * w * w + doubt * modes[mode, 6] ** 2:
-            if h > 0.0:
-                return e
-            continue
-        return -2
-    return -1
+def _carry(matrix, state, fresh, size):
+    """Take the velocity and the memory over an exit; displacement and drive go on."""
+    for i in range(1, size - 3):
+        total = 0.0
+        for q in range(size):
+            total += matrix[i, q] * state[q]
+        fresh[i] = total
+    for i in range(1, size - 3):
+        state[i] = fresh[i]

@@ -129,7 +129,7 @@ def run(
     period = table.motion.period
     total = offset + (laps * period if math.isfinite(period) else 0.0)
     scale = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total
-    pieces = _Pieces(size, CHUNK)
+    pieces = _Pieces(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
     try:
         for at, (signals, values) in _stops(table, laps, offset):
@@ -159,7 +159,7 @@ def run(
         if not pieces.count:
             raise
     laps_, offsets, modes, durations, states, exits = pieces.done()
-    if status == "complete" and _at_rest(table, states[-1], int(modes[-1])):
+    if status == "complete" and _at_rest(table, state, mode):
         status = "at rest"
     return Trajectory(system, table, laps_, offsets, modes, durations, states, exits, total, status)
 
@@ -194,8 +194,8 @@ class _Pieces:
 
 def _columns(room: int, size: int) -> tuple[NDArray[Any], ...]:
     return (
-        np.empty(room), np.empty(room), np.empty(room, np.int64), np.empty(room), np.empty((room, size)),
-        np.empty(room, np.int64),
+        np.empty(room, np.int32), np.empty(room), np.empty(room, np.int16), np.empty(room), np.empty((room, size)),
+        np.empty(room, np.int16),
     )  # fmt: skip
 
 

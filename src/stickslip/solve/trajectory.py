@@ -53,8 +53,8 @@ class Trajectory:
         Number of each piece's mode.
     durations : ndarray (n,)
         Length of each piece [s].
-    states : ndarray (n, N)
-        State at the start of each piece.
+    kept : ndarray (n, K)
+        State at the start of each piece; of a single tone's signals nothing is kept, the clock has them.
     exits : ndarray (n,)
         Number of the exit that ended each piece; -1 where the time was over.
     duration : float
@@ -65,12 +65,12 @@ class Trajectory:
 
     system: Oscillator
     table: Automaton
-    laps: Array
+    laps: NDArray[np.int32]
     offsets: Array
-    modes: NDArray[np.int64]
+    modes: NDArray[np.int16]
     durations: Array
-    states: Array
-    exits: NDArray[np.int64]
+    kept: Array
+    exits: NDArray[np.int16]
     duration: float
     status: str
 
@@ -79,6 +79,15 @@ class Trajectory:
         """Start of each piece [s]."""
         period = self.table.motion.period
         return self.offsets + (self.laps * period if np.isfinite(period) else 0.0)
+
+    @cached_property
+    def states(self) -> Array:
+        """Whole state at the start of each piece (n, N)."""
+        table = self.table
+        if self.kept.shape[1] == len(table.names):
+            return self.kept
+        angle = table.tones[0, 2] * self.offsets + table.tones[0, 3]
+        return np.column_stack([self.kept, np.ones(len(self.kept)), np.cos(angle), np.sin(angle)])
 
     @property
     def pieces(self) -> tuple[Piece, ...]:
