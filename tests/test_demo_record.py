@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from stickslip import datasets
+from stickslip import analyze, datasets
 
 MAKER = Path(__file__).resolve().parents[1] / "tools" / "make_demo_record.py"
 
@@ -52,7 +52,7 @@ def test_the_truth_obeys_the_rig(maker) -> None:
     spring_force, base_speed = rig.stiffness * (rig.base(t) - x), rig.amplitude * w * np.cos(w * t)
     fed = np.sum(spring_force * base_speed) / 50_000 / 2
     damped = np.sum(rig.damping * v**2) / 50_000 / 2
-    assert datasets.demo().truth["energy_per_cycle"] == pytest.approx(fed - damped, rel=2e-4)
+    assert datasets.demo().truth["energy per cycle"] == pytest.approx(fed - damped, rel=2e-4)
     for piece in pieces:
         if piece.direction == 0 and len(piece.times):
             assert np.ptp(piece.states[0]) == 0
@@ -70,4 +70,16 @@ def test_the_sensors_noise_is_as_stated(maker) -> None:
     assert np.std(record["x"][still]) == pytest.approx(np.hypot(1e-6, 2.5e-6 / np.sqrt(12)), rel=0.4)
     assert np.allclose(record["x"] / 2.5e-6, np.rint(record["x"] / 2.5e-6), atol=1e-6)
     assert np.std(record["a"][still]) == pytest.approx(0.04, rel=0.25)
-    assert record.truth["stops_per_cycle"] == 2
+    assert record.truth["stops per cycle"] == 2
+
+
+def test_every_answer_is_found_under_its_name_and_within_its_interval() -> None:
+    record = datasets.demo()
+    rig = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
+    found = {estimate.name: estimate for estimate in analyze(record, **rig).estimates}
+    answers = set(record.truth) - {*rig, "static friction", "sticks"}
+    assert answers <= set(found)
+    for name in answers:
+        low, high = found[name].interval
+        reach = (high - low) / 2  # of nine intervals of 95 % one may miss; none by its own width
+        assert low - reach <= record.truth[name] <= high + reach, found[name]

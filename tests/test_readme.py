@@ -1,4 +1,4 @@
-"""What the README tells a reader to type works, block by block, in the order in which it stands."""
+"""What the README and the pages of docs tell a reader to type works, block by block, in order."""
 
 from __future__ import annotations
 
@@ -9,23 +9,47 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from stickslip import datasets
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text("utf-8")
-BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
-PYTHON = [code for language, code in BLOCKS if language == "python"]
-SHELL = [line for language, code in BLOCKS if language == "sh" for line in code.splitlines() if line.strip()]
+PAGES = sorted((ROOT / "docs").glob("*.md"))
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """The fenced blocks of one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+
+
+PYTHON = blocks(README, "python")
+SHELL = [
+    line
+    for page in [README, *(page.read_text("utf-8") for page in PAGES)]
+    for block in blocks(page, "sh")
+    for line in block.splitlines()
+    if line.strip()
+]
 TARGETS = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text("utf-8"), flags=re.MULTILINE))
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where a reader sits: a folder with a rig's file in it, written by the project from its own record."""
-    import stickslip as ss
-
     folder = tmp_path_factory.mktemp("reader")
-    ss.write_record(ss.datasets.demo(), folder / "rig.csv")
+    record = datasets.demo()
+    units = {"plate [mm]": record["x"] * 1e3, "base [mm]": record["z"] * 1e3, "acc [g]": record["a"] / 9.80665}
+    columns = {"t [s]": record.time, **units, "cell [N]": record["load"]}
+    np.savetxt(
+        folder / "rig.csv",
+        np.column_stack(list(columns.values())),
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+        fmt="%.7f",
+    )
     return folder
 
 
@@ -37,11 +61,17 @@ def test_the_readme_has_what_it_promises() -> None:
     assert len(PYTHON[0].splitlines()) < 15, "the first use in under fifteen lines"
 
 
-def test_the_python_blocks_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.name)
+def test_the_python_blocks_run(folder: Path, page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    names: dict[str, object] = {}
-    for code in PYTHON:
-        exec(compile(code, "README.md", "exec"), names)
+    names: dict[str, object] = {"__name__": "__main__"}
+    for code in blocks(page.read_text("utf-8"), "python"):
+        exec(compile(code, page.name, "exec", dont_inherit=True), names)
+
+
+def test_the_first_use_leaves_a_report(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    exec(compile(PYTHON[0], "README.md", "exec", dont_inherit=True), {})
     assert (folder / "report.html").stat().st_size > 10_000
 
 
@@ -56,4 +86,4 @@ def test_the_commands_run(folder: Path, line: str) -> None:
         run = subprocess.run(program, cwd=folder, capture_output=True, text=True, timeout=120, env=os.environ)
         assert run.returncode == 0, run.stderr
         return
-    assert command[:3] == ["pip", "install", "stickslip[io]"], f"a command that no test runs: {line}"
+    assert command[:3] == ["pip", "install", ".[io]"], f"a command that no test runs: {line}"

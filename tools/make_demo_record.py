@@ -142,20 +142,23 @@ def measure(rig: Rig, pieces: list[Piece], seed: int) -> dict[str, NDArray[np.in
 
 
 def answers(rig: Rig, pieces: list[Piece], first: float, last: float) -> dict[str, object]:
-    """The true answers over the recorded span (a whole number of cycles)."""
+    """The true answers over the recorded span (a whole number of cycles), by the names of the estimates."""
     cycles = (last - first) * rig.frequency
     sticks = [(max(p.start, first), min(p.end, last), p.start) for p in pieces if p.direction == 0 and p.start < last]
     slid = sum(_distance(piece, first, last) for piece in pieces if piece.direction)
+    level = dict.fromkeys(("sliding friction", "sliding friction forward", "sliding friction back"), rig.kinetic)
     return {
-        "friction_level": rig.kinetic,
-        "static_friction": rig.static,
-        "stuck_share": sum(end - start for start, end, _ in sticks) / (last - first),
-        "stops_per_cycle": sum(began >= first for *_, began in sticks) / cycles,
-        "energy_per_cycle": rig.kinetic * slid / cycles,
-        "frequency": rig.frequency,
         "mass": rig.mass,
         "stiffness": rig.stiffness,
         "damping": rig.damping,
+        **level,
+        "friction offset": 0.0,
+        "slope of friction against speed": 0.0,
+        "energy per cycle": rig.kinetic * slid / cycles,
+        "forcing frequency": rig.frequency,
+        "stuck share of the time": sum(end - start for start, end, _ in sticks) / (last - first),
+        "stops per cycle": sum(began >= first for *_, began in sticks) / cycles,
+        "static friction": rig.static,
         "sticks": [[round(start - first, 7), round(end - first, 7)] for start, end, _ in sticks],
     }
 

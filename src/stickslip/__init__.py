@@ -22,12 +22,13 @@ _ROOMS = {
     "read_record": "files.read", "read_blocks": "files.read", "write_record": "files.write",
     "repair_clock": "signals.repair", "fill_gaps": "signals.repair", "fill_missing": "signals.repair",
     "restore_clipped": "signals.repair", "remove_drift": "signals.repair", "resample": "signals.repair",
-    "synchronise": "signals.synchronise", "clock_offset": "signals.synchronise",
+    "remove_spikes": "signals.repair",
+    "synchronise": "signals.synchronise", "clock_offset": "signals.synchronise", "clock_rate": "signals.synchronise",
     "differentiate": "signals.differentiate", "smooth": "signals.differentiate",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
-    "analyze": "analysis", "compare": "analysis", "Findings": "analysis", "Comparison": "analysis",
+    "analyze": "analysis", "compare": "analysis", "mend": "analysis", "Findings": "analysis", "Comparison": "analysis",
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",
     "Tabulated": "laws.tabulated", "StateVariable": "laws.state_variable", "InertialContact": "laws.inertial",
     "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load",
@@ -36,7 +37,8 @@ _ROOMS = {
     "Oscillator": "oscillator", "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
     "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
     "scenarios": "scenarios",
-    "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder", "datasets": "datasets",
+    "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder",
+    "summary": "reports.summary", "datasets": "datasets",
 }  # fmt: skip
 
 __all__ = [*_ROOMS, "__version__"]

@@ -14,8 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from stickslip.errors import ModelError, RecordError
 from stickslip.units import parse_value
 
-REPAIRS = ("clock", "gaps", "missing", "clipping", "drift")
-Repair = Literal["clock", "gaps", "missing", "clipping", "drift"]
+REPAIRS = ("clock", "gaps", "missing", "spikes", "clipping", "drift")
 
 
 def _in(unit: str) -> BeforeValidator:
@@ -35,6 +34,13 @@ def _in(unit: str) -> BeforeValidator:
 def _row_range(value: object) -> object:
     if not re.fullmatch(r"\s*(-?\d+)?\s*:\s*(-?\d+)?\s*", str(value)):
         raise ValueError("rows are written FIRST:LAST, either of which may be left out")
+    return value
+
+
+def _repair(value: object) -> object:
+    word, colon, channel = str(value).partition(":")
+    if word not in REPAIRS or bool(colon) != bool(channel):
+        raise ValueError(f"a repair is one of {', '.join(REPAIRS)}, for one channel alone as in drift:x")
     return value
 
 
@@ -62,7 +68,12 @@ class RigSettings(BaseModel):
     normal : dict of str to float
         Normal load [N] by file name or pattern ("*250g*"); a single number holds for every file.
     repair : tuple of str
-        Repairs made to every record after reading, in the order given: clock, gaps, missing, clipping, drift.
+        Repairs made to every record after reading, in the order given: clock, gaps, missing, spikes, clipping,
+        drift; see :func:`mend`.
+    time : str or None
+        The column that holds the time, where its header does not say so.
+    delimiter, decimal : str or None
+        Of text files, where they can not be told from the file.
     rows : str or None
         Rows to keep of each file, as "FIRST:LAST".
 
@@ -86,7 +97,10 @@ class RigSettings(BaseModel):
     normal: Annotated[dict[str, Annotated[float, _in("N"), Field(gt=0)]], BeforeValidator(_one_or_many)] = Field(
         default_factory=dict
     )
-    repair: tuple[Repair, ...] = ()
+    repair: tuple[Annotated[str, BeforeValidator(_repair)], ...] = ()
+    time: str | None = None
+    delimiter: str | None = None
+    decimal: Literal[".", ","] | None = None
     rows: Annotated[str, BeforeValidator(_row_range)] | None = None
 
     def normal_load(self, name: str) -> float | None:
@@ -114,10 +128,19 @@ def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lin
     lines : iterable of str
         The text they were read from, so that the message can name the line.
 
+    Returns
+    -------
+    RigSettings
+
     Raises
     ------
     ModelError
         An unknown key, or a value that has no meaning.
+
+    Examples
+    --------
+    >>> rig_settings({"mass": "250 g"}).mass
+    0.25
     """
     try:
         return RigSettings.model_validate(dict(values))
@@ -134,7 +157,7 @@ def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lin
             ) from error
         raise ModelError(
             f"{where} sets {key} = {first['input']!r}",
-            first["msg"].removeprefix("Value error, "),
+            first["msg"].removeprefix("Value error, ").replace("Input should", "it should"),
             f"correct {key}",
         ) from error
 

@@ -31,7 +31,15 @@ FOLDER_VARIABLE = "STICKSLIP_DATA"
 
 @dataclass(frozen=True)
 class SetFile:
-    """One file of a set: what it must hash to and, where known, the address of exactly that version."""
+    """One file of a set.
+
+    Attributes
+    ----------
+    sha256 : str
+        What its content must hash to.
+    url : str
+        The address of exactly that version, where one is known.
+    """
 
     sha256: str
     url: str = ""
@@ -196,13 +204,14 @@ def demo() -> Record:
     -------
     Record
         Channels ``x``, ``z`` [m], ``a`` [m/s^2] and ``load`` [N]. ``truth`` holds the rig (``mass`` [kg],
-        ``stiffness`` [N/m], ``damping`` [N s/m]) and the answers (``friction_level`` [N], ``stuck_share``,
-        ``stops_per_cycle``, ``energy_per_cycle`` [J], ``frequency`` [Hz], ``sticks``: start and end [s] of each).
+        ``stiffness`` [N/m], ``damping`` [N s/m]), the answers under the names of the estimates ("sliding friction" [N],
+        "stuck share of the time", "stops per cycle", "energy per cycle" [J], ...), and ``sticks``: start and end [s]
+        of each.
 
     Examples
     --------
     >>> record = demo()
-    >>> list(record), record.fs, record.truth["friction_level"]
+    >>> list(record), record.fs, record.truth["sliding friction"]
     (['x', 'z', 'a', 'load'], 2000.0, 1.1)
     """
     about = json.loads(_bundled("demo.json").read_text("utf-8"))

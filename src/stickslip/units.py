@@ -112,6 +112,8 @@ def parse_unit(text: str, expect: str | None = None) -> Unit:
     name = _normal(text)
     if expect is not None:
         name = _BY_QUANTITY.get((name, expect), name)
+    if name not in _TABLE and re.fullmatch(r"[A-Z][a-z]{2,}", name):  # a word: Volts, Newtons
+        name = name.lower()
     scale, si = _TABLE[name] if name in _TABLE else _by_pint(name, text)
     if expect is not None and si != expect:
         raise RecordError(

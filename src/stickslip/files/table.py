@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import FormatError
+from stickslip.errors import FormatError, StickslipError
 
 Array = NDArray[np.float64]
 Block = dict[str, Array]
@@ -99,6 +101,28 @@ def unique(names: Sequence[str]) -> list[str]:
         taken.add(candidate)
         result.append(candidate)
     return result
+
+
+@contextmanager
+def reading(path: Path, kind: str) -> Iterator[None]:
+    """Around a call into a format's library: whatever it raises on a damaged file becomes one sentence."""
+    try:
+        yield
+    except StickslipError:
+        raise
+    except MemoryError as error:
+        raise FormatError(
+            f"'{path.name}' asks for more memory than there is",
+            "columns are held whole unless they are read in blocks; a damaged file may state absurd sizes",
+            "name fewer channels=, or go through the file with read_blocks()",
+        ) from error
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
+        raise FormatError(
+            f"'{path.name}' can not be read as {kind} ({reason})",
+            "the file is damaged, cut off, or of another format",
+            "copy it again from its source, or export it as CSV",
+        ) from error
 
 
 def optional(module: str) -> ModuleType:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
-from stickslip.files.metadata import KEY, record_to_metadata, time_column
 from stickslip.files.table import optional
+from stickslip.record.metadata import KEY, record_to_metadata, time_column
 from stickslip.record.record import Record
 
 Array = NDArray[np.float64]

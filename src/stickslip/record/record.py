@@ -26,7 +26,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Step:
-    """One thing that was done to a record: the function, its arguments, and what came of it in words."""
+    """One thing that was done to a record.
+
+    Attributes
+    ----------
+    action : str
+        The function.
+    arguments : mapping
+        What it was called with.
+    outcome : str
+        What came of it, in words.
+    """
 
     action: str
     arguments: Mapping[str, Any] = field(default_factory=dict)
@@ -67,7 +77,7 @@ class Record:
     Examples
     --------
     >>> record = Record.of({"x": [0.0, 1.0, 0.0, -1.0]}, fs=4.0, units={"x": "mm"})
-    >>> record["x"][1], record.fs, record.duration
+    >>> float(record["x"][1]), record.fs, record.duration
     (0.001, 4.0, 1.0)
     """
 

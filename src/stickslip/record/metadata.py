@@ -1,16 +1,16 @@
-"""What a file written by write_record says of its Record beside the samples: one JSON text, the same in every format."""
+"""What a Record says of itself beside its samples: one JSON text, the same in every file and exchange format."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
-from stickslip.files.table import unique
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record, Step
 
@@ -37,24 +37,25 @@ def record_to_metadata(record: Record) -> dict[str, Any]:
 
 def time_column(record: Record) -> str:
     """The name under which time is written beside the channels."""
-    return unique([*record.samples, "time"])[-1]
+    name, number = "time", 1
+    while name in record.samples:
+        number += 1
+        name = f"time_{number}"
+    return name
 
 
 def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array], first: int = 0) -> Record:
-    """The record that `metadata` and the samples (from row `first` on, with the time column where stamps were kept) tell.
+    """The record that `metadata` and the samples tell.
+
+    The samples begin at row `first`, and include the time column where stamps were kept.
 
     Raises
     ------
     FormatError
         The metadata is of a later version, damaged, or does not fit the samples.
     """
-    try:
-        if metadata["version"] != VERSION:
-            raise FormatError(
-                f"the file is of version {str(metadata['version'])[:20]}",
-                f"this program reads version {VERSION}",
-                "update stickslip",
-            )
+    with _trusting():
+        _require_version(metadata)
         channels = {entry["name"]: Channel(**_restored(entry)) for entry in metadata["channels"]}
         stamps = samples[metadata["time"]] if metadata["stamps"] else None
         start = float(metadata["start"])
@@ -65,15 +66,75 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
             channels,
             float(metadata["fs"]),
             start,
-            tuple(Step(**_restored(step)) for step in metadata["history"]),
+            history_of(metadata),
             stamps,
             _restored(metadata["truth"]),
         )
+
+
+def columns_told(metadata: Mapping[str, Any], there: Collection[str]) -> list[str]:
+    """The columns that hold the record's samples, and its stamps where they were kept.
+
+    Raises
+    ------
+    FormatError
+        The metadata names none, or one that is not `there`.
+    """
+    entries = metadata.get("channels")
+    names = [entry.get("name") for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
+    names += [metadata.get("time")] if metadata.get("stamps") else []
+    missing = [str(name)[:40] for name in names if not isinstance(name, str) or name not in there]
+    if missing or not names:
+        raise FormatError(
+            f"the description of the record is damaged (it names {', '.join(missing) or 'no column'})",
+            f"the file has the columns {', '.join(there)}",
+            "write the file again from its source",
+        )
+    return [str(name) for name in names]
+
+
+def require_rows(metadata: Mapping[str, Any], found: int) -> None:
+    """Refuse a file that was cut short: its last number may be cut too."""
+    if metadata.get("rows") != found:
+        raise FormatError(
+            f"{found} rows where the description of the record says {str(metadata.get('rows'))[:20]}",
+            "a file written by write_record is whole",
+            "copy it again, or read what is there by naming channels=",
+        )
+
+
+def history_of(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
+    """The history that the metadata tells; empty where there is none."""
+    with _trusting():
+        return tuple(Step(**_restored(step)) for step in metadata.get("history", ()))
+
+
+def channel_names(metadata: Mapping[str, Any]) -> list[str]:
+    """The channels that the metadata tells."""
+    with _trusting():
+        _require_version(metadata)
+        return [str(entry["name"]) for entry in metadata["channels"]]
+
+
+def _require_version(metadata: Mapping[str, Any]) -> None:
+    if metadata["version"] != VERSION:
+        raise FormatError(
+            f"the file is of version {str(metadata['version'])[:20]}",
+            f"this program reads version {VERSION}",
+            "update stickslip",
+        )
+
+
+@contextmanager
+def _trusting() -> Iterator[None]:
+    """Around the use of a description: what does not fit becomes one sentence."""
+    try:
+        yield
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise FormatError(
             f"the description of the record is damaged ({type(error).__name__}: {str(error)[:80]})",
-            "a file written by write_record tells its channels, clock and history",
-            "write the file again from its source",
+            "a record that stickslip wrote tells its channels, clock and history",
+            "write it again from its source",
         ) from error
 
 

@@ -1,0 +1,335 @@
+"""The command line: parse, call one public function, show."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import glob
+import hashlib
+import json
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+
+if TYPE_CHECKING:
+    from stickslip import Comparison, Findings, Record, RigSettings
+
+INTERRUPTED = 130
+PATIENCE = 2.0  # seconds of silence before a progress bar is shown
+
+
+class _Commands(click.Group):
+    """Every error that stickslip raises on purpose ends as one sentence and its exit code."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("stickslip: interrupted; nothing was written.", err=True)
+            ctx.exit(INTERRUPTED)
+        except click.UsageError as error:
+            click.echo(f"stickslip: {error.format_message().rstrip('.')}; see {ctx.command_path} --help.", err=True)
+            ctx.exit(error.exit_code)
+        except ss.StickslipError as error:
+            click.echo(f"stickslip: {error}", err=True)
+            ctx.exit(error.exit_code)
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(ss.__version__, prog_name="stickslip")
+def main() -> None:
+    """How much friction is in this record, did the contact stick, and how sure is that?
+
+    Exit codes: 0 done, 1 the data can not answer (and why), 2 wrong use.
+    """
+
+
+def _pair(text: str, option: str) -> tuple[str, str]:
+    name, separator, value = text.partition("=")
+    if not separator or not name.strip() or not value.strip():
+        raise click.BadParameter(f"'{text}' is not NAME=VALUE", param_hint=option)
+    return name.strip(), value.strip()
+
+
+def _reading(command: Callable[..., None]) -> Callable[..., None]:
+    """The options that say how a file is read."""
+    options = [
+        click.option(
+            "--channels",
+            multiple=True,
+            metavar='"NAME=COLUMN [UNIT]"',
+            help='What a column is: "x=qm [m]", "force=vir * 35.15 [N]". Repeatable.',
+        ),
+        click.option(
+            "--units",
+            multiple=True,
+            metavar='"COLUMN=UNIT"',
+            help="Unit of a column whose header states none. Repeatable.",
+        ),
+        click.option("--fs", metavar="HZ", help="Sampling rate, for a file that states none."),
+        click.option("--time", metavar="COLUMN", help="Column that holds the time, where its header does not say."),
+        click.option("--delimiter", metavar="SIGN", help="Delimiter of a text file, where it can not be told."),
+        click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file."),
+        click.option("--rows", metavar="FIRST:LAST", help="Rows to keep of each file."),
+        click.option(
+            "--repair",
+            metavar="LIST",
+            help="Repairs after reading, in this order, with commas: clock, gaps, missing, spikes, clipping, drift; "
+            "for one channel alone as in drift:x.",
+        ),
+        click.option(
+            "--config",
+            type=click.Path(path_type=Path),
+            metavar="RIG.TOML",
+            help="File of the rig's constants and channel map; options go before it.",
+        ),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@main.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("250 g").')
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
+@click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
+@click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
+@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+@click.option(
+    "--normal",
+    multiple=True,
+    metavar='LOAD or "PATTERN=LOAD"',
+    help="Normal load in N, for all files or for those whose name fits. Repeatable.",
+)
+@click.option(
+    "--method",
+    type=click.Choice(["smoother", "five-point"]),
+    default="smoother",
+    show_default=True,
+    help="How displacement is differentiated.",
+)
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for the results; FILE-stickslip unless given.",
+)
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print the results as JSON and nothing else; a folder is written only with --output.",
+)
+@_reading
+def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: str, **options: Any) -> None:
+    """Find the friction in one record or several.
+
+    FILES that belong to one record are joined with +, as in x.mat+z.mat. A quoted pattern ("run_*.csv") stands for
+    all files that fit. Several records are compared, with the normal load too where it is known.
+
+    Results go into a folder: report.html to open in a browser, results.json, and the figures.
+
+    \b
+    stickslip analyze run.csv --channels "x=disp [mm]" --mass 3.08 --stiffness "1.19 N/mm"
+    stickslip analyze "run_*.csv" --config rig.toml --normal "*250g*=2.45" --normal "*450g*=4.41"
+    """
+    rig = _rig(**options)
+    groups = [group for argument in files for group in _groups(argument)]
+    folder = output or _default_folder(groups)
+    with _progress(2 * len(groups) + 1) as tell:
+        found = []
+        for group in groups:
+            tell(f"reading {group[0].name}")
+            record = _read(group, rig)
+            tell(f"analysing {group[0].name}")
+            found.append(ss.analyze(record, rig=rig, method=method))
+        results = ss.compare(found) if len(found) > 1 else found[0]
+        tell("drawing and writing")
+        written = ss.publish(results, folder=folder) if output or not as_json else None
+    _show(results, written, as_json=as_json)
+
+
+@main.command()
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("stickslip-demo"),
+    show_default=True,
+    metavar="DIR",
+    help="Folder for the results.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
+def demo(output: Path, as_json: bool) -> None:
+    """Analyse the bundled record of a simulated rig, with the true answers beside the estimates."""
+    with _progress(3) as tell:
+        tell("reading the bundled record")
+        record = ss.datasets.demo()
+        tell("analysing")
+        constants = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
+        findings = ss.analyze(record, **constants)
+        tell("drawing and writing")
+        written = ss.publish(findings, folder=output)
+    _show(findings, written, as_json=as_json)
+
+
+@main.command()
+@click.argument("file")
+@_reading
+def check(file: str, **options: Any) -> None:
+    """Tell what is wrong with a record, with row numbers."""
+    rig = _rig(**options)
+    for group in _groups(file):
+        record = _read(group, rig)
+        click.echo(f"{record!r}")
+        faults = record.check()
+        for fault in faults:
+            click.echo(f"- {fault}")
+        if not faults:
+            click.echo("- nothing wrong was found")
+
+
+@main.command()
+@click.argument("file")
+@click.argument("out", type=click.Path(path_type=Path))
+@_reading
+def convert(file: str, out: Path, **options: Any) -> None:
+    """Read FILE and write it as OUT: CSV, HDF5 or Parquet by its suffix, with units and history."""
+    groups = _groups(file)
+    if len(groups) != 1:
+        raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is converted at a time", param_hint="FILE")
+    click.echo(ss.write_record(_read(groups[0], _rig(**options)), out))
+
+
+@main.command()
+@click.argument("name", required=False)
+def datasets(name: str | None) -> None:
+    """List the public record sets, or fetch the one named."""
+    if name is not None:
+        for path in ss.datasets.fetch(name).files:
+            click.echo(path)
+        return
+    for each in ss.datasets.names():
+        click.echo(f"{ss.datasets.info(each)}\n")
+
+
+def _rig(
+    *,
+    config: Path | None,
+    channels: Sequence[str],
+    units: Sequence[str],
+    repair: str | None,
+    normal: Sequence[str] = (),
+    **constants: str | None,
+) -> RigSettings:
+    """The settings of the file, with those of the command line in front."""
+    given: dict[str, Any] = {key: value for key, value in constants.items() if value is not None}
+    base = ss.read_rig(config).model_dump() if config else {}
+    for key, pairs in (("channels", channels), ("units", units)):
+        if pairs:
+            given[key] = {**base.get(key, {}), **dict(_pair(pair, f"--{key}") for pair in pairs)}
+    if repair is not None:
+        given["repair"] = [word.strip() for word in repair.split(",") if word.strip()]
+    if normal:
+        given["normal"] = dict(_pair(load, "--normal") if "=" in load else ("*", load) for load in normal)
+    return ss.rig_settings({**base, **given}, source="the command line")
+
+
+def _groups(argument: str) -> list[list[Path]]:
+    """The records that an argument stands for, each as its files: patterns filled in, parts joined by + paired."""
+    if Path(argument).exists():
+        return [[Path(argument)]]
+    parts = []
+    for part in argument.split("+"):
+        fits = [Path(part)] if Path(part).exists() else sorted(Path(path) for path in glob.glob(part))
+        if not fits:
+            raise click.BadParameter(f"no file is called, or fits, '{part}'", param_hint="FILES")
+        parts.append(fits)
+    if len({len(fits) for fits in parts}) > 1:
+        counts = " and ".join(str(len(fits)) for fits in parts)
+        raise click.BadParameter(
+            f"the parts of '{argument}' fit {counts} files; each record needs one of each", param_hint="FILES"
+        )
+    return [list(files) for files in zip(*parts, strict=True)]
+
+
+def _default_folder(groups: Sequence[Sequence[Path]]) -> Path:
+    return Path(f"{groups[0][0].stem}-stickslip") if len(groups) == 1 else Path("comparison-stickslip")
+
+
+def _read(files: Sequence[Path], rig: RigSettings) -> Record:
+    paths: Any = files[0] if len(files) == 1 else list(files)
+    given = {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
+    record = ss.read_record(paths, rows=rig.row_range(), **given)
+    return ss.mend(_with_source(record, files), repairs=rig.repair)
+
+
+def _with_source(record: Record, files: Sequence[Path]) -> Record:
+    """The record with its files in the history; one that write_record kept comes back without."""
+    known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
+    if {path.name for path in files} <= known:
+        return record
+    sources = [{"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()} for path in files]
+    step = ss.Step("read_record", {"files": sources}, "a record as it was written")
+    return dataclasses.replace(record, history=(*record.history, step))
+
+
+@contextlib.contextmanager
+def _progress(steps: int) -> Iterator[Callable[[str], None]]:
+    """A bar on the error stream for work that lasts; silent where nobody watches."""
+    if not sys.stderr.isatty():
+        yield lambda words: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    progress = Progress(*columns, console=Console(stderr=True), transient=True)
+    task = progress.add_task("", total=steps, completed=-1)
+    patience = threading.Timer(PATIENCE, progress.start)
+    patience.daemon = True
+    patience.start()
+    try:
+        yield lambda words: progress.update(task, advance=1, description=words)
+    finally:
+        patience.cancel()
+        progress.stop()
+
+
+def _show(results: Findings | Comparison, written: Path | None, *, as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps(results.to_dict(), indent=2, ensure_ascii=False, allow_nan=False))
+        return
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=False)
+    for part in (*getattr(results, "findings", ()), results):
+        _print_table(console, part)
+    if written is not None:
+        click.echo(f"Report: {written / 'report.html'}")
+
+
+def _print_table(console: Any, results: Findings | Comparison) -> None:
+    from rich.markup import escape
+    from rich.table import Table
+
+    summary = ss.summary(results)
+    console.print(f"\n[bold]{escape(summary.title)}[/bold]")
+    for sentence in (*summary.headline, *summary.cautions):
+        console.print(escape(sentence))
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    truth = summary.has_truth
+    for heading in ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure"):
+        table.add_column(heading, overflow="fold")
+    for line in summary.lines:
+        cells = [line.name, line.value, line.interval, *([line.true or "-"] if truth else []), line.status]
+        table.add_row(*(escape(cell) for cell in cells))
+    console.print(table)
+    for note in summary.notes:
+        console.print(f"[dim]Note: {escape(note)}[/dim]")

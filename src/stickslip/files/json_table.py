@@ -1,0 +1,133 @@
+"""JSON: rows, objects or arrays of numbers, with what is said of rate and units beside them; SEP 005."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import FormatError
+from stickslip.files.layout import split_name
+from stickslip.files.table import Column, Options, Table, slices, unique
+
+NAME = "JSON"
+SUFFIXES = (".json",)
+
+Array = NDArray[np.float64]
+
+
+def recognise(path: Path, head: bytes) -> bool:
+    """By suffix, or by the first sign of a JSON text."""
+    text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
+    return text[:1] in (b"{", b"[") and (path.suffix.lower() in SUFFIXES or text[1:].lstrip()[:1] in (b'"', b"{", b"["))
+
+
+def read(path: Path, options: Options) -> Table:
+    """The columns of numbers in a JSON file."""
+    try:
+        contents = json.loads(path.read_text(encoding="utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise FormatError(
+            f"'{path.name}' is damaged ({str(error)[:80]})", "JSON is needed", "check the file"
+        ) from error
+    if _is_sep005(contents):
+        return _sep005(contents)
+    about = contents if isinstance(contents, Mapping) else {}
+    arrays = _columns(contents, about)
+    if not arrays:
+        raise FormatError(
+            f"'{path.name}' holds no columns of numbers",
+            "rows under a key 'data', arrays by name, or a list of objects are needed",
+            "name the arrays in one object: {'t': [...], 'x': [...]}",
+        )
+    fs = _rate(about)
+    parts = {key: split_name(key) for key in arrays}
+    names = unique([name for name, _ in parts.values()])
+    stated = about.get("units")
+    units = stated if isinstance(stated, Mapping) else {}
+    columns = []
+    for name, (key, (_, unit)) in zip(names, parts.items(), strict=True):
+        written = unit or units.get(key) or about.get(f"{key}_unit") or about.get(f"{key} unit")
+        columns.append(Column(name, str(written) if written else None, len(arrays[key]), fs))
+    notes = tuple(f"{key}: {value}" for key, value in about.items() if "unit" in key.lower() and isinstance(value, str))
+    constants = {
+        key: float(value) for key, value in about.items() if type(value) in (int, float) and abs(value) < 1e300
+    }
+    return Table(tuple(columns), slices(dict(zip(names, arrays.values(), strict=True))), constants, notes)
+
+
+def _columns(contents: Any, about: Mapping[str, Any]) -> dict[str, Array]:
+    """Arrays by name, whatever way round they stand."""
+    if isinstance(contents, Mapping):
+        arrays = {str(key): array for key, value in contents.items() if (array := _numbers(value)) is not None}
+        inner = contents.get("data")
+        return arrays if arrays or inner is None or isinstance(inner, str) else _columns(inner, about)
+    if not isinstance(contents, Sequence) or isinstance(contents, str) or not contents:
+        return {}
+    if all(isinstance(row, Mapping) for row in contents):
+        keys = dict.fromkeys(str(key) for row in contents for key in row)
+        found = {key: _numbers([row.get(key) for row in contents]) for key in keys}
+        return {key: array for key, array in found.items() if array is not None}
+    if all(isinstance(row, list) for row in contents):
+        width = max(len(row) for row in contents)
+        titles = about.get("columns") or about.get("names") or about.get("channels")
+        if not isinstance(titles, list) or len(titles) != width:
+            titles = [f"c{index + 1}" for index in range(width)]
+        padded = [[*row, *[None] * (width - len(row))] for row in contents]
+        found = {
+            title: _numbers([row[index] for row in padded])
+            for index, title in enumerate(unique([str(title) for title in titles]))
+        }
+        return {key: array for key, array in found.items() if array is not None}
+    return {}
+
+
+def _numbers(value: Any) -> Array | None:
+    """A list of numbers and nulls as an array; None for anything else."""
+    if not isinstance(value, list) or not value or all(item is None for item in value):
+        return None
+    if not all(item is None or type(item) in (int, float) for item in value):
+        return None
+    return np.array([np.nan if item is None else float(item) for item in value])
+
+
+def _rate(about: Mapping[str, Any]) -> float | None:
+    """The sampling rate [Hz] that the object states."""
+    for key, value in about.items():
+        word = re.sub(r"[^a-z]", "", key.lower())
+        if type(value) not in (int, float) or not 0 < value < 1e15:
+            continue
+        if word in ("fs", "fshz") or word.startswith(("samplingfreq", "samplingrate", "samplefreq", "samplerate")):
+            return float(value)
+        if word in ("dt", "deltat", "samplinginterval", "timestep"):
+            return 1.0 / float(value)
+    return None
+
+
+def _is_sep005(contents: Any) -> bool:
+    channels = contents if isinstance(contents, list) else [contents]
+    return bool(channels) and all(
+        isinstance(channel, Mapping) and "data" in channel and "fs" in channel and "unit_str" in channel
+        for channel in channels
+    )
+
+
+def _sep005(contents: Any) -> Table:
+    """The channel dictionaries of SDyPy's SEP 005."""
+    channels = contents if isinstance(contents, list) else [contents]
+    names = unique([str(channel.get("name") or f"c{index}") for index, channel in enumerate(channels, 1)])
+    columns, arrays = [], {}
+    for name, channel in zip(names, channels, strict=True):
+        values = _numbers(channel["data"])
+        if values is None or type(channel["fs"]) not in (int, float):
+            raise FormatError(
+                f"channel {name} holds no numbers", "SEP 005 gives data and fs as numbers", "write the file again"
+            )
+        arrays[name] = values
+        columns.append(Column(name, str(channel["unit_str"]) or None, len(values), float(channel["fs"])))
+    return Table(tuple(columns), slices(arrays))

@@ -1,0 +1,47 @@
+"""LabVIEW measurement files, by lvm-read; its pickle cache is never looked at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.errors import FormatError
+from stickslip.files.table import Column, Options, Table, optional, slices, unique
+
+NAME = "LabVIEW measurement"
+SUFFIXES = (".lvm",)
+
+
+def recognise(path: Path, head: bytes) -> bool:
+    """By the first words."""
+    return head.lstrip(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement")
+
+
+def read(path: Path, options: Options) -> Table:
+    """The columns of a file with one segment."""
+    lvm_read = optional("lvm_read")
+    # not lvm_read.read: even with read_from_pickle=False it loads FILE.lvm.pkl where there is one
+    contents = lvm_read.read_str(path.read_text(encoding="utf-8-sig", errors="replace"))
+    if contents["Segments"] != 1:
+        raise FormatError(
+            f"'{path.name}' has {contents['Segments']} segments",
+            "a record is one segment with one clock",
+            "split the file at its empty lines",
+        )
+    segment = contents[0]
+    data = np.atleast_2d(np.asarray(segment["data"], dtype=np.float64))
+    titles = [str(title).strip() for title in segment["Channel names"]]
+    kept = [index for index, title in enumerate(titles[: data.shape[1]]) if title != "Comment"]
+    names = unique([titles[index] or f"c{index + 1}" for index in kept])
+    with_time = titles[0] == "X_Value"
+    units = segment.get("Y_Unit_Label", [])
+    steps = [float(step) for step in segment.get("Delta_X", []) if step == step and step > 0]
+    fs = 1.0 / steps[0] if steps and len(set(steps)) == 1 else None
+    starts = [float(start) for start in segment.get("X0", []) if start == start]
+    columns = []
+    for name, index in zip(names, kept, strict=True):
+        reading = index - 1 if with_time else index
+        unit = "s" if with_time and index == 0 else (units[reading] if 0 <= reading < len(units) else "")
+        columns.append(Column(name, str(unit).strip() or None, len(data), fs, starts[0] if starts else 0.0))
+    return Table(tuple(columns), slices({name: data[:, index] for name, index in zip(names, kept, strict=True)}))

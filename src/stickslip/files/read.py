@@ -1,0 +1,504 @@
+"""read_record and read_blocks: from files to a Record, its columns chosen, scaled and on one clock."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import FormatError, RecordError
+from stickslip.files.select import Columns, Source, TimeColumn, Wanted
+from stickslip.files.table import Block, Options, reading
+from stickslip.record.clock import Clock, fit_clock, resolution
+from stickslip.record.metadata import columns_told, history_of, metadata_to_record, require_rows
+from stickslip.record.record import Record, Step
+
+Array = NDArray[np.float64]
+
+# Asked in this order whether a file is theirs; each is a module beside this one, imported when it is its turn.
+FORMATS = ("tdms", "matlab", "hdf5", "parquet", "uff", "audio", "lvm", "json_table", "text")
+
+HEAD = 1 << 16  # bytes shown to `recognise`
+ROWS_AT_ONCE = 1_000_000
+
+
+def read_record(
+    path: str | Path | Sequence[str | Path],
+    *,
+    channels: Mapping[str, str] | None = None,
+    fs: float | None = None,
+    units: Mapping[str, str] | None = None,
+    time: str | None = None,
+    rows: tuple[int | None, int | None] | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+) -> Record:
+    """Read a file, or several on one clock, as a Record in SI.
+
+    Formats: CSV and other text, MATLAB v5 to v7.3, TDMS, UFF 58, WAV/FLAC/OGG, HDF5, Parquet, LVM, JSON. A file
+    that write_record wrote, read without arguments, is the same record again, history included.
+
+    Parameters
+    ----------
+    path : str, Path or sequence of these
+        The file, or files that share a clock (equal time stamps within their rounding).
+    channels : mapping of str to str, optional
+        For each channel the column it comes from: ``"qm [m]"``, ``"vir * 35.1507 [N]"``,
+        ``"-200 * (F + 0.115) [N]"``, ```"`Servo motor speed` * -20/60/1000 [m/s]"``` (backticks around names
+        that are not one word), ``"#3 [mm]"`` (the third column), ``"ch1 [V] @ 500 mV/lbf"`` (a sensor's
+        sensitivity), ``"base.csv:x [mm]"`` (a column that several files have). Without it every column becomes a
+        channel, under a name of the vocabulary where name and unit fit one.
+    fs : float, optional
+        Sampling rate [Hz]; overrides the file's time column.
+    units : mapping of str to str, optional
+        Units of channels or columns for which neither the file nor `channels` states one. SI is assumed, and
+        said in the channel's source, where nobody states a unit.
+    time : str, optional
+        The time column, with its unit where it is not s: ``"#1 [ms]"``. Otherwise recognised by name.
+    rows : (int or None, int or None), optional
+        The rows to keep, as in a slice: ``(15, None)`` drops the first fifteen.
+    delimiter, decimal : str, optional
+        Of a text file, where they are mistaken otherwise.
+
+    Returns
+    -------
+    Record
+        With ``stamps`` where the time column is not uniform within its own rounding. The history names each
+        file with its sha256.
+
+    Raises
+    ------
+    FormatError
+        The file is missing, empty, damaged, or of no known format.
+    RecordError
+        A column, unit or clock is missing or contradicts the others.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import stickslip as ss
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "rig.csv")
+    ...     _ = path.write_text("t [ms];x [mm];cell [V]\\n0;1,5;0,1\\n4;1,6;0,3\\n8;1,4;0,2\\n")
+    ...     record = ss.read_record(path, channels={"x": "x", "load": "cell @ 500 mV/N"})
+    >>> record
+    Record(x [m], load [N]; 3 samples, 250 Hz, from 0 s)
+    """
+    asked = _open(path, channels, fs, units, time, rows, Options(delimiter, decimal))
+    try:
+        return asked.whole()
+    except MemoryError as error:
+        raise RecordError(
+            f"{asked.names} does not fit in memory",
+            "a Record holds all its samples",
+            "name fewer channels=, or go through the file with read_blocks()",
+        ) from error
+
+
+def read_blocks(
+    path: str | Path | Sequence[str | Path],
+    *,
+    size: int = ROWS_AT_ONCE,
+    channels: Mapping[str, str] | None = None,
+    fs: float | None = None,
+    units: Mapping[str, str] | None = None,
+    time: str | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+) -> Iterator[Record]:
+    """Read files that are larger than memory as a sequence of Records, each of at most `size` rows.
+
+    CSV, WAV, HDF5, Parquet and TDMS are streamed; the other formats are held in memory once.
+
+    Parameters
+    ----------
+    path : str, Path or sequence of these
+        As in read_record.
+    size : int, optional
+        Rows of each Record; the last may have fewer.
+    channels, fs, units, time, delimiter, decimal
+        As in read_record. The sampling rate is found from the first block.
+
+    Returns
+    -------
+    iterator of Record
+        In order; ``start`` continues from block to block.
+
+    Raises
+    ------
+    FormatError, RecordError
+        As read_record, with the block at fault.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import stickslip as ss
+    >>> record = ss.Record.of({"a": range(10)}, fs=2.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = ss.write_record(record, folder + "/long.csv")
+    ...     [(block.start, len(block)) for block in ss.read_blocks(path, size=4)]
+    [(0.0, 4), (2.0, 4), (4.0, 2)]
+    """
+    if size < 1:
+        raise RecordError(f"size = {size} rows", "a block has at least one row", "pass a larger size=")
+    return _open(path, channels, fs, units, time, None, Options(delimiter, decimal)).blocks(size)
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """What is to be read: the files, the channels made of their columns, the clock."""
+
+    sources: tuple[Source, ...]
+    wanted: tuple[Wanted, ...]
+    times: Mapping[int, TimeColumn]
+    fs: float | None
+    rows: tuple[int | None, int | None]
+    arguments: Mapping[str, Any]
+    notes: tuple[str, ...]
+
+    @property
+    def restores(self) -> bool:
+        """Whether this is a file by write_record, to be given back as it was."""
+        return len(self.sources) == 1 and bool(self.sources[0].table.record) and not self.arguments
+
+    def whole(self) -> Record:
+        """All rows at once."""
+        parts: dict[tuple[int, str], list[Array]] = {}
+        for block in self._raw(ROWS_AT_ONCE):
+            for key, values in block.items():
+                parts.setdefault(key, []).append(values)
+        data = {key: arrays[0] if len(arrays) == 1 else np.concatenate(arrays) for key, arrays in parts.items()}
+        length = len(next(iter(data.values()))) if data else 0
+        first, last, _ = slice(*self.rows).indices(length)
+        if first >= last:
+            raise RecordError(
+                f"rows {self.rows} of {self.names} hold nothing" if length else f"{self.names} has no rows",
+                f"the file has {length} rows and at least one is needed",
+                "check rows= and the file",
+            )
+        if self.restores:
+            require_rows(self.sources[0].table.record, length)
+            return self._restored(data, 0)
+        if (first, last) != (0, length):
+            data = {key: values[first:last] for key, values in data.items()}
+        _require_equal_ends(data, first)
+        return self._record(data, self._clock(data, first), "read_record")
+
+    def blocks(self, size: int) -> Iterator[Record]:
+        """Block after block."""
+        first, fs = 0, None
+        for data in self._raw(size):
+            if self.restores:
+                record = self._restored(data, first)
+            else:
+                clock = self._clock(data, first, fs)
+                record = self._record(data, clock, "read_blocks", {"size": size, "first": first})
+                fs = record.fs if fs is None and record.stamps is None else fs
+            first += len(record)
+            yield record
+        if self.restores:
+            require_rows(self.sources[0].table.record, first)
+        if not first:
+            raise RecordError(f"{self.names} has no rows", "at least one is needed", "check the file")
+
+    @property
+    def names(self) -> str:
+        """The files' names, for sentences."""
+        return ", ".join(source.path.name for source in self.sources)
+
+    @cached_property
+    def _needed(self) -> list[list[str]]:
+        """The columns to read of each file."""
+        if self.restores:
+            table = self.sources[0].table
+            return [columns_told(table.record, [column.name for column in table.columns])]
+        keys = [key for wanted in self.wanted for key in wanted.scales]
+        if self.fs is None:
+            keys += [key for time in self.times.values() for key in (time.key, *time.twins)]
+        return [list(dict.fromkeys(n for number, n in keys if number == i)) for i in range(len(self.sources))]
+
+    def _raw(self, size: int) -> Iterator[dict[tuple[int, str], Array]]:
+        """Blocks of the columns of all files, row beside row."""
+        streams = [
+            _even(_blocks(source, names, size), size)
+            for source, names in zip(self.sources, self._needed, strict=True)
+            if names
+        ]
+        numbers = [number for number, names in enumerate(self._needed) if names]
+        rows = [0] * len(streams)
+        while True:
+            blocks = [next(stream, {}) for stream in streams]
+            lengths = [len(next(iter(block.values()), ())) for block in blocks]
+            rows = [before + more for before, more in zip(rows, lengths, strict=True)]
+            if len(set(lengths)) > 1:
+                raise RecordError(
+                    f"the files {self.names} differ in rows, after {min(rows)} of them",
+                    "files that are read together share one clock, row by row",
+                    "read them apart and join them with synchronise()",
+                )
+            if not lengths or not lengths[0]:
+                return
+            yield {
+                (number, name): v for number, block in zip(numbers, blocks, strict=True) for name, v in block.items()
+            }
+
+    def _restored(self, data: Mapping[tuple[int, str], Array], first: int) -> Record:
+        told = self.sources[0].table.record
+        return metadata_to_record(told, {name: values for (_, name), values in data.items()}, first)
+
+    def _clock(self, data: Mapping[tuple[int, str], Array], first: int, known: float | None = None) -> Clock:
+        """The one clock of these rows, which begin at row `first` of the files."""
+        length = len(next(iter(data.values())))
+        if self.fs is not None:
+            return Clock(self.fs, first / self.fs)
+        found: list[tuple[Clock, float]] = []
+        for number in range(len(self.sources)):
+            rate = self._stated_rate(number)
+            if number in self.times:
+                time = self.times[number]
+                _require_twins(self.sources[number].path.name, time, data)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    fitted = fit_clock(data[time.key], time.scale, known)
+                    found.append((fitted, resolution(_finite(data[time.key])) * time.scale))
+            elif rate is not None:
+                found.append((Clock(rate[0], rate[1] + first / rate[0]), 0.0))
+        if not found:
+            names = [column.name for source in self.sources for column in source.table.columns]
+            raise RecordError(
+                f"{self.names} tells neither time nor sampling rate",
+                "a record has a clock",
+                f"pass fs= in Hz, or the time column in time= (columns: {', '.join(names[:20])})",
+            )
+        clock, rounding = found[0]
+        for other, its_rounding in found[1:]:
+            apart = float(np.nanmax(np.abs(_seconds(clock, length) - _seconds(other, length))))
+            # rounding explains a difference, but not one of a tenth of a sample
+            if not apart <= min(max(rounding + its_rounding, 0.01 / clock.fs), 0.1 / clock.fs):
+                raise RecordError(
+                    f"the clocks of {self.names} are up to {apart:.3g} s apart",
+                    "files that are read together share one clock",
+                    "read them apart and join them with synchronise()",
+                )
+        return clock
+
+    def _stated_rate(self, number: int) -> tuple[float, float] | None:
+        """Rate and start that the format states for the columns wanted of a file."""
+        names = self._needed[number]
+        stated = {(c.fs, c.start) for c in self.sources[number].table.columns if c.name in names}
+        fs, start = next(iter(stated), (None, 0.0))
+        return (fs, start) if fs is not None else None
+
+    def _record(
+        self, data: Mapping[tuple[int, str], Array], clock: Clock, action: str, extra: Mapping[str, Any] | None = None
+    ) -> Record:
+        samples = {wanted.channel.name: _combined(wanted, data) for wanted in self.wanted}
+        arguments = {**self.arguments, **(extra or {}), "files": [source.to_dict() for source in self.sources]}
+        length = len(next(iter(samples.values())))
+        outcome = f"{length} samples at {clock.fs:g} Hz"
+        outcome += "" if clock.stamps is None else ", the time stamps not uniform and kept"
+        outcome += f", the time stamps within {clock.wander:.2g} s of uniform" if clock.wander else ""
+        step = Step(action, arguments, "; ".join([outcome, *self.notes]))
+        channels = {wanted.channel.name: wanted.channel for wanted in self.wanted}
+        told = self.sources[0].table.record if len(self.sources) == 1 else {}
+        return Record(samples, channels, clock.fs, clock.start, (*history_of(told), step), clock.stamps)
+
+
+def _open(
+    path: str | Path | Sequence[str | Path],
+    channels: Mapping[str, str] | None,
+    fs: float | None,
+    units: Mapping[str, str] | None,
+    time: str | None,
+    rows: tuple[int | None, int | None] | None,
+    options: Options,
+) -> _Reading:
+    paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
+    if not paths:
+        raise FormatError("no file is named", "a record is read from one file or several", "pass a path")
+    if fs is not None and not (np.isfinite(fs) and fs > 0):
+        raise RecordError(f"fs = {fs} Hz", "a sampling rate is positive and finite", "pass fs= in Hz")
+    sources = tuple(_source(one, options) for one in paths)
+    said = {
+        "channels": dict(channels) if channels is not None else None,
+        "fs": fs,
+        "units": dict(units) if units else None,
+        "time": time,
+        "rows": list(rows) if rows is not None else None,
+        "delimiter": options.delimiter,
+        "decimal": options.decimal,
+    }
+    arguments = {name: value for name, value in said.items() if value is not None}
+    columns = Columns(sources)
+    times = columns.time(time, units or {}) if fs is None or time is not None else {}
+    notes = [note for source in sources for note in source.table.notes]
+    if channels is not None:
+        wanted = columns.asked(channels, units or {})
+        _require_equal_length(columns, wanted, times if fs is None else {})
+    else:
+        wanted, more = columns.every(units or {}, times)
+        notes += more
+    columns.check_units(units or {}, [one.channel.name for one in wanted])
+    if not wanted:
+        raise RecordError(
+            f"{', '.join(one.name for one in paths)} has no column beside time",
+            "a record needs one channel at least",
+            "check the file, or name columns in channels=",
+        )
+    return _Reading(sources, tuple(wanted), times, fs, rows or (None, None), arguments, tuple(notes))
+
+
+def _source(path: Path, options: Options) -> Source:
+    """Find the format of a file and open its table."""
+    try:
+        if not path.is_file():
+            raise FormatError(f"there is no file '{path}'", "a record is read from a file", "check the path")
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+            file.seek(0)
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    except (OSError, ValueError) as error:
+        raise FormatError(
+            f"'{path}' can not be opened ({error})", "the file can be read", "check path and rights"
+        ) from error
+    if not size:
+        raise FormatError(f"'{path.name}' is empty", "a record has rows of numbers", "copy or record the file again")
+    for name in FORMATS:
+        room = importlib.import_module(f"stickslip.files.{name}")
+        if room.recognise(path, head):
+            with _quietly(path, room.NAME):
+                return Source(path, room.NAME, room.read(path, options), digest, size)
+    raise FormatError(
+        f"'{path.name}' is of no known format",
+        f"these are read: {', '.join(_room(name).NAME for name in FORMATS)}",
+        "export it as CSV, HDF5 or MATLAB",
+    )
+
+
+def _room(name: str) -> ModuleType:
+    return importlib.import_module(f"stickslip.files.{name}")
+
+
+@contextmanager
+def _quietly(source: Path, kind: str) -> Iterator[None]:
+    """Damage as one sentence, without the parser's warnings: what they warn of either fails or shows in the numbers."""
+    with warnings.catch_warnings(), reading(source, kind):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _blocks(source: Source, names: Sequence[str], size: int) -> Iterator[Block]:
+    """The table's blocks, its failures as FormatError."""
+    with _quietly(source.path, source.format):
+        blocks = source.table.blocks(names, size)
+    while True:
+        with _quietly(source.path, source.format):
+            try:
+                block = next(blocks)
+            except StopIteration:
+                return
+        yield block
+
+
+def _even(blocks: Iterator[Block], size: int) -> Iterator[Block]:
+    """Blocks of exactly `size` rows, the last one shorter, out of blocks of any size."""
+    kept: list[Block] = []
+    count = 0
+    for block in blocks:
+        while block:
+            length = len(next(iter(block.values())))
+            take = min(length, size - count)
+            kept.append({name: values[:take] for name, values in block.items()})
+            count += take
+            if count == size:
+                yield _joined(kept)
+                kept, count = [], 0
+            block = {name: values[take:] for name, values in block.items()} if take < length else {}
+    if count:
+        yield _joined(kept)
+
+
+def _joined(blocks: Sequence[Block]) -> Block:
+    if len(blocks) == 1:
+        return blocks[0]
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+
+def _combined(wanted: Wanted, data: Mapping[tuple[int, str], Array]) -> Array:
+    (first, scale), *others = wanted.scales.items()
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = data[first] * scale
+        for key, scale in others:
+            values += data[key] * scale
+        values += wanted.offset
+        values *= wanted.scale
+    return values
+
+
+def _require_twins(file: str, time: TimeColumn, data: Mapping[tuple[int, str], Array]) -> None:
+    """Refuse a file whose columns of time differ from each other."""
+    mine = data[time.key]
+    for twin in time.twins:
+        apart = float(np.max(np.abs(data[twin] - mine)))
+        if apart > 0.1 * np.ptp(mine) / len(mine):
+            raise RecordError(
+                f"columns {time.key[1]} and {twin[1]} of '{file}' are up to {apart * time.scale:.3g} s apart",
+                "one record has one clock",
+                "name the one meant in time= and read the columns of the other apart",
+            )
+
+
+def _require_equal_ends(data: Mapping[tuple[int, str], Array], first: int) -> None:
+    """Refuse columns of unequal length, which a table fills up with empty cells at its end."""
+    ends = {}
+    for (_, name), values in data.items():
+        backwards = np.isfinite(values[::-1])
+        if backwards.any():
+            ends[name] = first + len(values) - int(np.argmax(backwards))
+    if ends and min(ends.values()) < max(ends.values()):
+        shortest = min(ends, key=lambda name: ends[name])
+        raise RecordError(
+            f"column {shortest} has values in {ends[shortest]} rows, others in {max(ends.values())}",
+            "the columns of one record are equally long",
+            f"keep the rows that all have with rows=({first}, {ends[shortest]})",
+        )
+
+
+def _finite(values: Array) -> Array:
+    return values[np.isfinite(values)]
+
+
+def _seconds(clock: Clock, length: int) -> Array:
+    return clock.stamps if clock.stamps is not None else clock.start + np.arange(length) / clock.fs
+
+
+def _require_equal_length(columns: Columns, wanted: Sequence[Wanted], times: Mapping[int, TimeColumn]) -> None:
+    """Refuse columns whose length or rate the format states to differ."""
+    keys = [key for one in wanted for key in one.scales]
+    keys += [times[number].key for number in dict.fromkeys(number for number, _ in keys) if number in times]
+    for number in dict.fromkeys(number for number, _ in keys):
+        mine = {name: columns.columns[number, name] for n, name in keys if n == number}
+        rows = {name: column.rows for name, column in mine.items() if column.rows is not None}
+        rates = {name: (column.fs, column.start) for name, column in mine.items() if column.fs is not None}
+        if len(set(rows.values())) > 1:
+            counts = ", ".join(f"{name} {count}" for name, count in rows.items())
+            raise RecordError(
+                f"columns of unequal length ({counts})", "one record has one clock", "read them as separate records"
+            )
+        if len(set(rates.values())) > 1 and number not in times:
+            shown = ", ".join(f"{name} {fs:g} Hz from {start:g} s" for name, (fs, start) in rates.items() if fs)
+            raise RecordError(
+                f"columns with clocks of their own ({shown})",
+                "one record has one clock",
+                "read them as separate records and join them with synchronise()",
+            )

@@ -1,0 +1,249 @@
+"""Which columns of which files become which channels, in which units, and which column is time."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from stickslip.errors import RecordError
+from stickslip.files.expression import Linear, Spec, apply_sensitivity, channel_unit, linear, split_spec, unknown
+from stickslip.files.table import Column, Table, unique
+from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
+from stickslip.units import Unit, parse_unit
+
+TIME_WORDS = (
+    "t", "time", "timestamp", "timestamps", "elapsed", "timeelapsed", "elapsedtime", "xvalue", "zeit", "times",
+    "seconds", "timechannel", "testtime", "runtime",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file: its table, and what the history says of it."""
+
+    path: Path
+    format: str
+    table: Table
+    sha256: str
+    bytes: int
+
+    def to_dict(self) -> dict[str, str | int]:
+        """Plain data for the history: the name without its folder."""
+        return {"name": self.path.name, "sha256": self.sha256, "bytes": self.bytes, "format": self.format}
+
+
+Key = tuple[int, str]  # the file's number and the column's name
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A channel to be made: ``scale * (offset + sum(scales * columns))``."""
+
+    channel: Channel
+    scale: float
+    scales: Mapping[Key, float]
+    offset: float
+
+
+@dataclass(frozen=True)
+class TimeColumn:
+    """The time column of a file, the seconds in its unit, and columns of the same title that must agree with it."""
+
+    key: Key
+    scale: float
+    twins: tuple[Key, ...] = ()
+
+
+class Columns:
+    """The columns of all files under every name that they may be called by."""
+
+    def __init__(self, sources: Sequence[Source]) -> None:
+        self.sources = sources
+        self.columns: dict[Key, Column] = {
+            (number, column.name): column for number, source in enumerate(sources) for column in source.table.columns
+        }
+        self._by_name: dict[str, Key] = {}
+        exact = [(name, (number, name)) for number, name in self.columns]
+        self._admit(exact)
+        for number, source in enumerate(sources):
+            numbered = [(f"#{n}", (number, column.name)) for n, column in enumerate(source.table.columns, 1)]
+            if len(sources) == 1:
+                self._admit(numbered)
+            else:
+                qualified = [(f"{source.path.name}:{name}", key) for name, key in exact if key[0] == number]
+                self._admit(qualified + [(f"{source.path.name}:{name}", key) for name, key in numbered])
+        self._admit([(re.split(r"[/\\]", name)[-1], key) for name, key in exact])
+        self.constants = {name: value for source in sources for name, value in source.table.constants.items()}
+
+    def _admit(self, pairs: Iterable[tuple[str, Key]]) -> None:
+        pairs = list(pairs)
+        counts = Counter(name for name, _ in pairs)
+        for name, key in pairs:
+            if counts[name] == 1:
+                self._by_name.setdefault(name, key)
+
+    def find(self, name: str) -> Key | None:
+        """The column called by that name, where there is exactly one."""
+        return self._by_name.get(name)
+
+    def combination(self, arithmetic: str) -> tuple[dict[Key, float], Linear]:
+        """The arithmetic as numbers times columns."""
+        names = {name: name for name in self._by_name}
+        found = linear(arithmetic, names, self.constants)
+        scales: dict[Key, float] = {}
+        for name, scale in found.scales.items():
+            key = self._by_name[name]
+            scales[key] = scales.get(key, 0.0) + scale
+        return scales, found
+
+    def asked(self, channels: Mapping[str, str], units: Mapping[str, str]) -> list[Wanted]:
+        """The channels of a channel map."""
+        wanted = []
+        for name, text in channels.items():
+            spec = split_spec(str(text))
+            scales, found = self.combination(spec.arithmetic)
+            plain = next(iter(scales)) if found.plain() else None
+            stated = spec.unit if spec.unit is not None else units.get(name)
+            if stated is None and plain:
+                stated = units.get(plain[1], self.columns[plain].unit)
+            wanted.append(Wanted(*self._channel(checked_name(name), spec, stated), scales, found.offset))
+        return wanted
+
+    def every(self, units: Mapping[str, str], times: Mapping[int, TimeColumn]) -> tuple[list[Wanted], list[str]]:
+        """All columns that share one clock, named by the vocabulary where they match it; and notes on the others."""
+        taken = {time.key for time in times.values()}
+        keys = [key for key, column in self.columns.items() if key not in taken and not is_time(column)]
+        kept = self._on_one_clock(keys, times)
+        notes = [f"left out {self.columns[key].name} (another length or rate)" for key in keys if key not in kept]
+        titles = unique([self._title(self.columns[key], units) for key in kept])
+        wanted = []
+        for name, key in zip(titles, kept, strict=True):
+            column = self.columns[key]
+            stated = units.get(name, units.get(column.name, column.unit))
+            wanted.append(
+                Wanted(*self._channel(name, Spec(column.name, column.name, None, ""), stated), {key: 1.0}, 0.0)
+            )
+        return wanted, notes
+
+    def _on_one_clock(self, keys: Sequence[Key], times: Mapping[int, TimeColumn]) -> list[Key]:
+        """Per file: the columns as long as its time column, or the largest group alike in length and rate."""
+        kept: list[Key] = []
+        for number in range(len(self.sources)):
+            mine = [key for key in keys if key[0] == number]
+            alike = Counter((self.columns[key].rows, self.columns[key].fs, self.columns[key].start) for key in mine)
+            if number in times:
+                rows = self.columns[times[number].key].rows
+                kept += [key for key in mine if rows is None or self.columns[key].rows in (None, rows)]
+            elif alike:
+                chosen = max(alike, key=lambda one: (alike[one], one[0] or 0))
+                kept += [k for k in mine if (self.columns[k].rows, self.columns[k].fs, self.columns[k].start) == chosen]
+        return kept
+
+    def _title(self, column: Column, units: Mapping[str, str]) -> str:
+        """A channel name for a column: a word of the vocabulary where name and unit fit one."""
+        last = re.split(r"[/\\]", column.name)[-1]
+        unit = units.get(column.name, column.unit)
+        word = last.lower() if len(last) > 1 and unit else last  # "Friction" without unit may be a coefficient
+        if word in VOCABULARY:
+            try:
+                described(word, channel_unit(unit, word).si if unit else VOCABULARY[word].units[0])
+                return word
+            except RecordError:
+                last = f"{last}_{unit}"
+        name = re.sub(r"[^A-Za-z0-9_]+", "_", last).strip("_")
+        name = name if name and not name[0].isdigit() else f"c_{name}".rstrip("_")
+        return f"{name}_" if name in VOCABULARY else name
+
+    def _channel(self, name: str, spec: Spec, stated: str | None) -> tuple[Channel, float]:
+        """The channel's description, and the factor to SI."""
+        source = spec.text.strip()
+        if spec.sensitivity:
+            if stated is None:
+                raise RecordError(
+                    f"channel {name} has a sensitivity and no unit",
+                    "a sensitivity acts on a reading in a known unit",
+                    f"write {spec.arithmetic} [V] @ {spec.sensitivity}",
+                )
+            unit = apply_sensitivity(spec.sensitivity, parse_unit(stated), name)
+        elif stated is None:
+            usual = VOCABULARY[name].units[-1 if name == "sound" else 0] if name in VOCABULARY else "1"
+            unit = Unit(usual, 1.0, usual)
+            source += f" (no unit stated, taken as {usual})" if usual != "1" else ""
+        else:
+            unit = self._unit(name, stated)
+            source += f" [{stated}]" if spec.unit is None else ""
+        return Channel(name, unit.si, described(name, unit.si), source, spec.sensitivity), unit.scale
+
+    def _unit(self, name: str, stated: str) -> Unit:
+        try:
+            return channel_unit(stated, name)
+        except RecordError:
+            if name in VOCABULARY or stated not in {column.unit for column in self.columns.values()}:
+                raise
+            return Unit(stated, 1.0, stated)  # a unit of the instrument's own ("counts"): the numbers stay as written
+
+    def time(self, asked: str | None, units: Mapping[str, str]) -> dict[int, TimeColumn]:
+        """The time column of each file that has one: the one asked for, or one recognised by its name."""
+        times = {}
+        for number, source in enumerate(self.sources):
+            if asked is not None:
+                found = self._asked_time(number, asked, units)
+            else:
+                named = [column for column in source.table.columns if is_time(column)]
+                best = min(named, key=_time_rank, default=None)
+                unit = units.get(best.name, best.unit or "s") if best else "s"
+                found = self._time_column(number, best, named, unit) if best else None
+            if found:
+                times[number] = found
+        if asked is not None and not times:
+            raise unknown("time column", asked, [name for _, name in self.columns])
+        return times
+
+    def _time_column(self, number: int, best: Column, named: Sequence[Column], unit: str) -> TimeColumn:
+        twins = [column.name for column in named if re.fullmatch(re.escape(best.name) + r"_\d+", column.name)]
+        scale = parse_unit(unit, expect="s").scale
+        return TimeColumn((number, best.name), scale, tuple((number, name) for name in twins))
+
+    def _asked_time(self, number: int, asked: str, units: Mapping[str, str]) -> TimeColumn | None:
+        spec = split_spec(asked)
+        table = self.sources[number].table
+        by_name = {f"#{n}": column for n, column in enumerate(table.columns, 1)}
+        by_name |= {re.split(r"[/\\]", column.name)[-1]: column for column in table.columns}
+        by_name |= {column.name: column for column in table.columns}
+        column = by_name.get(spec.arithmetic.strip("`"))
+        if column is None:
+            return None
+        stated = spec.unit or units.get(column.name) or column.unit or "s"
+        return TimeColumn((number, column.name), parse_unit(stated, expect="s").scale)
+
+    def check_units(self, units: Mapping[str, str], channels: Iterable[str]) -> None:
+        """Refuse a unit for something that is neither a channel nor a column."""
+        known = list(dict.fromkeys([*channels, *(name for _, name in self.columns)]))
+        for name in units:
+            if name not in known:
+                raise unknown("channel or column", name, known)
+
+
+def is_time(column: Column) -> bool:
+    """Whether a column is time by its name, and its unit does not contradict."""
+    if column.unit is not None:
+        try:
+            if parse_unit(column.unit).si != "s":
+                return False
+        except RecordError:
+            return False
+    return _word(column) in TIME_WORDS
+
+
+def _word(column: Column) -> str:
+    last = re.split(r"[/\\]", column.name)[-1].lower()
+    return re.sub(r"(_\d+$|[^a-z])", "", last)
+
+
+def _time_rank(column: Column) -> tuple[int, bool]:
+    word = _word(column)
+    rank = 0 if word in ("t", "time") else 1 if "elapsed" in word else 2
+    return rank, column.unit is None

@@ -1,0 +1,252 @@
+"""The friction force from the motion: what is left of the balance of forces on the mass."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import ModelError, RecordError
+from stickslip.record.record import Record, Step
+from stickslip.signals.differentiate import (
+    LEAST,
+    Filter,
+    best_bandwidth,
+    checked_bandwidth,
+    checked_method,
+    noise_along,
+    total_sd,
+)
+from stickslip.signals.interpolate import band_limited
+from stickslip.units import parse_value
+
+Array = NDArray[np.float64]
+
+QUESTION = "the friction force"
+ENDS = ("ground", "base")
+
+
+def friction_force(
+    record: Record,
+    *,
+    mass: float | str,
+    stiffness: float | str,
+    damping: float | str = 0.0,
+    damper: str = "ground",
+    method: str = "smoother",
+    contact: str = "ground",
+    bandwidth: float | None = None,
+) -> Record:
+    """How large is the friction force on the mass, at each moment?
+
+    The balance of forces (thesis, section 2.4, with a damper and an applied force P)
+
+    ``f = k z - k x - c v - m a + P``
+
+    with the friction f positive where it opposes positive velocity. With ``damper="base"`` the damper sits between
+    mass and base and ``c (v - dz/dt)`` stands for ``c v``. Without a channel z the base is taken to be fixed; without a
+    channel ``force`` nothing is applied. What is not measured of v and a is differentiated, a from v if that is
+    measured, else from x.
+
+    With the smoother, and a not measured, every term passes the same low-pass, so that the result is the true force
+    through that low-pass (``1 / (1 + lambda (2 - 2 cos w)^3)``, its bandwidth in the history) and noise: a jump of the
+    friction is spread over half a cycle of the bandwidth. Where a is measured, the measured channels are used as they
+    are, and v alone is smoothed, unless a bandwidth is given. With ``method="five-point"`` v and a are differenced and
+    averaged as in the thesis's Appendix A, and x and z used as they are.
+
+    Parameters
+    ----------
+    record : Record
+        With ``x`` [m], and z, v, a, force where measured. Delays stated for its channels are taken out first, by
+        band-limited interpolation; the rows that not every channel reaches any more are dropped.
+    mass : float or str
+        Moving mass m [kg], or with its unit: ``"250 g"``.
+    stiffness : float or str
+        Of the spring between mass and base, k [N/m].
+    damping : float or str
+        Viscous damping c [N s/m].
+    damper : {"ground", "base"}
+        Where the damper's other end is fixed.
+    method : {"smoother", "five-point"}
+        How derivatives are taken, see :func:`~stickslip.signals.differentiate.differentiate`.
+    contact : {"ground", "base"}
+        What the mass slides on. The force on the mass is the same; what it is held against (x, or x - z) is not, and
+        the questions that follow are told by the history.
+    bandwidth : float, optional
+        The smoother's frequency of -3 dB [Hz]; chosen from the record's noise when not given.
+
+    Returns
+    -------
+    Record
+        With ``friction`` [N], ``friction_sd`` [N], and ``v`` [m/s] and ``a`` [m/s^2] where they were not measured.
+        ``friction_sd`` is the standard deviation of each value: each channel's noise (stated for the channel, or
+        estimated, varying in time where it does) through the whole filter from that channel to the force, and the
+        smoothing bias (what a second pass would change). Errors of m, k, c and sensitivities are not in it.
+
+    Raises
+    ------
+    RecordError
+        A channel that is missing, not finite, on a broken clock or shorter than 24 samples.
+    ModelError
+        A constant that is not finite, a mass that is not positive, or an unknown damper or contact.
+    EstimateError
+        An unknown method, or a bandwidth that the record does not allow.
+
+    Examples
+    --------
+    >>> t = np.arange(3000) / 1000
+    >>> x = 1e-3 * np.sin(10 * t)  # m a + k x + f = 0 with m = 2, k = 100: f = (2 * 100 - 100) x
+    >>> record = friction_force(Record.of({"x": x}, fs=1000.0), mass=2.0, stiffness=100.0)
+    >>> bool(np.allclose(record["friction"][100:-100], 100 * x[100:-100], atol=1e-4))
+    True
+    """
+    rig = _Rig.stated({"mass": mass, "stiffness": stiffness, "damping": damping}, damper, contact)
+    checked_method(method)
+    used = ["x", *(name for name in ("z", "v", "a", "force") if name in record)]
+    record.require_clean(*used, question=QUESTION, samples=LEAST)
+    record = _without_delays(record, used)
+    record.require_clean(*used, question=QUESTION, samples=LEAST)
+    known = "a" in record
+    if bandwidth is not None:
+        width = checked_bandwidth(bandwidth, record.fs, len(record))
+    else:
+        width = best_bandwidth(record["v" if "v" in record and not known else "x"], record.fs)
+    derive = Filter(method, record.fs, width)
+    one_filter = method == "smoother" and (bandwidth is not None or not known)
+
+    force, variance, change = np.zeros(len(record)), np.zeros(len(record)), 0.0
+    for name, through, terms in _paths(rig.balance(record), derive, one_filter):
+        noise = noise_along(record[name], record.fs, record.channels[name].noise)
+        force += through.apply(record[name], terms)
+        variance += (through.noise_gain(len(record), terms) * noise) ** 2
+        change += through.inner_gain(terms, change=True) ** 2 * float(np.mean(noise**2))
+    ratio = math.sqrt(change / np.mean(variance)) if variance.any() else 0.0
+    sd = total_sd(force, np.sqrt(variance), derive if one_filter else None, ratio)
+
+    step = Step(
+        "friction_force",
+        {**asdict(rig), "method": method, "bandwidth": width if method == "smoother" else None},
+        "; ".join(rig.words(record, method, width, one_filter)),
+    )
+    made = _with_motion(record, derive)
+    made = made.with_channel("friction_sd", sd, unit="N", source="friction_force")
+    return made.with_channel(
+        "friction", force, unit="N", source="friction_force", noise=float(np.median(sd)), step=step
+    )
+
+
+@dataclass(frozen=True)
+class _Rig:
+    mass: float
+    stiffness: float
+    damping: float
+    damper: str
+    contact: str
+
+    @classmethod
+    def stated(cls, constants: Mapping[str, float | str], damper: str, contact: str) -> _Rig:
+        units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
+        values = {name: parse_value(constants[name], unit) for name, unit in units.items()}
+        for name, value in values.items():
+            if value < 0 or (name == "mass" and value == 0):
+                raise ModelError(
+                    f"{name} = {constants[name]}",
+                    "a mass is positive, a stiffness or damping not negative",
+                    f"state the rig's {name} in {units[name]}",
+                )
+        for word, end in (("damper", damper), ("contact", contact)):
+            if end not in ENDS:
+                raise ModelError(f"{word} = '{end}'", f"a {word} goes to the {' or the '.join(ENDS)}", "choose one")
+        return cls(damper=damper, contact=contact, **values)
+
+    def balance(self, record: Record) -> dict[str, dict[int, float]]:
+        """Per channel, the coefficient of each order of its derivative in the friction force."""
+        velocity = ("v", 0) if "v" in record else ("x", 1)
+        acceleration = ("a", 0) if "a" in record else (velocity[0], velocity[1] + 1)
+        terms: dict[str, dict[int, float]] = {"x": {0: -self.stiffness}}
+        for (name, order), constant in ((velocity, self.damping), (acceleration, self.mass)):
+            terms.setdefault(name, {})[order] = -constant
+        if "z" in record:
+            terms["z"] = {0: self.stiffness, 1: self.damping if self.damper == "base" else 0.0}
+        if "force" in record:
+            terms["force"] = {0: 1.0}
+        return terms
+
+    def words(self, record: Record, method: str, width: float, one_filter: bool) -> list[str]:
+        """What was assumed and how derivatives were taken, for the history."""
+        said = [
+            "f = k z - k x - c v - m a"
+            if "z" in record
+            else "no channel z: the base is taken to be fixed, f = - k x - c v - m a"
+        ]
+        if "force" in record:
+            said.append("the applied force is added")
+        measured = [name for name in ("v", "a") if name in record]
+        if measured:
+            said.append(f"{' and '.join(measured)} as measured")
+        if one_filter:
+            said.append(f"all channels smoothed to {width:.4g} Hz (-3 dB)")
+        elif method == "smoother" and len(measured) < 2:
+            said.append(f"the velocity smoothed to {width:.4g} Hz (-3 dB)")
+        elif method == "five-point":
+            said.append("derivatives by central differences and five-point averages")
+        said.append(f"contact against the {self.contact}")
+        return said
+
+
+def _paths(
+    balance: Mapping[str, Mapping[int, float]], derive: Filter, one_filter: bool
+) -> Iterator[tuple[str, Filter, dict[int, float]]]:
+    """Which channel goes through which filter, with which coefficients."""
+    as_measured = replace(derive, method="five-point")  # passes order 0 unchanged
+    for name, terms in balance.items():
+        if one_filter or derive.method == "five-point":
+            yield name, derive, dict(terms)
+            continue
+        # Apart, for the smoother would smooth order 0 too; odd derivatives do not correlate with the sample itself.
+        yield name, as_measured, {0: terms.get(0, 0.0)}
+        if any(terms.get(order) for order in (1, 2)):
+            yield name, derive, {order: c for order, c in terms.items() if order}
+
+
+def _with_motion(record: Record, derive: Filter) -> Record:
+    """The record with v and a, each differentiated where it was not measured."""
+    source, order = ("v", 0) if "v" in record else ("x", 1)
+    wanted = {"v": (source, order), "a": (source, order + 1)}
+    made = record
+    for (name, (origin, times)), unit in zip(wanted.items(), ("m/s", "m/s^2"), strict=True):
+        if name not in record:
+            noise = noise_along(record[origin], record.fs, record.channels[origin].noise)
+            level = derive.inner_gain({times: 1.0}) * float(np.sqrt(np.mean(noise**2)))
+            values = derive.apply(record[origin], {times: 1.0})
+            made = made.with_channel(name, values, unit=unit, source="friction_force", noise=level)
+    return made
+
+
+def _without_delays(record: Record, used: list[str]) -> Record:
+    """The record with the stated delays of the channels taken out, cut to the rows that all of them reach."""
+    delays = {name: record.channels[name].delay for name in used if record.channels[name].delay}
+    if not delays:
+        return record
+    shifts = {name: record.channels[name].delay * record.fs for name in record}
+    first = max(0, math.ceil(-min(shifts.values())))
+    last = len(record) - max(0, math.ceil(max(shifts.values())))
+    if last - first < LEAST:
+        raise RecordError(
+            f"delays of {', '.join(f'{name} {delay:g} s' for name, delay in delays.items())}",
+            f"{QUESTION} needs {LEAST} rows that every channel reaches, and {max(0, last - first)} are left",
+            "correct the delays, in seconds, or give a longer record",
+        )
+    rows = np.arange(first, last, dtype=float)
+    samples = {
+        name: band_limited(values, rows + shifts[name]) if shifts[name] else values[first:last]
+        for name, values in record.samples.items()
+    }
+    step = Step(
+        "friction_force", {"delays": delays}, f"delays taken out; {last - first} of {len(record)} rows reached by all"
+    )
+    moved = record.with_samples(samples, step, start=record.start + first / record.fs)
+    return replace(moved, channels={name: replace(channel, delay=0.0) for name, channel in moved.channels.items()})

@@ -1,0 +1,273 @@
+"""How much friction does a contact have, in which direction, and how does it change with speed?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
+from stickslip.identify.motion import (
+    AUDIBLE,
+    CREEP,
+    NOT_PERIODIC,
+    PHASES,
+    Cycles,
+    Motion,
+    away_from,
+    contact_motion,
+    find_cycles,
+)
+from stickslip.record.record import Record
+from stickslip.statistics import mean_of_cycles, mean_uncertainty, student
+
+Array = NDArray[np.float64]
+
+LEAST_SPREAD = 0.1  # of the sliding speed about its mean, below which no slope against speed can be told
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Friction against velocity, in bins of velocity.
+
+    Attributes
+    ----------
+    velocity : ndarray, shape (k,)
+        Bin centres, bins without samples left out.
+    friction : ndarray, shape (k,)
+        Mean over the cycles of each cycle's mean in the bin.
+    low, high : ndarray, shape (k,)
+        95 % interval of `friction` from the scatter between cycles; NaN where one cycle alone visits the bin.
+    count : ndarray, shape (k,)
+        Cycles that visit the bin.
+    """
+
+    velocity: Array
+    friction: Array
+    low: Array
+    high: Array
+    count: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Loops:
+    """Friction over the cycles of a motion.
+
+    Attributes
+    ----------
+    level : Estimate
+        Magnitude of the sliding friction, the mean of `forward` and `back`.
+    forward, back : Estimate
+        Its magnitude in either direction, positive where it opposes the motion.
+    offset : Estimate
+        Half of `forward` less `back`: a constant force in the record (a drift, a tilt), or an uneven contact.
+    slope : Estimate
+        Change of the sliding friction's magnitude with speed; negative where friction falls with speed.
+    energy_per_cycle : Estimate
+        ``closed integral of f dx`` [J].
+    frequency : Estimate
+        Cycles per second [Hz].
+    phase_grid : ndarray, shape (p,)
+        Phase of the mean cycle, 0 to 1.
+    displacement, velocity, friction : ndarray, shape (p,)
+        The mean cycle.
+    scatter : ndarray, shape (p,)
+        Standard deviation of the friction between cycles.
+    curve : Curve
+        Friction against velocity.
+    cycles : ndarray, shape (m,)
+        Time [s] at which each cycle begins.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    level: Estimate
+    forward: Estimate
+    back: Estimate
+    offset: Estimate
+    slope: Estimate
+    energy_per_cycle: Estimate
+    frequency: Estimate
+    phase_grid: Array
+    displacement: Array
+    velocity: Array
+    friction: Array
+    scatter: Array
+    curve: Curve
+    cycles: Array
+    status: str
+
+
+def friction_loops(
+    record: Record, *, contact: str | None = None, frequency: float | None = None, bins: int = 40
+) -> Loops:
+    r"""How much friction, forward and back, over each cycle, and how does it change with speed?
+
+    Per cycle, sliding forward (back), the level is the median of the friction in which every sample counts by its
+    speed, so by the way it covers: ``forward = weighted median of f, weights |v|`` where ``|v|`` is above what its
+    noise and creep reach and away from the jumps at a reversal, which differentiation blurs. A stuck contact, a
+    reversal and single artefacts so have no say. The energy is :math:`\oint f\,dx` by trapezoids. The slope is that
+    of ``f = sign(v) (F + s |v|) + offset`` by least squares. Every value is found per cycle; the interval is
+    Student's t on the scatter between cycles.
+
+    Parameters
+    ----------
+    record : Record
+        With ``friction`` and ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base.
+    contact : {"ground", "base"}, optional
+        What the mass slides on, the loops being over the displacement against it; as :func:`friction_force` was told,
+        or the ground, when not given.
+    frequency : float, optional
+        Forcing frequency [Hz]; found from the record when not given.
+    bins : int
+        Bins of velocity, over both directions.
+
+    Returns
+    -------
+    Loops
+
+    Raises
+    ------
+    RecordError
+        A channel is missing, broken or too short.
+    EstimateError
+        No motion, no complete cycle, or no sliding in one of the directions.
+
+    Examples
+    --------
+    >>> t = np.arange(5000) / 500
+    >>> v = np.cos(2 * np.pi * t)
+    >>> noise = np.random.default_rng(0).normal(0, 0.05, t.size)
+    >>> record = Record.of({"x": np.sin(2 * np.pi * t) / (2 * np.pi), "friction": 1.5 * np.sign(v) + noise}, fs=500)
+    >>> loops = friction_loops(record)
+    >>> round(loops.level.value, 2), round(loops.energy_per_cycle.value, 2)  # 4 * 1.5 N over 1 / (2 pi) m
+    (1.5, 0.95)
+    """
+    question = "friction loops"
+    record.require_clean("friction", question=question)
+    if bins < 2:
+        raise EstimateError(f"bins = {bins}", "a curve has two bins at least", "leave it at 40")
+    motion = contact_motion(record, contact=contact, question=question)
+    cycles = find_cycles(record, motion, frequency=frequency)
+    friction, unit = record["friction"], record.channels["friction"].unit
+    sliding = _sliding(motion, cycles)
+    label = cycles.labels(len(friction))
+    levels = _levels(friction, motion, sliding, label, len(cycles.edges) - 1)
+    how = "speed-weighted median, mean of cycles"
+    forward, back = (
+        mean_of_cycles(f"sliding friction {side}", values, unit=unit, method=how)
+        for side, values in zip(("forward", "back"), levels, strict=True)
+    )
+    energy = _energy(friction, motion, cycles)
+    folded = cycles.folded(friction)
+    return Loops(
+        level=mean_of_cycles("sliding friction", (levels[0] + levels[1]) / 2, unit=unit, method=how),
+        forward=forward,
+        back=back,
+        offset=mean_of_cycles("friction offset", (levels[0] - levels[1]) / 2, unit=unit, method=how),
+        slope=_slope(friction, motion, sliding, label, unit),
+        energy_per_cycle=energy,
+        frequency=cycles.frequency,
+        phase_grid=np.arange(PHASES) / PHASES,
+        displacement=cycles.folded(motion.displacement).mean(axis=0),
+        velocity=cycles.folded(motion.velocity).mean(axis=0),
+        friction=folded.mean(axis=0),
+        scatter=folded.std(axis=0, ddof=1) if len(folded) > 1 else np.zeros(PHASES),
+        curve=_curve(friction, motion, cycles, label, bins),
+        cycles=motion.start + cycles.edges[:-1] / motion.fs,
+        status=_status(cycles, forward, back, energy),
+    )
+
+
+def _sliding(motion: Motion, cycles: Cycles) -> NDArray[np.bool_]:
+    """Where the contact slides, away from reversals if there is sliding left there."""
+    threshold = max(CREEP * cycles.peak, AUDIBLE * motion.noise)
+    fast = np.abs(motion.velocity) > threshold
+    clear = fast & away_from(~fast, motion.blur)
+    return clear if clear.sum() > fast.sum() / 2 else fast
+
+
+def _levels(
+    friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], count: int
+) -> tuple[Array, Array]:
+    """Magnitude of the friction forward and back, per cycle; NaN where a cycle does not slide that way."""
+    found = []
+    for sign in (1.0, -1.0):
+        chosen = sliding & (sign * motion.velocity > 0) & (label >= 0)
+        levels = np.full(count, np.nan)
+        held = np.flatnonzero(np.bincount(label[chosen], minlength=count))
+        values, weights, cycle = sign * friction[chosen], np.abs(motion.velocity[chosen]), label[chosen]
+        order = np.lexsort((values, cycle))
+        values, weights, cycle = values[order], weights[order], cycle[order]
+        starts = np.searchsorted(cycle, held)
+        total = np.concatenate([[0.0], np.cumsum(weights)])
+        ends = np.searchsorted(cycle, held, side="right")
+        middle = np.searchsorted(total, (total[starts] + total[ends]) / 2) - 1
+        levels[held] = values[np.clip(middle, starts, ends - 1)]
+        found.append(levels)
+    return found[0], found[1]
+
+
+def _energy(friction: Array, motion: Motion, cycles: Cycles) -> Estimate:
+    work = np.concatenate([[0.0], np.cumsum((friction[1:] + friction[:-1]) / 2 * np.diff(motion.displacement))])
+    per_cycle = np.diff(np.interp(cycles.edges, np.arange(len(work)), work))
+    return mean_of_cycles("energy per cycle", per_cycle, unit="J", method="closed integral of f dx, mean of cycles")
+
+
+def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], unit: str) -> Estimate:
+    """Slope of the sliding friction's magnitude against speed, per cycle, levels forward and back left free."""
+    chosen = sliding & (label >= 0)
+    # both directions of a cycle are groups of their own: within them, magnitude against speed
+    group = 2 * label[chosen] + (motion.velocity[chosen] > 0)
+    speed = np.abs(motion.velocity[chosen])
+    magnitude = friction[chosen] * np.sign(motion.velocity[chosen])
+    counts = np.bincount(group)
+    present = np.maximum(counts, 1)
+    speed_about = speed - (np.bincount(group, speed) / present)[group]
+    magnitude_about = magnitude - (np.bincount(group, magnitude) / present)[group]
+    cycle = label[chosen]
+    power = np.bincount(cycle, speed_about**2)
+    product = np.bincount(cycle, speed_about * magnitude_about)
+    slopes = product[power > 0] / power[power > 0]
+    spread = math.sqrt(float(power.sum()) / len(speed)) / float(speed.mean())
+    found = mean_of_cycles(
+        "slope of friction against speed", slopes, unit="N s/m" if (unit, motion.unit) == ("N", "m") else
+        f"{unit} s/{motion.unit}", method="least squares per cycle, mean of cycles",
+        checks=(f"sliding speed varies by {100 * spread:.0f} % about its mean",),
+    )  # fmt: skip
+    if spread >= LEAST_SPREAD:
+        return found
+    return Estimate(**{**vars(found), "status": "the sliding speed hardly varies: no slope can be told"})
+
+
+def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.intp], bins: int) -> Curve:
+    reach = min(cycles.peak * 1.05, float(np.abs(motion.velocity).max()))
+    edges = np.linspace(-reach, reach, bins + 1)
+    place = np.searchsorted(edges, motion.velocity, side="right") - 1
+    chosen = (label >= 0) & (place >= 0) & (place < bins)
+    cell = label[chosen] * bins + place[chosen]
+    shape = (len(cycles.edges) - 1, bins)
+    count = np.bincount(cell, minlength=shape[0] * bins).reshape(shape)
+    total = np.bincount(cell, friction[chosen], minlength=shape[0] * bins).reshape(shape)
+    visited = count.any(axis=0)
+    rows = []
+    for number in np.flatnonzero(visited):
+        seen = count[:, number] > 0
+        means = total[seen, number] / count[seen, number]
+        sd, freedom = mean_uncertainty(means)
+        half = student(freedom) * sd if len(means) > 1 else math.nan
+        rows.append((means.mean(), means.mean() - half, means.mean() + half, len(means)))
+    middle, low, high, visits = (np.array(column) for column in zip(*rows, strict=True))
+    return Curve(((edges[1:] + edges[:-1]) / 2)[visited], middle, low, high, visits.astype(np.intp))
+
+
+def _status(cycles: Cycles, forward: Estimate, back: Estimate, energy: Estimate) -> str:
+    words = [] if forward.status == "ok" else [forward.status]
+    if not cycles.periodic:
+        words.append(NOT_PERIODIC)
+    if forward.value + back.value < 0 or energy.value < 0:
+        words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
+    return "; ".join(words) or "ok"

@@ -1,0 +1,345 @@
+"""The motion of a contact: how its two sides move against each other, and the cycles of that motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
+from stickslip.record.record import Record
+from stickslip.signals.differentiate import differentiate
+from stickslip.signals.noise import noise_level
+from stickslip.statistics import least_squares, mean_of_cycles
+
+Array = NDArray[np.float64]
+
+LEAST = 32  # samples
+AUDIBLE = 5.0  # a speed of five standard deviations of its noise is motion
+CREEP = 0.04  # share of the typical peak speed below which presliding and creep are not told from sticking
+TURNED = 0.1  # share of the typical peak speed that the motion reaches before it counts as reversed
+NEARLY = 0.02  # of a period: a cycle that lacks no more is complete
+PERIODIC = 0.9  # share of the displacement's variance that repeats from cycle to cycle
+NOT_PERIODIC = "the motion is not periodic: a cycle runs from one onset of motion to the next"
+PHASES = 200  # points of a mean cycle
+ENOUGH = 65536  # samples for the search of a frequency; longer records are averaged in blocks
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Displacement and velocity across a contact.
+
+    Attributes
+    ----------
+    displacement, velocity : ndarray, shape (n,)
+        Of the moving side against the other [unit, unit/s].
+    noise : float
+        Standard deviation of the velocity's noise [unit/s].
+    bandwidth : float
+        Frequency [Hz] up to which the velocity follows.
+    fs, start : float
+        Sampling rate [Hz] and time [s] of the first sample.
+    unit : str
+        "m" or "rad".
+    """
+
+    displacement: Array
+    velocity: Array
+    noise: float
+    bandwidth: float
+    fs: float
+    start: float
+    unit: str
+
+    @property
+    def blur(self) -> int:
+        """Samples on either side over which the smoothing spreads a jump: half a cycle of the bandwidth."""
+        return max(1, math.ceil(self.fs / (2 * self.bandwidth)))
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles:
+    """Complete cycles of a motion.
+
+    Attributes
+    ----------
+    edges : ndarray, shape (m + 1,)
+        Where each of the m cycles begins and the last ends, in samples (not whole).
+    frequency : Estimate
+        Cycles per second [Hz].
+    periodic : bool
+        Whether all cycles have one length; otherwise each runs from one onset of forward motion to the next.
+    peak : float
+        Typical peak speed: the median over the cycles of each one's largest.
+    """
+
+    edges: Array
+    frequency: Estimate
+    periodic: bool
+    peak: float
+
+    def labels(self, size: int) -> NDArray[np.intp]:
+        """Number of the cycle that each of `size` samples lies in; -1 outside the complete cycles."""
+        number = np.searchsorted(self.edges, np.arange(size), side="right") - 1
+        return np.where(number < len(self.edges) - 1, number, -1)
+
+    def folded(self, values: Array, phases: int = PHASES) -> Array:
+        """`values` at equal phases of each cycle, shape (m, phases)."""
+        grid = np.arange(phases) / phases
+        at = self.edges[:-1, None] + grid * np.diff(self.edges)[:, None]
+        return np.interp(at, np.arange(len(values)), values)
+
+
+def contact_motion(record: Record, *, contact: str | None, question: str) -> Motion:
+    """How do the two sides of the contact move against each other?
+
+    Against the ground: ``x`` (or ``theta``) and ``v``, differentiated from it where it was not measured. Against the
+    base: ``x - z`` and its derivative.
+
+    Parameters
+    ----------
+    record : Record
+        With ``x`` or ``theta``, or ``v`` alone, whose integral is then the displacement.
+    contact : {"ground", "base"}, optional
+        What the mass slides on; as :func:`friction_force` was told, or the ground, when not given.
+    question : str
+        Who asks, for the errors.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    RecordError
+        A channel is missing, broken or too short.
+    EstimateError
+        Nothing moves.
+    """
+    if contact is None:
+        told = [step.arguments.get("contact") for step in record.history if step.action == "friction_force"]
+        contact = str(told[-1]) if told else "ground"
+    if contact not in ("ground", "base"):
+        raise EstimateError(f"contact = '{contact}'", "the mass slides on the ground or the base", "choose one of them")
+    position = next((name for name in ("x", "theta") if name in record), "x")
+    based, timed = contact == "base", position not in record and is_measured(record, "v")
+    names = ["v"] if timed else [position, *(["z"] if based else [])]
+    measured = ["v"] if is_measured(record, "v") and not based and position == "x" else []
+    record.require_clean(*dict.fromkeys([*names, *measured]), question=question, samples=LEAST)
+    if timed:
+        displacement = np.concatenate([[0.0], np.cumsum((record["v"][1:] + record["v"][:-1]) / 2)]) / record.fs
+    else:
+        displacement = record[position] - (record["z"] if based else 0.0)
+    if np.ptp(displacement) == 0:
+        raise EstimateError(
+            f"channel {' and '.join(names)} never changes",
+            f"{question} needs motion",
+            "check the sensor and its column",
+        )
+    if measured:
+        known = record.channels["v"].noise
+        noise, bandwidth, velocity = known or noise_level(record["v"], record.fs), record.fs / 2, record["v"]
+    else:
+        derivative = differentiate(displacement, record.fs)
+        velocity, noise, bandwidth = derivative.values, float(np.median(derivative.sd)), derivative.bandwidth
+    fastest = float(np.abs(velocity).max())
+    unit = "rad" if position == "theta" else "m"
+    if fastest <= AUDIBLE * noise:
+        raise EstimateError(
+            f"the largest speed is {fastest:.3g} {unit}/s, its noise {noise:.3g} {unit}/s",
+            f"{question} needs motion that rises above its noise",
+            "give a record that moves, or a quieter sensor",
+        )
+    return Motion(displacement, velocity, noise, bandwidth, record.fs, record.start, unit)
+
+
+def find_cycles(record: Record, motion: Motion, *, frequency: float | None = None) -> Cycles:
+    """Which complete cycles does the motion go through?
+
+    The forcing frequency is the strongest line of ``z``, ``force`` or the displacement, whichever the record has first,
+    refined by least squares; a cycle begins where the fundamental of the displacement passes its mean upwards. If the
+    displacement does not repeat (less than 90 % of its variance), a cycle runs from one onset of forward motion to
+    the next; of motion at all, where it never reverses.
+
+    Parameters
+    ----------
+    record : Record
+        Where the forcing is looked for.
+    motion : Motion
+        Of the contact.
+    frequency : float, optional
+        Forcing frequency [Hz], where it is known.
+
+    Returns
+    -------
+    Cycles
+
+    Raises
+    ------
+    EstimateError
+        Not one complete cycle.
+    """
+    if frequency is None:
+        reference = next((name for name in ("z", "force") if name in record and _moves(record[name])), "")
+        found = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
+        cycles = _periodic(motion, found)
+        return cycles if cycles is not None and _repeats(cycles, motion.displacement) else _aperiodic(motion)
+    duration = len(motion.displacement) / motion.fs
+    cycles = None
+    if 1 / duration <= frequency < motion.fs / 2:
+        given = Estimate.normal("forcing frequency", frequency, sd=0.0, unit="Hz", method="given")
+        cycles = _periodic(motion, given)
+    if cycles is None:
+        raise EstimateError(
+            f"frequency = {frequency} Hz gives no complete cycle in {duration:.3g} s",
+            f"it lies between one cycle in the record and half the rate, {motion.fs / 2:g} Hz",
+            "give it in Hz, or leave it out",
+        )
+    return cycles
+
+
+def forcing_frequency(values: Array, fs: float) -> Estimate:
+    """The frequency of the strongest line, by least squares on ``a cos + b sin + c + d t``.
+
+    It starts from the largest value of the Hann-windowed spectrum and is refined by Gauss-Newton; the interval holds
+    for correlated residuals.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Samples.
+    fs : float
+        Sampling rate [Hz].
+
+    Returns
+    -------
+    Estimate
+        In Hz.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) / 1000
+    >>> noise = 0.1 * np.random.default_rng(0).standard_normal(t.size)
+    >>> round(forcing_frequency(np.sin(2 * np.pi * 2.5 * t) + noise, 1000).value, 2)
+    2.5
+    """
+    from scipy.fft import next_fast_len, rfft
+
+    block = max(1, len(values) // ENOUGH)
+    short = values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
+    rate, count = fs / block, len(short)
+    time = (np.arange(count) - (count - 1) / 2) / rate
+    trend = np.column_stack([np.ones(count), time / time[-1]])
+    level = short - trend @ np.linalg.lstsq(trend, short, rcond=None)[0]
+    size = next_fast_len(4 * count, real=True)
+    spectrum = np.abs(rfft(level * np.hanning(count), size))
+    first = max(1, size // count)  # one cycle in the record
+    guess = (first + int(np.argmax(spectrum[first:]))) * rate / size
+    name, method, sd = "forcing frequency", "least-squares sine", math.inf
+    for _ in range(12):
+        turn = 2 * np.pi * guess * time
+        wave = np.column_stack([np.cos(turn), np.sin(turn), trend])
+        a, b = np.linalg.lstsq(wave, short, rcond=None)[0][:2]
+        slope = 2 * np.pi * time * (b * wave[:, 0] - a * wave[:, 1])
+        try:
+            fit = least_squares(np.column_stack([wave, slope]), short)
+        except EstimateError:  # about a cycle: a sine is not told from a trend
+            status = "too few cycles to tell the frequency from a trend"
+            return Estimate.normal(name, guess, sd=math.inf, unit="Hz", method=method, status=status)
+        step, sd = float(fit.coefficients[-1]), float(fit.sd[-1])
+        guess += float(np.clip(step, -0.2 * guess, 0.2 * guess))
+        if abs(step) < 1e-3 * sd or abs(step) < 1e-12 * guess:
+            break
+    return Estimate.normal(name, guess, sd=sd, unit="Hz", method=method)
+
+
+def is_measured(record: Record, name: str) -> bool:
+    """Whether the record has the channel, and not from :func:`friction_force`, which derives what was not measured."""
+    return name in record and record.channels[name].source != "friction_force"
+
+
+def stretches(inside: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First samples of the stretches where `inside` holds, and the samples after their last."""
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
+    return turns[::2], turns[1::2]
+
+
+def away_from(events: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:
+    """Which samples are more than `margin` samples away from every sample where `events` holds."""
+    count = np.concatenate([[0], np.cumsum(events)])
+    rows = np.arange(len(events))
+    return np.asarray(count[np.minimum(rows + margin + 1, len(events))] == count[np.maximum(rows - margin, 0)])
+
+
+def _moves(values: Array) -> bool:
+    return bool(np.isfinite(values).all() and np.ptp(values) > 0)
+
+
+def _periodic(motion: Motion, frequency: Estimate) -> Cycles | None:
+    """Cycles of one length, from where the displacement's fundamental passes its mean upwards."""
+    count = len(motion.displacement)
+    time = np.arange(count) / motion.fs
+    centred = motion.displacement - motion.displacement.mean()
+    phase = np.angle(np.vdot(np.exp(2j * np.pi * frequency.value * time), centred))  # x ~ cos(2 pi f t + phase)
+    period = motion.fs / frequency.value
+    first = ((-np.pi / 2 - phase) / (2 * np.pi)) % 1.0 * period
+    if period - first < NEARLY * period:
+        first -= period
+    edges = first + period * np.arange(math.floor((count - 1 - first) / period + NEARLY) + 1)
+    edges = np.clip(edges, 0, count - 1)
+    return Cycles(edges, frequency, True, _typical_peak(motion.velocity, edges)) if len(edges) >= 2 else None
+
+
+def _aperiodic(motion: Motion) -> Cycles:
+    """Cycles between onsets of forward motion, or of motion where it never reverses."""
+    edges = next((found for found in (_onsets(motion), _departures(motion)) if len(found) >= 2), None)
+    if edges is None:
+        raise EstimateError(
+            f"the motion of {len(motion.velocity) / motion.fs:.3g} s holds no complete cycle",
+            "a cycle goes forward, back, and forward again, or rests, slips, and slips again",
+            "give a longer record, or frequency= if it is known",
+        )
+    mean = mean_of_cycles("cycle", np.diff(edges) / motion.fs, unit="s", method="")
+    longest, shortest = mean.interval[1], mean.interval[0]
+    average = Estimate(
+        "cycle frequency", 1 / mean.value, (1 / longest, 1 / shortest if shortest > 0 else math.inf),
+        mean.sd / mean.value**2, "Hz", "cycles between onsets of motion", "the motion is not periodic", mean.checks,
+    )  # fmt: skip
+    return Cycles(edges, average, False, _typical_peak(motion.velocity, edges))
+
+
+def _repeats(cycles: Cycles, displacement: Array) -> bool:
+    folded = cycles.folded(displacement)
+    if len(folded) < 2:  # all that can be told of one cycle is whether it closes
+        ends = np.interp(cycles.edges, np.arange(len(displacement)), displacement)
+        return bool(abs(ends[1] - ends[0]) <= (1 - PERIODIC) * np.ptp(folded))
+    spread = float(np.mean(folded.var(axis=0, ddof=1)))
+    return bool(spread <= (1 - PERIODIC) * displacement.var())
+
+
+def _onsets(motion: Motion) -> Array:
+    """Where forward motion begins after motion back."""
+    moving = np.flatnonzero(np.abs(motion.velocity) > _definite(motion))
+    signs = np.sign(motion.velocity[moving])
+    return moving[1:][(signs[1:] > 0) & (signs[:-1] < 0)].astype(float)
+
+
+def _departures(motion: Motion) -> Array:
+    """Where motion begins after rest."""
+    speed, definite = np.abs(motion.velocity), _definite(motion)
+    state = np.flatnonzero((speed > definite) | (speed < definite * CREEP / TURNED))
+    fast = speed[state] > definite
+    return state[1:][fast[1:] & ~fast[:-1]].astype(float)
+
+
+def _definite(motion: Motion) -> float:
+    """Speed above which the contact moves without a doubt."""
+    return max(TURNED * float(np.quantile(np.abs(motion.velocity), 0.99)), AUDIBLE * motion.noise)
+
+
+def _typical_peak(velocity: Array, edges: Array) -> float:
+    starts = np.ceil(edges).astype(int)
+    return float(np.median(np.maximum.reduceat(np.abs(velocity[: starts[-1]]), starts[:-1])))

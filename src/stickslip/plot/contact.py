@@ -1,0 +1,170 @@
+"""The contact: friction against displacement and velocity, sticks and slips."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stickslip.identify.motion import contact_motion
+from stickslip.plot.style import (
+    BLUE,
+    FAINT,
+    INK,
+    ORANGE,
+    Array,
+    axes_of,
+    axis_label,
+    new_figure,
+    prefixed,
+    styled,
+    thinned,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from stickslip.analysis import Findings
+
+MOST_CYCLES = 30
+POINTS_A_CYCLE = 300
+
+
+@styled
+def plot_displacement_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
+    """Friction against displacement: the cycles thin, their mean with a band of one standard deviation.
+
+    Parameters
+    ----------
+    findings : Findings
+        With loops.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+    """
+    return _loop(findings, "displacement", axes_of(ax))
+
+
+@styled
+def plot_velocity_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
+    """Friction against velocity: the cycles thin, their mean, and the binned curve with 95 % intervals.
+
+    Parameters
+    ----------
+    findings : Findings
+        With loops.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+    """
+    ax = _loop(findings, "velocity", axes_of(ax, height=4.2))
+    loops = findings.loops
+    assert loops is not None
+    x_factor, _ = prefixed(loops.velocity, "rad/s" if loops.level.unit == "N m" else "m/s")
+    y_factor, _ = prefixed(loops.friction, loops.level.unit)
+    curve = loops.curve
+    ax.errorbar(
+        x_factor * curve.velocity,
+        y_factor * curve.friction,
+        yerr=y_factor * np.abs(np.array([curve.friction - curve.low, curve.high - curve.friction])),
+        fmt="o", color=INK, markersize=3.2, linewidth=1.0, label="mean in velocity bins, 95 %", zorder=4,
+    )  # fmt: skip
+    for value in (loops.forward.value, -loops.back.value):
+        ax.axhline(y_factor * value, color=INK, linewidth=0.9, linestyle=":", zorder=1)
+    _legend_above(ax)
+    return ax
+
+
+@styled
+def plot_sticks(findings: Findings) -> Figure:
+    """How long the contact stuck, over the record's time, and how often each duration occurred.
+
+    Parameters
+    ----------
+    findings : Findings
+        With sticks.
+
+    Returns
+    -------
+    Figure
+    """
+    assert findings.sticks is not None
+    events = findings.sticks.events
+    figure, left = new_figure(height=3.0)
+    factor, unit = prefixed(np.array([event.duration for event in events]), "s")
+    bins = np.linspace(0, factor * max(event.duration for event in events), 40).tolist()
+    right = left.inset_axes((1.02, 0, 0.3, 1), sharey=left)
+    right.tick_params(labelleft=False)
+    for kind, colour, marker in (("stick", BLUE, "o"), ("slip", ORANGE, "^")):
+        chosen = [event for event in events if event.kind == kind]
+        if chosen:
+            durations = factor * np.array([event.duration for event in chosen])
+            some = thinned(len(chosen), 1500)
+            times = np.array([event.time for event in chosen])
+            left.plot(times[some], durations[some], marker, color=colour, markersize=4, linestyle="none", label=kind)
+            right.hist(durations, bins=bins, color=colour, alpha=0.75, orientation="horizontal")
+    left.set(xlabel="time [s]", ylabel=axis_label("duration", unit), ylim=(0, None))
+    left.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    right.set(xlabel="how many")
+    return figure
+
+
+def _loop(findings: Findings, abscissa: str, ax: Axes) -> Axes:
+    loops = findings.loops
+    assert loops is not None
+    length = "rad" if loops.level.unit == "N m" else "m"
+    unit = {"displacement": length, "velocity": f"{length}/s"}[abscissa]
+    mean_x = getattr(loops, abscissa)
+    x_factor, x_unit = prefixed(mean_x, unit)
+    y_factor, y_unit = prefixed(loops.friction, loops.level.unit)
+    drawn = _cycles(findings, abscissa)
+    for number, (x, friction) in enumerate(drawn):
+        label = f"{len(drawn)} of {len(loops.cycles)} cycles" if number == 0 else None
+        ax.plot(x_factor * x, y_factor * friction, color=FAINT, linewidth=0.6, alpha=0.6, label=label)
+    x, f, band = (np.append(part, part[0]) for part in (mean_x, loops.friction, loops.scatter))
+    if abscissa == "displacement":
+        ring = np.concatenate([f + band, (f - band)[::-1]])
+        ax.fill(x_factor * np.concatenate([x, x[::-1]]), y_factor * ring, color=ORANGE, alpha=0.2, linewidth=0)
+    ax.plot(x_factor * x, y_factor * f, color=ORANGE, linewidth=1.8, label="mean cycle")
+    ax.axhline(0, color=FAINT, linewidth=0.8)
+    ax.axvline(0, color=FAINT, linewidth=0.8)
+    words = f"{abscissa} of the contact"
+    ax.set(xlabel=axis_label(words, x_unit), ylabel=axis_label("friction", y_unit))
+    _legend_above(ax)
+    return ax
+
+
+def _legend_above(ax: Axes) -> None:
+    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+
+
+def _cycles(findings: Findings, abscissa: str) -> list[tuple[Array, Array]]:
+    """Displacement (or velocity) across the contact and friction of at most thirty cycles, thinned."""
+    record, loops, drawn = findings.record, findings.loops, []
+    assert loops is not None
+    across = _across(findings, abscissa)
+    rows = round(record.fs / loops.frequency.value)
+    for start in np.asarray(loops.cycles)[thinned(len(loops.cycles), MOST_CYCLES)]:
+        first = round((float(start) - record.start) * record.fs)
+        part = slice(max(first, 0), first + rows + 1)
+        some = thinned(len(across[part]), POINTS_A_CYCLE)
+        if len(some):
+            drawn.append((across[part][some], record["friction"][part][some]))
+    return drawn
+
+
+def _across(findings: Findings, abscissa: str) -> Array:
+    """Displacement or velocity of the mass against what it slides on."""
+    record, contact = findings.record, findings.settings.get("contact", "ground")
+    name = {"displacement": "x", "velocity": "v"}[abscissa]
+    if contact == "ground" and name in record:
+        return record[name]
+    across: Array = getattr(contact_motion(record, contact=contact, question="the figure"), abscissa)
+    return across

@@ -1,0 +1,110 @@
+"""One look for every figure: palette, sizes, unit prefixes, and fewer points than samples."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Arguments = ParamSpec("Arguments")
+Drawn = TypeVar("Drawn")
+
+# Okabe and Ito's palette, told apart by the colour blind; ink and grid follow the page's colours in a report.
+BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#b0559b", "#56b4e9"
+INK, FAINT, SHADE = "#1f2933", "#9aa5b1", "#c8d0da"
+WIDTH = 6.2  # inch: narrow enough that the letters stay readable on a phone
+COLUMNS = 1200  # of a min-max envelope: beyond the pixels of a figure
+STYLE: Any = {
+    "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"], "font.size": 9,
+    "axes.labelsize": 9, "axes.titlesize": 10, "xtick.labelsize": 8, "ytick.labelsize": 8, "legend.fontsize": 8,
+    "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "xtick.color": INK, "ytick.color": INK,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": FAINT, "grid.alpha": 0.3,
+    "grid.linewidth": 0.6, "axes.axisbelow": True, "lines.linewidth": 1.3, "legend.frameon": False,
+    "figure.facecolor": "none", "axes.facecolor": "none", "savefig.facecolor": "none", "svg.fonttype": "none",
+    "svg.hashsalt": "stickslip", "text.parse_math": False, "path.simplify": True, "axes.formatter.useoffset": False,
+}  # fmt: skip
+_PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+_PREFIXED = ("m", "m/s", "N", "N m", "N s/m", "s", "Pa", "J", "V")
+_READABLE = ("N", "N m", "N s/m", "V")  # a few hundredths of these are read more easily than thousandths
+
+
+def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
+    """`draw`, in the house's style whatever the user's own settings are."""
+
+    @functools.wraps(draw)
+    def drawing(*args: Arguments.args, **options: Arguments.kwargs) -> Drawn:
+        import matplotlib as mpl
+
+        with mpl.rc_context(STYLE):
+            return draw(*args, **options)
+
+    return drawing
+
+
+def new_figure(rows: int = 1, *, height: float = 3.4, heights: Sequence[float] | None = None) -> tuple[Figure, Any]:
+    """A figure of the report's width, not known to pyplot; and its axes, one under the other on one abscissa."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    return figure, figure.subplots(rows, 1, sharex=True, height_ratios=heights)
+
+
+def axes_of(ax: Axes | None, *, height: float = 3.8) -> Axes:
+    """The axes given, or those of a new figure."""
+    return ax if ax is not None else new_figure(height=height)[1]
+
+
+def prefixed(values: Array | float, unit: str) -> tuple[float, str]:
+    """Factor and unit that bring the largest of `values` between 1 and 1000.
+
+    Examples
+    --------
+    >>> prefixed(np.array([0.002, -0.011]), "m")
+    (1000.0, 'mm')
+    """
+    finite = np.abs(np.atleast_1d(values)[np.isfinite(np.atleast_1d(values))])
+    peak = float(finite.max()) if finite.size else 0.0
+    if unit not in _PREFIXED or peak == 0 or (unit in _READABLE and 0.01 <= peak < 1):
+        return 1.0, spelled(unit)
+    size, prefix = next(((s, p) for s, p in _PREFIXES if peak >= s), _PREFIXES[-1])
+    return (1.0, unit) if size == 1.0 or (unit == "s" and size > 1) else (1.0 / size, prefix + unit)
+
+
+def spelled(unit: str) -> str:
+    """A unit as it is printed: "m/s²"."""
+    return unit.replace("^2", "²").replace("^3", "³")
+
+
+def axis_label(words: str, unit: str, between: str = " ") -> str:
+    """ "displacement [mm]"; no bracket for a pure number."""
+    return words if unit in ("1", "") else f"{words}{between}[{spelled(unit)}]"
+
+
+def envelope(time: Array, values: Array, columns: int = COLUMNS) -> tuple[Array, Array]:
+    """The lowest and highest value of each of `columns` equal stretches, so that no peak is lost in drawing.
+
+    Examples
+    --------
+    >>> time = np.arange(100_000.0)
+    >>> spike = np.where(time == 777, 5.0, 0.0)
+    >>> len(envelope(time, spike)[0]), envelope(time, spike)[1].max()
+    (2400, np.float64(5.0))
+    """
+    if len(values) <= 2 * columns:
+        return time, values
+    edges = np.linspace(0, len(values), columns, endpoint=False).astype(int)
+    low, high = np.fmin.reduceat(values, edges), np.fmax.reduceat(values, edges)
+    return np.repeat(time[edges], 2), np.column_stack([low, high]).ravel()
+
+
+def thinned(count: int, limit: int) -> NDArray[np.intp]:
+    """At most `limit` indices spread evenly over `count`."""
+    return np.unique(np.linspace(0, count - 1, min(count, limit)).astype(np.intp))

@@ -1,0 +1,267 @@
+"""The check-up: what is wrong with a record, in words, with row numbers and the function that mends it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.record import flaws
+from stickslip.record.flaws import Runs
+from stickslip.record.stamps import Stamps, fit_line, inspect
+
+if TYPE_CHECKING:
+    from stickslip.record.record import Record
+
+Array = NDArray[np.float64]
+
+SHORTEST = 32  # samples below which no question about friction can be answered
+DRIFT = 0.3  # rise of the trend, in amplitudes of the oscillation, from which it is told
+SHARP_UNITS = ("m/s", "rad/s", "N", "N m")  # what may have plateaus with corners by nature: sticking, saturation
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with a record.
+
+    Attributes
+    ----------
+    kind : str
+        "short", "clock", "rate", "backwards", "repeated stamps", "jitter", "gap", "missing", "constant", "clipped",
+        "frozen", "spike", "drift" or "coarse".
+    channel : str or None
+        The channel it is in; None for the clock.
+    rows : tuple of (first, last)
+        All runs of rows concerned, both ends included, counted from 0.
+    message : str
+        One sentence: what, where, how much, and what mends it.
+    severity : str
+        "error" where questions are refused until it is mended, "warning" where they are answered with less trust.
+
+    Examples
+    --------
+    >>> from stickslip.record.record import Record
+    >>> wave = np.sin(0.2 * np.arange(400))
+    >>> wave[100:103] = np.nan
+    >>> print(Record.of({"x": wave}, fs=100.0).check()[0])
+    channel x has 3 values that are not numbers (rows 100 to 102); fill them with fill_missing(record).
+    """
+
+    kind: str
+    channel: str | None
+    rows: Runs
+    message: str
+    severity: str = "warning"
+
+    def __str__(self) -> str:
+        return self.message
+
+
+def find_faults(record: Record) -> list[Fault]:
+    """What is wrong with a record; empty when nothing is.
+
+    The clock is checked for stamps that stand still and jump, go back, repeat, jitter, are lost, or leave gaps; each
+    channel for values that are not numbers, a constant, clipping, frozen samples, spikes, drift, and too few levels. A
+    plateau of a stuck mass, a friction force's square wave, a sensor's steps, and rest at the end of a decay are
+    no faults.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    list of Fault
+        Errors first, the clock before the channels.
+
+    Examples
+    --------
+    >>> from stickslip.record.record import Record
+    >>> [fault.kind for fault in find_faults(Record.of({"x": [1.0] * 100}, fs=50.0))]
+    ['constant']
+    """
+    faults = _short(record)
+    if record.stamps is not None:
+        faults += _clock_faults(record.stamps)
+    for name in record:
+        faults += _channel_faults(name, record.channels[name].unit, record[name])
+    return sorted(faults, key=lambda fault: fault.severity != "error")
+
+
+def in_words(runs: Runs, most: int = 5) -> str:
+    """Rows for a sentence: the first few runs, and how many more there are.
+
+    Examples
+    --------
+    >>> in_words(((3, 3), (7, 9)))
+    'rows 3, 7 to 9'
+    """
+    parts = [f"{first}" if first == last else f"{first} to {last}" for first, last in runs[:most]]
+    more = f" and {len(runs) - most} more places" if len(runs) > most else ""
+    single = len(runs) == 1 and runs[0][0] == runs[0][1]
+    return f"{'row' if single else 'rows'} {', '.join(parts)}{more}"
+
+
+def _short(record: Record) -> list[Fault]:
+    if len(record) >= SHORTEST:
+        return []
+    message = f"the record has {len(record)} samples, too few for any question about friction; record for longer."
+    return [Fault("short", None, ((0, len(record) - 1),), message, "error")]
+
+
+# ---- the clock
+
+
+def _clock_faults(stamps: Array) -> list[Fault]:
+    clock = inspect(stamps)
+    faults: list[Fault] = []
+    if len(clock.missing):
+        runs = _pairs(clock.missing, 0)
+        faults.append(
+            _clock_fault(
+                "missing",
+                runs,
+                _several(len(clock.missing), "time stamp is not a number", "time stamps are not numbers"),
+                "repair_clock(record)",
+                "error",
+            )
+        )
+    if clock.held:
+        faults.append(_held(stamps, clock))
+    elif len(clock.repeated):
+        runs = _pairs(clock.repeated)
+        what = _several(len(clock.repeated), "time stamp repeats", "time stamps repeat") + " the one before"
+        faults.append(_clock_fault("repeated stamps", runs, what, "repair_clock(record)", "error"))
+    if len(clock.backward):
+        back = float(np.min(np.diff(stamps)[clock.backward]))
+        what = f"the time goes back {_several(len(clock.backward), 'time', 'times')}, by up to {-back:.4g} s"
+        faults.append(_clock_fault("backwards", _pairs(clock.backward), what, "repair_clock(record)", "error"))
+    if len(clock.slower):
+        slow = float(np.median(np.diff(stamps)[clock.slower]))
+        what = (
+            f"{len(clock.slower)} intervals of {1e3 * slow:.4g} ms where the others are {1e3 * clock.step:.4g} ms long"
+        )
+        cure = f"fill_gaps(record, longest={2 * slow:.2g}), or cut them off with record.rows()"
+        faults.append(_clock_fault("rate", _pairs(clock.slower), what, cure, "error"))
+    if len(clock.gaps):
+        lengths = np.diff(stamps)[clock.gaps]
+        lost = int(np.sum(np.maximum(1, np.round(lengths / clock.step) - 1)))
+        what = (
+            f"{_several(len(clock.gaps), 'gap', 'gaps')} of up to {1e3 * np.max(lengths):.4g} ms "
+            f"where samples come every {1e3 * clock.step:.4g} ms, about {_several(lost, 'sample', 'samples')} lost"
+        )
+        faults.append(_clock_fault("gap", _pairs(clock.gaps), what, "fill_gaps(record)", "error"))
+    if len(clock.uneven):
+        off = np.abs(np.diff(stamps)[clock.uneven] / clock.step - 1)
+        usual = f"{1e3 * clock.step:.4g} ms"
+        what = f"{len(clock.uneven)} intervals are uneven, off by up to {100 * np.max(off):.0f} % of {usual}"
+        cure = "fill_gaps(record)" if len(clock.gaps) else "repair_clock(record)"
+        faults.append(_clock_fault("jitter", _pairs(clock.uneven), what, cure, "error"))
+    return faults
+
+
+def _held(stamps: Array, clock: Stamps) -> Fault:
+    jumps = np.flatnonzero(np.diff(stamps) > 0)
+    block = np.diff(jumps)
+    low, high = np.percentile(block, [10, 90]) if len(block) else (len(stamps), len(stamps))
+    line = fit_line(stamps)
+    what = (
+        f"the time stamps stand still for {low:.0f} to {high:.0f} rows and then jump by "
+        f"{1e3 * float(np.median(np.diff(stamps)[jumps])):.3g} ms; the true rate is about {line.fs:.4g} Hz"
+    )
+    return _clock_fault("clock", _pairs(clock.repeated), what, "repair_clock(record)", "error")
+
+
+def _clock_fault(kind: str, runs: Runs, what: str, cure: str, severity: str) -> Fault:
+    verb = "relabel them" if kind == "clock" else "mend the clock"
+    return Fault(kind, None, runs, f"{what} ({in_words(runs)}); {verb} with {cure}.", severity)
+
+
+def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
+    """Runs that cover each row and the `width` rows after it, merged where they touch."""
+    if not len(first):
+        return ()
+    mask = np.zeros(int(first[-1]) + width + 1, dtype=bool)
+    for shift in range(width + 1):
+        mask[first + shift] = True
+    return flaws.runs_of(mask)
+
+
+# ---- the channels
+
+
+def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
+    lost = ~np.isfinite(values)
+    faults = []
+    if lost.any():
+        faults.append(
+            _fault(
+                "missing",
+                name,
+                flaws.runs_of(lost),
+                _several(int(lost.sum()), "value that is not a number", "values that are not numbers"),
+                "fill them with fill_missing(record)",
+                "error",
+            )
+        )
+    if lost.all() or len(values) < 3:
+        return faults
+    if lost.any():
+        values = flaws.held_over(values, lost)
+    if np.ptp(values) <= 1e-12 * float(np.max(np.abs(values))):
+        message = (
+            f"channel {name} is constant at {values[0]:.6g} {unit} throughout; look at its cable, range and column."
+        )
+        return [*faults, Fault("constant", name, ((0, len(values) - 1),), message)]
+    return faults + [fault for fault in _shape_faults(name, unit, values) if not _inside(fault.rows, lost)]
+
+
+def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
+    everywhere = ((0, len(values) - 1),)
+    few = flaws.levels_used(values)
+    if few is not None:
+        what = f"only {few} steps of the sensor across its whole motion"
+        return [_fault("coarse", name, everywhere, what, "choose a finer range of the instrument")]
+    faults = []
+    spikes = flaws.spikes(values)
+    if spikes:
+        what = _several(_count(spikes), "sample that stands off as a spike", "samples that stand off as spikes")
+        faults.append(_fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")'))
+        values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
+    measured = name != "friction"  # what is computed as friction has no sensor that could clip or freeze
+    cut = flaws.clipped(values, plateaus=unit in SHARP_UNITS) if measured else ()
+    if cut:
+        what = _several(_count(cut), "sample", "samples") + f" clipped near {values[cut[0][0]]:.4g} {unit}"
+        faults.append(
+            _fault("clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")')
+        )
+    top = flaws.rows_of(cut, len(values))
+    held = tuple(run for run in flaws.frozen(values) if not top[run[0] : run[1] + 1].any()) if measured else ()
+    if held:
+        longest = max(last - first + 1 for first, last in held)
+        what = f"samples frozen while the signal moved on, for up to {longest} rows"
+        faults.append(_fault("frozen", name, held, what, f'make them NaN and use fill_missing(record, "{name}")'))
+    rise = flaws.drift(values)
+    if rise > DRIFT:
+        what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"
+        faults.append(_fault("drift", name, everywhere, what, f'take it off with remove_drift(record, "{name}")'))
+    return faults
+
+
+def _several(count: int, one: str, many: str) -> str:
+    return f"{count} {one if count == 1 else many}"
+
+
+def _count(runs: Runs) -> int:
+    return sum(last - first + 1 for first, last in runs)
+
+
+def _fault(kind: str, name: str, runs: Runs, what: str, cure: str, severity: str = "warning") -> Fault:
+    return Fault(kind, name, runs, f"channel {name} has {what} ({in_words(runs)}); {cure}.", severity)
+
+
+def _inside(runs: Runs, lost: NDArray[np.bool_]) -> bool:
+    """Whether all runs lie where values were missing anyway."""
+    return all(lost[first : last + 1].any() for first, last in runs) and bool(runs)

@@ -1,0 +1,483 @@
+"""A Record as a pandas DataFrame, an xarray Dataset or SDyPy's SEP 005 channel list, and back.
+
+What stickslip wrote comes back exactly: units, clock, history and truth travel beside the samples as JSON. What
+others wrote comes in through the same door as a file: units are parsed, the clock is found in the time axis, and
+the first Step of the history says where it came from.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import FormatError, RecordError
+from stickslip.record.clock import Clock, fit_clock
+from stickslip.record.metadata import (
+    KEY,
+    channel_names,
+    history_of,
+    metadata_to_record,
+    parse_metadata,
+    record_to_metadata,
+    time_column,
+)
+from stickslip.record.record import Record, Step
+from stickslip.units import parse_unit
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+
+def to_pandas(record: Record) -> pd.DataFrame:
+    """The record as a DataFrame: one column a channel [SI], indexed by time [s].
+
+    Parameters
+    ----------
+    record : Record
+        The record; its history, units and clock go into ``.attrs``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        n rows; ``attrs["units"]`` maps columns to units, and :func:`from_pandas` gives the record back exactly.
+
+    Examples
+    --------
+    >>> record = Record.of({"x": [0.0, 1.0, 3.0]}, fs=10.0, units={"x": "mm"})
+    >>> frame = to_pandas(record)
+    >>> frame.attrs["units"], from_pandas(frame).equals(record)
+    ({'x': 'm'}, True)
+    """
+    import pandas as pd
+
+    frame = pd.DataFrame(dict(record.samples), index=pd.Index(record.time, name="time"), copy=True)
+    frame.attrs = {"units": {name: channel.unit for name, channel in record.channels.items()}, KEY: _described(record)}
+    return frame
+
+
+def from_pandas(
+    frame: pd.DataFrame, *, fs: float | None = None, units: Mapping[str, str] | None = None, time: str | None = None
+) -> Record:
+    """A record from a DataFrame, of stickslip's making or anyone's.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        One column a channel. The index is the clock: seconds, timedeltas or dates (then time counts from the
+        first). Stamps that are not uniform are kept, for ``repair_clock``.
+    fs : float, optional
+        Sampling rate [Hz]; needed where the index only numbers the rows. It overrides the index.
+    units : mapping of str to str, optional
+        Unit of each column; otherwise from headers like "x [mm]", from ``attrs["units"]``, else SI.
+    time : str, optional
+        The column that holds the time, in place of the index.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RecordError
+        No clock, a column that is not numbers, an unknown unit.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> frame = pd.DataFrame({"x [mm]": [1.0, 2.0, 4.0]}, index=[0.0, 0.01, 0.02])
+    >>> from_pandas(frame)
+    Record(x [m]; 3 samples, 100 Hz, from 0 s)
+    """
+    import pandas as pd
+
+    if not isinstance(frame, pd.DataFrame):
+        raise _not_a("a pandas DataFrame", frame)
+    if time is not None and time not in frame.columns:
+        raise RecordError(
+            f"there is no column '{time}'",
+            "time= names a column",
+            f"choose one of {', '.join(map(str, frame.columns))}",
+        )
+    axis: Any = frame.index if time is None else frame[time]
+    numbered = time is None and isinstance(axis, pd.RangeIndex) and axis.name is None
+    if not frame.columns.is_unique:
+        raise RecordError("two columns have one name", "each column names a channel", "rename one of them")
+    stated = frame.attrs.get("units")
+    return _received(
+        {str(name): frame[name].to_numpy() for name in frame.columns if name != time},
+        None if numbered else _seconds("index" if time is None else time, axis.to_numpy()),
+        fs=fs,
+        units=units or {},
+        stated={str(name): str(unit) for name, unit in stated.items()} if isinstance(stated, Mapping) else {},
+        described=frame.attrs.get(KEY),
+        step=Step("from_pandas", _given(fs=fs, units=units, time=time)),
+    )
+
+
+def to_xarray(record: Record) -> xr.Dataset:
+    """The record as an xarray Dataset over the coordinate ``time`` [s].
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+
+    Returns
+    -------
+    xarray.Dataset
+        One variable a channel with attributes ``units`` and ``long_name``; :func:`from_xarray` gives the record
+        back exactly. (Arithmetic in xarray does not carry units: "m" squared stays "m".)
+
+    Examples
+    --------
+    >>> record = Record.of({"x": [0.0, 1.0, 3.0]}, fs=10.0, units={"x": "mm"})
+    >>> dataset = to_xarray(record)
+    >>> dataset["x"].attrs["units"], from_xarray(dataset).equals(record)
+    ('m', True)
+    """
+    xarray = _xarray()
+    axis = time_column(record)
+    variables = {
+        name: (axis, values.copy(), {"units": record.channels[name].unit, "long_name": record.channels[name].quantity})
+        for name, values in record.samples.items()
+    }
+    dataset: xr.Dataset = xarray.Dataset(variables, coords={axis: (axis, np.array(record.time), {"units": "s"})})
+    dataset.attrs = {"fs": record.fs, KEY: _described(record)}
+    return dataset
+
+
+def from_xarray(
+    dataset: xr.Dataset | xr.DataArray, *, fs: float | None = None, units: Mapping[str, str] | None = None
+) -> Record:
+    """A record from an xarray Dataset or DataArray of one dimension, of stickslip's making or anyone's.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset or xarray.DataArray
+        Each variable is a channel; the dimension's coordinate is the clock (numbers in its ``units``, timedeltas
+        or dates).
+    fs : float, optional
+        Sampling rate [Hz]; needed where the dimension has no coordinate.
+    units : mapping of str to str, optional
+        Unit of each variable, before its attribute ``units`` (or ``unit``).
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RecordError
+        Several dimensions, no clock, a variable that is not numbers, an unknown unit.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> data = xr.DataArray([1.0, 2.0, 4.0], coords={"t": [0.0, 1.0, 2.0]}, dims="t", name="x", attrs={"units": "mm"})
+    >>> data["t"].attrs["units"] = "ms"
+    >>> from_xarray(data)
+    Record(x [m]; 3 samples, 1000 Hz, from 0 s)
+    """
+    xarray = _xarray()
+    if isinstance(dataset, xarray.DataArray):
+        dataset = dataset.to_dataset(name=str(dataset.name or "value"), promote_attrs=False)
+    if not isinstance(dataset, xarray.Dataset):
+        raise _not_a("an xarray Dataset or DataArray", dataset)
+    dimensions = {dimension for variable in dataset.data_vars.values() for dimension in variable.dims}
+    if len(dimensions) != 1 or any(variable.ndim != 1 for variable in dataset.data_vars.values()):
+        raise RecordError(
+            f"the variables lie over {', '.join(sorted(map(str, dimensions))) or 'no dimension'}",
+            "a record's channels lie over one dimension, time",
+            "select along the others first, as in dataset.isel(...)",
+        )
+    axis = dimensions.pop()
+    clock = dataset.coords[axis] if axis in dataset.indexes else None
+    scale = 1.0 if clock is None else parse_unit(str(clock.attrs.get("units", "s")), expect="s").scale
+    stated = {
+        str(name): str(variable.attrs.get("units", variable.attrs.get("unit")))
+        for name, variable in dataset.data_vars.items()
+        if {"units", "unit"} & set(variable.attrs)
+    }
+    return _received(
+        {str(name): variable.to_numpy() for name, variable in dataset.data_vars.items()},
+        None if clock is None else _seconds(str(axis), clock.to_numpy(), scale),
+        fs=fs,
+        units=units or {},
+        stated=stated,
+        described=dataset.attrs.get(KEY),
+        step=Step("from_xarray", _given(fs=fs, units=units)),
+    )
+
+
+def to_sep005(record: Record) -> list[dict[str, Any]]:
+    """The record as SDyPy's unified time series (SEP 005): one dictionary a channel.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+
+    Returns
+    -------
+    list of dict
+        ``name``, ``data`` [SI], ``unit_str``, ``fs`` [Hz] (or ``time`` [s] where the clock is broken), and what
+        :func:`from_sep005` needs to give the record back exactly.
+
+    Examples
+    --------
+    >>> record = Record.of({"x": [0.0, 1.0, 3.0]}, fs=10.0, units={"x": "mm"})
+    >>> [channel["unit_str"] for channel in to_sep005(record)], from_sep005(to_sep005(record)).equals(record)
+    (['m'], True)
+    """
+    described = _described(record)
+    clock: dict[str, Any] = {"fs": record.fs} if record.stamps is None else {"time": record.stamps.copy()}
+    return [
+        {
+            "name": name,
+            "data": values.copy(),
+            "unit_str": record.channels[name].unit,
+            **clock,
+            "quantity": record.channels[name].quantity,
+            KEY: described,
+        }
+        for name, values in record.samples.items()
+    ]
+
+
+def from_sep005(channels: Sequence[Mapping[str, Any]] | Mapping[str, Any]) -> Record:
+    """A record from SDyPy's unified time series (SEP 005), of stickslip's making or anyone's.
+
+    Parameters
+    ----------
+    channels : sequence of dict, or one dict
+        Each with ``name``, ``data`` (one-dimensional), ``unit_str`` (may be empty: SI) and ``fs`` [Hz] or
+        ``time`` [s]; all on one clock, with one ``start_timestamp`` if any.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RecordError
+        A field is missing, or the channels have different clocks.
+
+    Examples
+    --------
+    >>> from_sep005([{"name": "x", "data": [1.0, 2.0], "unit_str": "mm", "fs": 50}])
+    Record(x [m]; 2 samples, 50 Hz, from 0 s)
+    """
+    channels = [channels] if isinstance(channels, Mapping) else list(channels)
+    for number, channel in enumerate(channels):
+        _check_sep005(number, channel)
+    names = [str(channel["name"]) for channel in channels]
+    if len(set(names)) < len(names):
+        raise RecordError(f"the names are {', '.join(names)}", "SEP 005 asks for unique names", "rename a channel")
+    begins = {_begin(channel) for channel in channels}
+    clocks = {_clock_of(channel) for channel in channels}
+    if len(begins) > 1 or len(clocks) != 1:
+        raise RecordError(
+            f"the {len(channels)} channels have {len(clocks)} clocks and {len(begins)} start times",
+            "one record has one clock",
+            "convert channels of one clock at a time and join them with synchronise",
+        )
+    time = channels[0].get("time")
+    begin = begins.pop()
+    return _received(
+        {name: np.asarray(channel["data"]) for name, channel in zip(names, channels, strict=True)},
+        None if time is None else _seconds("time", np.asarray(time)),
+        fs=channels[0].get("fs") if time is None else None,
+        units={},
+        stated={str(c["name"]): str(c["unit_str"]) for c in channels if c.get("unit_str")},
+        described=channels[0].get(KEY),
+        step=Step("from_sep005", {"start_timestamp": begin} if begin else {}),
+    )
+
+
+def _check_sep005(number: int, channel: Mapping[str, Any]) -> None:
+    missing = {"name", "data", "unit_str"} - set(channel)
+    if missing or (channel.get("fs") is None and channel.get("time") is None):
+        raise RecordError(
+            f"channel {channel.get('name', number)} lacks {', '.join(sorted(missing)) or 'fs and time'}",
+            "SEP 005 asks for name, data, unit_str, and fs or time",
+            "add the field",
+        )
+
+
+def _clock_of(channel: Mapping[str, Any]) -> tuple[Any, ...]:
+    time = channel.get("time")
+    return channel.get("fs"), None if time is None else np.asarray(time).tobytes(), len(channel["data"])
+
+
+def _begin(channel: Mapping[str, Any]) -> str:
+    """The absolute start in ISO 8601, or nothing."""
+    text, pattern = channel.get("start_timestamp"), channel.get("start_timestamp_format")
+    if not text:
+        return ""
+    try:
+        moment = datetime.strptime(str(text), str(pattern)) if pattern else datetime.fromisoformat(str(text))
+    except ValueError as error:
+        raise RecordError(
+            f"start_timestamp '{text}' of channel {channel['name']} can not be read",
+            "SEP 005 asks for ISO 8601, or a start_timestamp_format",
+            "write it like 2023-06-29T15:00:00",
+        ) from error
+    return moment.isoformat()
+
+
+# ---- what all three share
+
+
+def _described(record: Record) -> str:
+    return json.dumps(record_to_metadata(record))
+
+
+def _received(
+    columns: Mapping[str, NDArray[Any]],
+    axis: Array | None,
+    *,
+    fs: float | None,
+    units: Mapping[str, str],
+    stated: Mapping[str, str],
+    described: Any,
+    step: Step,
+) -> Record:
+    """The record exactly as it left, if it is still what it was; otherwise a new one, through the door.
+
+    `units` are the user's, `stated` those that came with the data; both by column.
+    """
+    if unknown := set(units) - set(columns):
+        raise RecordError(
+            f"units= names {', '.join(sorted(unknown))}", "it names columns", f"choose among {', '.join(columns)}"
+        )
+    arrays = {name: _numbers(name, values) for name, values in columns.items()}
+    metadata = parse_metadata(described) if isinstance(described, str) else {}
+    if metadata and not units and fs in (None, metadata.get("fs")):
+        record = _unchanged(metadata, arrays, axis)
+        if record is not None:
+            return record
+    headers = {name: re.fullmatch(r"(.*?)\s*\[([^\]]*)\]\s*", name) for name in arrays}
+    names = {name: _identifier(match[1] if match else name) for name, match in headers.items()}
+    chosen = {name: match[2] for name, match in headers.items() if match} | dict(stated) | dict(units)
+    if len(set(names.values())) < len(names):
+        raise RecordError(
+            f"columns {', '.join(arrays)} give channels {', '.join(names.values())}",
+            "channels have different names of letters, digits and _",
+            "rename the columns",
+        )
+    lengths = {len(values) for values in arrays.values()} | ({len(axis)} if axis is not None else set())
+    if len(lengths) > 1:
+        raise RecordError(
+            f"columns and time axis have {', '.join(map(str, sorted(lengths)))} values",
+            "one record has one clock",
+            "cut them to the same rows",
+        )
+    clock = _clock(axis, fs)
+    record = Record.of(
+        {names[column]: values for column, values in arrays.items()},
+        fs=clock.fs,
+        units={names[column]: chosen[column] for column in arrays if column in chosen},
+        start=clock.start,
+    )
+    sources = {names[column]: f"{column} [{chosen.get(column, 'SI')}]" for column in arrays}
+    sources |= {names[column]: column for column, match in headers.items() if match}
+    outcome = f"{len(arrays)} channels of {len(record)} samples at {record.fs:g} Hz"
+    if clock.stamps is not None:
+        outcome += "; the time stamps are not uniform and were kept"
+    before = history_of(metadata) if metadata else ()
+    return replace(
+        record,
+        channels={name: replace(channel, source=sources[name]) for name, channel in record.channels.items()},
+        stamps=clock.stamps,
+        history=(*before, Step(step.action, step.arguments, outcome)),
+    )
+
+
+def _unchanged(metadata: Mapping[str, Any], arrays: Mapping[str, Array], axis: Array | None) -> Record | None:
+    """The record that was described, where channels, rows and clock are still its own."""
+    rows = {len(values) for values in arrays.values()}
+    if channel_names(metadata) != list(arrays) or rows != {metadata.get("rows")}:
+        return None
+    if axis is None and metadata.get("stamps"):
+        return None
+    record = metadata_to_record(metadata, {**arrays, **({} if axis is None else {str(metadata.get("time")): axis})})
+    return record if axis is None or np.array_equal(record.time, axis, equal_nan=True) else None
+
+
+def _clock(axis: Array | None, fs: float | None) -> Clock:
+    if fs is not None:
+        if isinstance(fs, bool) or not isinstance(fs, (int, float, np.number)):
+            raise RecordError(f"fs = {fs!r}", "a sampling rate is a number in Hz", "pass fs= in Hz")
+        return Clock(float(fs), 0.0 if axis is None or not len(axis) else float(axis[0]))
+    if axis is None:
+        raise RecordError(
+            "the rows are numbered, not timed", "a record has a sampling rate", "pass fs= in Hz, or give a time axis"
+        )
+    return fit_clock(axis)
+
+
+def _numbers(name: str, values: NDArray[Any]) -> Array:
+    if values.dtype.kind not in "fiubO" or values.ndim != 1:
+        raise RecordError(
+            f"column '{name}' holds {values.dtype} of shape {values.shape}",
+            "a channel is one row of real numbers",
+            "leave it out or convert it",
+        )
+    try:
+        return values.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise RecordError(
+            f"column '{name}' holds values that are not numbers ({error})",
+            "a channel is one row of real numbers",
+            "leave it out or convert it",
+        ) from error
+
+
+def _seconds(name: str, values: NDArray[Any], scale: float = 1.0) -> Array:
+    """A time axis in seconds; dates count from the first."""
+    if values.dtype.kind == "M" and len(values):
+        return np.asarray((values - values[0]) / np.timedelta64(1, "ns"), dtype=np.float64) * 1e-9
+    if values.dtype.kind == "m":
+        return np.asarray(values / np.timedelta64(1, "ns"), dtype=np.float64) * 1e-9
+    return _numbers(name, values) * scale
+
+
+def _identifier(name: str) -> str:
+    """`name` as a channel's name: letters, digits and _."""
+    name = re.sub(r"[^A-Za-z0-9]+", "_", name.strip()).strip("_") or "channel"
+    return f"_{name}" if name[0].isdigit() else name
+
+
+def _given(**arguments: Any) -> dict[str, Any]:
+    """The arguments that were given, for the history."""
+    return {
+        key: dict(value) if isinstance(value, Mapping) else value
+        for key, value in arguments.items()
+        if value is not None
+    }
+
+
+def _xarray() -> Any:
+    try:
+        import xarray
+    except ImportError as error:
+        raise FormatError(
+            "the package xarray is not installed",
+            "to_xarray and from_xarray need it",
+            'install it with: pip install "stickslip[io]"',
+        ) from error
+    return xarray
+
+
+def _not_a(wanted: str, value: object) -> RecordError:
+    return RecordError(f"what was given is of type {type(value).__name__}", f"this reads {wanted}", "convert it first")

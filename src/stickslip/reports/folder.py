@@ -1,0 +1,125 @@
+"""The folder of results: report, numbers and figures, there as a whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from stickslip import __version__
+from stickslip.analysis import Comparison, Findings
+from stickslip.errors import ModelError, RecordError
+from stickslip.plot.figures import Plate
+from stickslip.reports.page import render, sections_of
+
+PROGRAM = "stickslip"
+NUMBERS = "results.json"
+
+
+def publish(results: Findings | Comparison, *, folder: str | Path) -> Path:
+    """Write ``report.html``, ``results.json`` and the figures as SVG and PNG into a folder.
+
+    The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
+    is left alone.
+
+    Parameters
+    ----------
+    results : Findings or Comparison
+        What :func:`analyze` or :func:`compare` returned.
+    folder : path
+        The folder to make.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ModelError
+        The folder holds something that is not ours.
+    RecordError
+        The folder can not be written.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> record = ss.datasets.demo()
+    >>> rig = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
+    >>> folder = publish(ss.analyze(record, **rig), folder=Path(tempfile.mkdtemp()) / "results")
+    >>> sorted(path.name for path in folder.iterdir())
+    ['figures', 'report.html', 'results.json']
+    """
+    folder = Path(folder)
+    check_folder(folder)
+    sections = sections_of(results)
+    with _whole_folder(folder) as draft:
+        (draft / "report.html").write_text(render(sections), encoding="utf-8")
+        (draft / "figures").mkdir()
+        for number, section in enumerate(sections):
+            prefix = f"{number}-{_fit_for_a_file(section.words.title)}-" if len(sections) > 1 else ""
+            _write_figures(draft / "figures", prefix, section.plates)
+        files = sorted(str(path.relative_to(draft).as_posix()) for path in draft.rglob("*") if path.is_file())
+        told = {"program": PROGRAM, "version": __version__, "files": [*files, NUMBERS], **results.to_dict()}
+        text = json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False)
+        (draft / NUMBERS).write_text(text + "\n", encoding="utf-8")
+    return folder
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that holds anything that an earlier run did not write."""
+    if not folder.exists():
+        return
+    strangers = ["it is a file"] if not folder.is_dir() else _strangers(folder)
+    if strangers:
+        raise ModelError(
+            f"{folder} holds something that stickslip did not write ({strangers[0]})",
+            "results go into a new folder, an empty one, or one of earlier results",
+            "name another folder with --output",
+        )
+
+
+def _strangers(folder: Path) -> list[str]:
+    present = {
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir() or path.is_symlink()
+    }
+    try:
+        told = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
+        ours = set(told["files"]) if told["program"] == PROGRAM else set()
+    except (OSError, ValueError, KeyError, TypeError):  # absent or not ours: then every file is a stranger's
+        ours = set()
+    return sorted(present - ours)
+
+
+@contextmanager
+def _whole_folder(folder: Path) -> Iterator[Path]:
+    """A folder to fill that takes the place of `folder` at the end; an error or Ctrl-C removes it."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(
+            dir=folder.parent, prefix=f".{folder.name}-", suffix=".part", ignore_cleanup_errors=True
+        ) as place:
+            draft = Path(place) / "new"
+            draft.mkdir()
+            yield draft
+            if folder.exists():
+                folder.rename(Path(place) / "old")
+            draft.rename(folder)
+    except OSError as error:
+        raise RecordError(
+            f"{folder} can not be written ({error.strerror or error})",
+            "results need a place on a disk that can be written",
+            "name another folder with --output",
+        ) from error
+
+
+def _write_figures(folder: Path, prefix: str, plates: Sequence[Plate]) -> None:
+    for plate in plates:
+        (folder / f"{prefix}{plate.name}.svg").write_text(plate.svg(), encoding="utf-8")
+        (folder / f"{prefix}{plate.name}.png").write_bytes(plate.png())
+
+
+def _fit_for_a_file(title: str) -> str:
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", title).strip("-.")[:60] or "record"

@@ -1,0 +1,119 @@
+"""One self-contained page: what was found, how sure it is, and how it came about."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from stickslip import __version__
+from stickslip.analysis import Comparison, Findings
+from stickslip.estimate import Estimate
+from stickslip.files.write import whole
+from stickslip.plot import style
+from stickslip.plot.figures import Plate, figures
+from stickslip.record.record import Record
+from stickslip.reports.summary import Summary, summary
+
+TEMPLATE = "page.html.jinja"
+_COLOURS = {
+    style.INK: "currentColor", style.FAINT: "var(--faint)", style.SHADE: "var(--shade)", style.BLUE: "var(--blue)",
+    style.ORANGE: "var(--orange)", style.GREEN: "var(--green)", style.PURPLE: "var(--purple)", style.SKY: "var(--sky)",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Section:
+    """What the page says of one record, or of all of them: words and figures."""
+
+    words: Summary
+    plates: Sequence[Plate] = ()
+
+
+def report(
+    results: Findings | Comparison | Estimate | Sequence[Estimate],
+    record: Record | None,
+    path: str | Path,
+) -> Path:
+    """Write one HTML page that holds everything and asks nothing of a network.
+
+    Parameters
+    ----------
+    results : Findings, Comparison, Estimate or sequence of Estimate
+        What was found.
+    record : Record or None
+        Where plain estimates were found: its faults, channels and history are told. Findings bring their own.
+    path : path
+        The page to write; it appears whole or not at all.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FormatError
+        The page can not be written there.
+    EstimateError
+        `results` is empty or holds something else than estimates.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> friction = Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="median of 18 half cycles")
+    >>> page = report([friction], None, Path(tempfile.mkdtemp()) / "report.html")
+    >>> "1.318" in page.read_text(encoding="utf-8")
+    True
+    """
+    text = render(sections_of(results, record))
+    with whole(Path(path)) as draft:
+        draft.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+def sections_of(
+    results: Findings | Comparison | Estimate | Sequence[Estimate], record: Record | None = None
+) -> list[Section]:
+    """The sections of the page, with their figures drawn."""
+    if isinstance(results, Comparison):
+        parts: list[Findings | Comparison] = [results, *results.findings]
+        return [Section(summary(part), figures(part)) for part in parts]
+    if isinstance(results, Findings):
+        return [Section(summary(results), figures(results))]
+    return [Section(summary(results, record=record))]
+
+
+def render(sections: Sequence[Section]) -> str:
+    """The page as text."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("stickslip.reports"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters.update(inline_svg=inline_svg, told=told, spelled=style.spelled)
+    return environment.get_template(TEMPLATE).render(sections=sections, version=__version__)
+
+
+def inline_svg(plate: Plate) -> str:
+    """The figure as an SVG element that takes the page's width, colours and type."""
+    svg = plate.svg()
+    svg = svg[svg.index("<svg") :]
+    opening, rest = svg.split(">", 1)
+    opening = re.sub(r' (width|height)="[^"]*"', "", opening).replace("<svg", '<svg role="img" aria-hidden="true"')
+    rest = re.sub(r"<metadata>.*?</metadata>", "", rest, flags=re.DOTALL)
+    rest = re.sub(r'<g id="[^"]*">', "<g>", rest)
+    for colour, variable in _COLOURS.items():
+        rest = rest.replace(colour, variable)
+    return f"{opening}>{rest}"
+
+
+def told(value: Any) -> str:
+    """An argument of a step, with its parts spelled out."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {told(item)}" for key, item in value.items())
+    if isinstance(value, (list, tuple)):
+        return "; ".join(told(item) for item in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,171 @@
+"""What is told of a result, on the page and on the terminal alike: sentences first, then the table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from stickslip.analysis import Comparison, Findings, record_name
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
+from stickslip.record.channels import Channel
+from stickslip.record.record import Record, Step
+from stickslip.reports.words import cautions, headline, interval_of, number, value_of
+
+_CONSTANT_UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of the table of results, as text.
+
+    Attributes
+    ----------
+    name, value, interval : str
+        The quantity, its value and its 95 % interval.
+    true : str or None
+        The true value, where the record is simulated and knows it.
+    method, status : str
+        How it was found; "ok", or why not to trust it.
+    checks : tuple of str
+        What was checked.
+    """
+
+    name: str
+    value: str
+    interval: str
+    true: str | None
+    method: str
+    status: str
+    checks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A result in words.
+
+    Attributes
+    ----------
+    title : str
+        The record's name.
+    headline, cautions : sequence of str
+        What was found; what should keep the reader from trusting it.
+    lines : sequence of Line
+        The table.
+    faults : sequence of str or None
+        What the check-up found; None where there was none.
+    notes : sequence of str
+        What was assumed, and what could not be asked.
+    settings : mapping of str to str
+        Constants and choices.
+    channels : sequence of Channel
+        The record's channels.
+    history : sequence of Step
+        What was done to the record.
+    """
+
+    title: str
+    headline: Sequence[str] = ()
+    cautions: Sequence[str] = ()
+    lines: Sequence[Line] = ()
+    faults: Sequence[str] | None = None
+    notes: Sequence[str] = ()
+    settings: Mapping[str, str] | None = None
+    channels: Sequence[Channel] = ()
+    history: Sequence[Step] = ()
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether a true value is known for any row."""
+        return any(line.true is not None for line in self.lines)
+
+    @property
+    def has_checks(self) -> bool:
+        """Whether anything was checked for any row."""
+        return any(line.checks for line in self.lines)
+
+
+def summary(results: Findings | Comparison | Estimate | Sequence[Estimate], *, record: Record | None = None) -> Summary:
+    """What is told of a result: sentences for a person, the table, cautions, settings, history.
+
+    Parameters
+    ----------
+    results : Findings, Comparison, Estimate or sequence of Estimate
+        What was found.
+    record : Record, optional
+        Where plain estimates were found; Findings bring their own.
+
+    Returns
+    -------
+    Summary
+
+    Raises
+    ------
+    EstimateError
+        `results` is empty or holds something else than estimates.
+
+    Examples
+    --------
+    >>> friction = Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="median of 18 half cycles")
+    >>> summary([friction]).lines[0].interval
+    '1.310 to 1.326 N'
+    """
+    if isinstance(results, Comparison):
+        return _of_comparison(results)
+    if isinstance(results, Findings):
+        return _of_findings(results)
+    return _of_estimates([results] if isinstance(results, Estimate) else list(results), record)
+
+
+def _of_findings(findings: Findings) -> Summary:
+    record = findings.record
+    return Summary(
+        findings.name, headline(findings), cautions(findings),
+        lines=[_line(estimate, findings.true_value(estimate)) for estimate in findings.estimates],
+        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
+        channels=list(record.channels.values()), history=record.history,
+    )  # fmt: skip
+
+
+def _of_comparison(comparison: Comparison) -> Summary:
+    lines = [_line(estimate) for estimate in comparison.estimates]
+    for findings in comparison.findings:
+        if findings.level is not None:
+            true = findings.true_value(findings.level)
+            lines.append(_line(findings.level, true, name=f"{findings.level.name}, {findings.name}"))
+    title = f"{len(comparison.findings)} records compared"
+    return Summary(title, headline(comparison), lines=lines, notes=comparison.notes)
+
+
+def _of_estimates(estimates: list[Estimate], record: Record | None) -> Summary:
+    strangers = [type(item).__name__ for item in estimates if not isinstance(item, Estimate)]
+    if strangers or not estimates:
+        raise EstimateError(
+            f"a report of {', '.join(strangers) or 'nothing'}",
+            "a report is made of Findings, a Comparison, or Estimates",
+            "pass analyze(record), compare(findings) or a list of estimates",
+        )
+    lines = [_line(estimate) for estimate in estimates]
+    if record is None:
+        return Summary("Estimates", lines=lines)
+    faults = [str(fault) for fault in record.check()]
+    channels = list(record.channels.values())
+    return Summary(record_name(record), lines=lines, faults=faults, channels=channels, history=record.history)
+
+
+def _line(estimate: Estimate, true: float | None = None, *, name: str | None = None) -> Line:
+    return Line(
+        name or estimate.name, value_of(estimate), interval_of(estimate),
+        None if true is None else value_of(estimate, true), estimate.method, estimate.status, estimate.checks,
+    )  # fmt: skip
+
+
+def _settings(findings: Findings) -> dict[str, str]:
+    told = {
+        key: number(value, 0.0, _CONSTANT_UNITS[key]) if key in _CONSTANT_UNITS else str(value)
+        for key, value in findings.settings.items()
+    }
+    if findings.normal is not None:
+        told["normal load"] = number(findings.normal, 0.0, "N")
+    record = findings.record
+    return {**told, "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}

@@ -1,0 +1,162 @@
+"""Findings in sentences that a person understands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from stickslip.analysis import Comparison, Findings
+from stickslip.estimate import NORMAL_95, Estimate, decimals
+from stickslip.plot.style import prefixed
+
+RARELY = 0.005  # of the time
+SAME = 0.05  # forward and back differ noticeably beyond this part of the level
+FIGURES = 6  # significant figures at most: what is surer than that still reads well
+TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
+
+
+def number(value: float, sd: float, unit: str) -> str:
+    """A value with the digits that its uncertainty leaves, in a readable unit.
+
+    Examples
+    --------
+    >>> number(0.012345, 0.0002, "m")
+    '12.3 mm'
+    """
+    if not math.isfinite(value):
+        return "unknown"
+    factor, text = prefixed(value, unit)
+    digits = _digits(factor * sd, factor * value)
+    return f"{factor * value:.{digits}f}{'' if text == '1' else ' ' + text}"
+
+
+def value_of(estimate: Estimate, value: float | None = None) -> str:
+    """The estimate's value; or another one (the true one) with the same unit and digits."""
+    value = estimate.value if value is None else value
+    if not math.isfinite(value):
+        return "unknown"
+    factor, text, digits = _scale(estimate)
+    return f"{factor * value:.{digits}f}{text}"
+
+
+def interval_of(estimate: Estimate) -> str:
+    """The estimate's 95 % interval, in the unit of its value."""
+    low, high = estimate.interval
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return "unknown"
+    factor, text, digits = _scale(estimate)
+    return f"{factor * low:.{digits}f} to {factor * high:.{digits}f}{text}"
+
+
+def headline(result: Findings | Comparison) -> list[str]:
+    """What was found, in a few sentences."""
+    return list(_of_comparison(result) if isinstance(result, Comparison) else _of_findings(result))
+
+
+def cautions(findings: Findings) -> list[str]:
+    """What should keep the reader from trusting a number."""
+    doubts: dict[str, list[str]] = {}
+    for estimate in findings.estimates:
+        if estimate.status != "ok":
+            doubts.setdefault(estimate.status, []).append(estimate.name)
+    flagged = [_sentence(f"{', '.join(names)}: {status}.") for status, names in doubts.items()]
+    if findings.faults:
+        many = len(findings.faults)
+        flagged.append(f"The check-up found {many} fault{'s' * (many > 1)} in the record, listed below.")
+    return flagged
+
+
+def _of_findings(findings: Findings) -> Iterator[str]:
+    if findings.loops is not None:
+        yield from _of_loops(findings)
+    found = findings.regression
+    if found is not None and found.viscous is not None and found.coulomb is not None:
+        share = f"; {100 * found.residual:.1f} % of it is left unexplained" if math.isfinite(found.residual) else ""
+        yield (
+            f"An inertia of {value_of(found.inertia)}, viscous friction of {value_of(found.viscous)} and dry friction "
+            f"of {value_of(found.coulomb)} explain the measured force{share}."
+        )
+    if findings.sticks is not None:
+        yield from _of_sticks(findings)
+
+
+def _of_loops(findings: Findings) -> Iterator[str]:
+    loops = findings.loops
+    assert loops is not None
+    yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
+    if findings.coefficient is not None and findings.normal is not None:
+        yield (
+            f"Under a normal load of {number(findings.normal, 0.0, 'N')} that is a friction coefficient of "
+            f"{value_of(findings.coefficient)}."
+        )
+    forward, back = abs(loops.forward.value), abs(loops.back.value)
+    if (
+        abs(forward - back) > SAME * loops.level.value
+        and abs(forward - back) > 2 * loops.forward.sd + 2 * loops.back.sd
+    ):
+        yield (
+            f"The two directions differ: {value_of(loops.forward)} forward and {value_of(loops.back)} back; a zero "
+            "offset of a sensor or a sloping rig looks the same."
+        )
+    low, high = loops.slope.interval
+    if loops.slope.status != "ok":
+        return
+    if low > 0 or high < 0:
+        yield f"Friction {'rises' if low > 0 else 'falls'} with speed, by {value_of(loops.slope)}."
+    elif math.isfinite(low + high):
+        yield "No change of friction with speed can be told from zero."
+
+
+def _of_sticks(findings: Findings) -> Iterator[str]:
+    sticks = findings.sticks
+    assert sticks is not None
+    if not any(event.kind == "stick" for event in sticks.events):
+        yield "The contact never sticks."
+        return
+    if sticks.share.value < RARELY:
+        yield "The contact hardly ever sticks."
+        return
+    beat = f" of {value_of(findings.loops.frequency)}" if findings.loops is not None else ""
+    often = sticks.per_cycle.value
+    stops = f", with {often:.2g} stops in each cycle{beat}" if math.isfinite(often) and often > 0 else ""
+    yield f"It sticks {value_of(sticks.share)} of the time{stops}."
+
+
+def _of_comparison(comparison: Comparison) -> Iterator[str]:
+    levels = [findings.level for findings in comparison.findings if findings.level is not None]
+    if levels:
+        least, most = min(levels, key=lambda e: e.value), max(levels, key=lambda e: e.value)
+        yield (
+            f"Over {len(comparison.findings)} records the sliding friction runs from {value_of(least)} to "
+            f"{value_of(most)}."
+        )
+    if comparison.coefficient is not None:
+        mu = comparison.coefficient
+        yield f"Against the normal load the friction coefficient is {value_of(mu)} (95 % sure: {interval_of(mu)})."
+        if mu.interval[1] - mu.interval[0] > TOO_WIDE * abs(mu.value):
+            yield "The interval is wide because few records fix it; more loads would narrow it."
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+def _sd(estimate: Estimate) -> float:
+    """The standard deviation, or what a wide interval that is not symmetric amounts to."""
+    low, high = estimate.interval
+    return max(estimate.sd, (high - low) / (2 * NORMAL_95)) if math.isfinite(high - low) else estimate.sd
+
+
+def _digits(sd: float, value: float) -> int:
+    most = FIGURES - 1 - math.floor(math.log10(abs(value))) if value else FIGURES
+    return max(0, min(decimals(sd, value), most))
+
+
+def _scale(estimate: Estimate) -> tuple[float, str, int]:
+    """Factor, unit and decimals in which an estimate reads well."""
+    share = "share" in estimate.name and estimate.unit == "1"
+    factor, text = (100.0, "%") if share else prefixed(np.array([estimate.value, *estimate.interval]), estimate.unit)
+    digits = _digits(factor * _sd(estimate), factor * estimate.value)
+    return factor, "" if text == "1" else f" {text}", digits

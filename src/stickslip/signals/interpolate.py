@@ -1,0 +1,140 @@
+"""Values between samples, and in place of lost ones: band-limited where samples exist, autoregressive where not."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import RecordError
+
+Array = NDArray[np.float64]
+
+LOBES = 32  # zero crossings of the sinc kept on each side
+KAISER = 9.0  # window parameter: stop band below -90 dB
+ORDER = 32  # of the autoregression that bridges lost samples
+
+
+def band_limited(values: Array, times: Array, *, cutoff: float = 1.0) -> Array:
+    """The band-limited signal through uniform samples, at other times.
+
+    ``y(t) = sum_k x_k c sinc(c (t - k)) w((t - k) c / 32)`` with Kaiser's window w and cut-off c, normalised to unit
+    gain at zero frequency (Smith and Gossett 1984, "A flexible sampling-rate conversion method", ICASSP). Beyond its
+    ends the record is continued by odd reflection.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Uniform samples.
+    times : ndarray, shape (m,)
+        Where the signal is wanted, in samples from the first; within 0 and n - 1.
+    cutoff : float
+        Upper end of the band relative to the samples' Nyquist frequency, at most 1.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+
+    Examples
+    --------
+    >>> wave = np.sin(0.3 * np.arange(200))
+    >>> float(np.abs(band_limited(wave, np.array([100.5])) - np.sin(0.3 * 100.5))[0]) < 1e-4
+    True
+    """
+    reach = int(np.ceil(LOBES / cutoff))
+    n = len(values)
+    if n <= reach:
+        raise RecordError(
+            f"a channel of {n} samples", f"interpolation at this rate needs {reach + 1}", "give a longer record"
+        )
+    padded = np.concatenate([2 * values[0] - values[reach:0:-1], values, 2 * values[-1] - values[-2 : -reach - 2 : -1]])
+    result = np.empty(len(times))
+    taps = np.arange(-reach + 1, reach + 1)
+    for first in range(0, len(times), 16_384):
+        block = times[first : first + 16_384]
+        base = np.minimum(np.floor(block).astype(int), n - 1)
+        distance = (block - base)[:, None] - taps
+        inside = np.clip(1 - (distance * cutoff / LOBES) ** 2, 0, None)
+        weights = np.sinc(cutoff * distance) * np.i0(KAISER * np.sqrt(inside)) * (inside > 0)
+        samples = padded[np.minimum(base[:, None] + taps + reach, len(padded) - 1)]
+        result[first : first + 16_384] = np.sum(weights * samples, axis=1) / np.sum(weights, axis=1)
+    return result
+
+
+def bridge(values: Array, lost: NDArray[np.bool_]) -> Array:
+    """Put values in place of lost samples, so that an autoregression of the rest is kept as well as possible.
+
+    Minimises ``sum_i (x_i - sum_j a_j x_{i-j})^2`` over the lost samples, in both directions of time (Janssen,
+    Veldhuis and Vries, IEEE Trans. ASSP 34, 1986, eq. 8; the coefficients a come from the complete stretches).
+    A record too short, or too broken, for that is bridged by straight lines.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Samples; what they hold where `lost` is ignored.
+    lost : ndarray of bool, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    rows = np.arange(len(values))
+    result = np.array(values, dtype=float)
+    if not lost.any():
+        return result
+    result[lost] = np.interp(rows[lost], rows[~lost], values[~lost])
+    # outside the first and last known sample nothing can be bridged: the last known value is held there
+    inner = lost & (rows > rows[~lost][0]) & (rows < rows[~lost][-1])
+    for first, last in _neighbourhoods(inner):
+        part = slice(first, last)
+        result[part] = _bridged(result[part], inner[part])
+    return result
+
+
+def _neighbourhoods(lost: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Stretches around lost samples, wide enough to learn from, merged where they meet."""
+    rows = np.flatnonzero(lost)
+    margin = 40 * ORDER
+    merged: list[tuple[int, int]] = []
+    for row in rows:
+        first, last = max(0, int(row) - margin), min(len(lost), int(row) + margin + 1)
+        if merged and first <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], last)
+        else:
+            merged.append((first, last))
+    return merged
+
+
+def _bridged(values: Array, lost: NDArray[np.bool_]) -> Array:
+    from scipy.sparse import diags
+    from scipy.sparse.linalg import spsolve
+
+    mean = float(np.mean(values[~lost]))
+    signal = values - mean
+    order = min(ORDER, int(np.sum(~lost)) // 6)
+    coefficients = _autoregression(signal, lost, order) if order >= 2 else None
+    if coefficients is None:
+        return values
+    n = len(signal)
+    backward = np.concatenate([[1.0], -coefficients])
+    predictors = [diags(list(f), list(range(order + 1)), shape=(n - order, n)) for f in (backward, backward[::-1])]
+    normal = (predictors[0].T @ predictors[0] + predictors[1].T @ predictors[1]).tocsc()
+    unknown, known = np.flatnonzero(lost), np.flatnonzero(~lost)
+    rows = normal[unknown]
+    result = values.copy()
+    result[unknown] = np.atleast_1d(spsolve(rows[:, unknown].tocsc(), -(rows[:, known] @ signal[known]))) + mean
+    return result
+
+
+def _autoregression(signal: Array, lost: NDArray[np.bool_], order: int) -> Array | None:
+    """Coefficients of the forward-backward least-squares autoregression over complete stretches; None if too few."""
+    windows = np.lib.stride_tricks.sliding_window_view(signal, order + 1)
+    complete = ~np.lib.stride_tricks.sliding_window_view(lost, order + 1).any(axis=1)
+    rows = windows[complete][:: max(1, int(complete.sum()) // 20_000)]
+    if len(rows) < 2 * order:
+        return None
+    past = np.concatenate([rows[:, -2::-1], rows[:, 1:]])
+    present = np.concatenate([rows[:, -1], rows[:, 0]])
+    gram = past.T @ past
+    gram[np.diag_indices(order)] += 1e-10 * np.trace(gram) / order + 1e-300
+    solution: Array = np.linalg.solve(gram, past.T @ present)
+    return solution

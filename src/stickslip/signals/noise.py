@@ -1,0 +1,191 @@
+"""How noisy a channel is: the standard deviation of its broadband noise, and the step of its digitiser."""
+
+from __future__ import annotations
+
+import math
+from math import comb
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.errors import EstimateError
+
+Array = NDArray[np.float64]
+
+ORDERS = (2, 3, 4, 6, 8, 10)  # of differencing, tried in turn
+BLOCK = 12  # differences per block: short against the time between two friction events
+SPAN = 5  # blocks over which a varying level is averaged
+LEVELLED = 0.9  # the next order's answer over this one's when the motion no longer shows
+
+
+def noise_level(values: ArrayLike, fs: float) -> float:
+    """How large is the broadband noise of a channel?
+
+    The differences of order k of white noise of standard deviation s have the variance ``s^2 C(2k, k)``, while a
+    motion of w radians per sample is left with ``(2 sin(w/2))^k`` of its amplitude: differencing removes trends and
+    oscillation and keeps the noise. The variance is taken in blocks of 12 differences, and their median counts, so that
+    impacts, slip onsets and other events that fill less than half of the blocks do not. The order is the lowest after
+    which the answer no longer falls. An ideal digitiser of step q adds an error of ``q / sqrt(12)``, which
+    differences miss where the signal rests on one level; the answer is never below it.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        Samples, finite, n >= 24.
+    fs : float
+        Sampling rate [Hz]. White noise up to fs/2 is assumed; noise that was filtered before sampling is rated by what
+        is left of it near fs/2.
+
+    Returns
+    -------
+    float
+        Standard deviation, in the unit of `values`.
+
+    Raises
+    ------
+    EstimateError
+        Fewer than 24 samples, a value that is not finite, or a rate that is not positive.
+
+    Examples
+    --------
+    >>> t = np.arange(5000) / 1000
+    >>> noisy = np.sin(2 * np.pi * t) + 0.01 * np.random.default_rng(1).standard_normal(t.size)
+    >>> bool(0.0095 < noise_level(noisy, 1000) < 0.0105)
+    True
+    """
+    samples = checked_samples(values, fs, least=2 * BLOCK)
+    return max(_levelled(samples)[0], quantisation_step(samples) / math.sqrt(12))
+
+
+def local_noise(values: ArrayLike, fs: float) -> Array:
+    """How large is the broadband noise of a channel, at each sample?
+
+    Many sensors are noisier in motion than at rest (an encoder's interpolation, a jittering clock). The mean squares of
+    blocks as in :func:`noise_level` are followed by a running median of three and a running mean of five blocks. Where
+    they spread no more than a constant level of white noise would let them, that level is returned throughout.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        Samples, finite, n >= 24.
+    fs : float
+        Sampling rate [Hz].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Standard deviation at each sample, in the unit of `values`.
+
+    Raises
+    ------
+    EstimateError
+        As for :func:`noise_level`.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).standard_normal(6000)
+    >>> noise[3000:] *= 5
+    >>> level = local_noise(noise, 1000)
+    >>> bool(0.8 < level[1500] < 1.2 and 4 < level[4500] < 6)
+    True
+    """
+    samples = checked_samples(values, fs, least=2 * BLOCK)
+    floor = quantisation_step(samples) / math.sqrt(12)
+    level, order = _levelled(samples)
+    squares = _block_squares(samples, order)
+    if len(squares) < 2 * SPAN:
+        return np.full(samples.size, max(level, floor))
+    correction = _median_over_mean(order)
+    padded = np.pad(squares, 1, mode="edge")
+    running = np.median(np.lib.stride_tricks.sliding_window_view(padded, 3), axis=1) / correction
+    padded = np.pad(running, SPAN // 2, mode="edge")
+    running = np.convolve(padded, np.full(SPAN, 1 / SPAN), mode="valid")
+    spread = np.std(running) / np.mean(running) if running.any() else 0.0
+    if spread < 2 * np.sqrt(2 / (SPAN * _freedom(order))):  # twice what chance explains
+        return np.full(samples.size, max(level, floor))
+    centres = (np.arange(len(running)) + 0.5) * BLOCK + order / 2
+    return np.asarray(np.maximum(np.sqrt(np.interp(np.arange(samples.size), centres, running)), floor))
+
+
+def quantisation_step(values: ArrayLike) -> float:
+    """The step between the levels that the values lie on, or 0 where they lie on none.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        Samples, finite. At most 20000 of them, from all over the record, are looked at.
+
+    Returns
+    -------
+    float
+        Step of a digitiser, encoder or of rounded text, in the unit of `values`.
+
+    Examples
+    --------
+    >>> t = np.arange(5000) / 1000
+    >>> round(quantisation_step(np.round(np.sin(t) / 0.002) * 0.002), 6), quantisation_step(np.sin(t))
+    (0.002, 0.0)
+    """
+    samples = np.asarray(values, dtype=float)
+    levels = np.unique(samples[:: max(1, samples.size // 20000)])
+    gaps = np.diff(levels)
+    gaps = np.sort(gaps[gaps > 1e-9 * max(np.ptp(levels), np.abs(levels).max())]) if levels.size > 1 else gaps
+    if gaps.size < 8:
+        return 0.0
+    step = float(np.median(gaps[gaps < 1.5 * gaps[0]]))
+    counts = np.round(gaps / step)
+    step = float(gaps.sum() / counts.sum())
+    return step if np.all(np.abs(gaps / step - np.round(gaps / step)) < 0.05) else 0.0
+
+
+def checked_samples(values: ArrayLike, fs: float, *, least: int) -> Array:
+    """`values` as float64, if there are at least `least` of them, all finite, on a rate that is positive."""
+    samples = np.asarray(values, dtype=float)
+    if samples.ndim != 1 or samples.size < least:
+        raise EstimateError(
+            f"samples of shape {samples.shape}", f"one row of at least {least} is needed", "give a longer record"
+        )
+    if not np.isfinite(fs) or fs <= 0:
+        raise EstimateError(f"fs = {fs} Hz", "a sampling rate is positive and finite", "pass fs in Hz")
+    if not np.isfinite(samples).all():
+        row = int(np.flatnonzero(~np.isfinite(samples))[0])
+        raise EstimateError(
+            f"the value at row {row} is not a number",
+            "numbers are needed throughout",
+            "fill it with fill_missing(record)",
+        )
+    return samples
+
+
+def _levelled(samples: Array) -> tuple[float, int]:
+    """The noise by differences of the lowest order after which it no longer falls, and that order."""
+    orders = [order for order in ORDERS if samples.size - order >= BLOCK]
+    level, used = _level(samples, orders[0]), orders[0]
+    for order in orders[1:]:
+        lower = _level(samples, order)
+        if lower > LEVELLED * level:
+            break
+        level, used = lower, order
+    return level, used
+
+
+def _level(samples: Array, order: int) -> float:
+    return float(np.sqrt(np.median(_block_squares(samples, order)) / _median_over_mean(order)))
+
+
+def _block_squares(samples: Array, order: int) -> Array:
+    """Mean square of each block of differences of one order, as the variance of the white noise behind it."""
+    differences = np.diff(samples, order)
+    blocks = differences[: differences.size // BLOCK * BLOCK].reshape(-1, BLOCK)
+    return np.asarray(np.einsum("ij,ij->i", blocks, blocks) / (BLOCK * comb(2 * order, order)))
+
+
+def _freedom(order: int) -> float:
+    """Degrees of freedom of a block's mean square: its differences are correlated."""
+    lags = np.arange(-min(order, BLOCK - 1), min(order, BLOCK - 1) + 1)
+    correlation = np.array([comb(2 * order, order + int(lag)) for lag in np.abs(lags)]) / comb(2 * order, order)
+    return float(BLOCK**2 / np.sum((BLOCK - np.abs(lags)) * correlation**2))
+
+
+def _median_over_mean(order: int) -> float:
+    return float((1 - 2 / (9 * _freedom(order))) ** 3)  # of chi-square (Wilson and Hilferty 1931)

@@ -1,0 +1,235 @@
+"""How sure a mean or a regression coefficient is when neighbouring samples are alike.
+
+One idea serves every question: an estimate is the mean of a series (of cycles, or of each sample's influence on it),
+and the variance of a mean is the spectrum of the series at frequency zero. That is read from the lowest cosines.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
+
+Array = NDArray[np.float64]
+
+FEW_CYCLES = 4  # below this an interval rests on three scatters or less
+FEW_INDEPENDENT = 8.0  # independent samples per coefficient, below which an interval is not to be trusted
+INSEPARABLE = 1e3  # condition number of columns of unit length; a force balance that can be read has less than 30
+
+
+@dataclass(frozen=True, eq=False)
+class LeastSquares:
+    """Coefficients of a linear regression, with uncertainties that hold when residuals are correlated.
+
+    Attributes
+    ----------
+    coefficients, sd : ndarray, shape (p,)
+        Estimates and their standard deviations.
+    freedom : ndarray, shape (p,)
+        Degrees of freedom of each standard deviation, for Student's quantile.
+    residual : ndarray, shape (n,)
+        Data minus model.
+    condition : float
+        Condition number of the design after scaling its columns to unit length.
+    independent : float
+        Number of independent samples that the residual is worth.
+    """
+
+    coefficients: Array
+    sd: Array
+    freedom: Array
+    residual: Array
+    condition: float
+    independent: float
+
+    def estimate(self, index: int, name: str, unit: str, method: str, **more: Any) -> Estimate:
+        """Coefficient number `index` as an Estimate."""
+        return Estimate.normal(
+            name, self.coefficients[index], sd=self.sd[index], unit=unit, method=method,
+            quantile=student(float(self.freedom[index])), **more,
+        )  # fmt: skip
+
+
+def student(freedom: float) -> float:
+    """Two-sided 95 % quantile of Student's t with `freedom` degrees of freedom."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.975))
+
+
+def correlation_time(series: ArrayLike) -> float:
+    """How many neighbouring samples tell the same story?
+
+    ``tau = 1 + 2 sum_k rho_k``, summed up to the first autocorrelation that is not positive; n samples are then worth
+    n / tau independent ones.
+
+    Parameters
+    ----------
+    series : array_like, shape (n,)
+        Samples on a uniform clock.
+
+    Returns
+    -------
+    float
+        In samples; 1 for white noise, ``(1 + rho) / (1 - rho)`` for a first-order autoregression.
+
+    Examples
+    --------
+    >>> correlation_time([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    1.0
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    values = np.asarray(series, dtype=float)
+    values = values - values.mean()
+    power = float(values @ values)
+    if power == 0:
+        return 1.0
+    size = next_fast_len(2 * len(values), real=True)
+    correlation = irfft(np.abs(rfft(values, size)) ** 2, size)[1 : len(values)] / power
+    negative = np.flatnonzero(correlation <= 0)
+    return float(1 + 2 * correlation[: negative[0] if len(negative) else None].sum())
+
+
+def mean_uncertainty(series: ArrayLike) -> tuple[float, float]:
+    """How sure is the mean of a series whose neighbours are correlated?
+
+    The long-run variance by equally weighted cosines (Mueller 2007; Lazarus, Lewis, Stock and Watson 2018): with
+    ``L_j = sqrt(2/n) sum_t x_t cos(pi j (t - 1/2) / n)``, ``var(mean) = sum_j L_j^2 / (n q)``, j = 1..q, and
+    ``(mean - truth) / sd`` is Student's t with q degrees of freedom. The number of cosines is chosen from the series
+    itself, ``q = (n / tau)^(2/3)`` with its correlation time tau, so that the spectrum is flat over them at any
+    sampling rate. With all n - 1 cosines this is the textbook ``s / sqrt(n)``.
+
+    Parameters
+    ----------
+    series : array_like, shape (n,)
+        Samples or values per cycle, in order.
+
+    Returns
+    -------
+    sd : float
+        Standard deviation of the mean; infinite for one value.
+    freedom : float
+        Degrees of freedom of that standard deviation.
+
+    Examples
+    --------
+    >>> sd, freedom = mean_uncertainty(np.random.default_rng(0).standard_normal(10000))
+    >>> bool(0.008 < sd < 0.012), freedom > 100
+    (True, True)
+    """
+    from scipy.fft import dct
+
+    values = np.asarray(series, dtype=float)
+    count = len(values)
+    if count < 2:
+        return math.inf, 1.0
+    cosines = round(min(count - 1.0, max(2.0, (count / correlation_time(values)) ** (2 / 3))))
+    lowest = dct(values - values.mean(), type=2)[1 : cosines + 1] / math.sqrt(2 * count)
+    return math.sqrt(float(lowest @ lowest) / (cosines * count)), float(cosines)
+
+
+def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, checks: tuple[str, ...] = ()) -> Estimate:
+    """Mean over cycles, its interval from the scatter between them.
+
+    Parameters
+    ----------
+    name, unit, method : str
+        As in :class:`Estimate`.
+    values : array_like, shape (n,)
+        One value per cycle, in order; cycles without a value are NaN and left out.
+    checks : tuple of str
+        What else was checked.
+
+    Returns
+    -------
+    Estimate
+        With the status in words where fewer than four cycles carry it; one cycle has an infinite interval.
+
+    Raises
+    ------
+    EstimateError
+        No cycle has a value.
+
+    Examples
+    --------
+    >>> print(mean_of_cycles("level", [1.0, 1.1, 0.9, 1.0, 1.05], unit="N", method="mean of cycles").status)
+    ok
+    """
+    present = np.asarray(values, dtype=float)
+    present = present[np.isfinite(present)]
+    count = len(present)
+    if count == 0:
+        raise EstimateError(
+            f"no cycle gives a {name}", "one cycle at least must slide both ways", "give a longer record"
+        )
+    sd, freedom = mean_uncertainty(present)
+    scatter = present.std(ddof=1) if count > 1 else math.nan
+    status = "ok" if count >= FEW_CYCLES else f"only {count} cycle{'s' if count > 1 else ''}: the interval is crude"
+    return Estimate.normal(
+        name, present.mean(), sd=sd, unit=unit, method=method, quantile=student(freedom), status=status,
+        checks=(f"{count} cycles, scatter between them {scatter:.3g}{'' if unit == '1' else ' ' + unit}", *checks),
+    )  # fmt: skip
+
+
+def least_squares(design: ArrayLike, data: ArrayLike) -> LeastSquares:
+    """Linear least squares whose uncertainties hold for correlated, uneven residuals.
+
+    ``b = (X'X)^-1 X'y``. Each sample's influence on b is ``psi_t = n (X'X)^-1 x_t u_t`` with residual u; b varies as
+    the mean of psi does, so :func:`mean_uncertainty` of psi is its standard deviation. It is scaled by
+    ``sqrt(m / (m - p))``, m the number of independent samples, for the p coefficients fitted.
+
+    Parameters
+    ----------
+    design : array_like, shape (n, p)
+        One column per coefficient.
+    data : array_like, shape (n,)
+        What the columns explain, in order of time.
+
+    Returns
+    -------
+    LeastSquares
+
+    Raises
+    ------
+    EstimateError
+        Columns that can not be told apart.
+
+    Examples
+    --------
+    >>> line = least_squares(np.column_stack([np.arange(50.0), np.ones(50)]), 2 * np.arange(50.0) + 1)
+    >>> line.coefficients.round(6).tolist()
+    [2.0, 1.0]
+    """
+    columns, values = np.asarray(design, dtype=float), np.asarray(data, dtype=float)
+    count, terms = columns.shape
+    lengths = np.linalg.norm(columns, axis=0)
+    if count <= terms or not np.all(lengths > 0):
+        raise EstimateError(
+            f"{count} samples and a column of zeros" if count > terms else f"{count} samples for {terms} coefficients",
+            "every coefficient needs motion that shows it",
+            "give a record with more motion",
+        )
+    unit = columns / lengths
+    inner = unit.T @ unit
+    condition = math.sqrt(float(np.linalg.cond(inner)))
+    if condition > INSEPARABLE:
+        raise EstimateError(
+            f"the regression's condition number is {condition:.3g}",
+            "the columns must be told apart",
+            "leave a term out, or give a record whose speed and acceleration vary more",
+        )
+    bread = np.linalg.inv(inner)
+    scaled = bread @ (unit.T @ values)
+    residual = values - unit @ scaled
+    independent = count / correlation_time(residual)
+    shrinkage = math.sqrt(independent / max(1.0, independent - terms))
+    found = [mean_uncertainty(count * (unit @ row) * residual) for row in bread]
+    sd = np.array([each for each, _ in found]) * shrinkage / lengths
+    return LeastSquares(scaled / lengths, sd, np.array([q for _, q in found]), residual, condition, independent)

@@ -1,0 +1,174 @@
+"""Which questions are asked of a record, and how records compare."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.analysis import Comparison, Findings, analyze, compare, mend
+from stickslip.config import RigSettings
+from stickslip.errors import EstimateError, ModelError
+
+FS = 500.0
+TIME = np.arange(5000) / FS
+
+
+def sliding(friction: float = 1.5, *, seed: int = 0, **extra: float) -> ss.Record:
+    """Ten cycles of sliding at 1 Hz against a constant friction, measured with noise."""
+    rng = np.random.default_rng(seed)
+    force = friction * np.sign(np.cos(2 * np.pi * TIME)) + rng.normal(0, 0.02, TIME.size)
+    constant = {name: np.full(TIME.size, value) for name, value in extra.items()}
+    return ss.Record.of({"x": 0.01 * np.sin(2 * np.pi * TIME), "friction": force, **constant}, fs=FS)
+
+
+def test_the_demonstration_agrees_with_its_truth() -> None:
+    record = ss.datasets.demo()
+    findings = analyze(record, mass=2.42, stiffness=2310, damping=record.truth["damping"])
+    assert findings.level is not None
+    assert findings.level.value == pytest.approx(record.truth["sliding friction"], rel=0.01)
+    known = {e.name: findings.true_value(e) for e in findings.estimates if findings.true_value(e) is not None}
+    assert {"sliding friction", "stuck share of the time", "stops per cycle"} <= set(known)
+    assert known["sliding friction"] == record.truth["sliding friction"]
+
+
+def test_the_frame_slides_and_sticks_as_published(dataset: Callable[[str], Path]) -> None:
+    folder = dataset("frame_base_excited")
+    rig = RigSettings(
+        mass=3.0799, stiffness=1191, damping=0.669, damper="base", normal={"*250g*": "0.25 kg", "*450g*": "0.45 kg"}
+    )
+    files = [[folder / f"s_b_{weight}_{side}.mat" for side in "xy"] for weight in ("250g", "450g")]
+    found = [analyze(ss.read_record(pair, channels={"x": "x [mm]", "z": "y [mm]"}), rig=rig) for pair in files]
+    # sliding friction and stuck share found by hand from the same records
+    for findings, friction, stuck in zip(found, (0.682, 1.318), (0.52, 0.56), strict=True):
+        assert findings.level is not None
+        assert findings.level.value == pytest.approx(friction, rel=0.04)
+        assert findings.sticks is not None
+        assert findings.sticks.share.value == pytest.approx(stuck, abs=0.05)
+        assert findings.sticks.per_cycle.value == pytest.approx(2.0, abs=0.05)
+    comparison = compare(found)
+    assert comparison.coefficient is not None
+    assert comparison.coefficient.includes(0.682 / (0.25 * 9.80665))
+    assert found[0].name == "s_b_250g_x.mat + s_b_250g_y.mat"
+
+
+def test_the_positioning_system_is_regressed_as_published(dataset: Callable[[str], Path]) -> None:
+    path = dataset("emps") / "DATA_EMPS.mat"
+    findings = analyze(ss.read_record(path, channels={"x": "qm [m]", "force": "vir * 35.1507 [N]"}))
+    values = {estimate.name: estimate.value for estimate in findings.estimates}
+    published = {"inertia": 95.1089, "viscous friction": 203.5034, "Coulomb friction": 20.3935}
+    assert values == pytest.approx({**values, **published}, rel=0.01)  # Janot, Gautier, Brunot 2019
+    sides = {"viscous friction forward": 166.706, "viscous friction back": 240.424}
+    assert values == pytest.approx({**values, **sides}, rel=0.02)
+
+
+def test_a_failed_question_becomes_a_note() -> None:
+    record = sliding().with_channel("force", np.full(TIME.size, 2.0), unit="N")
+    findings = analyze(record)
+    assert findings.loops is not None
+    assert findings.regression is None
+    assert any(note.startswith("Regression: channel force never changes") for note in findings.notes)
+
+
+def test_what_is_missing_for_the_friction_force_is_named() -> None:
+    record = ss.Record.of({"x": sliding()["x"]}, fs=FS)
+    notes = " ".join(analyze(record, mass=2.0).notes)
+    assert "stiffness" in notes
+    assert "mass" not in notes
+
+
+def test_a_load_cell_stands_in_for_the_friction_and_says_so() -> None:
+    record = ss.Record.of({"x": sliding()["x"], "load": sliding()["friction"]}, fs=FS)
+    findings = analyze(record)
+    assert findings.level is not None
+    assert findings.level.value == pytest.approx(1.5, rel=0.01)
+    assert any("load cell" in note for note in findings.notes)
+    assert findings.record.history[-1].arguments == {"friction": "load"}
+
+
+@pytest.mark.parametrize(
+    ("samples", "reason"),
+    [
+        ({"x": np.full(5000, np.nan)}, "not numbers"),
+        ({"x": np.ones(5000)}, "never changes"),
+        ({"x": np.sin(np.arange(10.0))}, "10 samples"),
+        ({"sound": np.sin(np.arange(5000.0))}, "its channels are sound"),
+    ],
+)
+def test_a_record_that_answers_nothing_is_refused_in_one_sentence(samples: dict[str, np.ndarray], reason: str) -> None:
+    record = ss.Record.of(samples, fs=FS)
+    with pytest.raises(EstimateError, match=reason) as caught:
+        analyze(record, mass=1.0, stiffness=100.0)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("constants", [{"mass": -1}, {"mass": "2 N"}, {"contact": "wall"}, {"stiffness": float("nan")}])
+def test_a_constant_without_meaning_is_wrong_use(constants: dict[str, object]) -> None:
+    with pytest.raises(ModelError):
+        analyze(sliding(), **constants)  # type: ignore[arg-type]
+
+
+def test_the_arguments_go_before_the_rig() -> None:
+    rig = RigSettings(mass=2.0, stiffness=100.0)
+    record = ss.Record.of({"x": sliding()["x"]}, fs=FS)
+    findings = analyze(record, rig=rig, mass="3 kg")
+    assert findings.settings["mass"] == 3.0
+    assert findings.settings["stiffness"] == 100.0
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.4])
+def test_the_coefficient_and_the_line_are_those_of_the_law(offset: float) -> None:
+    loads = [1.0, 2.0, 4.0, 8.0]
+    comparison = compare([analyze(sliding(0.3 * n + offset, seed=int(n), normal=n)) for n in loads])
+    assert comparison.line is not None
+    slope, at_no_load = comparison.line
+    assert slope.value == pytest.approx(0.3, abs=0.003)  # noise 0.02 N, some 4000 sliding samples each
+    assert at_no_load.value == pytest.approx(offset, abs=0.005)
+    assert comparison.coefficient is not None
+    through_origin = sum(n * (0.3 * n + offset) for n in loads) / sum(n * n for n in loads)
+    assert comparison.coefficient.value == pytest.approx(through_origin, abs=0.003)
+    assert (comparison.coefficient.status == "ok") == (offset == 0.0)
+
+
+def test_two_records_are_compared_by_students_t() -> None:
+    found = [analyze(sliding(friction, normal=n)) for friction, n in ((1.0, 2.0), (1.3, 4.0))]
+    coefficient = compare(found).coefficient
+    assert coefficient is not None
+    slope = (2 * 1.0 + 4 * 1.3) / 20
+    rest = np.array([1.0, 1.3]) - slope * np.array([2.0, 4.0])
+    half = 12.7062 * np.sqrt(rest @ rest / 20)  # Student's t at 97.5 %, one degree of freedom
+    assert coefficient.interval[1] - coefficient.value == pytest.approx(half, rel=0.02)
+
+
+def test_without_loads_there_is_a_table_and_a_note() -> None:
+    comparison = compare([analyze(sliding(1.0)), analyze(sliding(2.0))])
+    assert comparison.coefficient is None
+    assert "not known" in comparison.notes[0]
+    with pytest.raises(EstimateError, match="two or more"):
+        compare([analyze(sliding())])
+
+
+def test_results_are_plain_data() -> None:
+    findings = analyze(sliding(normal=3.0))
+    told = json.loads(json.dumps(findings.to_dict(), allow_nan=False))
+    assert told["normal_load"] == 3.0
+    assert {"friction coefficient", "sliding friction"} <= {estimate["name"] for estimate in told["estimates"]}
+    assert isinstance(compare([findings, findings]), Comparison)
+    assert isinstance(findings, Findings)
+
+
+def test_mending_is_asked_for_and_logged() -> None:
+    wave = np.sin(0.2 * np.arange(2000))
+    wave[100:103] = np.nan
+    record = ss.Record.of({"x": wave, "load": wave}, fs=100.0)
+    mended = mend(record, repairs=["missing:x"])
+    assert np.isfinite(mended["x"]).all()
+    assert np.isnan(mended["load"]).sum() == 3
+    assert mended.history[-1].action == "fill_missing"
+    assert mend(record, repairs=[]) is record
+    with pytest.raises(ModelError, match="clok"):
+        mend(record, repairs=["clok"])

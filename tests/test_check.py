@@ -1,0 +1,122 @@
+"""The check-up finds every planted fault, and none where nothing is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus import FS, Damaged, clean_records, damaged_records
+from stickslip import Record, read_record
+
+SEEDS = (0, 2)
+DAMAGED = [(seed, each) for seed in SEEDS for each in damaged_records(seed)]
+CLEAN = [(seed, *each) for seed in SEEDS for each in clean_records(seed).items()]
+
+
+def test_the_corpus_is_large_enough():
+    names = {each.name for _, each in DAMAGED}
+    assert len(names) >= 40
+    assert len({name for _, name, _ in CLEAN}) >= 15
+
+
+@pytest.mark.parametrize(("seed", "damaged"), DAMAGED, ids=[f"{each.name}, seed {seed}" for seed, each in DAMAGED])
+def test_finds_a_planted_fault_and_no_other(seed: int, damaged: Damaged):
+    faults = damaged.record.check()
+    assert [(fault.kind, fault.channel) for fault in faults] == [(damaged.kind, damaged.channel)]
+    for first, last in damaged.rows:
+        assert any(low <= last and first <= high for low, high in faults[0].rows), (first, last)
+
+
+@pytest.mark.parametrize(("seed", "name", "record"), CLEAN, ids=[f"{name}, seed {seed}" for seed, name, _ in CLEAN])
+def test_finds_nothing_in_a_clean_record(seed: int, name: str, record: Record):
+    assert record.check() == []
+
+
+def test_says_where_and_what_mends_it():
+    (damaged,) = (each for seed, each in DAMAGED if seed == 0 and each.name == "missing in sine")
+    (first, last), (fault,) = damaged.rows[0], damaged.record.check()
+    assert fault.message == (
+        f"channel x has 15 values that are not numbers (rows {first} to {last}); fill them with fill_missing(record)."
+    )
+    assert fault.severity == "error"
+
+
+def test_short_and_empty_records_are_told_in_words():
+    short = Record.of({"x": np.arange(10.0)}, fs=FS)
+    assert [fault.kind for fault in short.check()] == ["short"]
+    nothing = Record.of({"x": np.full(100, np.nan)}, fs=FS)
+    assert [(fault.kind, fault.rows) for fault in nothing.check()] == [("missing", ((0, 99),))]
+
+
+def test_many_rows_are_counted_not_listed():
+    values = np.sin(np.arange(4000) / 30)
+    values[::100] = np.nan
+    (fault,) = Record.of({"x": values}, fs=FS).check()
+    assert len(fault.rows) == 40
+    assert "and 35 more places" in fault.message
+
+
+def test_faults_of_several_channels_are_told_apart():
+    clean = clean_records()
+    x, force = clean["sticking, noise"]["x"].copy(), clean["square wave, noise"]["force"].copy()
+    x[3000:3010], force[1234] = np.nan, 40.0
+    both = Record.of({"x": x, "force": force}, fs=FS)
+    assert {(fault.kind, fault.channel) for fault in both.check()} == {("missing", "x"), ("spike", "force")}
+
+
+def test_a_million_samples_are_checked_within_seconds():
+    import time
+
+    rng = np.random.default_rng(0)
+    wave = np.tile(clean_records()["sticking, noise"]["x"], 170)
+    record = Record.of({"x": wave + 1e-6 * rng.normal(size=len(wave))}, fs=FS)
+    began = time.process_time()
+    assert record.check() == []
+    assert time.process_time() - began < 5.0
+
+
+def test_real_records_without_fault(dataset):
+    emps = read_record(dataset("emps") / "DATA_EMPS.mat", channels={"x": "qm [m]", "force": "gtau * vir [N]"})
+    assert emps.check() == []
+    folder = dataset("frame_base_excited")
+    for weight in ("250g", "450g"):
+        files = [folder / f"s_b_{weight}_{letter}.mat" for letter in "xy"]
+        assert read_record(files, channels={"x": "x [mm]", "z": "y [mm]"}).check() == []
+
+
+def test_real_record_with_host_stamps(dataset):
+    for name in ("60.txt", "100.txt"):
+        record = read_pendulum(dataset("pendulum_bad_clock") / name)
+        (fault,) = record.check()
+        assert (fault.kind, fault.channel) == ("clock", None)
+        assert "259.5 Hz" in fault.message
+        assert "jump by 62 ms" in fault.message
+
+
+def test_real_record_with_lost_samples(dataset):
+    record = read_seal(dataset("rubber_seal") / "O-ring_1bar.csv")
+    faults = {fault.kind: fault for fault in record.check()}
+    assert set(faults) == {"gap", "jitter"}
+    assert faults["gap"].rows[0] == (12, 13)  # 126 ms is followed by 391 ms
+    assert "up to 265 ms" in faults["gap"].message
+
+
+def read_pendulum(path: Path) -> Record:
+    return read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed")
+
+
+def read_seal(path: Path) -> Record:
+    return read_record(path, channels={"x": "#5 [mm]", "force": "#7 [N]"}, time="#1 [ms]")
+
+
+def test_stamps_by_clock_strings_are_seen_through_too(dataset):
+    lines = (dataset("pendulum_bad_clock") / "100.txt").read_text().splitlines()[2:]
+    clock = [line.split(",")[0].split(":") for line in lines if line.strip()]
+    stamps = np.array([3600 * float(h) + 60 * float(m) + float(s) for h, m, s in clock])
+    record = replace(Record.of({"x": np.sin(np.arange(len(stamps)) / 50)}, fs=260.0), stamps=stamps)
+    (fault,) = record.check()
+    assert fault.kind == "clock"
+    assert "259.5 Hz" in fault.message

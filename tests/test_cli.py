@@ -1,0 +1,295 @@
+"""The command line: what it prints, what it writes, and how it refuses."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+from click.testing import CliRunner, Result
+
+import stickslip as ss
+from stickslip.cli import main
+
+PROGRAM = Path(sys.executable).with_name("stickslip")
+FS = 500.0
+TIME = np.arange(4000) / FS
+RIG = ["--mass", "2", "--stiffness", "1 N/mm"]
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, list(arguments))
+
+
+def slide(path: str, *, friction: float = 1.5, rows: int = 4000) -> Path:
+    """A file of a mass that slides on the ground against a measured friction."""
+    force = friction * np.sign(np.cos(2 * np.pi * TIME)) + np.random.default_rng(1).normal(0, 0.02, TIME.size)
+    columns = {"t [s]": TIME, "pos [mm]": 10 * np.sin(2 * np.pi * TIME), "fr [N]": force}
+    lines = [
+        ",".join(columns),
+        *(",".join(f"{value:.6f}" for value in row) for row in zip(*columns.values(), strict=True)),
+    ]
+    Path(path).write_text("\n".join(lines[: rows + 1]) + "\n", encoding="utf-8")
+    return Path(path)
+
+
+MAP = ["--channels", "x=pos [mm]", "--channels", "friction=fr [N]"]
+
+
+def test_one_file_gives_a_table_and_a_folder() -> None:
+    slide("run.csv")
+    result = run("analyze", "run.csv", *MAP)
+    assert result.exit_code == 0, result.output
+    assert "sliding friction" in result.stdout
+    assert "1.50" in result.stdout
+    assert result.stdout.rstrip().endswith("Report: run-stickslip/report.html")
+    assert {path.name for path in Path("run-stickslip").iterdir()} == {"report.html", "results.json", "figures"}
+    assert run("analyze", "run.csv", *MAP).exit_code == 0, "its own results are replaced"
+
+
+def test_a_pattern_gives_one_report_with_the_coefficient() -> None:
+    for load in (1, 2, 4):
+        slide(f"load_{load}N.csv", friction=0.3 * load)
+    loads = [part for load in (1, 2, 4) for part in ("--normal", f"*{load}N*={load}")]
+    result = run("analyze", "load_*.csv", *MAP, *loads, "--output", "all")
+    assert result.exit_code == 0, result.output
+    told = json.loads(Path("all/results.json").read_text(encoding="utf-8"))
+    assert [record["name"] for record in told["records"]] == ["load_1N.csv", "load_2N.csv", "load_4N.csv"]
+    coefficient = told["comparison"]["estimates"][0]
+    assert coefficient["name"] == "friction coefficient"
+    assert coefficient["value"] == pytest.approx(0.3, rel=0.01)
+    assert Path("all/figures/0-3-records-compared-friction-load.svg").is_file()
+
+
+def test_files_joined_by_plus_are_one_record(dataset: Callable[[str], Path]) -> None:
+    folder = dataset("frame_base_excited")
+    Path("rig.toml").write_text(
+        'mass = "3.0799 kg"\nstiffness = 1191\ndamping = 0.669\ndamper = "base"\n'
+        '[channels]\nx = "x [mm]"\nz = "y [mm]"\n[normal]\n"*250g*" = "0.25 kg"\n"*450g*" = "0.45 kg"\n'
+    )
+    result = run("analyze", f"{folder}/s_b_*_x.mat+{folder}/s_b_*_y.mat", "--config", "rig.toml", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert [record["name"] for record in told["records"]] == [
+        "s_b_250g_x.mat + s_b_250g_y.mat", "s_b_450g_x.mat + s_b_450g_y.mat"
+    ]  # fmt: skip
+    levels = [{e["name"]: e["value"] for e in record["estimates"]}["sliding friction"] for record in told["records"]]
+    assert levels == pytest.approx([0.682, 1.318], rel=0.04)
+    assert not [path for path in Path().iterdir() if path.name != "rig.toml"], "--json alone writes nothing"
+
+
+def test_options_go_before_the_file_of_the_rig() -> None:
+    slide("run.csv")
+    Path("rig.toml").write_text('mass = 2\nstiffness = 7\nrows = "0:1000"\n[channels]\nx = "pos [mm]"\n')
+    result = run("analyze", "run.csv", "--config", "rig.toml", "--mass", "3 kg", "--rows", "500:", "--json")
+    told = json.loads(result.stdout)
+    assert (told["settings"]["mass"], told["settings"]["stiffness"]) == (3.0, 7.0)
+    assert told["history"][0]["arguments"]["rows"] == [500, None]
+
+
+def test_a_bare_text_file_is_read_as_told() -> None:
+    lines = slide("run.csv").read_text().splitlines()[1:]
+    Path("bare.txt").write_text("\n".join(line.replace(".", ";").replace(",", "|").replace(";", ",") for line in lines))
+    channels = ["--channels", "x=#2 [mm]", "--channels", "friction=#3 [N]"]
+    result = run("analyze", "bare.txt", *channels, "--time", "#1 [s]", "--delimiter", "|", "--decimal", ",", "--json")
+    assert result.exit_code == 0, result.stderr
+    levels = {estimate["name"]: estimate["value"] for estimate in json.loads(result.stdout)["estimates"]}
+    assert levels["sliding friction"] == pytest.approx(1.5, rel=0.01)
+
+
+def test_repairs_are_made_in_order_and_logged() -> None:
+    path = slide("run.csv")
+    lines = path.read_text().splitlines()
+    lines[700] = lines[700].split(",")[0] + ",nan,nan"
+    path.write_text("\n".join(lines))
+    assert "fill_missing(record)" in run("check", "run.csv", *MAP).stdout
+    assert "nothing wrong" in run("check", "run.csv", *MAP, "--repair", "missing").stdout
+    result = run("analyze", "run.csv", *MAP, "--repair", "missing", "--json")
+    assert "fill_missing" in [step["action"] for step in json.loads(result.stdout)["history"]]
+
+
+def test_the_demonstration_needs_nothing_and_shows_the_truth() -> None:
+    result = run("demo")
+    assert result.exit_code == 0, result.output
+    assert "true value" in result.stdout
+    assert "True value" in Path("stickslip-demo/report.html").read_text(encoding="utf-8")
+    told = json.loads(run("demo", "--json").stdout)
+    assert told["truth"]["sliding friction"] == 1.1
+
+
+def test_a_record_converted_is_the_same_record() -> None:
+    slide("run.csv")
+    result = run("convert", "run.csv", "run.parquet", *MAP)
+    assert result.exit_code == 0, result.output
+    expected = ss.read_record("run.csv", channels={"x": "pos [mm]", "friction": "fr [N]"})
+    assert np.array_equal(ss.read_record("run.parquet")["x"], expected["x"])
+
+
+def test_a_record_that_comes_back_whole_is_named_by_its_file() -> None:
+    slide("run.csv")
+    run("convert", "run.csv", "kept.parquet", *MAP)
+    told = json.loads(run("analyze", "kept.parquet", "--normal", "kept*=3", "--json").stdout)
+    assert (told["name"], told["normal_load"]) == ("kept.parquet", 3.0)
+    digests = [file["sha256"] for step in told["history"] for file in step["arguments"].get("files", ())]
+    assert hashlib.sha256(Path("kept.parquet").read_bytes()).hexdigest() in digests
+
+
+def test_the_sets_are_listed_with_licence_and_fetched_by_name(dataset: Callable[[str], Path]) -> None:
+    listed = run("datasets").stdout
+    assert all(name in listed for name in ss.datasets.names())
+    assert "licence" in listed
+    folder = dataset("emps")
+    assert str(folder / "DATA_EMPS.mat") in run("datasets", "emps").stdout
+
+
+def damaged(kind: str) -> list[str]:
+    """The arguments of a run that can not succeed."""
+    wave = np.sin(2 * np.pi * TIME)
+    folder = Path(os.environ["STICKSLIP_DATA"])
+    if kind == "wrong unit":
+        return [str(slide("run.csv")), "--channels", "x=pos [N]"]
+    if kind == "unknown unit":
+        return [str(slide("run.csv")), "--channels", "x=pos [furlongs per fortnight]"]
+    if kind == "missing channel":
+        return [str(slide("run.csv")), "--channels", "x=displacement [mm]"]
+    if kind in ("truncated TDMS", "truncated MAT"):
+        whole = folder / {"truncated TDMS": "formats/raw1.tdms", "truncated MAT": "emps/DATA_EMPS.mat"}[kind]
+        if not whole.is_file():
+            pytest.skip(f"{whole.name} is not on this machine")
+        path = Path(f"cut{whole.suffix}")
+        path.write_bytes(whole.read_bytes()[: whole.stat().st_size // 3])
+        return [str(path), "--channels", "x=qm [m]"]
+    if kind == "unequal columns":
+        scipy.io.savemat("uneven.mat", {"x": wave, "f": wave[:1000]})
+        return ["uneven.mat", "--fs", "500", "--channels", "x=x [m]", "--channels", "force=f [N]"]
+    if kind == "unequal columns of text":
+        cells = [f"{t:.3f},{x:.4f},{'' if t > 2 else round(x, 3)}" for t, x in zip(TIME, wave, strict=False)]
+        Path("uneven.csv").write_text("t [s],x [mm],force [N]\n" + "\n".join(cells), encoding="utf-8")
+        return ["uneven.csv"]
+    text = {
+        "prose": "It was the best of times,\nit was the worst of times,\n" * 30,
+        "empty": "",
+        "all NaN": "t [s],x [mm]\n" + "\n".join(f"{t:.3f},nan" for t in TIME),
+        "constant": "t [s],x [mm]\n" + "\n".join(f"{t:.3f},1.0" for t in TIME),
+        "ten samples": "t [s],x [mm]\n" + "\n".join(f"{t:.3f},{x:.4f}" for t, x in zip(TIME[:10], wave, strict=False)),
+    }[kind]
+    Path("bad.csv").write_text(text, encoding="utf-8")
+    return ["bad.csv"]
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["wrong unit", "unknown unit", "missing channel", "prose", "empty", "truncated TDMS", "truncated MAT",
+     "unequal columns", "unequal columns of text", "all NaN", "constant", "ten samples"],
+)  # fmt: skip
+def test_bad_data_end_in_one_sentence_and_nothing_is_written(kind: str) -> None:
+    arguments = damaged(kind)
+    before = sorted(Path().iterdir())
+    result = run("analyze", *arguments, *RIG)
+    refused(result, code=1)
+    assert sorted(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["analyze"],
+        ["analyse", "run.csv"],
+        ["analyze", "absent.csv"],
+        ["analyze", "run_*.csv"],
+        ["analyze", "run.csv+absent.csv"],
+        ["analyze", "run.csv", "--mass", "-1"],
+        ["analyze", "run.csv", "--mass", "heavy"],
+        ["analyze", "run.csv", "--mass", "2 N"],
+        ["analyze", "run.csv", "--damper", "wall"],
+        ["analyze", "run.csv", "--channels", "x"],
+        ["analyze", "run.csv", "--repair", "clok"],
+        ["analyze", "run.csv", "--rows", "a:b"],
+        ["analyze", "run.csv", "--fs", "0"],
+        ["analyze", "run.csv", "--normal", "-3"],
+        ["analyze", "run.csv", "--config", "absent.toml"],
+        ["analyze", "run.csv", "--config", "typo.toml"],
+        ["analyze", "run.csv", *MAP, "--output", "mine"],
+        ["convert", "r*.csv", "out.csv"],
+    ],
+)
+def test_wrong_use_ends_in_one_sentence_and_exit_code_2(arguments: list[str]) -> None:
+    slide("run.csv", rows=1000)
+    slide("r2.csv", rows=1000)
+    Path("typo.toml").write_text("mas = .3")
+    Path("mine").mkdir()
+    Path("mine/thesis.tex").write_text("years of work")
+    before = sorted(Path().rglob("*"))
+    refused(run(*arguments), code=2)
+    assert sorted(Path().rglob("*")) == before
+
+
+def refused(result: Result, code: int) -> None:
+    assert result.exit_code == code, result.output
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    assert result.stdout == ""
+    assert result.stderr.startswith("stickslip: ")
+    assert result.stderr.count("\n") == 1, result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_true_process_keeps_the_table_and_the_trouble_apart() -> None:
+    slide("run.csv")
+    told = subprocess.run([PROGRAM, "analyze", "run.csv", *MAP, "--json"], capture_output=True, text=True, check=True)
+    assert json.loads(told.stdout)["name"] == "run.csv"
+    assert told.stderr == ""
+    bad = subprocess.run([PROGRAM, "analyze", "run.csv", "--mass", "0"], capture_output=True, text=True, check=False)
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert "Traceback" not in bad.stderr
+
+
+INTERRUPTED_WHILE_WRITING = """
+import os, signal
+from stickslip.reports import folder
+write = folder._write_figures
+def interrupted(*arguments):
+    write(*arguments)
+    os.kill(os.getpid(), signal.SIGINT)
+folder._write_figures = interrupted
+from stickslip.cli import main
+main()
+"""
+
+
+def test_an_interrupted_run_leaves_nothing_and_exits_130() -> None:
+    slide("run.csv")
+    before = sorted(Path().iterdir())
+    command = [sys.executable, "-c", INTERRUPTED_WHILE_WRITING, "analyze", "run.csv", *MAP]
+    told = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert told.returncode == 130
+    assert told.stderr == "stickslip: interrupted; nothing was written.\n"
+    assert sorted(Path().iterdir()) == before
+
+
+def test_help_is_there_before_the_heavy_libraries_are() -> None:
+    code = "import sys; from stickslip.cli import main; main(['--help'], standalone_mode=False); print(*sys.modules)"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "analyze" in told.stdout
+    loaded = set(told.stdout.split())
+    assert not loaded & {"numpy", "scipy", "pandas", "matplotlib", "pydantic", "jinja2", "rich"}
+    best = min(_seconds([PROGRAM, "--help"]) for _ in range(5))
+    assert best < 0.5, "0.06 s on an idle machine; the rest is room for a busy one"
+
+
+def _seconds(command: list[object]) -> float:
+    begun = time.perf_counter()
+    subprocess.run([str(part) for part in command], capture_output=True, check=True)
+    return time.perf_counter() - begun

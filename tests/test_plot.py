@@ -1,0 +1,167 @@
+"""Figures: what is drawn is what was found, and nothing is left open."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+
+import stickslip as ss
+from stickslip.analysis import Findings, analyze, compare
+from stickslip.plot.comparison import plot_load_dependence
+from stickslip.plot.contact import plot_velocity_loop
+from stickslip.plot.figures import Plate, figures
+from stickslip.plot.style import COLUMNS, STYLE, envelope, prefixed, thinned
+from stickslip.plot.traces import close_up, plot_traces
+
+FS = 500.0
+
+
+@pytest.fixture(scope="module")
+def demo() -> Findings:
+    record = ss.datasets.demo()
+    return analyze(record, **{name: record.truth[name] for name in ("mass", "stiffness", "damping")})
+
+
+@pytest.fixture(scope="module")
+def plates(demo: Findings) -> tuple[Plate, ...]:
+    return figures(demo)
+
+
+def slid(friction: float, normal: float) -> Findings:
+    time = np.arange(4000) / FS
+    force = friction * np.sign(np.cos(2 * np.pi * time)) + np.random.default_rng(1).normal(0, 0.02, time.size)
+    samples = {"x": 0.01 * np.sin(2 * np.pi * time), "friction": force, "normal": np.full(time.size, normal)}
+    return analyze(ss.Record.of(samples, fs=FS))
+
+
+def test_every_figure_of_the_demonstration_is_drawn_once_without_pyplot(demo: Findings) -> None:
+    before = dict(mpl.rcParams)
+    plates = figures(demo)
+    assert [plate.name for plate in plates] == [
+        "friction-velocity", "friction-displacement", "record", "close-up", "force-balance", "sticks"
+    ]  # fmt: skip
+    assert dict(mpl.rcParams) == before, "the user's own settings stay as they were"
+    for plate in plates:
+        assert isinstance(plate.figure, Figure)
+        assert plate.figure.canvas.manager is None, "not known to pyplot"
+        assert plate.caption.endswith(".")
+        assert all(axes.get_xlabel() or axes.get_shared_x_axes().joined(axes, plate.figure.axes[-1])
+                   for axes in plate.figure.axes)  # fmt: skip
+
+
+def test_images_are_valid_small_and_the_same_again(demo: Findings, plates: tuple[Plate, ...]) -> None:
+    for plate, again in zip(plates, figures(demo), strict=True):
+        assert ET.fromstring(plate.svg()).tag.endswith("svg")
+        assert len(plate.svg()) < 600_000
+        assert plate.svg() == again.svg()
+    assert plates[0].png().startswith(b"\x89PNG")
+
+
+def test_the_dotted_levels_are_the_estimates(demo: Findings) -> None:
+    axes = plot_velocity_loop(demo)
+    dotted = [line.get_ydata()[0] for line in axes.get_lines() if line.get_linestyle() == ":"]
+    assert demo.loops is not None
+    assert dotted == pytest.approx([demo.loops.forward.value, -demo.loops.back.value])
+    assert axes.get_ylabel() == "friction [N]"
+    assert axes.get_xlabel() == "velocity of the contact [mm/s]"
+
+
+def test_a_figure_goes_where_it_is_told(demo: Findings) -> None:
+    figure = Figure()
+    axes = figure.add_subplot()
+    assert plot_velocity_loop(demo, ax=axes) is axes
+
+
+def test_the_closer_look_holds_about_six_cycles(demo: Findings) -> None:
+    near = close_up(demo)
+    assert near is not None
+    assert near.duration == pytest.approx(6 / 2.5, rel=0.01)
+
+
+def test_sticks_are_shaded_where_they_are(demo: Findings) -> None:
+    near = close_up(demo)
+    axes = plot_traces(demo, record=near).axes[0]
+    spans = axes.collections[0].get_paths()
+    assert near is not None
+    shaded = sum(float(np.ptp(path.vertices[:, 0])) for path in spans)
+    assert demo.sticks is not None
+    assert shaded / near.duration == pytest.approx(demo.sticks.share.value, abs=0.03)
+
+
+def test_the_comparison_shows_the_line_of_the_coefficient() -> None:
+    comparison = compare([slid(0.3 * n, n) for n in (1.0, 2.0, 4.0)])
+    axes = plot_load_dependence(comparison)
+    line = next(line for line in axes.get_lines() if "×" in str(line.get_label()))
+    assert comparison.coefficient is not None
+    x, y = (np.asarray(part, dtype=float) for part in line.get_data())
+    assert y[-1] / x[-1] == pytest.approx(comparison.coefficient.value)
+    assert [plate.name for plate in figures(comparison)] == ["friction-load", "levels"]
+
+
+def test_a_regression_is_drawn_with_what_it_leaves_over() -> None:
+    time = np.arange(8000) / 1000
+    x = 0.1 * np.sin(np.pi * time) + 0.02 * np.sin(3.4 * np.pi * time)
+    v, a = np.gradient(x, 1e-3), np.gradient(np.gradient(x, 1e-3), 1e-3)
+    force = 3.0 * a + 5.0 * v + 2.0 * np.sign(v) + np.random.default_rng(0).normal(0, 0.3, time.size)
+    plates = {plate.name: plate for plate in figures(analyze(ss.Record.of({"x": x, "force": force}, fs=1000)))}
+    lines = {line.get_label(): line for line in plates["regression"].figure.axes[0].get_lines()}
+    assert {"measured", "explained"} <= set(lines)
+
+
+def test_a_dollar_sign_in_a_name_is_no_mathematics() -> None:
+    from dataclasses import replace
+
+    comparison = compare([replace(slid(1.0, 2.0), name="run $\\frac$ <1>.csv"), slid(2.0, 4.0)])
+    svg = figures(comparison)[1].svg()
+    assert "run $\\frac$ &lt;1&gt;.csv" in svg
+    ET.fromstring(svg)
+
+
+def test_the_style_can_be_told_apart_by_the_colour_blind() -> None:
+    from stickslip.plot import style
+
+    okabe_ito = {"#0072b2", "#d55e00", "#009e73", "#56b4e9"}
+    assert okabe_ito <= {style.BLUE, style.ORANGE, style.GREEN, style.SKY}
+    assert STYLE["svg.fonttype"] == "none", "text stays text: small, and found by search"
+
+
+@given(st.integers(0, 50_000), st.floats(1, 1e6))
+def test_no_peak_is_lost_in_drawing(place: int, height: float) -> None:
+    values = np.zeros(50_001)
+    values[place] = height
+    time, drawn = envelope(np.arange(50_001.0), values)
+    assert drawn.max() == height
+    assert len(time) == len(drawn) == 2 * COLUMNS
+
+
+def test_an_envelope_bridges_a_missing_sample_and_shows_a_gap() -> None:
+    values = np.sin(np.arange(10_000.0))
+    values[4000:4003] = np.nan
+    assert np.isfinite(envelope(np.arange(10_000.0), values)[1]).all()
+    values[4000:4100] = np.nan
+    time, drawn = envelope(np.arange(10_000.0), values)
+    missing = time[np.isnan(drawn)]
+    assert 3990 < missing.min() < missing.max() < 4100
+
+
+@given(st.integers(1, 10_000), st.integers(1, 500))
+def test_thinning_keeps_both_ends(count: int, limit: int) -> None:
+    chosen = thinned(count, limit)
+    assert len(chosen) <= limit
+    assert chosen[0] == 0
+    assert limit == 1 or chosen[-1] == count - 1
+
+
+@pytest.mark.parametrize(
+    ("peak", "unit", "shown"),
+    [(0.0123, "m", "mm"), (2e-5, "m/s", "µm/s"), (0.3, "N", "N"), (4500.0, "N", "kN"), (0.002, "J", "mJ"),
+     (120.0, "s", "s"), (0.5, "rad", "rad"), (2.0, "m/s^2", "m/s²"), (0.0, "m", "m"), (0.29, "1", "1")],
+)  # fmt: skip
+def test_units_are_chosen_to_be_read(peak: float, unit: str, shown: str) -> None:
+    assert prefixed(peak, unit)[1] == shown

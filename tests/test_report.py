@@ -1,0 +1,228 @@
+"""The page and the folder: self-contained, escaped, and there as a whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.analysis import Findings, analyze, compare
+from stickslip.errors import EstimateError, ModelError, StickslipError
+from stickslip.estimate import Estimate
+from stickslip.reports import folder as folder_module
+from stickslip.reports.folder import publish
+from stickslip.reports.page import report
+from stickslip.reports.summary import summary
+from stickslip.reports.words import headline, interval_of, value_of
+
+VOID = {"meta", "link", "br", "hr", "img", "input"}
+
+
+class Page(HTMLParser):
+    """Tags, attributes and visible text of a page; every tag must be closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.attributes: list[tuple[str, str, str | None]] = []
+        self.words: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.attributes += [(tag, name, value) for name, value in attrs]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.attributes += [(tag, name, value) for name, value in attrs]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] not in ("style", "script"):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+
+@pytest.fixture(scope="module")
+def demo() -> Findings:
+    record = ss.datasets.demo()
+    return analyze(record, **{name: record.truth[name] for name in ("mass", "stiffness", "damping")})
+
+
+def slid(friction: float, normal: float, name: str = "run.csv") -> Findings:
+    time = np.arange(4000) / 500
+    force = friction * np.sign(np.cos(2 * np.pi * time)) + np.random.default_rng(1).normal(0, 0.02, time.size)
+    samples = {"x": 0.01 * np.sin(2 * np.pi * time), "friction": force, "normal": np.full(time.size, normal)}
+    return replace(analyze(ss.Record.of(samples, fs=500.0)), name=name)
+
+
+@pytest.fixture(scope="module")
+def light(demo: Findings) -> Findings:
+    """Findings of one figure, quick to draw."""
+    return replace(demo, loops=None, sticks=None, settings={})
+
+
+def everything(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
+
+
+def test_the_page_asks_nothing_of_a_network(demo: Findings, tmp_path: Path) -> None:
+    text = report(demo, None, tmp_path / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.open == []
+    loading = {("img", "src"), ("script", "src"), ("link", "href"), ("iframe", "src"), ("object", "data")}
+    assert not [each for each in page.attributes if each[:2] in loading]
+    assert not [value for _, name, value in page.attributes if name.endswith("href") and not str(value).startswith("#")]
+    assert not re.search(r"@import|url\((?!#)", text)
+    assert len(text) < 2_000_000
+
+
+def test_the_page_tells_a_person_first_and_everything_after(demo: Findings, tmp_path: Path) -> None:
+    text = Page(report(demo, None, tmp_path / "report.html").read_text(encoding="utf-8")).text
+    places = [text.index(part) for part in (
+        "The contact slides against 1.1", "Friction against velocity", "Numbers", "True value",
+        "What was wrong with the record", "Settings", "What was done, in order", "Made by stickslip",
+    )]  # fmt: skip
+    assert places == sorted(places)
+    assert "mass 2.42" in text
+    assert all(step.action in text for step in demo.record.history)
+
+
+def test_the_page_holds_the_checksum_of_what_was_read(tmp_path: Path) -> None:
+    import hashlib
+
+    record = slid(1.0, 2.0).record
+    path = ss.write_record(ss.Record.of(dict(record.samples), fs=500.0), tmp_path / "slide.parquet")
+    findings = analyze(ss.read_record(path, channels={name: name for name in record}))
+    text = report(findings, None, tmp_path / "report.html").read_text(encoding="utf-8")
+    assert hashlib.sha256(path.read_bytes()).hexdigest() in text
+    assert findings.name == "slide.parquet"
+
+
+def test_what_a_file_says_is_text_and_never_markup(demo: Findings, tmp_path: Path) -> None:
+    evil = "<script>alert(1)</script>&\"'"
+    estimate = Estimate.normal(evil, 1.0, sd=0.1, unit="N", method=evil, status=evil, checks=(evil,))
+    step = ss.Step(evil, {evil: [{"name": evil}]}, evil)
+    record = replace(demo.record, history=(step,))
+    findings = replace(demo, name=evil, notes=(evil,), settings={**demo.settings, "damper": evil}, record=record)
+    for results, of in ((findings, None), ([estimate], record)):
+        page = Page(report(results, of, tmp_path / "report.html").read_text(encoding="utf-8"))
+        assert not [tag for tag, *_ in page.attributes if tag == "script"]
+        assert "<script>" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert evil in page.text
+
+
+def test_plain_estimates_have_a_page_with_their_record(demo: Findings, tmp_path: Path) -> None:
+    friction = Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="by hand")
+    text = Page(report([friction], demo.record, tmp_path / "report.html").read_text(encoding="utf-8")).text
+    assert "1.318 N" in text
+    assert "1.310 to 1.326 N" in text
+    assert "The check-up found nothing wrong" in text
+    for nothing in ([], ["1.3 N"]):
+        with pytest.raises(EstimateError, match="a report of"):
+            report(nothing, None, tmp_path / "none.html")  # type: ignore[arg-type]
+    assert everything(tmp_path) == {"report.html"}
+
+
+def test_faults_and_doubts_are_told(tmp_path: Path) -> None:
+    findings = slid(1.0, 2.0)
+    wave = np.array(findings.record["x"])
+    wave[100:103] = np.nan
+    faults = tuple(ss.Record.of({"x": wave}, fs=500.0).check())
+    doubtful = replace(findings, faults=faults)
+    told = summary(doubtful)
+    assert told.faults == [str(fault) for fault in faults]
+    assert any("1 fault" in caution for caution in told.cautions)
+    text = Page(report(doubtful, None, tmp_path / "r.html").read_text(encoding="utf-8")).text
+    assert str(faults[0]) in text
+
+
+def test_a_comparison_leads_to_each_record(tmp_path: Path) -> None:
+    comparison = compare([slid(0.3 * n, n, f"load {n:g}.csv") for n in (1.0, 2.0, 4.0)])
+    page = Page(report(comparison, None, tmp_path / "r.html").read_text(encoding="utf-8"))
+    links = [str(value)[1:] for tag, name, value in page.attributes if (tag, name) == ("a", "href")]
+    targets = {value for _, name, value in page.attributes if name == "id"}
+    assert len(links) == 3
+    assert set(links) <= targets
+    assert "friction coefficient is 0.3" in page.text
+
+
+@pytest.mark.parametrize(
+    ("estimate", "value", "interval"),
+    [
+        (Estimate.normal("a", 0.012345, sd=0.0002, unit="m", method=""), "12.3 mm", "12.0 to 12.7 mm"),
+        (Estimate.normal("stuck share of the time", 0.521, sd=0.02, unit="1", method=""), "52 %", "48 to 56 %"),
+        (Estimate.normal("a", 2.5, sd=1e-9, unit="Hz", method=""), "2.50000 Hz", "2.50000 to 2.50000 Hz"),
+        (Estimate.normal("a", float("nan"), sd=1.0, unit="N", method=""), "unknown", "unknown"),
+        (Estimate("a", 0.29, (0.2, 0.4), 0.001, "1", ""), "0.29", "0.20 to 0.40"),
+    ],
+)
+def test_numbers_carry_the_digits_that_they_are_sure_of(estimate: Estimate, value: str, interval: str) -> None:
+    assert value_of(estimate) == value
+    assert interval_of(estimate) == interval
+
+
+def test_the_headline_names_the_direction_of_a_slope(demo: Findings) -> None:
+    assert demo.loops is not None
+    falling = Estimate.normal("slope", -3.0, sd=0.1, unit="N s/m", method="")
+    sentences = " ".join(headline(replace(demo, loops=replace(demo.loops, slope=falling))))
+    assert "falls with speed" in sentences
+    doubted = replace(falling, status="the sliding speed hardly varies")
+    assert "with speed" not in " ".join(headline(replace(demo, loops=replace(demo.loops, slope=doubted))))
+    assert "2 stops in each cycle" in sentences
+
+
+def test_a_folder_holds_all_and_only_what_it_lists(demo: Findings, tmp_path: Path) -> None:
+    place = publish(demo, folder=tmp_path / "deep" / "results")
+    told = json.loads((place / "results.json").read_text(encoding="utf-8"))
+    files = {path.relative_to(place).as_posix() for path in place.rglob("*") if path.is_file()}
+    assert files == set(told["files"])
+    assert {"report.html", "figures/friction-velocity.svg", "figures/friction-velocity.png"} <= files
+    assert told["truth"]["sliding friction"] == 1.1
+    assert everything(tmp_path / "deep") == {"results", *(f"results/{name}" for name in everything(place))}
+
+
+def test_an_earlier_result_is_replaced_and_a_stranger_left_alone(light: Findings, tmp_path: Path) -> None:
+    place = publish(compare([replace(light, name="one"), light]), folder=tmp_path / "results")
+    assert "figures/1-one-record.svg" in everything(place)
+    publish(light, folder=place)
+    assert "figures/record.svg" in everything(place)
+    assert not [name for name in everything(place) if "one" in name]
+    (place / "notes.txt").write_text("mine", encoding="utf-8")
+    before = everything(tmp_path)
+    with pytest.raises(ModelError, match=r"notes\.txt"):
+        publish(light, folder=place)
+    assert everything(tmp_path) == before
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(ModelError, match="it is a file"):
+        publish(light, folder=tmp_path / "file")
+    with pytest.raises(StickslipError, match="can not be written"):
+        publish(light, folder=tmp_path / "file" / "below")
+
+
+@pytest.mark.parametrize("trouble", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_nothing_stays_of_a_folder_that_was_not_finished(
+    light: Findings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
+) -> None:
+    def fails(*args: object) -> Iterator[None]:
+        raise trouble
+
+    publish(light, folder=tmp_path / "earlier")
+    before = everything(tmp_path)
+    monkeypatch.setattr(folder_module, "_write_figures", fails)
+    for name in ("new", "earlier"):
+        with pytest.raises((StickslipError, KeyboardInterrupt)):
+            publish(light, folder=tmp_path / name)
+    assert everything(tmp_path) == before
