@@ -11,7 +11,8 @@ import pytest
 
 import stickslip as ss
 from stickslip import scenarios
-from stickslip.solve import phasors, simulate as simulate_module
+from stickslip.solve import phasors
+from stickslip.solve import simulate as simulate_module
 from stickslip.solve.energy import energy
 
 RIGID = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5))
@@ -203,10 +204,10 @@ def replay(system: ss.Oscillator, cycles: int) -> tuple[list[float], list[str]]:
     while True:
         if side:
             at = motion(t, x, v, k, mp.mpf(0), -side * level)
-            exits = [(lambda s, at=at: -side * at(s)[1], 0)]
+            exits = [(lambda s, at=at, side=side: -side * at(s)[1], 0)]
         else:
             at = motion(t, x, v, k + stiff, loss, stiff * anchor)
-            force = lambda s, at=at: stiff * (at(s)[0] - anchor) + loss * at(s)[1]  # noqa: E731
+            force = lambda s, at=at, held=anchor: stiff * (at(s)[0] - held) + loss * at(s)[1]  # noqa: E731
             exits = [(lambda s, f=force, j=j: j * f(s) - level, j) for j in (1, -1)]
         low, found = t, None
         if times:

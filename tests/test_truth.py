@@ -69,8 +69,8 @@ def test_the_non_stop_boundary_at_1e_12(row: list[float], side: int) -> None:
 def test_the_limits_of_the_boundary() -> None:
     """DH-4: pi/4 at resonance, 1 / sqrt(1 + pi^2/4) at high frequency."""
     for ratio, limit, close in ((1 + 1e-4, math.pi / 4, 1e-3), (50.0, 1 / math.sqrt(1 + math.pi**2 / 4), 1e-3)):
-        below, above = (steady_state(scenarios.forced(ratio, limit * (1 + s * close), damping_ratio=0.0), start={"x": 1.0})
-                        for s in (-1, 1))  # fmt: skip
+        systems = [scenarios.forced(ratio, limit * (1 + side * close)) for side in (-1, 1)]
+        below, above = (steady_state(system, start={"x": 1.0}) for system in systems)
         assert sum(below.stops) == 0
         assert sum(above.stops) > 0 or above.status == "rest"
 

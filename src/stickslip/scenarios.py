@@ -161,7 +161,7 @@ def grid(name: str) -> dict[str, Any]:
     grids = {key: entry for key, entry in _table().items() if "system" not in entry}
     if name not in grids:
         raise ModelError(f"no grid is called '{name}'", f"there are {', '.join(grids)}", "choose one")
-    return grids[name]
+    return dict(grids[name])
 
 
 def forced(ratio: float, load: float, *, damping_ratio: float = 0.0, static_ratio: float = 1.0) -> Oscillator:

@@ -31,8 +31,8 @@ class StateVariable:
 
     Examples
     --------
-    >>> StateVariable(1.1, rate=100.0).modes()[0].rates["theta"]["1"]
-    -121.00000000000001
+    >>> [mode.name for mode in StateVariable(1.1, rate=100.0).modes()]
+    ['back', 'held', 'forward']
     """
 
     kinetic: float

@@ -16,6 +16,7 @@ from stickslip.solve.simulate import opening, run
 from stickslip.solve.tangent import carry_tangents
 
 BATCHES = 25  # of which the scatter gives the interval
+STUDENT = 2.064  # two-sided 95 % quantile at 24 degrees of freedom
 
 
 def lyapunov(
@@ -58,7 +59,8 @@ def lyapunov(
     --------
     >>> from stickslip.drives import HarmonicForce
     >>> from stickslip.laws.coulomb import Coulomb
-    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.3), drive=HarmonicForce(1.0, frequency=0.6 / 6.283185307))
+    >>> drive = HarmonicForce(1.0, frequency=0.6 / 6.283185307)
+    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.3), drive=drive)
     >>> lyapunov(slider, cycles=500).value < 0
     True
     """
@@ -90,5 +92,7 @@ def lyapunov(
             growth.append(math.log(length) / period)
     batches = np.array([np.mean(part) for part in np.array_split(growth, BATCHES)])
     spread = float(np.std(batches, ddof=1) / math.sqrt(BATCHES))
-    return Estimate.normal("Lyapunov exponent", float(np.mean(growth)), sd=spread, unit="1/s",
-                           method=f"exact tangent over {cycles} periods, scatter of {BATCHES} batches", quantile=2.064)  # fmt: skip
+    method = f"exact tangent over {cycles} periods, scatter of {BATCHES} batches"
+    return Estimate.normal(
+        "Lyapunov exponent", float(np.mean(growth)), sd=spread, unit="1/s", method=method, quantile=STUDENT
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,7 +167,8 @@ def steady_state(
     --------
     >>> from stickslip.drives import HarmonicForce
     >>> from stickslip.laws.coulomb import Coulomb
-    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=HarmonicForce(1.0, frequency=0.8 / 6.283185307))
+    >>> drive = HarmonicForce(1.0, frequency=0.8 / 6.283185307)
+    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=drive)
     >>> orbit = steady_state(slider)
     >>> orbit.status, round(orbit.amplitude, 6), orbit.stops
     ('unique', 2.332235, (0, 0))
@@ -190,7 +192,7 @@ def steady_state(
             return found
         count = laps
     orbit = _lap(system, table, state, mode, 1)
-    growing = len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in zip(sizes[1:], sizes[2:], strict=False))
+    growing = len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:]))
     none = np.full(table.physical, np.nan, dtype=np.complex128)
     return SteadyState("unbounded" if growing else "not periodic", math.nan, 0, orbit, none)
 

@@ -74,9 +74,10 @@ def phasors(table: Automaton) -> Phasors | None:
     omega, phase = table.tones[0, 2:]
     period = 2 * math.pi / omega
     turning = slice(size - 2, size)
-    nodes = [_nodes(1j * omega, period)]
-    if nodes[0] is None:
+    turning_nodes = _nodes(1j * omega, period)
+    if turning_nodes is None:
         return None
+    nodes: list[NDArray[np.complex128]] = [turning_nodes]
     times = [_times(omega, len(nodes[0]))]
     modes, levels, exits, rests = [], [], [], []
     for j, flow in enumerate(table.flow):
@@ -99,7 +100,7 @@ def phasors(table: Automaton) -> Phasors | None:
         grid = _nodes(free, period)
         if grid is None:
             return None
-        offset = sum(len(values) for values in nodes)
+        offset = sum(len(known) for known in nodes)
         nodes.append(grid)
         times.append(_times(abs(free), len(grid)))
         modes.append([SLIDING, free.real, free.imag, forced.real, forced.imag, 1 / stiffness, abs(free),
@@ -159,7 +160,7 @@ def _deed(reset: Array, physical: int) -> float:
 
 def _times(rate: float, count: int) -> Array:
     """Times of the nodes, as the compiled code sees them."""
-    return np.arange(count) * (2 * HALF_STEP / rate)
+    return np.arange(count, dtype=np.float64) * (2 * HALF_STEP / rate)
 
 
 @njit(**FAST)

@@ -135,8 +135,9 @@ def run(
         for at, (signals, values) in _stops(table, laps, offset):
             state[signals] = values
             cell = min(table.cell[mode], total)
-            mode = kernel.settle(table.tables, mode, state, work[3, :size], cell, work[:2, :size], work[4, : DEGREE + 1],
-                                 work[5, : DEGREE + 1])  # fmt: skip
+            mode = kernel.settle(
+                table.tables, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]
+            )
             _refuse_chatter(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock, mode)
             outcome = kernel.FULL
             while outcome == kernel.FULL:
