@@ -36,7 +36,9 @@ _ROOMS = {
     "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives",
     "Oscillator": "oscillator", "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
     "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
-    "scenarios": "scenarios",
+    "scenarios": "scenarios", "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
+    "outcome": "reports.simulation", "Outcome": "reports.simulation", "publish_run": "reports.simulation",
+    "animate": "plot.animation",
     "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder",
     "summary": "reports.summary", "datasets": "datasets",
 }  # fmt: skip
