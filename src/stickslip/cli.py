@@ -230,7 +230,7 @@ def simulate(case: str | None, output: Path | None, as_json: bool, **options: An
         return
     wanted = _case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
     folder = output or (None if as_json else Path(f"{_fit_for_a_file(wanted.name)}-stickslip"))
-    with _progress(6) as tell:
+    with _progress(9 if options["animation"] else 4) as tell:
         tell("simulating")
         result = ss.outcome(wanted)
         written = ss.publish_run(result, folder=folder, tell=tell, **options) if folder else None

@@ -82,7 +82,8 @@ def checked(
     try:
         return model.model_validate(dict(values))
     except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
+        faults = error.errors(include_url=False, include_context=False)
+        first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")  # a typo explains what is missing
         path = [str(part) for part in first["loc"] if not str(part).startswith("function-")]
         within = [table, *path] if table else path
         where = f"{source}{line_of(within, lines)}"
@@ -94,7 +95,7 @@ def checked(
                 f"{where} has the key '{key}'", f"the keys known are {', '.join(known)}", nearest(path[0], known)
             ) from error
         if first["type"] == "missing":
-            raise ModelError(f"{where} has no {key}", f"{key} is needed", f"add {path[0]} = ...") from error
+            raise ModelError(f"{where} has no {key}", f"{key} is needed", f"add {path[0]} = VALUE") from error
         raise ModelError(
             f"{where} sets {key} = {first['input']!r}",
             first["msg"].removeprefix("Value error, ").replace("Input should", "it should"),

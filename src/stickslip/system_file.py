@@ -11,9 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
+import numpy as np
 from pydantic import BaseModel, Field, create_model
 
 from stickslip import scenarios
+from stickslip.drives import RecordedBase
 from stickslip.errors import ModelError
 from stickslip.oscillator import Oscillator
 from stickslip.scenarios import DRIVES, LAWS
@@ -107,9 +109,9 @@ class Case:
         given = {"duration": duration, "cycles": cycles, "fs": fs}
         values = checked(_Run, {name: value for name, value in given.items() if value is not None}, source="the run")
         run = {name: value for name, value in (("duration", values.duration), ("cycles", values.cycles)) if value}
-        if len(run) > 1:
-            raise ModelError("duration and cycles are given", "a run has one of the two", "leave one out")
-        return dataclasses.replace(self, run=run or self.run, fs=values.fs or self.fs)
+        case = dataclasses.replace(self, run=run or self.run, fs=values.fs or self.fs)
+        _check_run(case)
+        return case
 
 
 class _Oscillator(BaseModel):
@@ -168,7 +170,7 @@ def scenario_case(name: str) -> Case:
     Examples
     --------
     >>> scenario_case("FD-4").run
-    {'duration': 20.0}
+    {'duration': 126.0}
     """
     if name not in scenarios.names():
         raise ModelError(
@@ -237,10 +239,34 @@ def read_system(path: str | Path) -> Case:
     start = _part(_start_of(law), "start", whole.start, source)
     run = _part(_Run, "run", whole.run, source)
     fs = run.pop("fs", None)
-    if len(run) > 1:
-        raise ModelError(f"{source.name}{line_of(['run'], lines)} sets duration and cycles", "a run has one of the two",
-                         "remove one")  # fmt: skip
-    return Case(path.stem, whole.about, system, start, run or {"cycles": CYCLES}, fs)
+    case = Case(path.stem, whole.about, system, start, run or _whole_run(system), fs)
+    with _placed("run", source):
+        _check_run(case)
+    return case
+
+
+def _whole_run(system: Oscillator) -> dict[str, float]:
+    """What is run where nothing is said: the whole recorded motion, else some cycles."""
+    drive = system.drive
+    return {"duration": _length(drive)} if isinstance(drive, RecordedBase) else {"cycles": CYCLES}
+
+
+def _length(drive: RecordedBase) -> float:
+    return (np.size(drive.samples) - 1) / drive.fs
+
+
+def _check_run(case: Case) -> None:
+    if len(case.run) > 1:
+        raise ModelError("duration and cycles are given", "a run has one of the two", "leave one out")
+    drive = case.system.drive
+    if not isinstance(drive, RecordedBase):
+        return
+    natural = 1 / case.system.frequency if case.system.stiffness else 1.0
+    asked = case.run.get("duration", case.run.get("cycles", 0.0) * natural)
+    if asked > _length(drive) * (1 + 1e-9):
+        raise ModelError(
+            f"duration = {asked:g} s", f"the recorded base motion ends at {_length(drive):g} s", "run it no longer"
+        )
 
 
 def _part(model: type[BaseModel], table: str, values: Mapping[str, Any], source: _Source) -> dict[str, Any]:
@@ -251,11 +277,11 @@ def _part(model: type[BaseModel], table: str, values: Mapping[str, Any], source:
 def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mapping[str, Any], source: _Source) -> Any:
     """The law or drive named in a table, with its parameters."""
     name = values.get("name")
-    if name not in register:
+    if not isinstance(name, str) or name not in register:
         where = f"{source.name}{line_of([table, 'name'], source.lines)}"
-        given = f"sets {table}.name = {name!r}" if "name" in values else f"has no {table}.name"
-        next_step = nearest(str(name), register) if "name" in values else "add name = ..."
-        raise ModelError(f"{where} {given}", f"a {table} is one of {', '.join(register)}", next_step)
+        told = f"sets {table}.name = {name!r}" if "name" in values else f"has no {table}.name"
+        next_step = nearest(str(name), register) if "name" in values else "add name = NAME"
+        raise ModelError(f"{where} {told}", f"a {table} is one of {', '.join(register)}", next_step)
     factory = register[name]
     parameters = {key: value for key, value in values.items() if key != "name"}
     if name == "RecordedBase" and "record" in parameters:
@@ -312,7 +338,7 @@ def _kind(factory: type, name: str, on: str = "") -> Any:
     unit = UNITS.get(f"{factory.__name__}.{name}", UNITS.get(name, "1"))
     number = Annotated[float, quantity(unit)]
     if name == "samples" or hint == Sequence[float]:
-        return list[number]  # type: ignore[valid-type]
+        return list[number]
     return {float: number, float | None: number | None}.get(hint, hint)
 
 

@@ -128,7 +128,7 @@ def _stage(run: Trajectory, x: Array, base: Array, face: Array) -> tuple[Any, _S
     first, last = last_cycles(run, CYCLES)
     places = ((grid[1, 0], "time"), (grid[1, 1], "x"))
     dots = [_background(figure.add_subplot(place), run, across, first, last) for place, across in places]
-    canvas.draw()
+    canvas.draw()  # type: ignore[no-untyped-call]
     return canvas, scene, dots
 
 
@@ -147,7 +147,8 @@ class _Scene:
         for spine in ax.spines.values():
             spine.set_visible(False)
         ax.axhline(0, color=INK, linewidth=1.2)
-        self.mass = ax.add_patch(Rectangle((0, 0), 1.4, 1.0, ec=INK, linewidth=1.0, animated=True))
+        self.mass = Rectangle((0, 0), 1.4, 1.0, ec=INK, linewidth=1.0, animated=True)
+        ax.add_patch(self.mass)
         self.spring = ax.plot([], [], color=INK, linewidth=1.2, animated=True)[0]
         self.wall = ax.plot([], [], color=INK, linewidth=3.5, animated=True)[0]
         self.marks = ax.plot([], [], color=FAINT, linewidth=1.0, animated=True)[0]

@@ -13,7 +13,7 @@ from typing import Any
 from stickslip import __version__
 from stickslip.analysis import Comparison, Findings
 from stickslip.errors import ModelError, RecordError
-from stickslip.plot.figures import Plate
+from stickslip.plot.plate import Plate
 from stickslip.reports.page import render, sections_of
 
 PROGRAM = "stickslip"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -182,8 +183,13 @@ def publish_run(
         if animation is not None:
             from stickslip.plot.animation import animate
 
-            animate(run, draft / f"animation.{animation}", tell=lambda n, of: tell(f"animating, {n} of {of} frames"))
+            animate(run, draft / f"animation.{animation}", tell=functools.partial(_told_at_times, tell))
     return Path(folder)
+
+
+def _told_at_times(tell: Callable[[str], None], number: int, count: int) -> None:
+    if number % (count // 5) == 0:
+        tell(f"animating, {number} of {count} frames")
 
 
 def check_output(run: Trajectory, *, fs: float | None, form: str, animation: str | None) -> float:
@@ -244,7 +250,7 @@ def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list
     else:
         low, high, speed = (_text(*values[n]) for n in ("displacement, from", "displacement, to", "largest speed"))
         found.append(f"In the last cycle the mass moves between {low} and {high}, at up to {speed}.")
-    counts = Counter(event.kind for event in run.events) if len(run.modes) <= MOST_PIECES else {}
+    counts = Counter(event.kind for event in run.events)
     if counts:
         told = ", ".join(f"{count} × {kind}" for kind, count in counts.most_common())
         found.append(f"On the way the contact changes {sum(counts.values())} times: {told}.")
@@ -259,19 +265,14 @@ def _fastest_contact(run: Trajectory) -> float:
 
 
 def _fields(thing: Any) -> dict[str, Any]:
-    return {
-        field.name: _plain(getattr(thing, field.name))
-        for field in dataclasses.fields(thing)
-        if field.name not in ("law", "drive")
-    }
+    values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.name not in ("law", "drive")}
+    return {name: _plain(np.size(value) if name == "samples" else value) for name, value in values.items()}
 
 
 def _plain(value: Any) -> Any:
     """A value as JSON has it."""
     if isinstance(value, Mapping):
         return {key: _plain(inner) for key, inner in value.items()}
-    if isinstance(value, np.ndarray):
-        return value.tolist()
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [_plain(inner) for inner in value]
     if isinstance(value, float | np.floating):
