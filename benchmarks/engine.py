@@ -70,7 +70,8 @@ def dop853(system: ss.Oscillator, cycles: int, tolerance: float = 1e-10) -> Run:
         return function
 
     t, x, v, anchor, times, modes = 0.0, 0.0, 0.0, 0.0, [], []
-    side = 0
+    needed = pull(0.0, 0.0, 0.0)
+    side = 0 if stiff or abs(needed) <= level else int(math.copysign(1, needed))
     while t < end:
         if side:
             friction, exits = (lambda s, f=side * level: f), [terminal(lambda t, s: s[1], -side)]
@@ -84,8 +85,7 @@ def dop853(system: ss.Oscillator, cycles: int, tolerance: float = 1e-10) -> Run:
 
             exits = [terminal(lambda t, s, j=j, f=friction: j * f(s) - level, 1) for j in (1, -1)]
         field = (lambda t, s: [0.0, 0.0]) if friction is None else (lambda t, s, f=friction: slope(t, s, f))
-        ahead = solve_ivp(field, (t, end), [x, v], method="DOP853", rtol=tolerance, atol=tolerance * 1e-4, events=exits,
-                          max_step=0.05 / system.drive.frequency)  # fmt: skip
+        ahead = solve_ivp(field, (t, end), [x, v], method="DOP853", rtol=tolerance, atol=tolerance * 1e-4, events=exits)
         t, (x, v) = float(ahead.t[-1]), ahead.y[:, -1]
         if ahead.status != 1:
             break
