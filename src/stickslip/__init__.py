@@ -33,8 +33,9 @@ _ROOMS = {
     "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load",
     "Release": "drives", "HarmonicBase": "drives", "HarmonicForce": "drives", "MultiTone": "drives",
     "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives",
-    "Oscillator": "oscillator", "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
+    "Oscillator": "oscillator", "Structure": "structure", "Contact": "structure", "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
     "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
+    "energy": "solve.energy", "attractors": "solve.periodic",
     "scenarios": "scenarios",
     "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder", "datasets": "datasets",
 }  # fmt: skip

@@ -6,56 +6,59 @@ matrix; the exits of a joint mode are the exits of all its contacts. Only joint 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
-from stickslip.solve.automaton import DEGREE, Array, Automaton, exponential, turning
+from stickslip.solve.automaton import DEGREE, Array, Automaton, exponential, fastest
 from stickslip.structure import Contact, Structure
 
 MOST = 4096  # joint modes; more would not fit a desk
 
 
 @dataclass(frozen=True)
-class JointMode:
-    """A mode of every contact at once.
+class JointMode(Mode):
+    """A mode of every contact at once; named after them, its kind and side those of the only one.
 
     Attributes
     ----------
     parts : tuple of Mode
         The mode of each contact.
-    exits : tuple of Exit
-        Their exits, in order of precedence.
     owners : tuple of int
         Number of the contact that each exit belongs to.
     """
 
-    parts: tuple[Mode, ...]
-    exits: tuple[Exit, ...]
-    owners: tuple[int, ...]
+    parts: tuple[Mode, ...] = ()
+    owners: tuple[int, ...] = ()
 
-    @property
-    def name(self) -> str:
-        """The names of the parts."""
-        return " + ".join(part.name for part in self.parts) or "free"
-
-    @property
-    def kind(self) -> str:
-        """The kind of the only part, or of all parts together."""
-        return " + ".join(part.kind for part in self.parts) or "free"
-
-    @property
-    def side(self) -> int:
-        """The side of the only part; 0 for several."""
-        return self.parts[0].side if len(self.parts) == 1 else 0
+    @classmethod
+    def of(cls, parts: tuple[Mode, ...], taken: list[tuple[Exit, int]]) -> JointMode:
+        """The joint mode of some parts, with the exits that end it and the contacts these belong to."""
+        return cls(
+            name=" + ".join(part.name for part in parts) or "free",
+            kind=" + ".join(part.kind for part in parts) or "free",
+            side=parts[0].side if len(parts) == 1 else 0,
+            friction=None if parts and all(part.friction is None for part in parts) else {},
+            exits=tuple(exit_ for exit_, _ in taken),
+            parts=parts,
+            owners=tuple(owner for _, owner in taken),
+        )
 
     @property
     def passing(self) -> bool:
         """Whether no time passes: a contact has yet to find its mode."""
         return any(part.kind == "landing" for part in self.parts)
+
+    def changes(self, before: Mode, leaving: int) -> Iterator[tuple[int, Mode, Mode]]:
+        """Each contact whose mode has changed, and the one whose exit it was."""
+        if not isinstance(before, JointMode):
+            raise TypeError(f"{before.name} is no mode of several contacts")
+        for contact, (old, new) in enumerate(zip(before.parts, self.parts, strict=True)):
+            if old is not new or contact == before.owners[leaving]:
+                yield contact, old, new
 
 
 def product(system: Structure) -> Automaton:
@@ -115,8 +118,10 @@ class _Builder:
 
     def load(self, contact: Contact) -> Array:
         """The load that presses a closed contact."""
-        row = contact.preload * self.one
-        return row if contact.normal is None else row + contact.stiffness * (np.asarray(contact.normal) @ self.place)
+        row: Array = contact.preload * self.one
+        if contact.normal is not None:
+            row = row + contact.stiffness * (np.asarray(contact.normal) @ self.place)
+        return row
 
     def relative(self, c: int, form: Mapping[str, float], friction: Array, flow: Array | None = None) -> Array:
         """A linear form of contact c: x and v along its tangent relative to the counter-face, "1" its load.
@@ -222,11 +227,12 @@ class _Builder:
                 rows.append(series)
                 resets.append(self.carry(mode, e, modes[follow[e]], friction))
             first.append(len(rows))
-        cells = np.array([1 / rate if (rate := turning(flow)) > 0 else np.inf for flow in flows])
+        cells = np.array([1 / rate if (rate := fastest(flow)) > 0 else np.inf for flow in flows])
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
         lifted = np.array([[part.kind == "flight" for part in mode.parts] for mode in modes], dtype=bool)
         lifted = lifted.reshape(len(modes), len(self.contacts), 1)
         loads = np.array(self.loads).reshape(len(self.contacts), self.size)
+        single = len(self.contacts) == 1
         slips = [self.relative(c, {"v": 1.0}, self.one) for c in range(len(self.contacts))]
         return Automaton(
             names=self.names,
@@ -242,7 +248,7 @@ class _Builder:
             friction=np.array(frictions),
             outputs={
                 "z": self.base,
-                "slip": np.array(slips).reshape(len(slips), self.size),
+                "slip": slips[0] if single else np.array(slips).reshape(len(slips), self.size),
                 "face": self.face[0],
                 "face_rate": self.face[1],
                 "force": self.row(self.motion.force),
@@ -257,7 +263,7 @@ class _Builder:
         )
 
     def _opening(self) -> Array:
-        """The physical state at the start: displacements zero, least velocities without slip, memory as the laws say."""
+        """The physical state at the start: no displacement, least velocities without slip, memory as the laws say."""
         none = np.zeros(self.size)
         every = list(range(len(self.contacts)))
         velocities = np.linalg.pinv(self.tangents) @ self.faces(every, 1)
@@ -272,13 +278,15 @@ class _Builder:
         """The joint modes that follow from the start, and of each the numbers of those that its exits lead to."""
         tables = [{mode.name: mode for mode in contact.modes()} for contact in self.contacts]
         order: dict[tuple[str, ...], int] = {tuple(contact.entry for contact in self.contacts): 0}
-        waiting, modes, targets = list(order), [], []
+        waiting = list(order)
+        modes: list[JointMode] = []
+        targets: list[list[int]] = []
         for names in waiting:
             parts = tuple(table[name] for table, name in zip(tables, names, strict=True))
             landing = [c for c, part in enumerate(parts) if part.kind == "landing"]
             asked = landing[:1] or range(len(parts))
             taken = [(exit_, c) for c in asked for exit_ in parts[c].exits]
-            modes.append(JointMode(parts, tuple(e for e, _ in taken), tuple(c for _, c in taken)))
+            modes.append(JointMode.of(parts, taken))
             targets.append([])
             for exit_, c in taken:
                 following = (*names[:c], exit_.to, *names[c + 1 :])

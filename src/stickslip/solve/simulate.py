@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
-from stickslip.solve.automaton import DEGREE, Array, Automaton, automaton
+from stickslip.solve.automaton import DEGREE, Array, Automaton, System, automaton
 from stickslip.solve.phasors import blank_past, fast_tables
 from stickslip.solve.trajectory import Trajectory
 
@@ -20,7 +19,7 @@ CHUNK = 16384  # pieces between two looks at the clock and the keyboard
 
 
 def simulate(
-    system: Oscillator,
+    system: System,
     *,
     duration: float | None = None,
     cycles: float | None = None,
@@ -34,14 +33,15 @@ def simulate(
 
     Parameters
     ----------
-    system : Oscillator
+    system : Oscillator or Structure
         What moves.
     duration : float, optional
         Time to simulate [s]. Give this or `cycles`.
     cycles : float, optional
         Time in periods of the drive; without a periodic drive, in natural periods.
     start : mapping, optional
-        State at time 0: "x" [m], "v" [m/s], memory of the law by name, "mode". At rest at 0 where left out.
+        State at time 0: "x" [m], "v" [m/s] (of a structure "x1", "v1" ...), memory of the law by name, "mode". Where
+        left out: displacement 0, at rest on the counter-face.
     budget : int
         Most events in one period; more is taken for chatter.
 
@@ -59,6 +59,7 @@ def simulate(
     Examples
     --------
     >>> from stickslip.laws.coulomb import Coulomb
+    >>> from stickslip.oscillator import Oscillator
     >>> slider = Oscillator(mass=1, stiffness=4, law=Coulomb(1.0))
     >>> run = simulate(slider, duration=10, start={"x": 1.25})
     >>> [(round(event.time, 6), event.kind) for event in run.events]
@@ -72,7 +73,7 @@ def simulate(
     return run(system, table, state, mode, laps=laps, offset=offset, budget=budget)
 
 
-def _end(system: Oscillator, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
+def _end(system: System, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
     """The time to simulate, as full periods of the drive and a rest [s]."""
     if (duration is None) == (cycles is None):
         raise ModelError(f"duration = {duration}, cycles = {cycles}", "one of the two is given", "give one of them")
@@ -89,7 +90,7 @@ def _end(system: Oscillator, table: Automaton, duration: float | None, cycles: f
         return float(laps), (count - laps) * period if cycles is not None else max(0.0, given - laps * period)
     if cycles is None:
         return 0.0, given
-    if system.stiffness == 0:
+    if system.frequency == 0:
         raise ModelError(f"cycles = {cycles}", "a system without period has no cycles", "give duration= [s]")
     return 0.0, given / system.frequency
 
@@ -102,7 +103,6 @@ def opening(table: Automaton, start: Mapping[str, float | str]) -> tuple[Array, 
         state[table.names.index(name)] = value
     given: dict[str, Any] = dict(start)
     mode_name = given.pop("mode", None)
-    memory = table.names[2 : table.physical]
     for name in given:
         if name not in table.names[: table.physical]:
             raise ModelError(
@@ -110,16 +110,17 @@ def opening(table: Automaton, start: Mapping[str, float | str]) -> tuple[Array, 
             )
         if not math.isfinite(given[name]):
             raise ModelError(f"start has {name} = {given[name]}", "a start is finite", f"correct {name}")
-    state[0] = given.get("x", 0.0)
-    state[1] = given.get("v", table.outputs["face_rate"] @ state)
-    for j, name in enumerate(memory):
-        state[2 + j] = given.get(name, table.opening[j] @ state)
-    slip = table.outputs["slip"] @ state
-    return state, table.index(mode_name) if mode_name is not None else table.entry[int(np.sign(slip)) + 1]
+    for j, name in enumerate(table.names[: table.physical]):
+        state[j] = given.get(name, table.opening[j] @ state)
+    if mode_name is not None:
+        return state, table.index(mode_name)
+    if len(set(table.entry)) == 1:
+        return state, table.entry[1]
+    return state, table.entry[int(np.sign(table.outputs["slip"] @ state)) + 1]
 
 
 def run(
-    system: Oscillator, table: Automaton, state: Array, mode: int, *, laps: float, offset: float, budget: int
+    system: System, table: Automaton, state: Array, mode: int, *, laps: float, offset: float, budget: int
 ) -> Trajectory:
     """March from a state at time 0 to the end of the time, in chunks."""
     size = len(table.names)
@@ -128,7 +129,7 @@ def run(
     clock, state = np.zeros(3), state.copy()
     period = table.motion.period
     total = offset + (laps * period if math.isfinite(period) else 0.0)
-    scale = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total
+    scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
     pieces = _Pieces(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
     try:
