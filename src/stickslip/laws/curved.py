@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -168,6 +168,10 @@ class CurvedMode:
     friction: Expression | None
     exits: tuple[Exit, ...] = ()
     rates: Mapping[str, Expression] = field(default_factory=dict)
+
+    def changes(self, before: CurvedMode, leaving: int) -> Iterator[tuple[int, CurvedMode, CurvedMode]]:
+        """Contact, its mode before and its mode now, as of a linear mode."""
+        yield 0, before, self
 
 
 @runtime_checkable

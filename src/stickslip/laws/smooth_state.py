@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from stickslip.laws.base import Exit, Row, finite
-from stickslip.laws.curved import CurvedMode, Sliding, symbol, tanh
+from stickslip.laws.base import Row, finite
+from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol, tanh
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,4 @@ class SmoothStateVariable(Sliding):
         decay = self.kinetic * self.rate
         pull = decay * (1.0 if self.printed else self.kinetic)
         rates = {"theta": pull * tanh(self.steepness * v) - decay * theta}
-        return (
-            CurvedMode("back", "slip", -1, theta, (Exit({"v": 1.0}, "forward"),), rates),
-            CurvedMode("forward", "slip", 1, theta, (Exit({"v": -1.0}, "back"),), rates),
-        )
+        return tuple(CurvedMode(name, "slip", side, theta, (turn,), rates) for name, side, turn in either_side())

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from stickslip.drives import Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
+from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
 from stickslip.structure import Structure
 
@@ -113,6 +114,12 @@ def automaton(system: System) -> Automaton:
         from stickslip.solve.product import product
 
         return product(system)
+    if isinstance(system.law, CurvedLaw):
+        raise ModelError(
+            f"{type(system.law).__name__} has curved modes",
+            "this question needs a law of linear modes",
+            "ask simulate(), or make a polygon of the curve with Tabulated.of()",
+        )
     return _Builder(system).build()
 
 

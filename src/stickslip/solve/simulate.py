@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
+from stickslip.laws.curved import CurvedLaw
+from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
 from stickslip.solve.automaton import DEGREE, Array, Automaton, System, automaton
 from stickslip.solve.phasors import blank_past, fast_tables
@@ -25,11 +27,12 @@ def simulate(
     cycles: float | None = None,
     start: Mapping[str, float | str] | None = None,
     budget: int = 10_000,
+    rtol: float = 1e-12,
 ) -> Trajectory:
     """How does the system move?
 
     Every mode is linear, so the motion between events is a closed form, and the first exit of each mode is found with
-    a certificate that none was jumped over.
+    a certificate that none was jumped over. A law with curved modes is followed by Taylor series to a tolerance instead.
 
     Parameters
     ----------
@@ -44,6 +47,8 @@ def simulate(
         left out: displacement 0, at rest on the counter-face.
     budget : int
         Most events in one period; more is taken for chatter.
+    rtol : float
+        For curved laws: error of a step relative to the largest value each entry of the state has had.
 
     Returns
     -------
@@ -67,10 +72,24 @@ def simulate(
     >>> run.status, run.state(10)["x"]
     ('at rest', 0.25)
     """
+    if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
+        return _simulate_curved(system, duration, cycles, start or {}, budget, rtol)
     table = automaton(system)
     laps, offset = _end(system, table, duration, cycles)
     state, mode = opening(table, start or {})
     return run(system, table, state, mode, laps=laps, offset=offset, budget=budget)
+
+
+def _simulate_curved(
+    system: Oscillator, duration: float | None, cycles: float | None, start: Mapping[str, float | str], budget: int,
+    rtol: float,
+) -> Trajectory:
+    from stickslip.solve.curved import run_curved, tape
+
+    table: Any = tape(system)
+    span = _end(system, table, duration, cycles)
+    state, mode = opening(table, start)
+    return run_curved(table, state, mode, span=span, stops=_stops(table, *span), budget=budget, rtol=rtol)
 
 
 def _end(system: System, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
