@@ -167,8 +167,7 @@ class Structure:
         size = len(mass)
         for name in ("mass", "damping", "stiffness"):
             object.__setattr__(self, name, _matrix(name, getattr(self, name), size))
-        least = float(np.min(np.linalg.eigvalsh(mass / np.max(np.abs(mass)))))
-        if not np.array_equal(mass, mass.T) or least < 1e-14 * size:
+        if not np.array_equal(mass, mass.T) or not _positive(mass):
             raise ModelError(
                 f"mass = {mass.tolist()} kg",
                 "a mass matrix is symmetric and positive definite",
@@ -242,6 +241,14 @@ class Structure:
         return replace(
             self, **own, drive=replace(drive, **inner), contacts=[_contact_having(c, changes) for c in contacts]
         )
+
+
+def _positive(mass: Array) -> bool:
+    """Whether a symmetric matrix is positive definite beyond rounding, whatever the units of its rows."""
+    units = np.sqrt(np.maximum(np.diag(mass), 0.0))
+    if not np.all(units > 0):
+        return False
+    return bool(np.min(np.linalg.eigvalsh(mass / np.outer(units, units))) > 1e-14 * len(mass))
 
 
 def _contact_having(contact: Contact, changes: Mapping[str, Any]) -> Contact:
