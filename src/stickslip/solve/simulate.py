@@ -154,6 +154,7 @@ def run(
     try:
         for at, (signals, values) in _stops(table, laps, offset):
             state[signals] = values
+            work[3, :size] = np.maximum(np.abs(state), work[3, :size])  # what rounding is measured by
             cell = min(table.cell[mode], total)
             mode = kernel.settle(
                 table.tables, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]
