@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -62,6 +62,10 @@ class Mode:
     friction: Row | None
     exits: tuple[Exit, ...]
     rates: Mapping[str, Row] = field(default_factory=dict)
+
+    def changes(self, before: Mode, leaving: int) -> Iterator[tuple[int, Mode, Mode]]:
+        """Contact, its mode before and its mode now: what an event by exit `leaving` into this mode has changed."""
+        yield 0, before, self
 
 
 class Law(Protocol):

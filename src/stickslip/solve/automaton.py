@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,12 @@ from numpy.typing import NDArray
 from stickslip.drives import Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
+from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
+from stickslip.structure import Structure
 
 Array = NDArray[np.float64]
+System = Oscillator | Structure
 
 DEGREE = 20  # of the Taylor polynomial in a cell; with rate * cell <= 1 the remainder is 1/21! = 2e-20 of its scale
 
@@ -46,8 +50,6 @@ class Automaton:
         Mode that follows; whether only a crossing counts.
     reset : ndarray (E, N, N)
         R of each exit, with the stuck velocity set where the next mode holds the mass.
-    leap : ndarray (M, M, N, N)
-        What carries the state from a mode to another through modes in which no time passes.
     first : ndarray (M + 1,)
         Exits of mode j are ``first[j]`` to ``first[j + 1]``.
     friction : ndarray (M, N)
@@ -60,10 +62,12 @@ class Automaton:
         Number of leading entries that belong to the oscillator and its law.
     entry : tuple of int
         Modes in which motion starts with negative, zero and positive relative velocity.
-    opening : ndarray (memory, N)
-        The law's memory at the start as a linear form of the state.
+    opening : ndarray (physical, N)
+        Each physical entry at the start, where it is not given, as a linear form of the entries before it.
     tones : ndarray (J, 4)
         Index of cosine, index of sine, angular frequency, phase.
+    degrees : int
+        Degrees of freedom: the state starts with their displacements, then their velocities.
     """
 
     names: tuple[str, ...]
@@ -75,7 +79,6 @@ class Automaton:
     target: NDArray[np.int64]
     crossing: NDArray[np.bool_]
     reset: Array
-    leap: Array
     first: NDArray[np.int64]
     friction: Array
     outputs: Mapping[str, Array]
@@ -84,12 +87,18 @@ class Automaton:
     entry: tuple[int, int, int]
     opening: Array
     tones: Array
+    degrees: int = 1
 
     @property
     def tables(self) -> tuple[NDArray[Any], ...]:
         """The arrays that the kernels read, in their order."""
         return (self.flow, self.cell, self.hop, self.series, self.target, self.crossing, self.reset, self.first,
                 self.tones)  # fmt: skip
+
+    @cached_property
+    def leap(self) -> Array:
+        """What carries the state from a mode to another through modes in which no time passes (M, M, N, N)."""
+        return _leaps(len(self.modes), self.first, self.target, self.reset, len(self.names))
 
     def index(self, mode: str) -> int:
         """Number of the mode of that name."""
@@ -99,8 +108,18 @@ class Automaton:
         return names.index(mode)
 
 
-def automaton(system: Oscillator) -> Automaton:
+def automaton(system: System) -> Automaton:
     """The flat tables of a system."""
+    if isinstance(system, Structure):
+        from stickslip.solve.product import product
+
+        return product(system)
+    if isinstance(system.law, CurvedLaw):
+        raise ModelError(
+            f"{type(system.law).__name__} has curved modes",
+            "this question needs a law of linear modes",
+            "ask simulate(), or make a polygon of the curve with Tabulated.of()",
+        )
     return _Builder(system).build()
 
 
@@ -196,7 +215,8 @@ class _Builder:
             first.append(len(rows))
         entry = system.law.entry
         none = np.zeros(self.size)
-        opening = [self.relative(form, none) + self.moved(name, 0) for name, form in system.law.memory.items()]
+        opening = [none, self.face[1]]
+        opening += [self.relative(form, none) + self.moved(name, 0) for name, form in system.law.memory.items()]
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
         return Automaton(
             names=self.names,
@@ -208,7 +228,6 @@ class _Builder:
             target=np.array(targets, dtype=np.int64),
             crossing=np.array([e.crossing for mode in self.modes for e in mode.exits], dtype=np.bool_),
             reset=np.array(resets).reshape(len(rows), self.size, self.size),
-            leap=_leaps(len(self.modes), first, targets, resets, self.size),
             first=np.array(first, dtype=np.int64),
             friction=np.array(frictions),
             outputs={
@@ -221,12 +240,12 @@ class _Builder:
             motion=self.motion,
             physical=2 + len(self.memory),
             entry=(order[entry[0]], order[entry[1]], order[entry[2]]),
-            opening=np.array(opening).reshape(len(opening), self.size),
+            opening=np.array(opening),
             tones=np.array(tones).reshape(len(tones), 4),
         )
 
 
-def _leaps(count: int, first: list[int], targets: list[int], resets: list[Array], size: int) -> Array:
+def _leaps(count: int, first: NDArray[np.int64], targets: NDArray[np.int64], resets: Array, size: int) -> Array:
     """The products of resets along the shortest way from each mode to each other one."""
     leaps = np.zeros((count, count, size, size))
     for begin in range(count):
@@ -243,25 +262,28 @@ def _leaps(count: int, first: list[int], targets: list[int], resets: list[Array]
 
 
 def _cell(flow: Array) -> float:
-    """The length of a Taylor cell [s]: no rate turns more than one radian in it.
-
-    The rates are the moduli of the eigenvalues, found without the constant and nilpotent parts, whose eigenvalues
-    come out of a general solver as small noise instead of zero.
-    """
-    rate = float(np.max(np.abs(_eigenvalues(flow)), initial=0.0))
+    """The length of a Taylor cell [s]: no rate turns more than one radian in it."""
+    rate = fastest(flow)
     return 1.0 / rate if rate > 0 else np.inf
+
+
+def fastest(flow: Array) -> float:
+    """The fastest rate of a flow [1/s]: the largest modulus of its eigenvalues.
+
+    They are found without the constant and nilpotent parts, whose eigenvalues come out of a general solver as small
+    noise instead of zero.
+    """
+    return float(np.max(np.abs(_eigenvalues(flow)), initial=0.0))
 
 
 def _eigenvalues(flow: Array) -> Any:
     """Eigenvalues of the strongly connected parts of the flow: exact zeros stay zero."""
-    from scipy.sparse.csgraph import connected_components
-
-    count, label = connected_components(flow != 0, directed=True, connection="strong")
-    found = []
-    for j in range(count):
-        part = np.flatnonzero(label == j)
-        found.append(np.linalg.eigvals(flow[np.ix_(part, part)]))
-    return np.concatenate(found)
+    size = len(flow)
+    reach = (flow != 0) | np.eye(size, dtype=bool)
+    for _ in range(max(1, size.bit_length())):
+        reach = reach @ reach
+    parts = {tuple(np.flatnonzero(reach[j] & reach[:, j])) for j in range(size)}
+    return np.concatenate([np.linalg.eigvals(flow[np.ix_(part, part)]) for part in sorted(parts)])
 
 
 def exponential(flow: Array, time: float) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.solve.trajectory import Trajectory
+from stickslip.structure import Structure
 
 ORDER = 12  # Gauss points on each cell; exact to rounding where no rate turns more than a radian
 
@@ -60,7 +61,8 @@ def energy(run: Trajectory) -> Energy:
     >>> round(energy(decay).friction, 12)  # 1 N along 2 m and 1 m
     3.0
     """
-    table, mass = run.table, run.system.mass
+    table, mass = run.table, np.atleast_2d(run.system.mass)
+    tangents = run.system.tangents if isinstance(run.system, Structure) else np.ones((1, 1))
     cells = np.minimum(table.cell[run.modes], run.durations)
     counts = np.maximum(1, np.ceil(run.durations / cells - 1e-9)).astype(np.int64)
     widths = np.repeat(run.durations / counts, counts)
@@ -68,14 +70,19 @@ def energy(run: Trajectory) -> Energy:
     begins = np.repeat(run.starts, counts) + index * widths
     nodes, weights = np.polynomial.legendre.leggauss(ORDER)
     times = begins[:, None] + widths[:, None] * (nodes + 1) / 2
-    (v, a, friction), _ = run.sample(np.minimum(times.ravel(), run.duration), ("v", "a", "friction"))
+    values, _ = run.sample(np.minimum(times.ravel(), run.duration), ("v", "a", "friction"))
+    v, a, friction = np.split(values, [len(mass), 2 * len(mass)])
     w = (widths[:, None] * weights / 2).ravel()
-    push = mass * a + friction
-    end = run.state(run.duration)["v"] if run.exits[-1] < 0 else float(run.states[-1, 1])
-    kinetic = mass * (end**2 - float(run.states[0, 1]) ** 2) / 2
+    taken = np.sum(tangents.T @ friction * v, axis=0)
+    given = np.sum(mass @ a * v, axis=0) + taken
+    first = run.states[0, len(mass) : 2 * len(mass)]
+    last = (
+        run.sample([run.duration], ("v",))[0][:, 0] if run.exits[-1] < 0 else run.states[-1, len(mass) : 2 * len(mass)]
+    )
+    kinetic = float(last @ mass @ last - first @ mass @ first) / 2
     return Energy(
-        float(kinetic),
-        float(np.sum(w * push * v)),
-        float(np.sum(w * friction * v)),
-        float(np.sum(w * (np.abs(push * v) + np.abs(friction * v)))) + abs(float(kinetic)),
+        kinetic,
+        float(np.sum(w * given)),
+        float(np.sum(w * taken)),
+        float(np.sum(w * (np.abs(given) + np.abs(taken)))) + abs(kinetic),
     )

@@ -176,7 +176,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
     tuple of int
         Status, number of pieces, mode.
     """
-    flow, cells, hop, _, target, _, reset, _, tones = tables
+    flow, cells, hop, series, target, _, reset, _, tones = tables
     laps, times, modes, durations, states, exits = out
     n = state.shape[0]
     c, noise = work[4], work[5]
@@ -213,6 +213,14 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
             if leaving >= 0:
                 advance(flow[mode], held, dt, scratch)
                 gone += dt
+                # the last digits: where the state itself, not the polynomial, has the exit at zero
+                g, d = 0.0, 0.0
+                for j in range(n):
+                    g += series[leaving, 0, j] * held[j]
+                    d += series[leaving, 1, j] * held[j]
+                if d > 0.0 and abs(g) < 1e-9 * d * min(cell, dt):
+                    advance(flow[mode], held, -g / d, scratch)
+                    gone -= g / d
                 break
             if span <= cell:
                 advance(flow[mode], held, span, scratch)
@@ -223,6 +231,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
                 held[i] = scratch[0, i]
                 scale[i] = max(scale[i], abs(held[i]))
             gone += cell
+            set_tones(tones, held, clock[1] + gone)
         durations[count] = gone
         exits[count] = leaving
         count += 1

@@ -9,8 +9,7 @@ import numpy as np
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Estimate
-from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import automaton
+from stickslip.solve.automaton import System, automaton
 from stickslip.solve.periodic import end_of
 from stickslip.solve.simulate import opening, run
 from stickslip.solve.tangent import carry_tangents
@@ -20,7 +19,7 @@ STUDENT = 2.064  # two-sided 95 % quantile at 24 degrees of freedom
 
 
 def lyapunov(
-    system: Oscillator,
+    system: System,
     *,
     cycles: int = 5000,
     transient: int = 100,
@@ -36,7 +35,7 @@ def lyapunov(
 
     Parameters
     ----------
-    system : Oscillator
+    system : Oscillator or Structure
         What moves, with a periodic drive.
     cycles : int
         Periods over which the growth is averaged.
@@ -60,6 +59,7 @@ def lyapunov(
     >>> from stickslip.drives import HarmonicForce
     >>> from stickslip.laws.coulomb import Coulomb
     >>> drive = HarmonicForce(1.0, frequency=0.6 / 6.283185307)
+    >>> from stickslip.oscillator import Oscillator
     >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.3), drive=drive)
     >>> lyapunov(slider, cycles=500).value < 0
     True
@@ -75,8 +75,9 @@ def lyapunov(
     difference = np.zeros((1, size))
     difference[0, : table.physical] = np.linspace(1.0, 0.5, table.physical)
     work = np.empty((8, size))
-    scale = 1 / system.frequency / (2 * math.pi) if system.stiffness else period
-    weights = np.array([1.0, scale, *[1.0] * (table.physical - 2)])
+    scale = 1 / system.frequency / (2 * math.pi) if system.frequency else period
+    weights = np.ones(table.physical)
+    weights[table.degrees : 2 * table.degrees] = scale
     growth = []
     for lap in range(transient + cycles):
         orbit = run(system, table, state, mode, laps=1.0, offset=0.0, budget=10_000)

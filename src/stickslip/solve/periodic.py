@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import Array, Automaton, automaton, exponential
+from stickslip.solve.automaton import Array, Automaton, System, automaton, exponential
 from stickslip.solve.simulate import opening, run
 from stickslip.solve.tangent import carry_tangents
 from stickslip.solve.trajectory import Event, Trajectory
@@ -115,12 +114,12 @@ class SteadyState:
         times = np.append((ends[:-1, None] + np.diff(ends)[:, None] * inner).ravel(), self.orbit.duration)
         times = np.unique(np.concatenate([times, np.maximum(ends[1:] * (1 - 1e-13), 0.0)]))
         values, _ = self.orbit.sample(times, (output,))
-        best = int(np.argmax(np.abs(values[0])))
+        best = int(np.argmax(np.max(np.abs(values), axis=0)))
         low, high = times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)]
-        top = float(np.abs(values[0, best]))
+        top = float(np.max(np.abs(values[:, best])))
         for _ in range(12):
             grid = np.linspace(low, high, 33)
-            fine = np.abs(self.orbit.sample(grid, (output,))[0][0])
+            fine = np.max(np.abs(self.orbit.sample(grid, (output,))[0]), axis=0)
             peak = int(np.argmax(fine))
             top = max(top, float(fine[peak]))
             low, high = grid[max(peak - 1, 0)], grid[min(peak + 1, 32)]
@@ -128,7 +127,7 @@ class SteadyState:
 
 
 def steady_state(
-    system: Oscillator,
+    system: System,
     *,
     start: Mapping[str, float | str] | None = None,
     transient: int = 64,
@@ -143,7 +142,7 @@ def steady_state(
 
     Parameters
     ----------
-    system : Oscillator
+    system : Oscillator or Structure
         What moves.
     start : mapping, optional
         Where the transient starts, as in ``simulate``; another start can lead to another orbit.
@@ -168,6 +167,7 @@ def steady_state(
     >>> from stickslip.drives import HarmonicForce
     >>> from stickslip.laws.coulomb import Coulomb
     >>> drive = HarmonicForce(1.0, frequency=0.8 / 6.283185307)
+    >>> from stickslip.oscillator import Oscillator
     >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=drive)
     >>> orbit = steady_state(slider)
     >>> orbit.status, round(orbit.amplitude, 6), orbit.stops
@@ -197,7 +197,55 @@ def steady_state(
     return SteadyState("unbounded" if growing else "not periodic", math.nan, 0, orbit, none)
 
 
-def _lap(system: Oscillator, table: Automaton, state: Array, mode: int, laps: int) -> Trajectory:
+def attractors(
+    system: Oscillator, *, starts: Sequence[Mapping[str, float | str]], transient: int = 64, orders: int = 4
+) -> tuple[SteadyState, ...]:
+    """Which steady motions exist beside each other?
+
+    Parameters
+    ----------
+    system : Oscillator
+        What moves.
+    starts : sequence of mapping
+        Where the transients start, as in ``simulate``; each leads to one motion.
+    transient, orders : int
+        As in :func:`steady_state`.
+
+    Returns
+    -------
+    tuple of SteadyState
+        The different ones among them, in the order they were found.
+
+    Examples
+    --------
+    >>> from stickslip.drives import HarmonicForce
+    >>> from stickslip.laws.coulomb import Coulomb
+    >>> drive = HarmonicForce(1.0, frequency=0.8 / 6.283185307)
+    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.7, static=1.05), drive=drive)
+    >>> [orbit.status for orbit in attractors(slider, starts=[{}, {"x": 3.0}])]
+    ['rest', 'unique']
+    """
+    found: list[SteadyState] = []
+    for start in starts:
+        orbit = steady_state(system, start=start, transient=transient, orders=orders)
+        if not any(_same(orbit, other) for other in found):
+            found.append(orbit)
+    return tuple(found)
+
+
+def _same(one: SteadyState, other: SteadyState) -> bool:
+    """Whether two steady motions are one: alike in status, order, modes and, at phase zero, state."""
+    if (one.status, one.order) != (other.status, other.order):
+        return False
+    if one.status == "rest":
+        return True  # a set of equilibria counts once
+    if list(one.orbit.modes) != list(other.orbit.modes):
+        return False
+    scale = np.max(np.abs(one.orbit.states), axis=0)
+    return bool(np.all(np.abs(one.orbit.states[0] - other.orbit.states[0]) <= 1e-8 * scale))
+
+
+def _lap(system: System, table: Automaton, state: Array, mode: int, laps: int) -> Trajectory:
     return run(system, table, state, mode, laps=float(laps), offset=0.0, budget=10_000)
 
 
@@ -215,12 +263,12 @@ def end_of(orbit: Trajectory) -> tuple[Array, int]:
     return last, mode
 
 
-def _iterate(system: Oscillator, table: Automaton, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
+def _iterate(system: System, table: Automaton, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
     orbit = _lap(system, table, state, mode, laps)
     return *end_of(orbit), float(np.max(np.abs(orbit.states[-64:, 0])))
 
 
-def _closed(system: Oscillator, table: Automaton, state: Array, mode: int, orders: int) -> SteadyState | None:
+def _closed(system: System, table: Automaton, state: Array, mode: int, orders: int) -> SteadyState | None:
     """The orbit near a state, of the least order that closes; None where Newton finds none."""
     for order in range(1, orders + 1):
         best: tuple[float, Trajectory | None, int] = (math.inf, None, 0)
@@ -247,14 +295,13 @@ def _closed(system: Oscillator, table: Automaton, state: Array, mode: int, order
 
 def _repeats_freely(table: Automaton) -> bool:
     """Whether free motion in every slip mode repeats after one period of the drive: b = 1/2n without damping."""
-    free = [flow[:2, :2] for flow, mode in zip(table.flow, table.modes, strict=True) if mode.kind == "slip"]
+    own = 2 * table.degrees
+    free = [flow[:own, :own] for flow, mode in zip(table.flow, table.modes, strict=True) if mode.kind == "slip"]
     turns = [exponential(flow, table.motion.period) for flow in free]
-    return bool(turns) and all(np.allclose(turn, np.eye(2), rtol=0, atol=1e-9) for turn in turns)
+    return bool(turns) and all(np.allclose(turn, np.eye(own), rtol=0, atol=1e-9) for turn in turns)
 
 
-def _family(
-    system: Oscillator, table: Automaton, state: Array, mode: int, size: float, orders: int
-) -> SteadyState | None:
+def _family(system: System, table: Automaton, state: Array, mode: int, size: float, orders: int) -> SteadyState | None:
     """An orbit inside a family whose edge is approached forever: a push off the edge closes at once."""
     for push in (0.05, 0.1, 0.2):
         pushed = state.copy()
@@ -295,14 +342,12 @@ def _judged(orbit: Trajectory, order: int, jacobian: Array, slowest: float) -> S
     return SteadyState(status, order * table.motion.period, order, orbit, multipliers)
 
 
-def _self_excited(
-    system: Oscillator, table: Automaton, start: Mapping[str, float | str], transient: int
-) -> SteadyState:
+def _self_excited(system: System, table: Automaton, start: Mapping[str, float | str], transient: int) -> SteadyState:
     """The orbit between two equal ends of a stick."""
     if not table.motion.rates:
         raise SolveError("nothing drives the system", "only a driven motion repeats", "give a drive=")
     state, mode = opening(table, start)
-    scale = 1 / system.frequency if system.stiffness else 1.0
+    scale = 1 / system.frequency if system.frequency else 1.0
     # the way of the belt moves on, so the relative coordinate is compared, not the signals
     duration = transient * scale
     for _ in range(8):
@@ -314,8 +359,9 @@ def _self_excited(
         ]
         if len(ends) > 2:
             first, last = ends[-2], ends[-1]
-            gap = np.abs(motion.states[last, :2] - motion.states[first, :2])
-            if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, :2]), axis=0)):
+            own = slice(0, 2 * table.degrees)
+            gap = np.abs(motion.states[last, own] - motion.states[first, own])
+            if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, own]), axis=0)):
                 return _between(motion, first, last)
         duration *= 2
     none = np.full(table.physical, np.nan, dtype=np.complex128)

@@ -163,7 +163,7 @@ def _times(rate: float, count: int) -> Array:
     return np.arange(count, dtype=np.float64) * (2 * HALF_STEP / rate)
 
 
-@njit(**FAST)
+@njit(**FAST, forceinline=True)
 def _turn(nodes, first, count, density, decay, turn, t):
     """e^{(decay + i turn) t} from the nearest node."""
     j = min(count - 1, int(t * density + 0.5))
@@ -184,7 +184,7 @@ def _turn(nodes, first, count, density, decay, turn, t):
     return a * c - b * s, a * s + b * c
 
 
-@njit(**FAST)
+@njit(**FAST, forceinline=True)
 def _below(g, d, h, j, fourth, length):
     """Whether g + d t + h t^2/2 + j t^3/6 + fourth t^4/24 stays below zero on (0, length]: Bernstein coefficients."""
     a, b, c = d * length, h * length * length, j * length * length * length
@@ -198,7 +198,7 @@ def _below(g, d, h, j, fourth, length):
     )
 
 
-@njit(**FAST)
+@njit(**FAST, forceinline=True)
 def _certified(grid, piece, exits, leaving, w, lr, li, t, end, parts, nodes):
     """Whether every exit stays below zero on (0, t): quartic bounds from both ends of `parts` intervals.
 

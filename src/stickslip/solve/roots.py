@@ -21,7 +21,7 @@ import math
 
 from numba import njit
 
-OPTIONS = {"cache": True, "error_model": "numpy"}
+OPTIONS = {"cache": True, "error_model": "numpy", "_nrt": False}
 NONE = 2.0  # no root in the cell
 NOISE = 64 * 2.220446049250313e-16
 

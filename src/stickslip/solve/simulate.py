@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
+from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
-from stickslip.solve.automaton import DEGREE, Array, Automaton, automaton
+from stickslip.solve.automaton import DEGREE, Array, Automaton, System, automaton
 from stickslip.solve.phasors import blank_past, fast_tables
 from stickslip.solve.trajectory import Trajectory
 
@@ -20,30 +21,34 @@ CHUNK = 16384  # pieces between two looks at the clock and the keyboard
 
 
 def simulate(
-    system: Oscillator,
+    system: System,
     *,
     duration: float | None = None,
     cycles: float | None = None,
     start: Mapping[str, float | str] | None = None,
     budget: int = 10_000,
+    rtol: float = 1e-12,
 ) -> Trajectory:
     """How does the system move?
 
     Every mode is linear, so the motion between events is a closed form, and the first exit of each mode is found with
-    a certificate that none was jumped over.
+    a certificate that none was jumped over. A law with curved modes is followed by Taylor series to a tolerance instead.
 
     Parameters
     ----------
-    system : Oscillator
+    system : Oscillator or Structure
         What moves.
     duration : float, optional
         Time to simulate [s]. Give this or `cycles`.
     cycles : float, optional
         Time in periods of the drive; without a periodic drive, in natural periods.
     start : mapping, optional
-        State at time 0: "x" [m], "v" [m/s], memory of the law by name, "mode". At rest at 0 where left out.
+        State at time 0: "x" [m], "v" [m/s] (of a structure "x1", "v1" ...), memory of the law by name, "mode". Where
+        left out: displacement 0, at rest on the counter-face.
     budget : int
         Most events in one period; more is taken for chatter.
+    rtol : float
+        For curved laws: error of a step relative to the largest value each entry of the state has had.
 
     Returns
     -------
@@ -59,6 +64,7 @@ def simulate(
     Examples
     --------
     >>> from stickslip.laws.coulomb import Coulomb
+    >>> from stickslip.oscillator import Oscillator
     >>> slider = Oscillator(mass=1, stiffness=4, law=Coulomb(1.0))
     >>> run = simulate(slider, duration=10, start={"x": 1.25})
     >>> [(round(event.time, 6), event.kind) for event in run.events]
@@ -66,13 +72,27 @@ def simulate(
     >>> run.status, run.state(10)["x"]
     ('at rest', 0.25)
     """
+    if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
+        return _simulate_curved(system, duration, cycles, start or {}, budget, rtol)
     table = automaton(system)
     laps, offset = _end(system, table, duration, cycles)
     state, mode = opening(table, start or {})
     return run(system, table, state, mode, laps=laps, offset=offset, budget=budget)
 
 
-def _end(system: Oscillator, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
+def _simulate_curved(
+    system: Oscillator, duration: float | None, cycles: float | None, start: Mapping[str, float | str], budget: int,
+    rtol: float,
+) -> Trajectory:
+    from stickslip.solve.curved import run_curved, tape
+
+    table: Any = tape(system)
+    span = _end(system, table, duration, cycles)
+    state, mode = opening(table, start)
+    return run_curved(table, state, mode, span=span, stops=_stops(table, *span), budget=budget, rtol=rtol)
+
+
+def _end(system: System, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
     """The time to simulate, as full periods of the drive and a rest [s]."""
     if (duration is None) == (cycles is None):
         raise ModelError(f"duration = {duration}, cycles = {cycles}", "one of the two is given", "give one of them")
@@ -89,7 +109,7 @@ def _end(system: Oscillator, table: Automaton, duration: float | None, cycles: f
         return float(laps), (count - laps) * period if cycles is not None else max(0.0, given - laps * period)
     if cycles is None:
         return 0.0, given
-    if system.stiffness == 0:
+    if system.frequency == 0:
         raise ModelError(f"cycles = {cycles}", "a system without period has no cycles", "give duration= [s]")
     return 0.0, given / system.frequency
 
@@ -102,7 +122,6 @@ def opening(table: Automaton, start: Mapping[str, float | str]) -> tuple[Array, 
         state[table.names.index(name)] = value
     given: dict[str, Any] = dict(start)
     mode_name = given.pop("mode", None)
-    memory = table.names[2 : table.physical]
     for name in given:
         if name not in table.names[: table.physical]:
             raise ModelError(
@@ -110,16 +129,17 @@ def opening(table: Automaton, start: Mapping[str, float | str]) -> tuple[Array, 
             )
         if not math.isfinite(given[name]):
             raise ModelError(f"start has {name} = {given[name]}", "a start is finite", f"correct {name}")
-    state[0] = given.get("x", 0.0)
-    state[1] = given.get("v", table.outputs["face_rate"] @ state)
-    for j, name in enumerate(memory):
-        state[2 + j] = given.get(name, table.opening[j] @ state)
-    slip = table.outputs["slip"] @ state
-    return state, table.index(mode_name) if mode_name is not None else table.entry[int(np.sign(slip)) + 1]
+    for j, name in enumerate(table.names[: table.physical]):
+        state[j] = given.get(name, table.opening[j] @ state)
+    if mode_name is not None:
+        return state, table.index(mode_name)
+    if len(set(table.entry)) == 1:
+        return state, table.entry[1]
+    return state, table.entry[int(np.sign(table.outputs["slip"] @ state)) + 1]
 
 
 def run(
-    system: Oscillator, table: Automaton, state: Array, mode: int, *, laps: float, offset: float, budget: int
+    system: System, table: Automaton, state: Array, mode: int, *, laps: float, offset: float, budget: int
 ) -> Trajectory:
     """March from a state at time 0 to the end of the time, in chunks."""
     size = len(table.names)
@@ -128,12 +148,13 @@ def run(
     clock, state = np.zeros(3), state.copy()
     period = table.motion.period
     total = offset + (laps * period if math.isfinite(period) else 0.0)
-    scale = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total
+    scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
     pieces = _Pieces(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
     try:
         for at, (signals, values) in _stops(table, laps, offset):
             state[signals] = values
+            work[3, :size] = np.maximum(np.abs(state), work[3, :size])  # what rounding is measured by
             cell = min(table.cell[mode], total)
             mode = kernel.settle(
                 table.tables, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]

@@ -11,20 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import SolveError
-from stickslip.oscillator import Oscillator
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
-from stickslip.solve.automaton import Array, Automaton
+from stickslip.solve.automaton import Array, Automaton, System
 from stickslip.solve.kernel import sample
 
 
 class Event(NamedTuple):
-    """One change of mode: when [s], what it is called, the mode it leads to and that mode's side."""
+    """One change of mode: when [s], what it is called, the mode it leads to, that mode's side, and which contact."""
 
     time: float
     kind: str
     mode: str
     side: int
+    contact: int = 0
 
 
 class Piece(NamedTuple):
@@ -42,7 +42,7 @@ class Trajectory:
 
     Attributes
     ----------
-    system : Oscillator
+    system : Oscillator or Structure
         What moved.
     table : Automaton
         Its flat mode tables.
@@ -63,7 +63,7 @@ class Trajectory:
         "complete", "at rest" (nothing more will happen), or "interrupted".
     """
 
-    system: Oscillator
+    system: System
     table: Automaton
     laps: NDArray[np.int32]
     offsets: Array
@@ -113,8 +113,9 @@ class Trajectory:
             if self.exits[j - 1] < 0:
                 continue
             before, after = modes[self.modes[j - 1]], modes[self.modes[j]]
-            turned = before.side * after.side < 0
-            yield Event(float(self.starts[j]), "reversal" if turned else after.kind, after.name, after.side)
+            for contact, old, new in after.changes(before, self.exits[j - 1] - self.table.first[self.modes[j - 1]]):
+                turned = old.side * new.side < 0
+                yield Event(float(self.starts[j]), "reversal" if turned else new.kind, new.name, new.side, contact)
 
     def state(self, time: float) -> dict[str, float]:
         """The exact state at one instant: x [m], v [m/s], the law's memory, a [m/s^2], friction [N], and the mode.
@@ -136,7 +137,8 @@ class Trajectory:
         """
         names = self.table.names[: self.table.physical]
         values, piece = self.sample([time], ("state", "a", "friction"))
-        named = dict(zip((*names, "a", "friction"), map(float, values[:, 0]), strict=True))
+        names = (*names, *self.labels("a"), *self.labels("friction"))
+        named = dict(zip(names, map(float, values[:, 0]), strict=True))
         return {**named, "mode": int(self.modes[piece[0]])}
 
     def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, NDArray[np.int64]]:
@@ -148,7 +150,8 @@ class Trajectory:
             T instants [s], increasing, within the simulated time.
         outputs : tuple of str
             Of "x", "v", "a", "friction", "z", "slip" (velocity relative to the counter-face), "force", the names of
-            the law's memory, and "state" (all physical entries of the state).
+            the law's memory, and "state" (all physical entries of the state). Of a structure "x", "v" and "a" are
+            those of every degree of freedom, "friction", "slip" and "load" those of every contact.
 
         Returns
         -------
@@ -169,18 +172,52 @@ class Trajectory:
         sample(self.table.tables, self.starts, self.modes, self.states, times, rows, piece, out, work)
         return out, piece
 
+    def section(self, *, phase: float = 0.0) -> Array:
+        """The Poincare section: the physical state once in each period of the drive.
+
+        Parameters
+        ----------
+        phase : float
+            Where in the period to look [rad].
+
+        Returns
+        -------
+        ndarray (n, K)
+            x [m], v [m/s] and the law's memory, a row for each period.
+
+        Raises
+        ------
+        SolveError
+            The drive has no period.
+        """
+        period = self.table.motion.period
+        if not np.isfinite(period):
+            raise SolveError("the drive has no period", "a section looks once in each", "use a periodic drive")
+        offset = phase % (2 * np.pi) / (2 * np.pi) * period
+        count = int(np.floor((self.duration - offset) / period * (1 + 1e-12))) + 1
+        times = np.minimum(offset + np.arange(max(count, 0)) * period, self.duration)
+        return self.sample(times, ("state",))[0].T
+
     def rows(self, name: str) -> Array:
         """An output as linear forms of the state, by mode: (M, R, N)."""
         table = self.table
         count, size = len(table.modes), len(table.names)
+        degrees = table.degrees
+        spans = {"x": range(degrees), "v": range(degrees, 2 * degrees), "state": range(table.physical)}
         if name == "a":
-            return table.flow[:, 1:2]
+            return table.flow[:, degrees : 2 * degrees]
         if name == "friction":
-            return table.friction[:, None]
+            return table.friction.reshape(count, -1, size)
         if name in table.outputs:
-            return np.broadcast_to(table.outputs[name], (count, 1, size))
-        places = list(range(table.physical)) if name == "state" else [table.names.index(name)]
+            forms = np.atleast_2d(table.outputs[name])
+            return np.broadcast_to(forms, (count, *forms.shape[-2:]))
+        places = list(spans[name]) if name in spans else [table.names.index(name)]
         return np.broadcast_to(np.eye(size)[places], (count, len(places), size))
+
+    def labels(self, name: str) -> tuple[str, ...]:
+        """What the rows of an output are called: the name alone where there is one, else name1, name2 ..."""
+        count = self.rows(name).shape[1]
+        return (name,) if count == 1 else tuple(f"{name}{j + 1}" for j in range(count))
 
     def record(self, *, fs: float) -> Record:
         """The motion sampled at a rate, as a Record.
@@ -193,7 +230,8 @@ class Trajectory:
         Returns
         -------
         Record
-            Channels x, v, a, friction, and z where the base moves, force where a force acts.
+            Channels x, v, a, friction, and z where the base moves, force where a force acts; x1, x2 ... of a
+            structure.
         """
         count = int(np.floor(self.duration * fs * (1 + 1e-12))) + 1
         times = np.minimum(np.arange(count) / fs, self.duration)
@@ -201,9 +239,13 @@ class Trajectory:
         names += ["z"] * bool(self.table.motion.base) + ["force"] * bool(self.table.motion.force)
         values, _ = self.sample(times, tuple(names))
         units = {"x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N"}
-        channels = {name: Channel(name, units[name], described(name, units[name]), source="simulate") for name in names}
+        labels = {label: name for name in names for label in self.labels(name)}
+        channels = {
+            label: Channel(label, units[name], described(name, units[name]), source="simulate")
+            for label, name in labels.items()
+        }
         step = Step("simulate", {"system": repr(self.system), "fs": fs}, f"{len(self.modes)} pieces, {self.status}")
-        samples: Mapping[str, Array] = dict(zip(names, values, strict=True))
+        samples: Mapping[str, Array] = dict(zip(labels, values, strict=True))
         return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(self.system)})
 
     def __repr__(self) -> str:
