@@ -3,7 +3,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Record sets beside the checkout are used where they are; without them each is fetched when it is asked for by name.
+ifneq ($(wildcard ../shared/data),)
 export STICKSLIP_DATA ?= $(abspath ../shared/data)
+endif
 
 .PHONY: demo test lint docs bench smoke clean
 

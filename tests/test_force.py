@@ -123,12 +123,32 @@ def test_stated_delays_are_taken_out(delay):
     assert made.start == pytest.approx(max(0.0, np.ceil(-delay * fs) / fs))
 
 
+def test_a_second_balance_takes_nothing_from_the_first(motion):
+    record = noisy_record(motion, 1000.0, 1e-3)
+    first = friction_force(record, **RIG)
+    second = friction_force(first, **RIG)
+    assert np.array_equal(second["friction"], first["friction"])
+    assert "as measured" not in second.history[-1].outcome
+    other = friction_force(first, **RIG, method="five-point")
+    assert np.array_equal(other["friction"], friction_force(record, **RIG, method="five-point")["friction"])
+    shifted = first.with_channel("x", 2 * first["x"], unit="m")  # v and a of the first balance are stale now
+    direct = friction_force(record.with_channel("x", 2 * record["x"], unit="m"), **RIG)
+    assert np.array_equal(friction_force(shifted, **RIG)["friction"], direct["friction"])
+
+
+def test_a_torque_is_no_part_of_a_balance_of_forces(motion):
+    turned = Record.of({"x": motion["x"], "force": motion["f"]}, fs=1000.0, units={"x": "m", "force": "N m"})
+    with pytest.raises(RecordError, match="force is in N m"):
+        friction_force(turned, **RIG)
+
+
 @pytest.mark.parametrize(
     ("wrong", "error"),
     [
         ({"mass": 0.0}, ModelError), ({"mass": -1.0}, ModelError), ({"stiffness": -5}, ModelError),
         ({"mass": float("nan")}, StickslipError), ({"mass": "3 mm"}, StickslipError), ({"damper": "wall"}, ModelError),
         ({"contact": "wall"}, ModelError), ({"method": "spline"}, EstimateError), ({"bandwidth": 1e4}, EstimateError),
+        ({"bandwidth": "x"}, RecordError), ({"bandwidth": [3]}, RecordError),
     ],
 )  # fmt: skip
 def test_wrong_constants_are_refused_in_a_sentence(wrong, error):

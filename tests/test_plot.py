@@ -18,7 +18,7 @@ from stickslip.plot.contact import plot_velocity_loop
 from stickslip.plot.figures import figures
 from stickslip.plot.plate import Plate
 from stickslip.plot.style import COLUMNS, STYLE, envelope, prefixed, thinned
-from stickslip.plot.traces import close_up, plot_traces
+from stickslip.plot.traces import close_up, plot_force_balance, plot_traces
 
 FS = 500.0
 
@@ -93,6 +93,41 @@ def test_sticks_are_shaded_where_they_are(demo: Findings) -> None:
     shaded = sum(float(np.ptp(path.vertices[:, 0])) for path in spans)
     assert demo.sticks is not None
     assert shaded / near.duration == pytest.approx(demo.sticks.share.value, abs=0.03)
+
+
+def pushed(*, damper: str = "ground") -> ss.Record:
+    """A mass (2 kg, 800 N/m, 3 N s/m) on a moving base, pushed so that its friction is 1.5 N against the motion."""
+    w, time = 2 * np.pi, np.arange(8000) / 1000
+    x, v, a = 0.02 * np.sin(w * time), 0.02 * w * np.cos(w * time), -0.02 * w**2 * np.sin(w * time)
+    z, base_speed = 0.005 * np.sin(w * time + 1), 0.005 * w * np.cos(w * time + 1)
+    drag = 3 * (v - base_speed * (damper == "base"))
+    samples = {"x": x, "z": z, "v": v, "a": a, "force": 2 * a + drag + 1.5 * np.sign(v) - 800 * (z - x)}
+    noise = np.random.default_rng(1).normal(0, 1e-7, time.size)
+    return ss.Record.of({**samples, "x": x + noise}, fs=1000.0)
+
+
+@pytest.mark.parametrize("damper", ["ground", "base"])
+def test_each_term_of_the_balance_is_drawn_as_itself(damper: str) -> None:
+    record = pushed(damper=damper)
+    balanced = ss.friction_force(record, mass=2, stiffness=800, damping=3, damper=damper)
+    axes = plot_force_balance(analyze(balanced))
+    drawn = {str(line.get_label()): np.asarray(line.get_ydata(), dtype=float) for line in axes.get_lines()}
+    across = record["v"] - (0.005 * 2 * np.pi * np.cos(2 * np.pi * record.time + 1) if damper == "base" else 0)
+    expected = {
+        "spring": 800 * (record["z"] - record["x"]), "inertia": -2 * record["a"], "damper": -3 * across,
+        "applied force": record["force"], "friction": balanced["friction"],
+    }  # fmt: skip
+    assert list(drawn)[:5] == list(expected)
+    for name, values in expected.items():
+        assert drawn[name] == pytest.approx(envelope(balanced.time, values)[1], abs=0.005), name
+
+
+def test_a_friction_that_was_measured_has_no_balance_to_draw() -> None:
+    record = pushed()
+    measured = record.with_channel("friction", 1.5 * np.sign(record["v"]), unit="N")
+    assert "force-balance" not in [plate.name for plate in figures(analyze(measured, mass=2, stiffness=800))]
+    again = analyze(ss.friction_force(record, mass=2, stiffness=800, damping=3))
+    assert "force-balance" in [plate.name for plate in figures(again)], "whoever asked for it"
 
 
 def test_the_comparison_shows_the_line_of_the_coefficient() -> None:

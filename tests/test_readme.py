@@ -82,8 +82,15 @@ def test_the_commands_run(folder: Path, line: str) -> None:
         assert set(command[1:]) <= TARGETS
         return
     if command[0] == "stickslip":
-        program = [sys.executable, "-m", "stickslip.cli", *command[1:]]
+        program = [sys.executable, "-m", "stickslip", *command[1:]]
         run = subprocess.run(program, cwd=folder, capture_output=True, text=True, timeout=120, env=os.environ)
         assert run.returncode == 0, run.stderr
+        if command[1] == "check":
+            assert "samples" in run.stdout
+            assert "nothing wrong was found" in run.stdout
+        else:
+            assert command[1] == "analyze", f"a command whose answer no test looks at: {line}"
+            assert "sliding friction" in run.stdout
+            assert (folder / run.stdout.split()[-1]).stat().st_size > 10_000, "the report that it names is there"
         return
     assert command[:3] == ["pip", "install", ".[io]"], f"a command that no test runs: {line}"

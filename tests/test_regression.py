@@ -53,6 +53,22 @@ def test_intervals_hold_the_truth(rho):
     assert np.all(np.mean(held, axis=0) >= 0.85)  # 3 binomial standard deviations below 0.95
 
 
+def test_a_stated_delay_is_taken_out():
+    record, rows = record_of(noise=0.0), 25
+    late = Record.of({"x": record["x"][rows:], "force": record["force"][:-rows]}, fs=FS)
+    assert abs(regress_friction(late).inertia.value - 3) > 0.3
+    told = regress_friction(late.with_details("force", delay=rows / FS))
+    for name, value in TRUTH.items():
+        assert getattr(told, name).value == pytest.approx(value, rel=0.01), name
+
+
+@pytest.mark.parametrize(("position", "unit"), [("x", "N m"), ("theta", "N")])
+def test_units_that_do_not_belong_together_are_refused(position, unit):
+    record = record_of()
+    with pytest.raises(RecordError, match=f"force is in {unit}, the motion in"):
+        regress_friction(Record.of({position: record["x"], "force": record["force"]}, fs=FS, units={"force": unit}))
+
+
 def test_directions_may_differ():
     record = record_of(forward=(4.0, 1.5), back=(6.0, 2.5), noise=0.05)
     found = regress_friction(record, symmetric=False)

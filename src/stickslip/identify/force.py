@@ -9,8 +9,10 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import ModelError, RecordError
+from stickslip.errors import ModelError
+from stickslip.identify.motion import is_measured, require_fit
 from stickslip.record.record import Record, Step
+from stickslip.signals.delay import without_delays
 from stickslip.signals.differentiate import (
     LEAST,
     Filter,
@@ -20,7 +22,6 @@ from stickslip.signals.differentiate import (
     noise_along,
     total_sd,
 )
-from stickslip.signals.interpolate import band_limited
 from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ def friction_force(
     damper: str = "ground",
     method: str = "smoother",
     contact: str = "ground",
-    bandwidth: float | None = None,
+    bandwidth: float | str | None = None,
 ) -> Record:
     """How large is the friction force on the mass, at each moment?
 
@@ -60,8 +61,8 @@ def friction_force(
     Parameters
     ----------
     record : Record
-        With ``x`` [m], and z, v, a, force where measured. Delays stated for its channels are taken out first, by
-        band-limited interpolation; the rows that not every channel reaches any more are dropped.
+        With ``x`` [m], and z, v, a, force [N] where measured. What an earlier call derived is derived afresh. Delays
+        stated for these channels are taken out first, see :func:`~stickslip.signals.delay.without_delays`.
     mass : float or str
         Moving mass m [kg], or with its unit: ``"250 g"``.
     stiffness : float or str
@@ -75,7 +76,7 @@ def friction_force(
     contact : {"ground", "base"}
         What the mass slides on. The force on the mass is the same; what it is held against (x, or x - z) is not, and
         the questions that follow are told by the history.
-    bandwidth : float, optional
+    bandwidth : float or str, optional
         The smoother's frequency of -3 dB [Hz]; chosen from the record's noise when not given.
 
     Returns
@@ -89,7 +90,7 @@ def friction_force(
     Raises
     ------
     RecordError
-        A channel that is missing, not finite, on a broken clock or shorter than 24 samples.
+        A channel that is missing, not finite, on a broken clock or shorter than 24 samples; a force in N m.
     ModelError
         A constant that is not finite, a mass that is not positive, or an unknown damper or contact.
     EstimateError
@@ -105,10 +106,11 @@ def friction_force(
     """
     rig = _Rig.stated({"mass": mass, "stiffness": stiffness, "damping": damping}, damper, contact)
     checked_method(method)
+    record = _as_measured(record)
     used = ["x", *(name for name in ("z", "v", "a", "force") if name in record)]
     record.require_clean(*used, question=QUESTION, samples=LEAST)
-    record = _without_delays(record, used)
-    record.require_clean(*used, question=QUESTION, samples=LEAST)
+    require_fit(record, *({"force"} & set(record)), length="m", question=QUESTION)
+    record = without_delays(record, *used, question=QUESTION, samples=LEAST)
     known = "a" in record
     if bandwidth is not None:
         width = checked_bandwidth(bandwidth, record.fs, len(record))
@@ -212,6 +214,12 @@ def _paths(
             yield name, derive, {order: c for order, c in terms.items() if order}
 
 
+def _as_measured(record: Record) -> Record:
+    """The record without what an earlier balance made, which would be taken for measured."""
+    measured = {name: record[name] for name in record if is_measured(record, name)}
+    return replace(record, samples=measured) if measured else record
+
+
 def _with_motion(record: Record, derive: Filter) -> Record:
     """The record with v and a, each differentiated where it was not measured."""
     source, order = ("v", 0) if "v" in record else ("x", 1)
@@ -224,29 +232,3 @@ def _with_motion(record: Record, derive: Filter) -> Record:
             values = derive.apply(record[origin], {times: 1.0})
             made = made.with_channel(name, values, unit=unit, source="friction_force", noise=level)
     return made
-
-
-def _without_delays(record: Record, used: list[str]) -> Record:
-    """The record with the stated delays of the channels taken out, cut to the rows that all of them reach."""
-    delays = {name: record.channels[name].delay for name in used if record.channels[name].delay}
-    if not delays:
-        return record
-    shifts = {name: record.channels[name].delay * record.fs for name in record}
-    first = max(0, math.ceil(-min(shifts.values())))
-    last = len(record) - max(0, math.ceil(max(shifts.values())))
-    if last - first < LEAST:
-        raise RecordError(
-            f"delays of {', '.join(f'{name} {delay:g} s' for name, delay in delays.items())}",
-            f"{QUESTION} needs {LEAST} rows that every channel reaches, and {max(0, last - first)} are left",
-            "correct the delays, in seconds, or give a longer record",
-        )
-    rows = np.arange(first, last, dtype=float)
-    samples = {
-        name: band_limited(values, rows + shifts[name]) if shifts[name] else values[first:last]
-        for name, values in record.samples.items()
-    }
-    step = Step(
-        "friction_force", {"delays": delays}, f"delays taken out; {last - first} of {len(record)} rows reached by all"
-    )
-    moved = record.with_samples(samples, step, start=record.start + first / record.fs)
-    return replace(moved, channels={name: replace(channel, delay=0.0) for name, channel in moved.channels.items()})

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate
+from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
@@ -20,13 +20,18 @@ from stickslip.identify.motion import (
     away_from,
     contact_motion,
     find_cycles,
+    motion_channels,
+    require_fit,
 )
 from stickslip.record.record import Record
-from stickslip.statistics import mean_of_cycles, mean_uncertainty, student
+from stickslip.signals.delay import without_delays
+from stickslip.statistics import least_squares, mean_of_cycles, mean_uncertainty, student
 
 Array = NDArray[np.float64]
 
 LEAST_SPREAD = 0.1  # of the sliding speed about its mean, below which no slope against speed can be told
+BRANCHES = ("back, slowing down", "forward, slowing down", "back, speeding up", "forward, speeding up")
+BRANCH_BINS, FEW_BINS = 50, 8  # means of equal count along the speed, in which a branch's line is sought
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +85,8 @@ class Loops:
         Friction against velocity.
     cycles : ndarray, shape (m,)
         Time [s] at which each cycle begins.
+    unit : str
+        Of the displacement, "m" or "rad".
     status : str
         "ok", or in words what to beware of.
     """
@@ -98,11 +105,12 @@ class Loops:
     scatter: Array
     curve: Curve
     cycles: Array
+    unit: str
     status: str
 
 
 def friction_loops(
-    record: Record, *, contact: str | None = None, frequency: float | None = None, bins: int = 40
+    record: Record, *, contact: str | None = None, frequency: float | str | None = None, bins: int = 40
 ) -> Loops:
     r"""How much friction, forward and back, over each cycle, and how does it change with speed?
 
@@ -111,16 +119,18 @@ def friction_loops(
     noise and creep reach and away from the jumps at a reversal, which differentiation blurs. A stuck contact, a
     reversal and single artefacts so have no say. The energy is :math:`\oint f\,dx` by trapezoids. The slope is that
     of ``f = sign(v) (F + s |v|) + offset`` by least squares. Every value is found per cycle; the interval is
-    Student's t on the scatter between cycles.
+    Student's t on the scatter between cycles. The slope's is widened to what its four branches allow (forward and back,
+    speeding up and slowing down): to Student's t on their spread, and to how their friction strays from a line.
 
     Parameters
     ----------
     record : Record
-        With ``friction`` and ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base.
+        With ``friction`` and ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base. Delays stated for them
+        are taken out first.
     contact : {"ground", "base"}, optional
         What the mass slides on, the loops being over the displacement against it; as :func:`friction_force` was told,
         or the ground, when not given.
-    frequency : float, optional
+    frequency : float or str, optional
         Forcing frequency [Hz]; found from the record when not given.
     bins : int
         Bins of velocity, over both directions.
@@ -132,7 +142,7 @@ def friction_loops(
     Raises
     ------
     RecordError
-        A channel is missing, broken or too short.
+        A channel is missing, broken or too short, or the units of friction and motion do not belong together.
     EstimateError
         No motion, no complete cycle, or no sliding in one of the directions.
 
@@ -148,9 +158,11 @@ def friction_loops(
     """
     question = "friction loops"
     record.require_clean("friction", question=question)
-    if bins < 2:
-        raise EstimateError(f"bins = {bins}", "a curve has two bins at least", "leave it at 40")
+    if not isinstance(bins, (int, np.integer)) or bins < 2:
+        raise EstimateError(f"bins = {bins}", "a curve has two bins at least, a whole number", "leave it at 40")
+    record = without_delays(record, *motion_channels(record, contact), "friction", question=question)
     motion = contact_motion(record, contact=contact, question=question)
+    require_fit(record, "friction", length=motion.unit, question=question)
     cycles = find_cycles(record, motion, frequency=frequency)
     friction, unit = record["friction"], record.channels["friction"].unit
     sliding = _sliding(motion, cycles)
@@ -178,6 +190,7 @@ def friction_loops(
         scatter=folded.std(axis=0, ddof=1) if len(folded) > 1 else np.zeros(PHASES),
         curve=_curve(friction, motion, cycles, label, bins),
         cycles=motion.start + cycles.edges[:-1] / motion.fs,
+        unit=motion.unit,
         status=_status(cycles, forward, back, energy),
     )
 
@@ -233,14 +246,55 @@ def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: N
     product = np.bincount(cycle, speed_about * magnitude_about)
     slopes = product[power > 0] / power[power > 0]
     spread = math.sqrt(float(power.sum()) / len(speed)) / float(speed.mean())
+    per_speed = "N s/m" if motion.unit == "m" else "N m s/rad"
     found = mean_of_cycles(
-        "slope of friction against speed", slopes, unit="N s/m" if (unit, motion.unit) == ("N", "m") else
-        f"{unit} s/{motion.unit}", method="least squares per cycle, mean of cycles",
+        "slope of friction against speed", slopes, unit=per_speed, method="least squares per cycle, mean of cycles",
         checks=(f"sliding speed varies by {100 * spread:.0f} % about its mean",),
     )  # fmt: skip
-    if spread >= LEAST_SPREAD:
-        return found
-    return Estimate(**{**vars(found), "status": "the sliding speed hardly varies: no slope can be told"})
+    if spread < LEAST_SPREAD:
+        return replace(found, status="the sliding speed hardly varies: no slope can be told")
+    ahead = np.minimum(np.arange(len(sliding)) + motion.blur, len(sliding) - 1)
+    behind = np.maximum(np.arange(len(sliding)) - motion.blur, 0)
+    faster = np.sign(motion.velocity) * (motion.velocity[ahead] - motion.velocity[behind]) > 0
+    return _widened(found, _branch_slopes(speed, magnitude, 2 * faster[chosen] + (motion.velocity[chosen] > 0)))
+
+
+def _branch_slopes(speed: Array, magnitude: Array, branch: NDArray[np.intp]) -> list[Estimate]:
+    """Slope of each branch of the loop, its interval from how the friction strays from a line along the speed."""
+    found = []
+    for number in range(4):
+        chosen = np.flatnonzero(branch == number)
+        bins = min(BRANCH_BINS, len(chosen) // 4)
+        if bins < FEW_BINS or np.ptp(speed[chosen]) == 0:
+            continue
+        rows = chosen[np.argsort(speed[chosen])]
+        starts = np.arange(bins) * len(rows) // bins
+        counts = np.diff(np.append(starts, len(rows)))
+        abscissa, ordinate = (np.add.reduceat(values[rows], starts) / counts for values in (speed, magnitude))
+        line = least_squares(np.column_stack([abscissa - abscissa.mean(), np.ones(bins)]), ordinate)
+        found.append(line.estimate(0, BRANCHES[number], "", ""))
+    return found
+
+
+def _widened(slope: Estimate, branches: list[Estimate]) -> Estimate:
+    """The slope as surely as the branches of the loop agree on it.
+
+    Friction that changes with position, or a contact that turns round elastically, repeats in every cycle: the scatter
+    between cycles does not know of it. A branch's line, or the other branches, do.
+    """
+    if len(branches) < 2:
+        return slope
+    values = np.array([branch.value for branch in branches])
+    apart = student(len(values) - 1) * float(values.std(ddof=1)) / math.sqrt(len(values))
+    astray = float(np.mean([branch.interval[1] - branch.value for branch in branches]))
+    told = ", ".join(f"{branch.name} {branch.value:.3g}" for branch in branches)
+    half = max(apart, astray)
+    if half <= slope.interval[1] - slope.value:
+        return replace(slope, checks=(*slope.checks, told))
+    wide = (slope.value - half, slope.value + half)
+    lost = wide[0] <= 0 <= wide[1] and not slope.includes(0.0)
+    status = "friction changes along the way as much as with speed: no slope can be told" if lost else slope.status
+    return replace(slope, interval=wide, sd=half / NORMAL_95, status=status, checks=(*slope.checks, told))
 
 
 def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.intp], bins: int) -> Curve:

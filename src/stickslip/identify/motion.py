@@ -8,16 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import EstimateError
+from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import differentiate
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import least_squares, mean_of_cycles
+from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
 LEAST = 32  # samples
+FORCES = {"m": "N", "rad": "N m"}  # what does work on a displacement, or an angle
 AUDIBLE = 5.0  # a speed of five standard deviations of its noise is motion
 CREEP = 0.04  # share of the typical peak speed below which presliding and creep are not told from sticking
 TURNED = 0.1  # share of the typical peak speed that the motion reaches before it counts as reversed
@@ -93,6 +95,21 @@ class Cycles:
         return np.interp(at, np.arange(len(values)), values)
 
 
+def motion_channels(record: Record, contact: str | None) -> list[str]:
+    """The channels that tell the motion of the contact, its position first."""
+    if contact is None:
+        told = [step.arguments.get("contact") for step in record.history if step.action == "friction_force"]
+        contact = str(told[-1]) if told else "ground"
+    if contact not in ("ground", "base"):
+        raise EstimateError(f"contact = '{contact}'", "the mass slides on the ground or the base", "choose one of them")
+    if contact == "base":
+        return ["x", "z"]
+    velocity = ["v"] if is_measured(record, "v") else []
+    if "x" in record:
+        return ["x", *velocity]
+    return ["theta"] if "theta" in record else velocity or ["x"]
+
+
 def contact_motion(record: Record, *, contact: str | None, question: str) -> Motion:
     """How do the two sides of the contact move against each other?
 
@@ -102,7 +119,7 @@ def contact_motion(record: Record, *, contact: str | None, question: str) -> Mot
     Parameters
     ----------
     record : Record
-        With ``x`` or ``theta``, or ``v`` alone, whose integral is then the displacement.
+        With ``x`` or ``theta``, or ``v`` alone, whose integral is then the displacement; their delays taken out.
     contact : {"ground", "base"}, optional
         What the mass slides on; as :func:`friction_force` was told, or the ground, when not given.
     question : str
@@ -119,34 +136,27 @@ def contact_motion(record: Record, *, contact: str | None, question: str) -> Mot
     EstimateError
         Nothing moves.
     """
-    if contact is None:
-        told = [step.arguments.get("contact") for step in record.history if step.action == "friction_force"]
-        contact = str(told[-1]) if told else "ground"
-    if contact not in ("ground", "base"):
-        raise EstimateError(f"contact = '{contact}'", "the mass slides on the ground or the base", "choose one of them")
-    position = next((name for name in ("x", "theta") if name in record), "x")
-    based, timed = contact == "base", position not in record and is_measured(record, "v")
-    names = ["v"] if timed else [position, *(["z"] if based else [])]
-    measured = ["v"] if is_measured(record, "v") and not based and position == "x" else []
-    record.require_clean(*dict.fromkeys([*names, *measured]), question=question, samples=LEAST)
-    if timed:
-        displacement = np.concatenate([[0.0], np.cumsum((record["v"][1:] + record["v"][:-1]) / 2)]) / record.fs
-    else:
-        displacement = record[position] - (record["z"] if based else 0.0)
+    names = motion_channels(record, contact)
+    record.require_clean(*names, question=question, samples=LEAST)
+    displacement = record[names[0]]
+    if names == ["v"]:
+        displacement = np.concatenate([[0.0], np.cumsum((displacement[1:] + displacement[:-1]) / 2)]) / record.fs
+    if "z" in names:
+        displacement = displacement - record["z"]
     if np.ptp(displacement) == 0:
         raise EstimateError(
-            f"channel {' and '.join(names)} never changes",
+            f"channel {names[0]} never changes{' against z' if 'z' in names else ''}",
             f"{question} needs motion",
             "check the sensor and its column",
         )
-    if measured:
+    if "v" in names:
         known = record.channels["v"].noise
         noise, bandwidth, velocity = known or noise_level(record["v"], record.fs), record.fs / 2, record["v"]
     else:
         derivative = differentiate(displacement, record.fs)
         velocity, noise, bandwidth = derivative.values, float(np.median(derivative.sd)), derivative.bandwidth
     fastest = float(np.abs(velocity).max())
-    unit = "rad" if position == "theta" else "m"
+    unit = "rad" if "theta" in names else "m"
     if fastest <= AUDIBLE * noise:
         raise EstimateError(
             f"the largest speed is {fastest:.3g} {unit}/s, its noise {noise:.3g} {unit}/s",
@@ -156,7 +166,7 @@ def contact_motion(record: Record, *, contact: str | None, question: str) -> Mot
     return Motion(displacement, velocity, noise, bandwidth, record.fs, record.start, unit)
 
 
-def find_cycles(record: Record, motion: Motion, *, frequency: float | None = None) -> Cycles:
+def find_cycles(record: Record, motion: Motion, *, frequency: float | str | None = None) -> Cycles:
     """Which complete cycles does the motion go through?
 
     The forcing frequency is the strongest line of ``z``, ``force`` or the displacement, whichever the record has first,
@@ -170,7 +180,7 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | None = Non
         Where the forcing is looked for.
     motion : Motion
         Of the contact.
-    frequency : float, optional
+    frequency : float or str, optional
         Forcing frequency [Hz], where it is known.
 
     Returns
@@ -187,14 +197,14 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | None = Non
         found = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
         cycles = _periodic(motion, found)
         return cycles if cycles is not None and _repeats(cycles, motion.displacement) else _aperiodic(motion)
-    duration = len(motion.displacement) / motion.fs
+    frequency, duration = parse_value(frequency, "Hz"), len(motion.displacement) / motion.fs
     cycles = None
     if 1 / duration <= frequency < motion.fs / 2:
         given = Estimate.normal("forcing frequency", frequency, sd=0.0, unit="Hz", method="given")
         cycles = _periodic(motion, given)
     if cycles is None:
         raise EstimateError(
-            f"frequency = {frequency} Hz gives no complete cycle in {duration:.3g} s",
+            f"frequency = {frequency:g} Hz gives no complete cycle in {duration:.3g} s",
             f"it lies between one cycle in the record and half the rate, {motion.fs / 2:g} Hz",
             "give it in Hz, or leave it out",
         )
@@ -259,6 +269,18 @@ def forcing_frequency(values: Array, fs: float) -> Estimate:
 def is_measured(record: Record, name: str) -> bool:
     """Whether the record has the channel, and not from :func:`friction_force`, which derives what was not measured."""
     return name in record and record.channels[name].source != "friction_force"
+
+
+def require_fit(record: Record, *forces: str, length: str, question: str) -> None:
+    """Refuse, in one sentence, a torque with a displacement or a force with an angle (`length` "m" or "rad")."""
+    for name in forces:
+        unit = record.channels[name].unit
+        if unit != FORCES[length]:
+            raise RecordError(
+                f"channel {name} is in {unit}, the motion in {length}",
+                f"{question} needs a force in N with a displacement, or a torque in N m with an angle",
+                "give both in units that belong together, as in a lever's x = r theta or force = torque / r",
+            )
 
 
 def stretches(inside: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.identify.motion import is_measured
+from stickslip.identify.motion import is_measured, require_fit
 from stickslip.record.record import Record
+from stickslip.signals.delay import without_delays
 from stickslip.signals.differentiate import Derivative, Filter, differentiate, smooth
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, least_squares
+from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
@@ -80,7 +82,7 @@ def regress_friction(
     signal: str | None = None,
     symmetric: bool = True,
     stiffness: bool = False,
-    bandwidth: float | None = None,
+    bandwidth: float | str | None = None,
 ) -> Regression:
     r"""Which inertia, viscous and Coulomb friction explain a measured force?
 
@@ -97,14 +99,15 @@ def regress_friction(
     Parameters
     ----------
     record : Record
-        With the force, and ``x`` (or ``theta``) or ``v``; ``v`` and ``a`` are used where they were measured.
+        With the force, and ``x`` (or ``theta``) or ``v``; ``v`` and ``a`` are used where they were measured. Delays
+        stated for them are taken out first.
     signal : {"force", "load", "friction"}, optional
         The channel to explain; the first of these that the record has.
     symmetric : bool
         Whether both directions share their coefficients.
     stiffness : bool
         Whether a term in the displacement is fitted too.
-    bandwidth : float, optional
+    bandwidth : float or str, optional
         Frequency of -3 dB [Hz] of the smoother; by the rule above when not given.
 
     Returns
@@ -114,7 +117,7 @@ def regress_friction(
     Raises
     ------
     RecordError
-        A channel is missing, broken or too short.
+        A channel is missing, broken or too short, or the units of force and motion do not belong together.
     EstimateError
         No motion, motion in one direction only, or coefficients that the motion can not tell apart.
 
@@ -131,6 +134,7 @@ def regress_friction(
     """
     question = "the regression of a force"
     name = _signal(record, signal, question)
+    record = without_delays(record, name, *_measured(record), question=question)
     sources = _sources(record, name, stiffness, question)
     width = _bandwidth(record, name, sources, bandwidth)
     smoother = Filter("smoother", record.fs, width)
@@ -159,20 +163,31 @@ def _signal(record: Record, signal: str | None, question: str) -> str:
     return name
 
 
+def _position(record: Record) -> str:
+    return next((each for each in ("x", "theta") if each in record), "x")
+
+
+def _measured(record: Record) -> list[str]:
+    """The channels of the motion that were measured, along a path or round an axis."""
+    motion = ["theta"] if _position(record) == "theta" else ["x", "v", "a"]
+    return [each for each in motion if is_measured(record, each)]
+
+
 def _sources(record: Record, name: str, stiffness: bool, question: str) -> dict[str, tuple[Array, int]]:
     """For displacement (if asked for), velocity and acceleration: the channel it comes from and the order to take."""
-    position = next((each for each in ("x", "theta") if each in record), "x")
-    known = [each for each in (position, "v", "a") if is_measured(record, each)]
+    position = _position(record)
+    known = _measured(record)
     if known in ([], ["a"]):
         record.require(position, question=question)
     record.require_clean(*known, name, question=question, samples=LEAST)
+    require_fit(record, name, length="rad" if position == "theta" else "m", question=question)
     for each in known:
         if np.ptp(record[each]) == 0:
             raise EstimateError(
                 f"channel {each} never changes", f"{question} needs motion", "check the sensor and its column"
             )
-    velocity = (record["v"], 0) if "v" in known and position != "theta" else (record[position], 1)
-    acceleration = (record["a"], 0) if "a" in known and position != "theta" else (velocity[0], velocity[1] + 1)
+    velocity = (record["v"], 0) if "v" in known else (record[position], 1)
+    acceleration = (record["a"], 0) if "a" in known else (velocity[0], velocity[1] + 1)
     found = {"v": velocity, "a": acceleration}
     if stiffness:
         record.require(position, question=f"{question} with a stiffness")
@@ -180,14 +195,14 @@ def _sources(record: Record, name: str, stiffness: bool, question: str) -> dict[
     return found
 
 
-def _bandwidth(record: Record, name: str, sources: dict[str, tuple[Array, int]], given: float | None) -> float:
+def _bandwidth(record: Record, name: str, sources: dict[str, tuple[Array, int]], given: float | str | None) -> float:
     if given is not None:
-        low, high = 10 * record.fs / len(record), 0.45 * record.fs
-        if not low <= given <= high:
+        width, low, high = parse_value(given, "Hz"), 10 * record.fs / len(record), 0.45 * record.fs
+        if not low <= width <= high:
             raise EstimateError(
                 f"bandwidth = {given} Hz", f"this record allows {low:.3g} to {high:.3g} Hz", "choose one in between"
             )
-        return float(given)
+        return width
     values, order = sources["a"]
     best = _best(values, record.fs, order).bandwidth
     held = WIDER * _holding(record[name], record.fs)

@@ -18,10 +18,13 @@ from stickslip.identify.motion import (
     Motion,
     contact_motion,
     find_cycles,
+    motion_channels,
     stretches,
 )
 from stickslip.record.record import Record
+from stickslip.signals.delay import without_delays
 from stickslip.statistics import mean_of_cycles
+from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
@@ -85,7 +88,11 @@ class Sticks:
 
 
 def find_sticks(
-    record: Record, *, contact: str | None = None, threshold: float | None = None, frequency: float | None = None
+    record: Record,
+    *,
+    contact: str | None = None,
+    threshold: float | str | None = None,
+    frequency: float | str | None = None,
 ) -> Sticks:
     """When does the contact stick, for what share of the time, how often per cycle?
 
@@ -99,13 +106,13 @@ def find_sticks(
     Parameters
     ----------
     record : Record
-        With ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base.
+        With ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base. Stated delays are taken out first.
     contact : {"ground", "base"}, optional
         What the mass slides on, the speed being that against it; as :func:`friction_force` was told, or the ground,
         when not given.
-    threshold : float, optional
+    threshold : float or str, optional
         Speed [m/s or rad/s] below which the contact may stick; found from the record when not given.
-    frequency : float, optional
+    frequency : float or str, optional
         Forcing frequency [Hz]; found from the record when not given.
 
     Returns
@@ -130,16 +137,17 @@ def find_sticks(
     (0.3, 2)
     """
     question = "sticks and slips"
+    record = without_delays(record, *motion_channels(record, contact), question=question)
     motion = contact_motion(record, contact=contact, question=question)
     cycles = find_cycles(record, motion, frequency=frequency)
     noisy, creep = AUDIBLE * motion.noise, CREEP * cycles.peak
-    if threshold is not None and not 0 < threshold < cycles.peak:
+    limit = max(noisy, creep) if threshold is None else parse_value(threshold, f"{motion.unit}/s")
+    if not 0 < limit < cycles.peak and threshold is not None:
         raise EstimateError(
-            f"threshold = {threshold} {motion.unit}/s",
+            f"threshold = {limit} {motion.unit}/s",
             f"it lies between 0 and the typical peak speed, {cycles.peak:.3g} {motion.unit}/s",
             "leave it out to have it found",
         )
-    limit = max(noisy, creep) if threshold is None else float(threshold)
     if SLIPPED * limit >= cycles.peak:
         raise EstimateError(
             f"the typical peak speed is {cycles.peak:.3g} {motion.unit}/s, the threshold {limit:.3g} {motion.unit}/s",
@@ -154,7 +162,7 @@ def find_sticks(
         *_sensitivity(motion, cycles, limit),
     )
     status = "ok" if cycles.periodic else NOT_PERIODIC
-    if threshold is not None and threshold < noisy:
+    if limit < noisy:
         status = f"the threshold is within the velocity's noise ({noisy:.3g} {motion.unit}/s is five deviations)"
     per_cycle = mean_of_cycles(
         "stops per cycle", _counted(stuck, cycles), unit="1", method=f"sticks begun in each cycle; {rule}"

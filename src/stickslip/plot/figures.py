@@ -9,7 +9,7 @@ from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.contact import plot_displacement_loop, plot_sticks, plot_velocity_loop
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
-from stickslip.plot.traces import MOST_SHADES, close_up, plot_force_balance, plot_traces
+from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
 
 if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory
@@ -82,13 +82,10 @@ def _of_findings(findings: Findings) -> list[Plate]:
             plate("close-up", plot_traces(findings, record=near), "A closer look",
                    f"A few cycles from the middle of the record.{stuck}")
         )  # fmt: skip
-    if {"mass", "stiffness"} <= findings.settings.keys() and {"x", "a", "friction"} <= set(findings.record):
+    if force_balance(findings.record) is not None:
         plates.append(
-            plate(
-                "force-balance", plot_force_balance(findings, record=near), "Where the friction force comes from",
-                "What the spring gives, less what the mass and the damper take, must have gone into friction."
-                + stuck,
-            )
+            plate("force-balance", plot_force_balance(findings, record=near), "Where the friction force comes from",
+                   f"At every moment the other terms add up to the friction.{stuck}")
         )  # fmt: skip
     if sticks:
         plates.append(

@@ -5,8 +5,10 @@ from __future__ import annotations
 import functools
 import io
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from stickslip.plot.style import styled
 
@@ -45,17 +47,39 @@ class Plate:
     @styled
     def png(self) -> bytes:
         """The figure as a PNG image on white."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
         drawn = io.BytesIO()
-        self.figure.savefig(drawn, format="png", dpi=150, facecolor="white")
+        with _kept(self.figure) as figure:
+            figure.set_dpi(150)
+            figure.set_facecolor("white")
+            canvas: Any = FigureCanvasAgg(figure)
+            canvas.print_png(drawn)
         return drawn.getvalue()
 
 
 @styled
 def _svg_of(figure: Figure) -> str:
     """Hundredths of a point are fine enough for a path, and keep a page small."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     drawn = io.StringIO()
-    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+    with _kept(figure):
+        canvas: Any = FigureCanvasSVG(figure)
+        canvas.print_svg(drawn, metadata={"Date": None, "Creator": None})
     return re.sub(r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), drawn.getvalue())
+
+
+@contextmanager
+def _kept(figure: Figure) -> Iterator[Figure]:
+    """The figure, drawn on a canvas of its own and left as it was; ``savefig`` would draw it twice."""
+    canvas, dpi, colour = figure.canvas, figure.dpi, figure.get_facecolor()
+    try:
+        yield figure
+    finally:
+        figure.set_canvas(canvas)
+        figure.set_dpi(dpi)
+        figure.set_facecolor(colour)
 
 
 @styled
@@ -65,6 +89,8 @@ def plate(name: str, drawn: Figure | Axes, title: str, caption: str) -> Plate:
 
     figure = drawn if isinstance(drawn, Figure) else drawn.get_figure(root=True)
     assert isinstance(figure, Figure)
-    figure.draw_without_rendering()  # lays the axes out, once for both formats
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)  # once for both formats
     figure.set_layout_engine("none")
     return Plate(re.sub(r"\W+", "-", name), figure, title, caption)

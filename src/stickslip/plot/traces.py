@@ -16,12 +16,15 @@ from stickslip.plot.style import (
     PURPLE,
     SHADE,
     SKY,
+    Array,
+    axes_of,
     axis_label,
     envelope,
     new_figure,
     prefixed,
     styled,
 )
+from stickslip.signals.differentiate import differentiate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,6 +36,10 @@ if TYPE_CHECKING:
 PANELS = (("x", "z"), ("theta",), ("v",), ("a",), ("force",), ("load",), ("friction",), ("normal",), ("y",), ("sound",))
 MOST_SHADES = 300
 CLOSE_UP_CYCLES = 6
+_TERMS = {
+    "spring": (BLUE, "--"), "inertia": (GREEN, "-."), "damper": (PURPLE, ":"), "applied force": (SKY, "--"),
+    "friction": (ORANGE, "-"),
+}  # fmt: skip
 _COLOURS = {"x": BLUE, "z": SKY, "friction": ORANGE, "force": PURPLE, "load": PURPLE, "v": GREEN}
 
 
@@ -99,9 +106,32 @@ def shade_sticks(ax: Axes, findings: Findings, record: Record) -> None:
     ax.set_ylim(low, high)
 
 
+def force_balance(record: Record) -> dict[str, Array] | None:
+    """The terms of the balance that gave the friction, in the order of drawing; None where it was not computed.
+
+    ``f = k (z - x) - m a - c v + P``, with ``c (v - dz/dt)`` for a damper on the base; the constants are those in the
+    history of the record, not those at hand.
+    """
+    told = [step.arguments for step in record.history if step.action == "friction_force" and "mass" in step.arguments]
+    if not told or "friction" not in record or record.channels["friction"].source != "friction_force":
+        return None
+    rig = told[-1]
+    stretch = record["z"] - record["x"] if "z" in record else -record["x"]
+    terms = {"spring": rig["stiffness"] * stretch, "inertia": -rig["mass"] * record["a"]}
+    if rig["damping"]:
+        across = record["v"]
+        if rig["damper"] == "base" and "z" in record:
+            moved = differentiate(record["z"], record.fs, method=rig["method"], bandwidth=rig["bandwidth"])
+            across = across - moved.values
+        terms["damper"] = -rig["damping"] * across
+    if "force" in record:
+        terms["applied force"] = record["force"]
+    return {**terms, "friction": record["friction"]}
+
+
 @styled
 def plot_force_balance(findings: Findings, *, record: Record | None = None, ax: Axes | None = None) -> Axes:
-    """The terms of the force balance over a few cycles: spring, inertia, damper, and the friction they leave.
+    """The terms of the force balance: spring, inertia, damper, applied force, and the friction that they leave.
 
     Parameters
     ----------
@@ -116,24 +146,16 @@ def plot_force_balance(findings: Findings, *, record: Record | None = None, ax: 
     -------
     Axes
     """
-    from stickslip.plot.style import axes_of
-
     ax = axes_of(ax)
-    record = findings.record if record is None else record
-    constants = findings.settings
-    stretch = record["z"] - record["x"] if "z" in record else -record["x"]
-    spring = constants["stiffness"] * stretch
-    inertia = -constants["mass"] * record["a"]
-    damper = record["friction"] - spring - inertia
-    factor, unit = prefixed(np.concatenate([spring, inertia]), record.channels["friction"].unit)
-    terms = [
-        ("spring", spring, BLUE, "--"),
-        ("inertia", inertia, GREEN, "-."),
-        ("friction", record["friction"], ORANGE, "-"),
-    ]
-    if constants.get("damping"):
-        terms.insert(2, ("damper", damper, PURPLE, ":"))
-    for words, values, colour, line in terms:
+    whole = findings.record
+    record = whole if record is None else record
+    terms = force_balance(whole)
+    assert terms is not None
+    first = round((record.start - whole.start) * whole.fs)
+    parts = {words: values[first : first + len(record)] for words, values in terms.items()}
+    factor, unit = prefixed(np.concatenate(list(parts.values())), "N")
+    for words, values in parts.items():
+        colour, line = _TERMS[words]
         ax.plot(*envelope(record.time, factor * values), line, color=colour, label=words)
     shade_sticks(ax, findings, record)
     ax.axhline(0, color=FAINT, linewidth=0.8)

@@ -113,9 +113,14 @@ def _whole_folder(folder: Path) -> Iterator[Path]:
             draft = Path(place) / "new"
             draft.mkdir()
             yield draft
-            if folder.exists():
-                folder.rename(Path(place) / "old")
-            draft.rename(folder)
+            earlier = Path(place) / "old"
+            try:
+                if folder.exists():
+                    folder.rename(earlier)
+                draft.rename(folder)
+            finally:
+                if earlier.exists() and not folder.exists():
+                    earlier.rename(folder)
     except OSError as error:
         raise RecordError(
             f"{folder} can not be written ({error.strerror or error})",

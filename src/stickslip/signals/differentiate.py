@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import EstimateError
 from stickslip.signals.noise import checked_samples, local_noise
 from stickslip.signals.smoother import ROUGHNESS, end_modes, penalised
+from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 Method = Literal["smoother", "five-point"]
@@ -177,7 +178,7 @@ def differentiate(
     order: int = 1,
     method: Method = "smoother",
     noise: ArrayLike | None = None,
-    bandwidth: float | None = None,
+    bandwidth: float | str | None = None,
 ) -> Derivative:
     r"""What is the velocity (order 1) or the acceleration (order 2) behind a sampled displacement?
 
@@ -205,7 +206,7 @@ def differentiate(
         See above.
     noise : float or array_like, shape (n,), optional
         Standard deviation of the samples' noise; estimated, in time where it varies, when not given.
-    bandwidth : float, optional
+    bandwidth : float or str, optional
         The smoother's frequency of -3 dB [Hz]; chosen when not given.
 
     Returns
@@ -233,7 +234,7 @@ def differentiate(
 
 
 def smooth(
-    values: ArrayLike, fs: float, *, noise: ArrayLike | None = None, bandwidth: float | None = None
+    values: ArrayLike, fs: float, *, noise: ArrayLike | None = None, bandwidth: float | str | None = None
 ) -> Derivative:
     """What is the channel without its noise? The smoother of :func:`differentiate` at order 0.
 
@@ -407,7 +408,7 @@ def noise_along(samples: Array, fs: float, noise: ArrayLike | None) -> Array:
 
 
 def _filtered(
-    values: ArrayLike, fs: float, order: int, method: str, noise: ArrayLike | None, bandwidth: float | None
+    values: ArrayLike, fs: float, order: int, method: str, noise: ArrayLike | None, bandwidth: float | str | None
 ) -> Derivative:
     checked_method(method)
     samples = checked_samples(values, fs, least=LEAST)
@@ -434,16 +435,16 @@ def _filtered(
     return Derivative(result, total_sd(result, gain * along, smoother, ratio), fs, order, method, width, level)
 
 
-def checked_bandwidth(bandwidth: float, fs: float, size: int) -> float:
-    """`bandwidth`, if a record of `size` samples can be smoothed to it."""
-    low, high = fs / size, fs / 2
+def checked_bandwidth(bandwidth: float | str, fs: float, size: int) -> float:
+    """`bandwidth` in Hz, if a record of `size` samples can be smoothed to it."""
+    bandwidth, low, high = parse_value(bandwidth, "Hz"), fs / size, fs / 2
     if not low <= bandwidth <= high:
         raise EstimateError(
             f"bandwidth = {bandwidth} Hz",
             f"this record can be smoothed to between {low:g} Hz (one cycle) and {high:g} Hz (half the rate)",
             "choose a bandwidth in between, or leave it out",
         )
-    return float(bandwidth)
+    return bandwidth
 
 
 def _half_power(response: Callable[[Any], Array], top: float) -> float:
