@@ -21,7 +21,7 @@ from stickslip.plot.trajectory import cycle_of, last_cycles
 from stickslip.reports.folder import results_folder, write_figures
 from stickslip.solve.energy import energy
 from stickslip.solve.simulate import simulate
-from stickslip.solve.trajectory import Trajectory
+from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.system_file import Case
 
 A_PERIOD = 200  # samples of the record in the shortest period of drive, system or contact
@@ -175,8 +175,7 @@ def publish_run(
     with results_folder(Path(folder), {**result.to_dict(), "fs": rate}) as draft:
         tell("writing the record")
         write_record(run.record(fs=rate), draft / f"record.{form}")
-        lines = [f"{e.time!r},{e.kind},{e.mode},{e.side}" for e in run.events]
-        (draft / "events.csv").write_text("\n".join(["time [s],kind,mode,side", *lines]) + "\n", encoding="utf-8")
+        (draft / "events.csv").write_text(_events_text(run), encoding="utf-8")
         tell("drawing the figures")
         (draft / "figures").mkdir()
         write_figures(draft / "figures", "", figures(run))
@@ -185,6 +184,11 @@ def publish_run(
 
             animate(run, draft / f"animation.{animation}", tell=functools.partial(_told_at_times, tell))
     return Path(folder)
+
+
+def _events_text(run: Trajectory) -> str:
+    headings = ",".join(["time [s]", *Event._fields[1:]])
+    return "\n".join([headings, *(",".join(map(str, event)) for event in run.events)]) + "\n"
 
 
 def _told_at_times(tell: Callable[[str], None], number: int, count: int) -> None:
