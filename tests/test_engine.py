@@ -49,7 +49,7 @@ def random_case(seed: int) -> tuple[ss.Oscillator, dict[str, float], float]:
         lambda: ss.Tabulated([0, *np.cumsum(g.uniform(0.05, 1, count)) * v], level * g.uniform(0.3, 1, count + 1),
                              static=1.1 * level),
         lambda: ss.StateVariable(level, 10 ** g.uniform(-1, 1) * rate / level, steepness=10 ** g.uniform(1, 3) / v),
-        lambda: ss.InertialContact(level, contact, mass * 10 ** g.uniform(-2, 0), loss, static),
+        lambda: ss.InertialContact(level, contact, mass * 10 ** g.uniform(-1, 0), loss, static),
         lambda: ss.ElastoSlip(contact * g.uniform(0.2, 1, count), level * g.uniform(0.05, 1, count)),
         lambda: ss.PositionLoad(level, g.uniform(-1.5, 1.5) * level / x),
     )  # fmt: skip
@@ -64,7 +64,7 @@ def random_case(seed: int) -> tuple[ss.Oscillator, dict[str, float], float]:
 
 @pytest.mark.parametrize("block", range(10))
 def test_energy_balances_in_random_runs(block: int) -> None:
-    for seed in range(30 * block, 30 * block + 30):
+    for seed in range(20 * block, 20 * block + 20):
         system, start, duration = random_case(seed)
         run = ss.simulate(system, duration=duration, start=start)
         balance = energy(run)
@@ -159,7 +159,7 @@ def test_friction_stays_below_static_while_stuck() -> None:
     assert np.allclose(np.abs(record["friction"][~stuck]), 0.9)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_compliant_run_equals_a_replay_of_forty_digits(seed: int) -> None:
     g = np.random.default_rng(seed)
     level, stiffness = float(g.uniform(0.8, 1.3)), float(g.uniform(5e4, 3e5))
@@ -200,7 +200,7 @@ def replay(system: ss.Oscillator, cycles: int) -> tuple[list[float], list[str]]:
 
     t, x, v, anchor, side = mp.mpf(0), mp.mpf(0), mp.mpf(0), mp.mpf(0), 0
     times, modes = [], []
-    step = end / cycles / 4000
+    step = end / cycles / 1500
     while True:
         if side:
             at = motion(t, x, v, k, mp.mpf(0), -side * level)

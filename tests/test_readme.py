@@ -50,6 +50,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         comments="",
         fmt="%.7f",
     )
+    for page in PAGES:
+        for block in blocks(page.read_text("utf-8"), "toml"):
+            if named := re.match(r"# (\w+\.toml)\n", block):
+                (folder / named[1]).write_text(block, encoding="utf-8")
     return folder
 
 

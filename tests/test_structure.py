@@ -16,6 +16,7 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.dahl import Dahl
 from stickslip.laws.elastoslip import ElastoSlip
 from stickslip.laws.inertial import InertialContact
 from stickslip.laws.linear_slope import LinearSlope
@@ -455,6 +456,8 @@ GOOD = {"mass": np.eye(2), "damping": np.zeros((2, 2)), "stiffness": np.eye(2)}
         (lambda: Contact(Coulomb(1.0), [1, 0], normal=[0, 1]), "stiffness = 0"),
         (lambda: Contact(Coulomb(1.0), [1, 0], normal=[0, 1], stiffness=-1.0), "stiffness = -1"),
         (lambda: Contact(LinearSlope(1.0, slope=-0.1), [1, 0], normal=[0, 1], stiffness=1.0), "LinearSlope"),
+        (lambda: Contact(LinearSlope(1.0, slope=-0.1), [1, 0], preload=5.0), "under a preload"),
+        (lambda: Contact(Dahl(1.0, stiffness=100.0), [1, 0]), "Dahl in a structure"),
         (lambda: simulate(Structure(**GOOD), duration=1.0, start={"x3": 1.0}), "x3"),
         (lambda: simulate(Structure(**{**GOOD, "stiffness": np.zeros((2, 2))}), cycles=1), "no cycles"),
     ],

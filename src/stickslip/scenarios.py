@@ -16,11 +16,16 @@ from stickslip.drives import Belt, HarmonicBase, HarmonicForce, MultiTone, Ramp,
 from stickslip.errors import ModelError
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.dahl import Dahl
 from stickslip.laws.elastoslip import ElastoSlip
 from stickslip.laws.inertial import InertialContact
 from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.lugre import LuGre
 from stickslip.laws.position_load import PositionLoad
+from stickslip.laws.rate_state import RateState
+from stickslip.laws.smooth_state import SmoothStateVariable
 from stickslip.laws.state_variable import StateVariable
+from stickslip.laws.stribeck import Stribeck
 from stickslip.laws.tabulated import Tabulated
 from stickslip.oscillator import Oscillator
 from stickslip.solve.periodic import SteadyState, steady_state
@@ -30,7 +35,8 @@ from stickslip.solve.trajectory import Trajectory
 LAWS: dict[str, Callable[..., Any]] = {
     "Coulomb": Coulomb, "CompliantContact": CompliantContact, "LinearSlope": LinearSlope, "Tabulated": Tabulated,
     "StateVariable": StateVariable, "InertialContact": InertialContact, "ElastoSlip": ElastoSlip,
-    "PositionLoad": PositionLoad,
+    "PositionLoad": PositionLoad, "Stribeck": Stribeck, "Dahl": Dahl, "LuGre": LuGre, "RateState": RateState,
+    "SmoothStateVariable": SmoothStateVariable,
 }  # fmt: skip
 DRIVES: dict[str, Callable[..., Any]] = {
     "Release": Release, "HarmonicBase": HarmonicBase, "HarmonicForce": HarmonicForce, "MultiTone": MultiTone,

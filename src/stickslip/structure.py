@@ -15,6 +15,9 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, finite
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.elastoslip import ElastoSlip
+from stickslip.laws.inertial import InertialContact
 
 Array = NDArray[np.float64]
 
@@ -31,7 +34,8 @@ class Contact:
     Attributes
     ----------
     law : Law
-        Friction law. Under a load that follows the motion: Coulomb or CompliantContact.
+        Friction law. Under a load that follows the motion: Coulomb or CompliantContact; under a preload also ElastoSlip
+        and InertialContact; any other with linear modes where its levels are forces.
     tangent : array_like (n,)
         Direction of sliding, :math:`w_t`: the contact slides by :math:`w_t\cdot q` less the counter-face's motion.
     normal : array_like (n,), optional
@@ -66,6 +70,12 @@ class Contact:
         finite("preload", self.preload, unit="N")
         finite("carried", self.carried, unit="", signed=True)
         object.__setattr__(self, "tangent", _direction("tangent", self.tangent))
+        if isinstance(self.law, CurvedLaw):
+            raise ModelError(
+                f"{type(self.law).__name__} in a structure",
+                "the contacts of a structure have linear modes",
+                "use Tabulated, or an Oscillator",
+            )
         if self.normal is None:
             if self.stiffness != 0:
                 raise ModelError(
@@ -73,14 +83,20 @@ class Contact:
                     "a load follows the motion in a direction",
                     "give normal=, or leave out stiffness=",
                 )
+            if self.preload != 1:
+                self._require("under a preload", Coulomb, CompliantContact, ElastoSlip, InertialContact)
             return
         object.__setattr__(self, "normal", _direction("normal", self.normal))
         finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        if not isinstance(self.law, Coulomb | CompliantContact):
+        self._require("under a load that follows the motion", Coulomb, CompliantContact)
+
+    def _require(self, where: str, *proportional: type) -> None:
+        """Refuse a law whose forces are not all proportional to the load."""
+        if not isinstance(self.law, proportional):
             raise ModelError(
-                f"{type(self.law).__name__} under a load that follows the motion",
+                f"{type(self.law).__name__} {where}",
                 "its forces are not proportional to the load in every mode",
-                "use Coulomb or CompliantContact, or leave out normal=",
+                f"use {' or '.join(law.__name__ for law in proportional)}, or leave out normal= and preload=",
             )
 
     def modes(self) -> tuple[Mode, ...]:

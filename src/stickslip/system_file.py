@@ -17,6 +17,7 @@ from pydantic import BaseModel, Field, create_model
 from stickslip import scenarios
 from stickslip.drives import RecordedBase
 from stickslip.errors import ModelError
+from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
@@ -26,7 +27,7 @@ UNITS = {
     "kinetic": "N", "static": "N", "forces": "N", "error": "N", "mass": "kg", "stiffness": "N/m", "stiffnesses": "N/m",
     "damping": "N s/m", "slope": "N s/m", "gradient": "N/m", "rate": "1/(N s)", "steepness": "s/m", "speeds": "m/s",
     "speed": "m/s", "amplitude": "m", "frequency": "Hz", "phase": "rad", "fs": "Hz", "samples": "m",
-    "HarmonicForce.amplitude": "N",
+    "HarmonicForce.amplitude": "N", "viscous": "N s/m", "normal": "N", "distance": "m", "reference": "m/s",
 }  # fmt: skip
 STATE_UNITS = {"x": "m", "v": "m/s", "y": "m", "u": "m/s", "theta": "N"}
 CYCLES = 20.0  # of a run where nothing is said
@@ -350,5 +351,6 @@ def _start_of(law: Any) -> type[BaseModel]:
         **{name: "m" if name in law.places else STATE_UNITS.get(name, "1") for name in law.memory},
     }
     known: dict[str, Any] = {name: (Annotated[float, quantity(unit)] | None, None) for name, unit in names.items()}
-    known["mode"] = (Literal[tuple(mode.name for mode in law.modes())] | None, None)
+    modes = law.rates() if isinstance(law, CurvedLaw) else law.modes()
+    known["mode"] = (Literal[tuple(mode.name for mode in modes)] | None, None)
     return create_model("Start", __config__=STRICT, **known)

@@ -198,7 +198,7 @@ def steady_state(
 
 
 def attractors(
-    system: Oscillator, *, starts: Sequence[Mapping[str, float | str]], transient: int = 64, orders: int = 4
+    system: System, *, starts: Sequence[Mapping[str, float | str]], transient: int = 64, orders: int = 4
 ) -> tuple[SteadyState, ...]:
     """Which steady motions exist beside each other?
 
@@ -220,6 +220,7 @@ def attractors(
     --------
     >>> from stickslip.drives import HarmonicForce
     >>> from stickslip.laws.coulomb import Coulomb
+    >>> from stickslip.oscillator import Oscillator
     >>> drive = HarmonicForce(1.0, frequency=0.8 / 6.283185307)
     >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.7, static=1.05), drive=drive)
     >>> [orbit.status for orbit in attractors(slider, starts=[{}, {"x": 3.0}])]
