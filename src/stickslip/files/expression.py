@@ -192,11 +192,7 @@ def _walk(node: ast.expr, arithmetic: str, named: Callable[[str], Linear]) -> Li
             return _walk(left, arithmetic, named) + (second if isinstance(sign, ast.Add) else second * -1.0)
         case ast.BinOp(left=left, op=ast.Mult() | ast.Div() as op, right=right):
             first, second = _walk(left, arithmetic, named), _walk(right, arithmetic, named)
-<<<<<<< HEAD
             if second.scales and (first.scales or isinstance(op, ast.Div)):
-=======
-            if first.scales and second.scales or (isinstance(op, ast.Div) and second.scales):
->>>>>>> origin/engine
                 raise _refusal(arithmetic, "it is not linear in the columns")
             if isinstance(op, ast.Div) and second.offset == 0:
                 raise _refusal(arithmetic, "it divides by zero")

@@ -20,7 +20,14 @@ from stickslip.errors import FormatError, RecordError
 from stickslip.files.select import Columns, Source, TimeColumn, Wanted
 from stickslip.files.table import Block, Options, reading
 from stickslip.record.clock import Clock, fit_clock, resolution
-from stickslip.record.metadata import columns_told, history_of, metadata_to_record, require_rows
+from stickslip.record.metadata import (
+    Digests,
+    history_of,
+    metadata_to_record,
+    require_columns,
+    require_rows,
+    units_told,
+)
 from stickslip.record.record import Record, Step
 
 Array = NDArray[np.float64]
@@ -167,9 +174,19 @@ class _Reading:
     notes: tuple[str, ...]
 
     @property
+    def told(self) -> Mapping[str, Any]:
+        """What write_record left in the file, if it is one and nothing else is asked for."""
+        return self.sources[0].table.record if len(self.sources) == 1 and not self.arguments else {}
+
+    @cached_property
     def restores(self) -> bool:
-        """Whether this is a file by write_record, to be given back as it was."""
-        return len(self.sources) == 1 and bool(self.sources[0].table.record) and not self.arguments
+        """Whether columns and units are those that write_record left, to be given back as it was."""
+        if not self.told:
+            return False
+        units = {column.name: column.unit for column in self.sources[0].table.columns}
+        told = units_told(self.told)
+        require_columns(self.told, units)
+        return len(told) == len(units) and all(units[name] in (None, unit) for name, unit in told.items())
 
     def whole(self) -> Record:
         """All rows at once."""
@@ -187,8 +204,9 @@ class _Reading:
                 "check rows= and the file",
             )
         if self.restores:
-            require_rows(self.sources[0].table.record, length)
-            return self._restored(data, 0)
+            require_rows(self.told, length)
+            if not Digests(_by_column(data)).changed(self.told):
+                return metadata_to_record(self.told, _by_column(data))
         if (first, last) != (0, length):
             data = {key: values[first:last] for key, values in data.items()}
         _require_equal_ends(data, first)
@@ -196,10 +214,11 @@ class _Reading:
 
     def blocks(self, size: int) -> Iterator[Record]:
         """Block after block."""
-        first, fs = 0, None
+        first, fs, digests = 0, None, Digests()
         for data in self._raw(size):
             if self.restores:
-                record = self._restored(data, first)
+                digests.add(_by_column(data))
+                record = metadata_to_record(self.told, _by_column(data), first)
             else:
                 clock = self._clock(data, first, fs)
                 record = self._record(data, clock, "read_blocks", {"size": size, "first": first})
@@ -207,7 +226,13 @@ class _Reading:
             first += len(record)
             yield record
         if self.restores:
-            require_rows(self.sources[0].table.record, first)
+            require_rows(self.told, first)
+            if changed := digests.changed(self.told):
+                raise FormatError(
+                    f"{', '.join(changed)} of {self.names} was changed since write_record wrote it",
+                    "a record is given back in blocks as it was",
+                    "read what is there by naming channels=",
+                )
         if not first:
             raise RecordError(f"{self.names} has no rows", "at least one is needed", "check the file")
 
@@ -220,8 +245,7 @@ class _Reading:
     def _needed(self) -> list[list[str]]:
         """The columns to read of each file."""
         if self.restores:
-            table = self.sources[0].table
-            return [columns_told(table.record, [column.name for column in table.columns])]
+            return [list(units_told(self.told))]
         keys = [key for wanted in self.wanted for key in wanted.scales]
         if self.fs is None:
             keys += [key for time in self.times.values() for key in (time.key, *time.twins)]
@@ -251,10 +275,6 @@ class _Reading:
             yield {
                 (number, name): v for number, block in zip(numbers, blocks, strict=True) for name, v in block.items()
             }
-
-    def _restored(self, data: Mapping[tuple[int, str], Array], first: int) -> Record:
-        told = self.sources[0].table.record
-        return metadata_to_record(told, {name: values for (_, name), values in data.items()}, first)
 
     def _clock(self, data: Mapping[tuple[int, str], Array], first: int, known: float | None = None) -> Clock:
         """The one clock of these rows, which begin at row `first` of the files."""
@@ -307,6 +327,7 @@ class _Reading:
         outcome = f"{length} samples at {clock.fs:g} Hz"
         outcome += "" if clock.stamps is None else ", the time stamps not uniform and kept"
         outcome += f", the time stamps within {clock.wander:.2g} s of uniform" if clock.wander else ""
+        outcome += "; changed since write_record wrote it" if self.told else ""
         step = Step(action, arguments, "; ".join([outcome, *self.notes]))
         channels = {wanted.channel.name: wanted.channel for wanted in self.wanted}
         told = self.sources[0].table.record if len(self.sources) == 1 else {}
@@ -443,6 +464,11 @@ def _combined(wanted: Wanted, data: Mapping[tuple[int, str], Array]) -> Array:
         values += wanted.offset
         values *= wanted.scale
     return values
+
+
+def _by_column(data: Mapping[tuple[int, str], Array]) -> dict[str, Array]:
+    """The columns of one file by their names."""
+    return {name: values for (_, name), values in data.items()}
 
 
 def _require_twins(file: str, time: TimeColumn, data: Mapping[tuple[int, str], Array]) -> None:

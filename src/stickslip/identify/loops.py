@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
-    NOT_PERIODIC,
     PHASES,
     Cycles,
     Motion,
@@ -57,8 +56,8 @@ class Curve:
     count: NDArray[np.intp]
 
 
-@dataclass(frozen=True, eq=False)
-class Loops:
+@dataclass(frozen=True, eq=False, repr=False)
+class Loops(Result):
     """Friction over the cycles of a motion.
 
     Attributes
@@ -320,8 +319,8 @@ def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.in
 
 def _status(cycles: Cycles, forward: Estimate, back: Estimate, energy: Estimate) -> str:
     words = [] if forward.status == "ok" else [forward.status]
-    if not cycles.periodic:
-        words.append(NOT_PERIODIC)
+    if cycles.status != "ok":
+        words.append(cycles.status)
     if forward.value + back.value < 0 or energy.value < 0:
         words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
     return "; ".join(words) or "ok"

@@ -25,7 +25,6 @@ CREEP = 0.04  # share of the typical peak speed below which presliding and creep
 TURNED = 0.1  # share of the typical peak speed that the motion reaches before it counts as reversed
 NEARLY = 0.02  # of a period: a cycle that lacks no more is complete
 PERIODIC = 0.9  # share of the displacement's variance that repeats from cycle to cycle
-NOT_PERIODIC = "the motion is not periodic: a cycle runs from one onset of motion to the next"
 PHASES = 200  # points of a mean cycle
 ENOUGH = 65536  # samples for the search of a frequency; longer records are averaged in blocks
 
@@ -72,16 +71,19 @@ class Cycles:
         Where each of the m cycles begins and the last ends, in samples (not whole).
     frequency : Estimate
         Cycles per second [Hz].
-    periodic : bool
-        Whether all cycles have one length; otherwise each runs from one onset of forward motion to the next.
     peak : float
         Typical peak speed: the median over the cycles of each one's largest.
+    status : str
+        "ok" where all cycles have one length; otherwise why they have not, and how they were told apart.
+    turns : ndarray, shape (m,), or None
+        Where each cycle turns back, in samples, if its length wanders.
     """
 
     edges: Array
     frequency: Estimate
-    periodic: bool
     peak: float
+    status: str = "ok"
+    turns: Array | None = None
 
     def labels(self, size: int) -> NDArray[np.intp]:
         """Number of the cycle that each of `size` samples lies in; -1 outside the complete cycles."""
@@ -89,20 +91,28 @@ class Cycles:
         return np.where(number < len(self.edges) - 1, number, -1)
 
     def folded(self, values: Array, phases: int = PHASES) -> Array:
-        """`values` at equal phases of each cycle, shape (m, phases)."""
+        """`values` at equal phases of each cycle, shape (m, phases); all cycles turn back at the same phase."""
         grid = np.arange(phases) / phases
-        at = self.edges[:-1, None] + grid * np.diff(self.edges)[:, None]
+        begin, length = self.edges[:-1, None], np.diff(self.edges)[:, None]
+        turn = length / 2 if self.turns is None else self.turns[:, None] - begin
+        half = float(np.median(turn / length))
+        at = begin + np.minimum(grid / half, 1) * turn + np.maximum((grid - half) / (1 - half), 0) * (length - turn)
         return np.interp(at, np.arange(len(values)), values)
 
 
-def motion_channels(record: Record, contact: str | None) -> list[str]:
-    """The channels that tell the motion of the contact, its position first."""
+def slid_on(record: Record, contact: str | None) -> str:
+    """What the mass slides on: as said, or as :func:`friction_force` was told, or the ground."""
     if contact is None:
         told = [step.arguments.get("contact") for step in record.history if step.action == "friction_force"]
         contact = str(told[-1]) if told else "ground"
     if contact not in ("ground", "base"):
         raise EstimateError(f"contact = '{contact}'", "the mass slides on the ground or the base", "choose one of them")
-    if contact == "base":
+    return contact
+
+
+def motion_channels(record: Record, contact: str | None) -> list[str]:
+    """The channels that tell the motion of the contact, its position first."""
+    if slid_on(record, contact) == "base":
         return ["x", "z"]
     velocity = ["v"] if is_measured(record, "v") else []
     if "x" in record:
@@ -196,7 +206,8 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | str | None
         reference = next((name for name in ("z", "force") if name in record and _moves(record[name])), "")
         found = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
         cycles = _periodic(motion, found)
-        return cycles if cycles is not None and _repeats(cycles, motion.displacement) else _aperiodic(motion)
+        repeated = 0.0 if cycles is None else _repeated(cycles, motion.displacement)
+        return cycles if cycles is not None and repeated >= PERIODIC else _aperiodic(motion, repeated)
     frequency, duration = parse_value(frequency, "Hz"), len(motion.displacement) / motion.fs
     cycles = None
     if 1 / duration <= frequency < motion.fs / 2:
@@ -312,13 +323,18 @@ def _periodic(motion: Motion, frequency: Estimate) -> Cycles | None:
         first -= period
     edges = first + period * np.arange(math.floor((count - 1 - first) / period + NEARLY) + 1)
     edges = np.clip(edges, 0, count - 1)
-    return Cycles(edges, frequency, True, _typical_peak(motion.velocity, edges)) if len(edges) >= 2 else None
+    return Cycles(edges, frequency, _typical_peak(motion.velocity, edges)) if len(edges) >= 2 else None
 
 
-def _aperiodic(motion: Motion) -> Cycles:
+def _aperiodic(motion: Motion, repeated: float) -> Cycles:
     """Cycles between onsets of forward motion, or of motion where it never reverses."""
-    edges = next((found for found in (_onsets(motion), _departures(motion)) if len(found) >= 2), None)
-    if edges is None:
+    edges, turns = _onsets(motion, 1.0), None
+    if len(edges) >= 2:
+        back = _onsets(motion, -1.0)  # one between each two forward
+        turns = back[(back > edges[0]) & (back < edges[-1])]
+    else:
+        edges = _departures(motion)
+    if len(edges) < 2:
         raise EstimateError(
             f"the motion of {len(motion.velocity) / motion.fs:.3g} s holds no complete cycle",
             "a cycle goes forward, back, and forward again, or rests, slips, and slips again",
@@ -328,24 +344,29 @@ def _aperiodic(motion: Motion) -> Cycles:
     longest, shortest = mean.interval[1], mean.interval[0]
     average = Estimate(
         "cycle frequency", 1 / mean.value, (1 / longest, 1 / shortest if shortest > 0 else math.inf),
-        mean.sd / mean.value**2, "Hz", "cycles between onsets of motion", "the motion is not periodic", mean.checks,
+        mean.sd / mean.value**2, "Hz", "cycles between onsets of motion", "the motion is not periodic",
+        mean.checks,
     )  # fmt: skip
-    return Cycles(edges, average, False, _typical_peak(motion.velocity, edges))
+    status = (
+        f"the motion is not periodic ({100 * max(0.0, repeated):.0f} % of its variance repeats): "
+        f"{len(edges) - 1} cycles from one onset of motion, at {_definite(motion):.3g} {motion.unit}/s, to the next"
+    )
+    return Cycles(edges, average, _typical_peak(motion.velocity, edges), status, turns)
 
 
-def _repeats(cycles: Cycles, displacement: Array) -> bool:
+def _repeated(cycles: Cycles, displacement: Array) -> float:
+    """Share of the displacement's variance that is the same in every cycle."""
     folded = cycles.folded(displacement)
     if len(folded) < 2:  # all that can be told of one cycle is whether it closes
         ends = np.interp(cycles.edges, np.arange(len(displacement)), displacement)
-        return bool(abs(ends[1] - ends[0]) <= (1 - PERIODIC) * np.ptp(folded))
-    spread = float(np.mean(folded.var(axis=0, ddof=1)))
-    return bool(spread <= (1 - PERIODIC) * displacement.var())
+        return 1 - float(abs(ends[1] - ends[0]) / np.ptp(folded))
+    return 1 - float(np.mean(folded.var(axis=0, ddof=1))) / float(displacement.var())
 
 
-def _onsets(motion: Motion) -> Array:
-    """Where forward motion begins after motion back."""
+def _onsets(motion: Motion, sign: float) -> Array:
+    """Where motion to that side begins after motion to the other."""
     moving = np.flatnonzero(np.abs(motion.velocity) > _definite(motion))
-    signs = np.sign(motion.velocity[moving])
+    signs = sign * np.sign(motion.velocity[moving])
     return moving[1:][(signs[1:] > 0) & (signs[:-1] < 0)].astype(float)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate
+from stickslip.estimate import Estimate, Result
 from stickslip.identify.motion import is_measured, require_fit
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
@@ -27,8 +27,8 @@ OVERSAMPLED = 10  # samples per cycle of the bandwidth that are kept for the reg
 BIASED = 0.01  # share of noise in the power of a column above which its coefficient is visibly low
 
 
-@dataclass(frozen=True, eq=False)
-class Regression:
+@dataclass(frozen=True, eq=False, repr=False)
+class Regression(Result):
     """Coefficients of a force balance.
 
     Attributes

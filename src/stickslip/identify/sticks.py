@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate
+from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
-    NOT_PERIODIC,
     Cycles,
     Motion,
     contact_motion,
@@ -55,15 +54,17 @@ class StickEvent:
     whole: bool = True
 
 
-@dataclass(frozen=True, eq=False)
-class Sticks:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sticks(Result):
     """Sticks and slips of a contact.
 
     Attributes
     ----------
     share : Estimate
-        Share of the time that the contact sticks. Its low end is widened to what is left if every slip began and ended
-        when its speed, carried on to zero, did.
+        Share of the time that the speed is below the threshold, as such records are commonly counted: at most so much
+        of it sticks. The interval's low end is what is left if every slip began and ended when its speed, carried on
+        to zero, did: linearly before a stick, and after it as a square (with static friction above the sliding one
+        linearly too, so that the low end errs to the low side). `sd` is that of a normal law as wide as the interval.
     per_cycle : Estimate
         Stops per cycle.
     events : tuple of StickEvent
@@ -144,26 +145,26 @@ def find_sticks(
     limit = max(noisy, creep) if threshold is None else parse_value(threshold, f"{motion.unit}/s")
     if not 0 < limit < cycles.peak and threshold is not None:
         raise EstimateError(
-            f"threshold = {limit} {motion.unit}/s",
-            f"it lies between 0 and the typical peak speed, {cycles.peak:.3g} {motion.unit}/s",
+            f"threshold = {_words(limit, motion)}",
+            f"it lies between 0 and the typical peak speed, {_words(cycles.peak, motion)}",
             "leave it out to have it found",
         )
     if SLIPPED * limit >= cycles.peak:
         raise EstimateError(
-            f"the typical peak speed is {cycles.peak:.3g} {motion.unit}/s, the threshold {limit:.3g} {motion.unit}/s",
+            f"the typical peak speed is {_words(cycles.peak, motion)}, the threshold {_words(limit, motion)}",
             "slips are told from sticks where they are three times as fast as the threshold",
             "give a record with less noise or more motion",
         )
     stuck, certain = _stuck(motion, limit)
-    origin = "given" if threshold is not None else "from the noise" if noisy >= creep else "from creep"
-    rule = f"speed below {limit:.3g} {motion.unit}/s ({origin})"
+    told = "five deviations of its noise" if noisy >= creep else f"{100 * CREEP:g} % of its peak, to pass over creep"
+    rule = f"time with the speed below {_words(limit, motion)} ({'given' if threshold is not None else told})"
     stated = (
-        f"velocity noise {motion.noise:.2g} {motion.unit}/s, threshold {limit:.3g} {motion.unit}/s {origin}",
+        f"the velocity's noise is {_words(motion.noise, motion)}",
         *_sensitivity(motion, cycles, limit),
     )
-    status = "ok" if cycles.periodic else NOT_PERIODIC
+    status = cycles.status
     if limit < noisy:
-        status = f"the threshold is within the velocity's noise ({noisy:.3g} {motion.unit}/s is five deviations)"
+        status = f"the threshold is within the velocity's noise ({_words(noisy, motion)} is five deviations)"
     per_cycle = mean_of_cycles(
         "stops per cycle", _counted(stuck, cycles), unit="1", method=f"sticks begun in each cycle; {rule}"
     )
@@ -176,6 +177,10 @@ def find_sticks(
         frequency=cycles.frequency,
         status=status,
     )
+
+
+def _words(speed: float, motion: Motion) -> str:
+    return f"{1e3 * speed:.3g} mm/s" if motion.unit == "m" else f"{speed:.3g} rad/s"
 
 
 def _stuck(motion: Motion, limit: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -216,7 +221,8 @@ def _share(
         for part in (stuck, certain)
     )
     low, high = max(0.0, below.interval[0]), min(1.0, above.interval[1])
-    return Estimate(name, above.value, (low, high), above.sd, "1", above.method, above.status, above.checks)
+    sd = (high - low) / (2 * NORMAL_95)
+    return Estimate(name, above.value, (low, high), sd, "1", above.method, above.status, above.checks)
 
 
 def _sensitivity(motion: Motion, cycles: Cycles, limit: float) -> tuple[str, ...]:

@@ -21,12 +21,13 @@ from stickslip.errors import FormatError, RecordError
 from stickslip.record.clock import Clock, fit_clock
 from stickslip.record.metadata import (
     KEY,
-    channel_names,
+    Digests,
     history_of,
     metadata_to_record,
     parse_metadata,
     record_to_metadata,
     time_column,
+    units_told,
 )
 from stickslip.record.record import Record, Step
 from stickslip.units import parse_unit
@@ -363,7 +364,7 @@ def _received(
     arrays = {name: _numbers(name, values) for name, values in columns.items()}
     metadata = parse_metadata(described) if isinstance(described, str) else {}
     if metadata and not units and fs in (None, metadata.get("fs")):
-        record = _unchanged(metadata, arrays, axis)
+        record = _unchanged(metadata, arrays, stated, axis)
         if record is not None:
             return record
     headers = {name: re.fullmatch(r"(.*?)\s*\[([^\]]*)\]\s*", name) for name in arrays}
@@ -394,6 +395,7 @@ def _received(
     outcome = f"{len(arrays)} channels of {len(record)} samples at {record.fs:g} Hz"
     if clock.stamps is not None:
         outcome += "; the time stamps are not uniform and were kept"
+    outcome += "; not as it left stickslip: rows, samples or units were changed" if metadata else ""
     before = history_of(metadata) if metadata else ()
     return replace(
         record,
@@ -403,15 +405,17 @@ def _received(
     )
 
 
-def _unchanged(metadata: Mapping[str, Any], arrays: Mapping[str, Array], axis: Array | None) -> Record | None:
-    """The record that was described, where channels, rows and clock are still its own."""
-    rows = {len(values) for values in arrays.values()}
-    if channel_names(metadata) != list(arrays) or rows != {metadata.get("rows")}:
+def _unchanged(
+    metadata: Mapping[str, Any], arrays: Mapping[str, Array], stated: Mapping[str, str], axis: Array | None
+) -> Record | None:
+    """The record that was described, where channels, units, samples and clock are still its own."""
+    units = units_told(metadata)
+    *channels, time = units
+    columns = dict(arrays) if axis is None else {**arrays, time: axis}
+    relabelled = any(units[name] != stated.get(name, units[name]) for name in channels)
+    if channels != list(arrays) or relabelled or Digests(columns).changed(metadata):
         return None
-    if axis is None and metadata.get("stamps"):
-        return None
-    record = metadata_to_record(metadata, {**arrays, **({} if axis is None else {str(metadata.get("time")): axis})})
-    return record if axis is None or np.array_equal(record.time, axis, equal_nan=True) else None
+    return None if axis is None and metadata.get("stamps") else metadata_to_record(metadata, columns)
 
 
 def _clock(axis: Array | None, fs: float | None) -> Clock:

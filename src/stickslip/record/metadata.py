@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
@@ -32,7 +33,32 @@ def record_to_metadata(record: Record) -> dict[str, Any]:
         "channels": [_plain(vars(channel)) for channel in record.channels.values()],
         "history": [_plain(step.to_dict()) for step in record.history],
         "truth": _plain(record.truth),
+        "sha256": Digests({time_column(record): record.time, **record.samples}).told(),
     }
+
+
+class Digests:
+    """The sha256 of each column's numbers, row after row: whether samples are still those that were described."""
+
+    def __init__(self, columns: Mapping[str, Array] | None = None) -> None:
+        self._sums: dict[str, hashlib._Hash] = {}
+        self.add(columns or {})
+
+    def add(self, columns: Mapping[str, Array]) -> None:
+        """Go on with the next rows."""
+        for name, values in columns.items():
+            # one bit pattern for each number: NaN has many, zero has two
+            same = np.where(np.isnan(values), np.nan, np.asarray(values, dtype="<f8") + 0.0)
+            self._sums.setdefault(name, hashlib.sha256()).update(same.tobytes())
+
+    def told(self) -> dict[str, str]:
+        """The digests in hexadecimal, by column."""
+        return {name: total.hexdigest() for name, total in self._sums.items()}
+
+    def changed(self, metadata: Mapping[str, Any]) -> list[str]:
+        """The columns whose numbers are not those that the metadata tells."""
+        with _trusting():
+            return [name for name, digest in self.told().items() if metadata["sha256"].get(name) != digest]
 
 
 def time_column(record: Record) -> str:
@@ -72,25 +98,29 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
         )
 
 
-def columns_told(metadata: Mapping[str, Any], there: Collection[str]) -> list[str]:
-    """The columns that hold the record's samples, and its stamps where they were kept.
+def units_told(metadata: Mapping[str, Any]) -> dict[str, str]:
+    """The columns that were written, the channels and then time, each with its unit.
 
     Raises
     ------
     FormatError
-        The metadata names none, or one that is not `there`.
+        The metadata is of a later version or damaged.
     """
-    entries = metadata.get("channels")
-    names = [entry.get("name") for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
-    names += [metadata.get("time")] if metadata.get("stamps") else []
-    missing = [str(name)[:40] for name in names if not isinstance(name, str) or name not in there]
-    if missing or not names:
+    with _trusting():
+        _require_version(metadata)
+        units = {str(entry["name"]): str(entry["unit"]) for entry in metadata["channels"]}
+        return {**units, str(metadata["time"]): "s"}
+
+
+def require_columns(metadata: Mapping[str, Any], there: Collection[str]) -> None:
+    """Refuse a file that lacks a column which its description names."""
+    missing = [name[:40] for name in units_told(metadata) if name not in there]
+    if missing:
         raise FormatError(
-            f"the description of the record is damaged (it names {', '.join(missing) or 'no column'})",
+            f"the description of the record is damaged (it names {', '.join(missing)})",
             f"the file has the columns {', '.join(there)}",
             "write the file again from its source",
         )
-    return [str(name) for name in names]
 
 
 def require_rows(metadata: Mapping[str, Any], found: int) -> None:
@@ -107,13 +137,6 @@ def history_of(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
     """The history that the metadata tells; empty where there is none."""
     with _trusting():
         return tuple(Step(**_restored(step)) for step in metadata.get("history", ()))
-
-
-def channel_names(metadata: Mapping[str, Any]) -> list[str]:
-    """The channels that the metadata tells."""
-    with _trusting():
-        _require_version(metadata)
-        return [str(entry["name"]) for entry in metadata["channels"]]
 
 
 def _require_version(metadata: Mapping[str, Any]) -> None:
