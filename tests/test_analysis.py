@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +121,77 @@ def test_the_arguments_go_before_the_rig() -> None:
     assert findings.settings["stiffness"] == 100.0
 
 
+def test_constants_that_are_not_used_are_said_and_left_out() -> None:
+    findings = analyze(sliding(), mass=3.0, damping=0.5)
+    assert any("mass and damping as stated are not used" in note for note in findings.notes)
+    assert findings.settings == {"contact": "ground"}
+    assert not any("not used" in note for note in analyze(sliding()).notes)
+
+
+def test_a_balance_of_before_is_made_anew_by_other_constants() -> None:
+    record = ss.datasets.demo()
+    first = ss.friction_force(record, mass=2.42, stiffness=2310, contact="ground")
+    told = analyze(first)
+    assert told.settings["mass"] == 2.42
+    assert np.array_equal(told.record["friction"], first["friction"])
+    again = analyze(first, mass=3.0, stiffness=2310)
+    assert again.settings["mass"] == 3.0
+    direct = analyze(record, mass=3.0, stiffness=2310)
+    assert np.array_equal(again.record["friction"], direct.record["friction"])
+
+
+def test_stated_delays_are_taken_out_of_the_record_that_is_shown() -> None:
+    late = ss.Record.of({"x": sliding()["x"][:-20], "friction": sliding()["friction"][20:]}, fs=FS)
+    findings = analyze(late.with_details("x", delay=20 / FS))
+    assert findings.record.channels["x"].delay == 0
+    assert findings.loops is not None
+    assert findings.loops.energy_per_cycle.value == pytest.approx(4 * 1.5 * 0.01, rel=0.01)
+
+
+@pytest.mark.parametrize(("reading", "load", "words"), [
+    (-4.0, 4.0, "its magnitude is taken"), (np.nan, None, "no numbers"), (0.0, None, "zeros"),
+])  # fmt: skip
+def test_a_normal_load_is_taken_by_its_magnitude_or_missed_aloud(reading: float, load: float, words: str) -> None:
+    findings = analyze(sliding(normal=reading))
+    assert findings.normal == load
+    assert any(words in note for note in findings.notes)
+    stated = analyze(sliding(normal=reading), rig=RigSettings(normal=7.0))
+    assert stated.normal == (load or 7.0)
+
+
+def test_records_left_out_of_the_coefficient_are_named() -> None:
+    found = [replace(analyze(sliding(0.3 * n, normal=n)), name=f"load {n}") for n in (2.0, 4.0)]
+    turning = ss.Record.of(
+        {"theta": sliding()["x"], "friction": sliding()["friction"], "normal": np.full(TIME.size, 3.0)},
+        fs=FS, units={"friction": "N m"},
+    )  # fmt: skip
+    torque = replace(analyze(turning), name="torque")
+    mute = replace(found[0], name="mute", loops=None)
+    comparison = compare([*found, torque, mute])
+    assert comparison.coefficient is not None
+    assert comparison.coefficient.value == pytest.approx(0.3, abs=0.01)
+    assert "The friction of torque is a torque" in " ".join(comparison.notes)
+    assert "No friction level was found for mute." in comparison.notes
+
+
+def test_the_line_is_no_surer_than_its_records() -> None:
+    found = [analyze(sliding(0.3 * n, normal=n)) for n in (1.0, 2.0, 4.0)]
+    levels = [f.loops.level for f in found if f.loops is not None]
+    vague = [
+        replace(f, loops=replace(f.loops, level=replace(level, sd=0.1)))
+        for f, level in zip(found, levels, strict=True)
+        if f.loops is not None
+    ]
+    comparison = compare(vague)
+    assert comparison.line is not None
+    design = np.column_stack([[1.0, 2.0, 4.0], np.ones(3)])
+    own = 0.1 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    for estimate, sd in zip(comparison.line, own, strict=True):
+        assert estimate.interval[1] - estimate.value == pytest.approx(1.96 * sd, rel=1e-3)
+    endless = compare([replace(vague[0], loops=replace(vague[0].loops, level=replace(levels[0], sd=np.inf))), *vague])
+    assert np.isfinite(endless.estimates[0].sd)
+
+
 @pytest.mark.parametrize("offset", [0.0, 0.4])
 def test_the_coefficient_and_the_line_are_those_of_the_law(offset: float) -> None:
     loads = [1.0, 2.0, 4.0, 8.0]
@@ -159,6 +231,16 @@ def test_results_are_plain_data() -> None:
     assert {"friction coefficient", "sliding friction"} <= {estimate["name"] for estimate in told["estimates"]}
     assert isinstance(compare([findings, findings]), Comparison)
     assert isinstance(findings, Findings)
+
+
+def test_answers_print_as_their_estimates() -> None:
+    findings = analyze(sliding(normal=3.0))
+    assert findings.loops is not None
+    for answer in (findings, findings.loops, findings.sticks, compare([findings, findings])):
+        assert len(repr(answer)) < 1500
+        assert "array" not in repr(answer)
+    assert str(findings.loops).startswith("Loops:\n  sliding friction 1.49")
+    assert str(findings).startswith("record:\n  friction coefficient 0.5")
 
 
 def test_mending_is_asked_for_and_logged() -> None:

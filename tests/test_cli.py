@@ -100,6 +100,70 @@ def test_options_go_before_the_file_of_the_rig() -> None:
     assert told["history"][0]["arguments"]["rows"] == [500, None]
 
 
+def test_a_load_on_the_command_line_goes_before_those_of_the_file() -> None:
+    for name in ("one", "two", "three"):
+        slide(f"{name}.csv")
+    Path("rig.toml").write_text('[normal]\n"one*" = 1\n"two*" = 2\n"*" = 9\n')
+    result = run("analyze", "one.csv", "two.csv", "three.csv", *MAP, "--config", "rig.toml", "--normal", "two*=5",
+                 "--json")  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    assert [record["normal_load"] for record in json.loads(result.stdout)["records"]] == [1.0, 5.0, 9.0]
+
+
+def test_a_file_that_can_not_answer_is_named_and_left_out() -> None:
+    slide("run_1.csv")
+    slide("run_2.csv")
+    slide("run_3.csv", rows=10)
+    Path("run_4.csv").write_text("")
+    result = run("analyze", "run_*.csv", *MAP)
+    assert result.exit_code == 0, result.stderr
+    lines = result.stderr.splitlines()
+    assert [line.split(":")[1].strip() for line in lines] == ["left out", "left out"]
+    assert "run_3.csv" in lines[0]
+    assert "run_4.csv" in lines[1]
+    told = json.loads(Path("comparison-stickslip/results.json").read_text(encoding="utf-8"))
+    assert [record["name"] for record in told["records"]] == ["run_1.csv", "run_2.csv"]
+    assert [note for note in told["comparison"]["notes"] if "run_4.csv" in note]
+    assert "run_4.csv" in Path("comparison-stickslip/report.html").read_text(encoding="utf-8")
+    alone = run("analyze", "run_1.csv", "run_4.csv", *MAP, "--json")
+    assert json.loads(alone.stdout)["name"] == "run_1.csv"
+    assert "run_4.csv" in json.loads(alone.stdout)["notes"][-1]
+    before = sorted(Path().rglob("*"))
+    none = run("analyze", "run_3.csv", "run_4.csv", *MAP)
+    refused(none, code=1)
+    assert "none of 2 records answers" in none.stderr
+    assert sorted(Path().rglob("*")) == before
+    refused(run("analyze", "run_1.csv", "run_4.csv", *MAP, "--mass", "-1"), code=2)
+
+
+def test_the_check_goes_on_after_a_file_that_can_not_be_read() -> None:
+    Path("run_1.csv").write_text("")
+    slide("run_2.csv")
+    result = run("check", "run_*.csv", *MAP)
+    assert result.exit_code == 1
+    assert "nothing wrong" in result.stdout
+    assert "run_1.csv" in result.stderr
+    refused(run("check", "run_1.csv"), code=1)
+
+
+def test_the_faults_are_told_in_the_terminal_and_in_its_own_words() -> None:
+    lines = slide("run.csv").read_text().splitlines()
+    stamps = [f"{(row // 8) * 8 / FS:.3f}" for row in range(len(lines) - 1)]  # the host stamped late
+    late = [",".join([stamp, *line.split(",")[1:]]) for stamp, line in zip(stamps, lines[1:], strict=True)]
+    Path("late.csv").write_text("\n".join([lines[0], *late]))
+    result = run("analyze", "late.csv", *MAP)
+    assert result.exit_code == 1
+    assert "see stickslip check and mend the clock with --repair clock or --repair gaps" in result.stderr
+    Path("numbers.csv").write_text("\n".join(line.split(",", 1)[1] for line in lines))
+    assert "pass --fs in Hz" in run("analyze", "numbers.csv", *MAP).stderr
+    lines[700] = lines[700].rsplit(",", 1)[0] + ",30"
+    Path("run.csv").write_text("\n".join(lines))
+    told = " ".join(run("analyze", "run.csv", *MAP).stdout.split())
+    assert "1 fault" in told
+    assert "row 699" in told
+    assert "--repair spikes:friction" in told
+
+
 def test_a_bare_text_file_is_read_as_told() -> None:
     lines = slide("run.csv").read_text().splitlines()[1:]
     Path("bare.txt").write_text("\n".join(line.replace(".", ";").replace(",", "|").replace(";", ",") for line in lines))
@@ -115,7 +179,7 @@ def test_repairs_are_made_in_order_and_logged() -> None:
     lines = path.read_text().splitlines()
     lines[700] = lines[700].split(",")[0] + ",nan,nan"
     path.write_text("\n".join(lines))
-    assert "fill_missing(record)" in run("check", "run.csv", *MAP).stdout
+    assert "--repair missing" in run("check", "run.csv", *MAP).stdout
     assert "nothing wrong" in run("check", "run.csv", *MAP, "--repair", "missing").stdout
     result = run("analyze", "run.csv", *MAP, "--repair", "missing", "--json")
     assert "fill_missing" in [step["action"] for step in json.loads(result.stdout)["history"]]
@@ -220,6 +284,8 @@ def test_bad_data_end_in_one_sentence_and_nothing_is_written(kind: str) -> None:
         ["analyze", "run.csv", "--rows", "a:b"],
         ["analyze", "run.csv", "--fs", "0"],
         ["analyze", "run.csv", "--normal", "-3"],
+        ["analyze", "run.csv", *MAP, "--normal", "walk*=3"],
+        ["analyze", "mine"],
         ["analyze", "run.csv", "--config", "absent.toml"],
         ["analyze", "run.csv", "--config", "typo.toml"],
         ["analyze", "run.csv", *MAP, "--output", "mine"],
@@ -254,6 +320,41 @@ def test_a_true_process_keeps_the_table_and_the_trouble_apart() -> None:
     bad = subprocess.run([PROGRAM, "analyze", "run.csv", "--mass", "0"], capture_output=True, text=True, check=False)
     assert (bad.returncode, bad.stdout) == (2, "")
     assert "Traceback" not in bad.stderr
+
+
+WATCHED = """
+import sys
+from stickslip import cli
+cli.PATIENCE = 0.0
+cli.main()
+"""
+
+
+def test_work_that_lasts_is_told_to_who_watches() -> None:
+    """The error stream is a terminal here; the table stays alone on the other stream."""
+    pty = pytest.importorskip("pty", reason="a terminal to watch at")
+    slide("run.csv")
+    slide("two.csv")
+    watching, watched = pty.openpty()
+    command = [sys.executable, "-c", WATCHED, "analyze", "run.csv", "two.csv", *MAP]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=watched, env={**os.environ, "TERM": "xterm"}) as told:
+        os.close(watched)
+        shown = b""
+        while True:
+            try:
+                shown += (part := os.read(watching, 4096))
+            except OSError:  # the last writer is gone
+                break
+            if not part:
+                break
+        assert told.stdout is not None
+        table = told.stdout.read().decode()
+    os.close(watching)
+    assert told.returncode == 0
+    for words in ("reading run.csv", "checking and analysing two.csv", "drawing and writing", "0/5", "4/5"):
+        assert words in shown.decode(), words
+    assert "drawing" not in table
+    assert "sliding friction" in table
 
 
 INTERRUPTED_WHILE_WRITING = """

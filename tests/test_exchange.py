@@ -73,6 +73,64 @@ def test_a_frame_that_was_cut_keeps_units_and_history_and_says_so() -> None:
     assert [step.action for step in part.history] == ["Record.of", "with_details", "repair", "from_pandas"]
 
 
+# ---- what was changed outside
+
+
+def rescale(made: Any, factor: float) -> None:
+    """The channel x times `factor`, in place."""
+    if isinstance(made, list):
+        made[0]["data"] = made[0]["data"] * factor
+    else:
+        attributes = dict(made["x"].attrs)
+        made["x"] = made["x"] * factor
+        made["x"].attrs.update(attributes)
+
+
+def relabel(made: Any, unit: str) -> None:
+    """The channel x stated in another unit, in place."""
+    if isinstance(made, list):
+        made[0]["unit_str"] = unit
+    elif isinstance(made, pd.DataFrame):
+        made.attrs["units"]["x"] = unit
+    else:
+        made["x"].attrs["units"] = unit
+
+
+@pytest.mark.parametrize(("out", "back"), WAYS)
+def test_a_channel_turned_into_mm_outside_comes_back_the_same_size(out: Any, back: Any) -> None:
+    record = rich_record()
+    made = out(record)
+    rescale(made, 1000.0)
+    relabel(made, "mm")
+    again = back(made)
+    assert np.allclose(again["x"], record["x"], rtol=1e-15, atol=0)
+    assert again.history[-1].action == back.__name__
+    assert "not as it left" in again.history[-1].outcome
+    assert list(again.history[:-1]) == list(record.history)
+
+
+@pytest.mark.parametrize(("out", "back"), WAYS)
+def test_values_changed_outside_are_logged(out: Any, back: Any) -> None:
+    made = out(rich_record())
+    rescale(made, 2.0)
+    again = back(made)
+    assert np.array_equal(again["x"], 2 * rich_record()["x"])
+    assert again.history[-1].action == back.__name__
+
+
+@pytest.mark.parametrize(("out", "back"), WAYS)
+def test_a_unit_corrected_outside_counts(out: Any, back: Any) -> None:
+    made = out(rich_record())
+    relabel(made, "mm")
+    assert np.allclose(back(made)["x"], 1e-3 * rich_record()["x"], rtol=1e-15, atol=0)
+
+
+def test_a_time_axis_changed_outside_counts() -> None:
+    frame = rich_record().to_pandas()
+    frame.index = pd.Index(2 * frame.index.to_numpy(), name="time")
+    assert from_pandas(frame).fs == pytest.approx(rich_record().fs / 2)
+
+
 # ---- foreign
 
 

@@ -156,6 +156,12 @@ def test_motion_that_does_not_repeat_is_cut_at_its_onsets():
     assert "not periodic" in loops.status
     assert len(loops.cycles) == 10  # 12 legs go forward; 11 of them follow one back; between those lie 10 cycles
     assert loops.frequency.value == pytest.approx(1 / (2 * legs.mean()), rel=0.15)
+    assert "10 cycles from one onset of motion" in loops.status
+    # the mean cycle is aligned at its reversals: it goes as far as the cycles do on average, at their level
+    forward, back = (0.05 * 2 / np.pi * legs[2 + side : 22 + side : 2].mean() for side in (0, 1))
+    assert np.ptp(loops.displacement) == pytest.approx(max(forward, back), rel=0.05)
+    moving = np.abs(loops.velocity) > 0.3 * np.abs(loops.velocity).max()
+    assert np.abs(loops.friction[moving]) == pytest.approx(2.0, abs=0.1)
 
 
 def test_velocity_alone_or_an_angle_will_do():

@@ -73,6 +73,16 @@ def test_the_dotted_levels_are_the_estimates(demo: Findings) -> None:
     assert axes.get_xlabel() == "velocity of the contact [mm/s]"
 
 
+def test_a_rotary_contact_is_drawn_against_its_angle() -> None:
+    time = np.arange(4000) / FS
+    torque = 1.5 * np.sign(np.cos(2 * np.pi * time)) + np.random.default_rng(1).normal(0, 0.02, time.size)
+    samples = {"theta": 0.3 * np.sin(2 * np.pi * time), "friction": torque}
+    plates = {plate.name: plate for plate in figures(analyze(ss.Record.of(samples, fs=FS, units={"friction": "N m"})))}
+    for name, unit in (("displacement", "rad"), ("velocity", "rad/s")):
+        axes = plates[f"friction-{name}"].figure.axes[0]
+        assert (axes.get_xlabel(), axes.get_ylabel()) == (f"{name} of the contact [{unit}]", "friction [N m]")
+
+
 def test_a_figure_goes_where_it_is_told(demo: Findings) -> None:
     figure = Figure()
     axes = figure.add_subplot()

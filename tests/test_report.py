@@ -164,7 +164,9 @@ def test_a_comparison_leads_to_each_record(tmp_path: Path) -> None:
     [
         (Estimate.normal("a", 0.012345, sd=0.0002, unit="m", method=""), "12.3 mm", "12.0 to 12.7 mm"),
         (Estimate.normal("stuck share of the time", 0.521, sd=0.02, unit="1", method=""), "52 %", "48 to 56 %"),
-        (Estimate.normal("a", 2.5, sd=1e-9, unit="Hz", method=""), "2.50000 Hz", "2.50000 to 2.50000 Hz"),
+        (Estimate.normal("a", 2.5, sd=1e-9, unit="Hz", method=""), "2.5000 Hz", "within its last digit"),
+        (Estimate.normal("a", 2.0, sd=0.0, unit="1", method=""), "2", "no scatter"),
+        (Estimate.normal("a", 0.0125, sd=0.0, unit="m", method=""), "12.5 mm", "no scatter"),
         (Estimate.normal("a", float("nan"), sd=1.0, unit="N", method=""), "unknown", "unknown"),
         (Estimate("a", 0.29, (0.2, 0.4), 0.001, "1", ""), "0.29", "0.20 to 0.40"),
     ],
@@ -182,6 +184,28 @@ def test_the_headline_names_the_direction_of_a_slope(demo: Findings) -> None:
     doubted = replace(falling, status="the sliding speed hardly varies")
     assert "with speed" not in " ".join(headline(replace(demo, loops=replace(demo.loops, slope=doubted))))
     assert "2 stops in each cycle" in sentences
+
+
+def test_the_share_that_sticks_is_told_as_its_interval(demo: Findings) -> None:
+    """Its value is the upper end: creep below the threshold counts as sticking."""
+    assert demo.sticks is not None
+    share = Estimate("stuck share of the time", 0.332, (0.26, 0.334), 0.02, "1", "")
+    told = " ".join(headline(replace(demo, sticks=replace(demo.sticks, share=share))))
+    assert "It sticks 26 to 33 % of the time" in told
+
+
+def test_directions_that_differ_are_told_of_a_regression_too() -> None:
+    time = np.arange(8000) / 1000
+    x = 0.1 * np.sin(np.pi * time) + 0.02 * np.sin(3.4 * np.pi * time)
+    v, a = np.gradient(x, 1e-3), np.gradient(np.gradient(x, 1e-3), 1e-3)
+    noise = np.random.default_rng(0).normal(0, 0.05, time.size)
+    for back in (2.0, 3.0):
+        force = 3.0 * a + 5.0 * v + np.where(v > 0, 2.0, -back) + noise
+        told = " ".join(headline(analyze(ss.Record.of({"x": x, "force": force}, fs=1000))))
+        differ = re.search(r"The two directions differ: ([\d.]+) N forward and ([\d.]+) N back", told)
+        assert (differ is not None) == (back == 3.0), told
+        if differ is not None:
+            assert [float(force) for force in differ.groups()] == pytest.approx([2.0, 3.0], abs=0.01)
 
 
 def test_a_folder_holds_all_and_only_what_it_lists(demo: Findings, tmp_path: Path) -> None:

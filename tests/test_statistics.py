@@ -109,7 +109,8 @@ def test_columns_that_can_not_be_told_apart_are_refused():
 def test_few_cycles_are_said():
     one = mean_of_cycles("level", [1.2, np.nan], unit="N", method="mean of cycles")
     assert one.interval == (-math.inf, math.inf)
-    assert one.status == "only 1 cycle: the interval is crude"
+    assert one.status == "only 1 cycle: how sure it is can not be told"
+    assert one.checks == ("1 cycle",)
     two = mean_of_cycles("level", [1.0, 1.2], unit="N", method="mean of cycles")
     assert two.interval[1] - two.value == pytest.approx(12.706 * 0.1, rel=1e-3)  # Student, one degree of freedom
     assert mean_of_cycles("level", np.ones(8), unit="N", method="mean of cycles").status == "ok"

@@ -32,6 +32,7 @@ def test_share_by_closed_form(level):
     truth = 2 * math.asin(level) / math.pi
     assert sticks.share.value == pytest.approx(truth, abs=0.03)  # within the threshold of 4 % of the peak speed
     assert sticks.share.interval[0] <= truth <= sticks.share.interval[1]
+    assert 3.9 * sticks.share.sd == pytest.approx(np.diff(sticks.share.interval)[0], rel=0.01)  # no surer than that
     assert sticks.per_cycle.value == 2
     assert sticks.threshold == pytest.approx(0.04 * PEAK, rel=0.05)
     assert sticks.status == "ok"
@@ -86,8 +87,8 @@ def test_creep_within_a_stick_is_part_of_it():
 
 def test_threshold_follows_the_noise():
     quiet, noisy = (find_sticks(record_of(stick_slip(0.5), noise=noise)) for noise in (1e-6, 4e-4))
-    assert "from creep" in quiet.share.method
-    assert "from the noise" in noisy.share.method
+    assert "4 % of its peak, to pass over creep" in quiet.share.method
+    assert "five deviations of its noise" in noisy.share.method
     assert noisy.threshold == pytest.approx(5 * noisy.noise)
     assert noisy.share.value == pytest.approx(1 / 3, abs=0.08)
     assert any("at half the threshold" in check for check in quiet.share.checks)

@@ -148,3 +148,61 @@ def test_a_damaged_description_is_one_sentence(tmp_path: Path, old: str, new: st
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(ss.StickslipError, match=words):
         ss.read_record(path)
+
+
+# ---- what was changed outside
+
+
+def edited(path: Path, old: str, new: str) -> Path:
+    comment, rest = path.read_text().split("\n", 1)
+    assert old in rest
+    path.write_text(comment + "\n" + rest.replace(old, new, 1))
+    return path
+
+
+def kept(folder: Path) -> Path:
+    return ss.write_record(ss.Record.of({"x": [1.0, 2.5, 3.0]}, fs=10.0), folder / "kept.csv")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "values", "fs"),
+    [
+        ("x [m]", "x [mm]", [1e-3, 2.5e-3, 3e-3], 10),
+        ("2.5", "2.75", [1.0, 2.75, 3.0], 10),
+        ("time [s]", "time [ms]", [1.0, 2.5, 3.0], 10_000),
+        ("0.1,", "0.17,", [1.0, 2.5, 3.0], 10),
+    ],
+    ids=["unit", "value", "unit of time", "time"],
+)
+def test_an_edited_file_is_read_as_it_is_now(
+    tmp_path: Path, old: str, new: str, values: list[float], fs: float
+) -> None:
+    record = ss.read_record(edited(kept(tmp_path), old, new))
+    assert record["x"] == pytest.approx(values, rel=1e-15)
+    assert record.history[-1].action == "read_record"
+    assert "changed since" in record.history[-1].outcome
+    assert record.fs == pytest.approx(fs)
+    assert (record.stamps is not None) == (new == "0.17,")
+
+
+def test_a_column_added_outside_is_read_too(tmp_path: Path) -> None:
+    path = kept(tmp_path)
+    lines = path.read_text().splitlines()
+    path.write_text(
+        "\n".join(
+            [lines[0], *(line + more for line, more in zip(lines[1:], [",v [m/s]", *[",1", ",2", ",3"]], strict=True))]
+        )
+    )
+    assert list(ss.read_record(path)["v"]) == [1.0, 2.0, 3.0]
+
+
+def test_blocks_of_an_edited_file_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ss.FormatError, match=r"x .*changed.*channels="):
+        list(ss.read_blocks(edited(kept(tmp_path), "2.5", "2.75"), size=2))
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("unit", ["counts", "N m", "m/s^2", "1", "kg^0.5 m", "V s^2/m"])
+def test_any_unit_comes_back(tmp_path: Path, suffix: str, unit: str) -> None:
+    record = ss.Record.of({"ch": [1.0, 2.0]}, fs=4.0).with_channel("ch", [1.0, 2.0], unit=unit)
+    assert ss.read_record(ss.write_record(record, tmp_path / f"kept{suffix}")).equals(record)

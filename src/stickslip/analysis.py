@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, ModelError, StickslipError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.identify.force import friction_force
 from stickslip.identify.loops import Loops, friction_loops
+from stickslip.identify.motion import is_measured, slid_on
 from stickslip.identify.regression import Regression, regress_friction
 from stickslip.identify.sticks import Sticks, find_sticks
 from stickslip.record.record import Record, Step
+from stickslip.signals.delay import without_delays
 from stickslip.signals.repair import (
     fill_gaps,
     fill_missing,
@@ -26,15 +28,19 @@ from stickslip.signals.repair import (
     repair_clock,
     restore_clipped,
 )
+from stickslip.statistics import student
 
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
 
 Answer = TypeVar("Answer")
 
+USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
+CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
 
-@dataclass(frozen=True, eq=False)
-class Findings:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Findings(Result):
     """What a record says about its friction.
 
     Attributes
@@ -85,7 +91,7 @@ class Findings:
         """Every number found, in the order of asking."""
         level = [self.coefficient] if self.coefficient is not None else []
         answers = (self.loops, self.regression, self.asymmetric, self.sticks)
-        found = [*level, *(estimate for answer in answers for estimate in _estimates_of(answer))]
+        found = [*level, *(estimate for answer in answers if answer is not None for estimate in answer.estimates)]
         first: dict[str, Estimate] = {}
         for estimate in found:
             first.setdefault(estimate.name, estimate)
@@ -112,8 +118,8 @@ class Findings:
         return {key: _plain(value) for key, value in told.items()}
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
     """Several records side by side.
 
     Attributes
@@ -203,12 +209,15 @@ def analyze(
     rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
     asked = _Asked([], [])
     faults = tuple(record.check())
-    whole = _with_friction(record, rig, method, asked)
+    known = [each for each in USED if each in record]
+    whole = asked.ask("Stated delays", lambda: without_delays(record, *known)) if known else record
+    whole = _with_friction(whole or record, rig, method, asked)
+    contact = slid_on(whole, rig.contact if "contact" in rig.model_fields_set else None)
     loops = sticks = regression = asymmetric = None
     if "friction" in whole and _moves(whole):
-        loops = asked.ask("Friction loops", lambda: friction_loops(whole, contact=rig.contact))
+        loops = asked.ask("Friction loops", lambda: friction_loops(whole, contact=contact))
     if _moves(whole):
-        sticks = asked.ask("Sticks and slips", lambda: find_sticks(whole, contact=rig.contact))
+        sticks = asked.ask("Sticks and slips", lambda: find_sticks(whole, contact=contact))
     if _moves(whole) and "force" in whole:
         regression = asked.ask("Regression", lambda: regress_friction(whole))
         if regression is not None:
@@ -218,7 +227,8 @@ def analyze(
         raise _nothing(name, record, asked.refusals)
     return Findings(
         name, whole, faults, loops, sticks, regression, asymmetric,
-        normal=_normal_load(record, rig, name), notes=tuple(asked.notes), settings=_stated(rig, method),
+        normal=_normal_load(record, rig, name, asked.notes), notes=tuple(asked.notes),
+        settings={**_balanced(whole), "contact": contact},
     )  # fmt: skip
 
 
@@ -281,9 +291,9 @@ _PER_CHANNEL: dict[str, tuple[str, Callable[[Record, str], Record]]] = {
 def compare(findings: Sequence[Findings]) -> Comparison:
     """Friction of several records side by side, and against the normal load where it is known.
 
-    The coefficient is the slope of ``f = mu N`` by least squares; its interval is Student's t on the scatter about
-    the line, or what the records' own intervals allow where that is wider. With three loads or more a line
-    ``f = mu N + f0`` is fitted beside it.
+    The coefficient is the slope of ``f = mu N`` by least squares; with three loads or more a line ``f = mu N + f0`` is
+    fitted beside it. Their intervals are Student's t on the scatter about the line, or what the records' own intervals
+    allow where that is wider.
 
     Parameters
     ----------
@@ -312,19 +322,33 @@ def compare(findings: Sequence[Findings]) -> Comparison:
     """
     if len(findings) < 2:
         raise EstimateError(f"{len(findings)} record", "a comparison needs two or more", "give several files")
-    known = [(f.normal, f.level) for f in findings if f.normal is not None and f.level is not None]
-    known = [(load, level) for load, level in known if level.unit == "N"]
-    missing = [f.name for f in findings if f.normal is None]
-    notes = [f"The normal load of {', '.join(missing)} is not known; state it to fit the coefficient."] * bool(missing)
+    known = [f for f in findings if f.normal is not None and f.level is not None and f.level.unit == "N"]
+    left_out = {
+        "The normal load of {} is not known; state it to fit the coefficient.": [f for f in findings if not f.normal],
+        "No friction level was found for {}.": [f for f in findings if f.level is None],
+        "The friction of {} is a torque: it is not set against a normal load.": [
+            f for f in findings if f.level is not None and f.level.unit != "N"
+        ],
+    }
+    notes = [words.format(", ".join(f.name for f in those)) for words, those in left_out.items() if those]
     if len(known) < 2:
         return Comparison(tuple(findings), notes=tuple(notes))
-    loads = np.array([load for load, _ in known])
-    levels = np.array([level.value for _, level in known])
-    sds = np.array([level.sd for _, level in known])
-    coefficient = _through_origin(loads, levels, sds)
+    loads = np.array([f.normal for f in known], dtype=float)
+    levels, sds = (np.array([getattr(f.level, key) for f in known]) for key in ("value", "sd"))
+    over = f"over {len(known)} records"
+    (slope,) = _line(loads[:, None], levels, sds)
+    scatter = math.sqrt(float(np.sum((levels - slope["value"] * loads) ** 2)) / (len(known) - 1))
+    coefficient = Estimate.normal(
+        "friction coefficient", **slope, unit="1", method=f"slope through the origin {over}",
+        checks=(f"scatter about the line {scatter:.3g} N",),
+    )  # fmt: skip
     line = None
     if len(np.unique(loads)) >= 3:
-        line = _straight_line(loads, levels)
+        slope, offset = _line(np.column_stack([loads, np.ones_like(loads)]), levels, sds)
+        line = (
+            Estimate.normal("slope of the line", **slope, unit="1", method=f"straight line {over}"),
+            Estimate.normal("friction at no load", **offset, unit="N", method=f"straight line {over}"),
+        )
         if not line[1].includes(0.0):
             coefficient = replace(coefficient, status="the line misses the origin: see friction at no load")
     else:
@@ -361,17 +385,23 @@ class _Asked:
 def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
     from stickslip.config import rig_settings
 
-    return rig_settings({**(rig.model_dump() if rig is not None else {}), **given}, source="the call")
+    return rig_settings({**(rig.model_dump(exclude_unset=True) if rig is not None else {}), **given}, source="the call")
 
 
-def _stated(rig: RigSettings, method: str) -> dict[str, Any]:
-    constants = rig.model_dump(include={"mass", "stiffness", "damping", "damper", "contact"}, exclude_none=True)
-    return {**constants, "differentiation": method}
+def _balanced(record: Record) -> dict[str, Any]:
+    """The constants and the method behind the friction force, where it comes from a balance of forces."""
+    if "friction" not in record or is_measured(record, "friction"):
+        return {}
+    told = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
+    return {key.replace("method", "differentiation"): made[key] for made in told for key in (*CONSTANTS, "method")}
 
 
 def _with_friction(record: Record, rig: RigSettings, method: str, asked: _Asked) -> Record:
     """The record with its friction force, where there is a way to it."""
-    if "friction" in record:
+    if is_measured(record, "friction"):
+        unused = [key for key in CONSTANTS if key in rig.model_fields_set and getattr(rig, key) is not None]
+        if unused:
+            asked.notes.append(f"The friction was measured: {' and '.join(unused)} as stated {_are(unused)} not used.")
         return record
     if "x" in record and rig.mass is not None and rig.stiffness is not None:
         balanced = asked.ask(
@@ -385,6 +415,8 @@ def _with_friction(record: Record, rig: RigSettings, method: str, asked: _Asked)
             asked.notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
         if balanced is not None:
             return balanced
+    if "friction" in record:
+        return record
     if "load" in record and "force" not in record:
         asked.notes.append(
             "The load cell's reading is taken as the friction force; inertia between both is part of it."
@@ -401,6 +433,10 @@ def _with_friction(record: Record, rig: RigSettings, method: str, asked: _Asked)
     return record
 
 
+def _are(words: Sequence[str]) -> str:
+    return "is" if len(words) == 1 else "are"
+
+
 def _lacking(record: Record, rig: RigSettings) -> list[str]:
     missing = [key for key in ("mass", "stiffness") if getattr(rig, key) is None]
     return missing if "x" in record else ["a displacement x", *missing]
@@ -413,7 +449,7 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
     return EstimateError(
         f"{value}: its channels are {', '.join(f'{c.name} [{c.unit}]' for c in record.channels.values())}",
         "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
-        'name the columns, as in channels={"x": "COLUMN [mm]"} or --channels "x=COLUMN [mm]"',
+        'name the columns, as in channels={"x": "COLUMN [mm]"}',
     )
 
 
@@ -421,49 +457,30 @@ def _moves(record: Record) -> bool:
     return any(name in record for name in ("x", "v", "theta"))
 
 
-def _estimates_of(result: object | None) -> Iterator[Estimate]:
-    if result is not None:
-        yield from (value for value in vars(result).values() if isinstance(value, Estimate))
-
-
-def _normal_load(record: Record, rig: RigSettings, name: str) -> float | None:
+def _normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> float | None:
+    """The normal load as measured, by its magnitude, or as stated for the file."""
     if "normal" in record:
-        mean = float(np.nanmean(record["normal"]))
-        return mean if math.isfinite(mean) and mean > 0 else None
+        finite = record["normal"][np.isfinite(record["normal"])]
+        mean = float(finite.mean()) if len(finite) else 0.0
+        if mean < 0:
+            notes.append(f"The normal load reads {mean:.4g} N: its magnitude is taken.")
+        if mean:
+            return abs(mean)
+        notes.append("The channel normal tells no load: it holds " + ("zeros." if len(finite) else "no numbers."))
     loads = (rig.normal_load(part) for part in [*name.split(" + "), name])
     return next((load for load in loads if load is not None), None)
 
 
-def _through_origin(loads: NDArray[np.float64], levels: NDArray[np.float64], sds: NDArray[np.float64]) -> Estimate:
-    from scipy.special import stdtrit
-
-    power = float(loads @ loads)
-    slope = float(loads @ levels) / power
-    free = len(loads) - 1
-    scatter = math.sqrt(float(np.sum((levels - slope * loads) ** 2)) / free / power)
-    own = math.sqrt(float(np.sum((loads * sds) ** 2))) / power
-    quantile = float(stdtrit(free, 0.975))
-    sd = max(scatter, own * NORMAL_95 / quantile)
-    return Estimate.normal(
-        "friction coefficient", slope, sd=sd, unit="1", quantile=quantile,
-        method=f"slope through the origin over {len(loads)} records",
-        checks=(f"scatter about the line {scatter * math.sqrt(power):.3g} N",),
-    )  # fmt: skip
-
-
-def _straight_line(loads: NDArray[np.float64], levels: NDArray[np.float64]) -> tuple[Estimate, Estimate]:
-    from scipy.special import stdtrit
-
-    design = np.column_stack([loads, np.ones_like(loads)])
-    (slope, offset), *_ = np.linalg.lstsq(design, levels, rcond=None)
-    free = len(loads) - 2
-    variance = float(np.sum((levels - design @ [slope, offset]) ** 2)) / free
-    slope_sd, offset_sd = np.sqrt(variance * np.diag(np.linalg.inv(design.T @ design)))
-    quantile, method = float(stdtrit(free, 0.975)), f"straight line over {len(loads)} records"
-    return (
-        Estimate.normal("slope of the line", slope, sd=slope_sd, unit="1", quantile=quantile, method=method),
-        Estimate.normal("friction at no load", offset, sd=offset_sd, unit="N", quantile=quantile, method=method),
-    )
+def _line(design: NDArray[np.float64], levels: NDArray[np.float64], sds: NDArray[np.float64]) -> list[dict[str, float]]:
+    """Coefficients by least squares; each varies as the scatter about the line says, or as `sds` do if that is more."""
+    free = len(levels) - design.shape[1]
+    inverse = np.linalg.pinv(design)
+    found = inverse @ levels
+    scatter = np.sqrt(np.sum((levels - design @ found) ** 2) / free * np.sum(inverse**2, axis=1))
+    # a record of one cycle has no sd of its own: the scatter alone speaks for it
+    own = np.sqrt(inverse**2 @ np.where(np.isfinite(sds), sds, 0.0) ** 2)
+    sd = np.maximum(scatter, own * NORMAL_95 / student(free))
+    return [{"value": v, "sd": s, "quantile": student(free)} for v, s in zip(found, sd, strict=True)]
 
 
 def _plain(value: Any) -> Any:

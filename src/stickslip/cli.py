@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import fnmatch
 import glob
 import hashlib
 import json
+import re
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -24,6 +26,18 @@ INTERRUPTED = 130
 SHOWN_EVENTS = 12
 PATIENCE = 2.0  # seconds of silence before a progress bar is shown
 
+# What a sentence says to a Python user, and how the command line says it.
+_REPAIRS = {
+    "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
+    "restore_clipped": "clipping", "remove_drift": "drift",
+}  # fmt: skip
+_SPOKEN = (
+    (r"\brecord\.check\(\)", "stickslip check"),
+    (r"\brecord\.rows\(\)", "--rows"),
+    (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
+    (r"\b(channels|units|fs|time|delimiter|decimal|method|damper|contact)=(?=\W|$)", r"--\1"),
+)
+
 
 class _Commands(click.Group):
     """Every error that stickslip raises on purpose ends as one sentence and its exit code."""
@@ -38,7 +52,7 @@ class _Commands(click.Group):
             click.echo(f"stickslip: {error.format_message().rstrip('.')}; see {ctx.command_path} --help.", err=True)
             ctx.exit(error.exit_code)
         except ss.StickslipError as error:
-            click.echo(f"stickslip: {error}", err=True)
+            click.echo(f"stickslip: {_spoken(error)}", err=True)
             ctx.exit(error.exit_code)
 
 
@@ -47,8 +61,22 @@ class _Commands(click.Group):
 def main() -> None:
     """How much friction is in this record, did the contact stick, and how sure is that?
 
-    Exit codes: 0 done, 1 the data can not answer (and why), 2 wrong use.
+    Exit codes: 0 done, 1 the data can not answer (and why), 2 wrong use. Of several files, those that can not answer
+    are named and left out; the exit code is 1 where none is left.
     """
+
+
+def _spoken(words: object) -> str:
+    """A sentence with the options of the command line for what it says of Python."""
+
+    def repair(call: re.Match[str]) -> str:
+        word = _REPAIRS.get(call[1])
+        return call[0] if word is None else f"--repair {word}" + (f":{call[2]}" if call[2] else "")
+
+    text = re.sub(r'\b(\w+)\(record(?:, "(\w+)")?\)', repair, str(words))
+    for said, option in _SPOKEN:
+        text = re.sub(said, option, text)
+    return text
 
 
 def _pair(text: str, option: str) -> tuple[str, str]:
@@ -143,17 +171,14 @@ def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: 
     """
     rig = _rig(**options)
     groups = [group for argument in files for group in _groups(argument)]
+    _require_fits(options["normal"], groups)
     folder = output or _default_folder(groups)
     with _progress(2 * len(groups) + 1) as tell:
-        found = []
-        for group in groups:
-            tell(f"reading {group[0].name}")
-            record = _read(group, rig)
-            tell(f"analysing {group[0].name}")
-            found.append(ss.analyze(record, rig=rig, method=method))
-        results = ss.compare(found) if len(found) > 1 else found[0]
-        tell("drawing and writing")
+        results, refused = _answers(groups, rig, method, tell)
+        tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if output or not as_json else None
+    for error in refused:
+        click.echo(f"stickslip: left out: {_spoken(error)}", err=True)
     _show(results, written, as_json=as_json)
 
 
@@ -170,12 +195,12 @@ def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: 
 def demo(output: Path, as_json: bool) -> None:
     """Analyse the bundled record of a simulated rig, with the true answers beside the estimates."""
     with _progress(3) as tell:
-        tell("reading the bundled record")
+        tell("reading the bundled record", 0)
         record = ss.datasets.demo()
-        tell("analysing")
+        tell("analysing", 1)
         constants = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
         findings = ss.analyze(record, **constants)
-        tell("drawing and writing")
+        tell("drawing and writing", 2)
         written = ss.publish(findings, folder=output)
     _show(findings, written, as_json=as_json)
 
@@ -230,8 +255,8 @@ def simulate(case: str | None, output: Path | None, as_json: bool, **options: An
         return
     wanted = _case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
     folder = output or (None if as_json else Path(f"{_fit_for_a_file(wanted.name)}-stickslip"))
-    with _progress(9 if options["animation"] else 4) as tell:
-        tell("simulating")
+    with _progress(4 if options["animation"] else 3) as tell:
+        tell("simulating", 0)
         result = ss.outcome(wanted)
         written = ss.publish_run(result, folder=folder, tell=tell, **options) if folder else None
     _show_run(result, written, as_json=as_json)
@@ -245,14 +270,17 @@ def simulate(case: str | None, output: Path | None, as_json: bool, **options: An
 def check(file: str, **options: Any) -> None:
     """Tell what is wrong with a record, with row numbers."""
     rig = _rig(**options)
+    refused: list[ss.StickslipError] = []
     for group in _groups(file):
-        record = _read(group, rig)
-        click.echo(f"{record!r}")
-        faults = record.check()
-        for fault in faults:
-            click.echo(f"- {fault}")
-        if not faults:
-            click.echo("- nothing wrong was found")
+        with _collected(refused, group):
+            record = _read(group, rig)
+            click.echo(f"{record!r}")
+            for words in [str(fault) for fault in record.check()] or ["nothing wrong was found"]:
+                click.echo(f"- {_spoken(words)}")
+    for error in refused[:-1]:
+        click.echo(f"stickslip: {_spoken(error)}", err=True)
+    if refused:
+        raise refused[-1]
 
 
 @main.command()
@@ -317,13 +345,27 @@ def _rig(
             given[key] = {**base.get(key, {}), **dict(_pair(pair, f"--{key}") for pair in pairs)}
     if repair is not None:
         given["repair"] = [word.strip() for word in repair.split(",") if word.strip()]
-    if normal:
-        given["normal"] = dict(_pair(load, "--normal") if "=" in load else ("*", load) for load in normal)
+    if normal:  # the first pattern that fits decides
+        loads = dict(_pair(load, "--normal") if "=" in load else ("*", load) for load in normal)
+        given["normal"] = loads | {key: load for key, load in base.get("normal", {}).items() if key not in loads}
     return ss.rig_settings({**base, **given}, source="the command line")
+
+
+def _require_fits(normal: Sequence[str], groups: Sequence[Sequence[Path]]) -> None:
+    """Refuse a load stated for files that are not there: it is a typing error."""
+    names = [name for group in groups for name in (*(path.name for path in group), _name(group))]
+    for load in normal:
+        pattern, separator, _ = load.partition("=")
+        if separator and not fnmatch.filter(names, pattern.strip()):
+            raise click.BadParameter(f"no file fits '{pattern.strip()}'", param_hint="--normal")
 
 
 def _groups(argument: str) -> list[list[Path]]:
     """The records that an argument stands for, each as its files: patterns filled in, parts joined by + paired."""
+    if Path(argument).is_dir():
+        raise click.BadParameter(
+            f"'{argument}' is a folder; name a file, or a pattern like '{Path(argument) / '*.csv'}'", param_hint="FILES"
+        )
     if Path(argument).exists():
         return [[Path(argument)]]
     parts = []
@@ -344,6 +386,43 @@ def _default_folder(groups: Sequence[Sequence[Path]]) -> Path:
     return Path(f"{groups[0][0].stem}-stickslip") if len(groups) == 1 else Path("comparison-stickslip")
 
 
+def _name(files: Sequence[Path]) -> str:
+    return " + ".join(path.name for path in files)
+
+
+def _answers(
+    groups: Sequence[Sequence[Path]], rig: RigSettings, method: str, tell: Callable[[str, int], None]
+) -> tuple[Findings | Comparison, list[ss.StickslipError]]:
+    """What the records answer, together; and why those that are left out do not."""
+    found: list[Findings] = []
+    refused: list[ss.StickslipError] = []
+    for number, group in enumerate(groups):
+        with _collected(refused, group):
+            tell(f"reading {_name(group)}", 2 * number)
+            record = _read(group, rig)
+            tell(f"checking and analysing {_name(group)}", 2 * number + 1)
+            found.append(ss.analyze(record, rig=rig, method=method))
+    if not found:
+        first, many = refused[0], f"none of {len(refused)} records answers; the first: " * (len(refused) > 1)
+        raise type(first)(f"{many}{first.value}", first.rule, first.next_step)
+    results = ss.compare(found) if len(found) > 1 else found[0]
+    notes = (*results.notes, *(f"Left out: {error}" for error in refused))
+    return dataclasses.replace(results, notes=notes), refused
+
+
+@contextlib.contextmanager
+def _collected(refused: list[ss.StickslipError], files: Sequence[Path]) -> Iterator[None]:
+    """Put what the data can not answer aside, with the file's name; what was asked wrongly ends all."""
+    try:
+        yield
+    except ss.ModelError:
+        raise
+    except ss.StickslipError as error:
+        known = any(path.name in str(error) for path in files)
+        value = error.value if known else f"{_name(files)}: {error.value}"
+        refused.append(type(error)(value, error.rule, error.next_step))
+
+
 def _read(files: Sequence[Path], rig: RigSettings) -> Record:
     paths: Any = files[0] if len(files) == 1 else list(files)
     given = {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
@@ -362,22 +441,24 @@ def _with_source(record: Record, files: Sequence[Path]) -> Record:
 
 
 @contextlib.contextmanager
-def _progress(steps: int) -> Iterator[Callable[[str], None]]:
-    """A bar on the error stream for work that lasts; silent where nobody watches."""
+def _progress(steps: int) -> Iterator[Callable[[str, float], None]]:
+    """What is being done, on the error stream, for work that lasts; silent where nobody watches."""
     if not sys.stderr.isatty():
-        yield lambda words: None
+        yield lambda words, done: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    columns = (
+        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+    )  # fmt: skip
     progress = Progress(*columns, console=Console(stderr=True), transient=True)
-    task = progress.add_task("", total=steps, completed=-1)
+    task = progress.add_task("", total=steps)
     patience = threading.Timer(PATIENCE, progress.start)
     patience.daemon = True
     patience.start()
     try:
-        yield lambda words: progress.update(task, advance=1, description=words)
+        yield lambda words, done: progress.update(task, completed=done, description=words)
     finally:
         patience.cancel()
         progress.stop()
@@ -401,8 +482,8 @@ def _print_table(console: Any, results: Findings | Comparison) -> None:
 
     summary = ss.summary(results)
     console.print(f"\n[bold]{escape(summary.title)}[/bold]")
-    for sentence in (*summary.headline, *summary.cautions):
-        console.print(escape(sentence))
+    for sentence in (*summary.headline, *summary.cautions, *(f"- {fault}" for fault in summary.faults or ())):
+        console.print(escape(_spoken(sentence)))
     truth = summary.has_truth
     headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")
     rows = (
@@ -411,7 +492,7 @@ def _print_table(console: Any, results: Findings | Comparison) -> None:
     )
     console.print(_table(headings, rows))
     for note in summary.notes:
-        console.print(f"[dim]Note: {escape(note)}[/dim]")
+        console.print(f"[dim]Note: {escape(_spoken(note))}[/dim]")
 
 
 def _show_run(result: Outcome, written: Path | None, *, as_json: bool) -> None:

@@ -89,7 +89,21 @@ class Estimate:
         return f"{self.name} {self.value:.{digits}f}{unit} (95 %: {low:.{digits}f} to {high:.{digits}f}){flag}"
 
 
+class Result:
+    """An answer made of estimates and arrays, which prints as its estimates."""
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every number found."""
+        return tuple(value for value in vars(self).values() if isinstance(value, Estimate))
+
+    def __repr__(self) -> str:
+        status = getattr(self, "status", "ok")
+        flag = "" if status == "ok" else f" [{status}]"
+        return "\n  ".join([f"{getattr(self, 'name', type(self).__name__)}{flag}:", *map(str, self.estimates)])
+
+
 def decimals(sd: float, value: float) -> int:
-    """Decimals worth printing: one significant digit of the uncertainty, four of an exact value."""
-    scale = sd if sd > 0 and math.isfinite(sd) else abs(value) * 1e-3
+    """Decimals worth printing: one significant digit of the uncertainty, four of an exact value, seven at most."""
+    scale = max(sd, abs(value) * 1e-6) if sd > 0 and math.isfinite(sd) else abs(value) * 1e-3
     return 3 if scale <= 0 or not math.isfinite(scale) else min(12, max(0, -math.floor(math.log10(scale))))

@@ -181,11 +181,15 @@ def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, chec
             f"no cycle gives a {name}", "one cycle at least must slide both ways", "give a longer record"
         )
     sd, freedom = mean_uncertainty(present)
-    scatter = present.std(ddof=1) if count > 1 else math.nan
-    status = "ok" if count >= FEW_CYCLES else f"only {count} cycle{'s' if count > 1 else ''}: the interval is crude"
+    if count == 1:
+        status, check = "only 1 cycle: how sure it is can not be told", "1 cycle"
+    else:
+        status = "ok" if count >= FEW_CYCLES else f"only {count} cycles: the interval is crude"
+        scatter = f"{present.std(ddof=1):.3g}{'' if unit == '1' else ' ' + unit}"
+        check = f"{count} cycles, scatter between them {scatter}"
     return Estimate.normal(
         name, present.mean(), sd=sd, unit=unit, method=method, quantile=student(freedom), status=status,
-        checks=(f"{count} cycles, scatter between them {scatter:.3g}{'' if unit == '1' else ' ' + unit}", *checks),
+        checks=(check, *checks),
     )  # fmt: skip
 
 

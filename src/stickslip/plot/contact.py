@@ -67,7 +67,7 @@ def plot_velocity_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
     ax = _loop(findings, "velocity", axes_of(ax, height=4.2))
     loops = findings.loops
     assert loops is not None
-    x_factor, _ = prefixed(loops.velocity, "rad/s" if loops.level.unit == "N m" else "m/s")
+    x_factor, _ = prefixed(loops.velocity, f"{loops.unit}/s")
     y_factor, _ = prefixed(loops.friction, loops.level.unit)
     curve = loops.curve
     ax.errorbar(
@@ -119,8 +119,7 @@ def plot_sticks(findings: Findings) -> Figure:
 def _loop(findings: Findings, abscissa: str, ax: Axes) -> Axes:
     loops = findings.loops
     assert loops is not None
-    length = "rad" if loops.level.unit == "N m" else "m"
-    unit = {"displacement": length, "velocity": f"{length}/s"}[abscissa]
+    unit = {"displacement": loops.unit, "velocity": f"{loops.unit}/s"}[abscissa]
     mean_x = getattr(loops, abscissa)
     x_factor, x_unit = prefixed(mean_x, unit)
     y_factor, y_unit = prefixed(loops.friction, loops.level.unit)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -131,7 +130,7 @@ def publish_run(
     fs: float | None = None,
     form: str = "csv",
     animation: str | None = None,
-    tell: Callable[[str], None] = lambda words: None,
+    tell: Callable[[str, float], None] = lambda words, done: None,
 ) -> Path:
     """Write a run into a folder: results.json, events.csv, the sampled record, the figures, and a moving picture.
 
@@ -151,7 +150,7 @@ def publish_run(
     animation : {"gif", "mp4"}, optional
         A moving picture beside the figures.
     tell : callable
-        Called with a few words before each part of the work.
+        Called before each part of the work with a few words and how many parts are done; the run counts as one.
 
     Returns
     -------
@@ -175,27 +174,22 @@ def publish_run(
     run = result.run
     rate = check_output(run, fs=fs or result.case.fs, form=form, animation=animation)
     with results_folder(Path(folder), {**result.to_dict(), "fs": rate}) as draft:
-        tell("writing the record")
+        tell("writing the record", 1)
         write_record(run.record(fs=rate), draft / f"record.{form}")
         (draft / "events.csv").write_text(_events_text(run), encoding="utf-8")
-        tell("drawing the figures")
+        tell("drawing the figures", 2)
         (draft / "figures").mkdir()
         write_figures(draft / "figures", "", figures(run))
         if animation is not None:
             from stickslip.plot.animation import animate
 
-            animate(run, draft / f"animation.{animation}", tell=functools.partial(_told_at_times, tell))
+            animate(run, draft / f"animation.{animation}", tell=lambda n, of: tell("animating", 3 + n / of))
     return Path(folder)
 
 
 def _events_text(run: Trajectory) -> str:
     headings = ",".join(["time [s]", *Event._fields[1:]])
     return "\n".join([headings, *(",".join(map(str, event)) for event in run.events)]) + "\n"
-
-
-def _told_at_times(tell: Callable[[str], None], number: int, count: int) -> None:
-    if number % (count // 5) == 0:
-        tell(f"animating, {number} of {count} frames")
 
 
 def check_output(run: Trajectory, *, fs: float | None, form: str, animation: str | None) -> float:

@@ -13,7 +13,7 @@ from stickslip.plot.style import prefixed
 
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
-FIGURES = 6  # significant figures at most: what is surer than that still reads well
+FIGURES = 5  # significant figures at most: what is surer than that still reads well
 TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
 
 
@@ -46,8 +46,11 @@ def interval_of(estimate: Estimate) -> str:
     low, high = estimate.interval
     if not (math.isfinite(low) and math.isfinite(high)):
         return "unknown"
+    if low == high:
+        return "no scatter"
     factor, text, digits = _scale(estimate)
-    return f"{factor * low:.{digits}f} to {factor * high:.{digits}f}{text}"
+    ends = f"{factor * low:.{digits}f}", f"{factor * high:.{digits}f}"
+    return f"{ends[0]} to {ends[1]}{text}" if ends[0] != ends[1] else "within its last digit"
 
 
 def headline(result: Findings | Comparison) -> list[str]:
@@ -78,8 +81,22 @@ def _of_findings(findings: Findings) -> Iterator[str]:
             f"An inertia of {value_of(found.inertia)}, viscous friction of {value_of(found.viscous)} and dry friction "
             f"of {value_of(found.coulomb)} explain the measured force{share}."
         )
+    apart = findings.asymmetric
+    if findings.loops is None and apart is not None:
+        yield from _of_directions(apart.coulomb_forward, apart.coulomb_back)
     if findings.sticks is not None:
         yield from _of_sticks(findings)
+
+
+def _of_directions(forward: Estimate | None, back: Estimate | None) -> Iterator[str]:
+    if forward is None or back is None:
+        return
+    apart = abs(forward.value - back.value)
+    if apart > SAME * (forward.value + back.value) / 2 and apart > 2 * forward.sd + 2 * back.sd:
+        yield (
+            f"The two directions differ: {value_of(forward)} forward and {value_of(back)} back; a zero offset of a "
+            "sensor or a sloping rig looks the same."
+        )
 
 
 def _of_loops(findings: Findings) -> Iterator[str]:
@@ -91,15 +108,7 @@ def _of_loops(findings: Findings) -> Iterator[str]:
             f"Under a normal load of {number(findings.normal, 0.0, 'N')} that is a friction coefficient of "
             f"{value_of(findings.coefficient)}."
         )
-    forward, back = abs(loops.forward.value), abs(loops.back.value)
-    if (
-        abs(forward - back) > SAME * loops.level.value
-        and abs(forward - back) > 2 * loops.forward.sd + 2 * loops.back.sd
-    ):
-        yield (
-            f"The two directions differ: {value_of(loops.forward)} forward and {value_of(loops.back)} back; a zero "
-            "offset of a sensor or a sloping rig looks the same."
-        )
+    yield from _of_directions(loops.forward, loops.back)
     low, high = loops.slope.interval
     if loops.slope.status != "ok":
         return
@@ -121,7 +130,9 @@ def _of_sticks(findings: Findings) -> Iterator[str]:
     beat = f" of {value_of(findings.loops.frequency)}" if findings.loops is not None else ""
     often = sticks.per_cycle.value
     stops = f", with {often:.2g} stops in each cycle{beat}" if math.isfinite(often) and often > 0 else ""
-    yield f"It sticks {value_of(sticks.share)} of the time{stops}."
+    low, high = sticks.share.interval
+    share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
+    yield f"It sticks {share} of the time{stops}."
 
 
 def _of_comparison(comparison: Comparison) -> Iterator[str]:
@@ -150,6 +161,8 @@ def _sd(estimate: Estimate) -> float:
 
 
 def _digits(sd: float, value: float) -> int:
+    if sd == 0:  # a constant that was given, a count that never varied
+        return max(0, len(f"{value:.4g}".partition(".")[2]))
     most = FIGURES - 1 - math.floor(math.log10(abs(value))) if value else FIGURES
     return max(0, min(decimals(sd, value), most))
 
