@@ -499,6 +499,10 @@ GOOD = {"mass": np.eye(2), "damping": np.zeros((2, 2)), "stiffness": np.eye(2)}
         (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.0]]}), "mass of shape"),
         (lambda: Structure(**{**GOOD, "stiffness": np.eye(3)}), "2 by 2"),
         (lambda: Structure(**{**GOOD, "damping": 1.0}), "2 by 2"),
+        (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.0], [0.0]]}), "rows of equal length"),
+        (lambda: Structure(**{**GOOD, "stiffness": [["soft", 0.0], [0.0, 1.0]]}), "stiffness = "),
+        (lambda: Structure(**GOOD, contacts=Contact(Coulomb(1.0), [1, 0])), "list of Contact"),  # type: ignore[arg-type]
+        (lambda: Structure(**GOOD, contacts=[Coulomb(1.0)]), "list of Contact"),  # type: ignore[list-item]
         (lambda: Structure(**GOOD, contacts=[Contact(Coulomb(1.0), [1.0])]), "degree of freedom"),
         (lambda: Structure(**GOOD, contacts=[Contact(Coulomb(1.0), [1, 0], normal=[1], stiffness=1.0)]), "normal of 1"),
         (lambda: Structure(**GOOD, acts_on=[1.0]), "acts_on"),
@@ -526,6 +530,14 @@ def test_what_has_no_meaning_is_refused(call: Any, words: str) -> None:
     assert refused.value.value
     assert refused.value.rule
     assert refused.value.next_step
+
+
+def test_changes_reach_their_owner() -> None:
+    changed = hoffmann(0.6).having(kinetic=0.3, speed=0.5, preload=2.0, damping=0.1 * np.eye(2))
+    (pad,) = changed.contacts
+    assert (pad.law, pad.preload, changed.drive) == (Coulomb(0.3), 2.0, Belt(0.5))
+    assert np.array_equal(changed.damping, 0.1 * np.eye(2))
+    assert np.array_equal(changed.stiffness, hoffmann(0.6).stiffness)
 
 
 def test_more_joint_modes_than_fit_are_refused() -> None:
