@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -23,6 +24,7 @@ from stickslip.laws.linear_slope import LinearSlope
 from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import automaton
 from stickslip.solve.energy import energy
+from stickslip.solve.periodic import steady_state
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Contact, Structure
@@ -428,6 +430,61 @@ def test_a_start_above_the_counter_face_is_flight() -> None:
     assert run.events[0].mode in ("back", "forward")
 
 
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+def test_events_keep_when_the_unit_of_force_changes(scale: float) -> None:
+    parts = np.eye(2), 0.01 * np.eye(2), np.array([[23.25, 3.897], [3.897, 7.75]])
+    pad = Contact(Coulomb(0.6, static=0.7), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    runs = []
+    for s in (1.0, scale):
+        contacts = [
+            replace(pad, stiffness=11.0 * s, preload=5.0 * s),
+            Contact(CompliantContact(0.2 * s, stiffness=40.0 * s), [1, 1]),
+        ]
+        system = Structure(*(s * part for part in parts), contacts=contacts, drive=Belt(0.8))
+        runs.append(simulate(system, duration=40.0, start={"x1": 0.3, "x2": -0.1, "v1": 0.0, "v2": 0.0}))
+    assert len(runs[0].events) > 20
+    assert [event[1:] for event in runs[0].events] == [event[1:] for event in runs[1].events]
+    assert np.allclose([e.time for e in runs[0].events], [e.time for e in runs[1].events], rtol=0, atol=1e-12 * 40)
+
+
+def test_a_steady_orbit_and_its_multipliers_are_those_of_the_map() -> None:
+    """Eigenvalues of the exact derivative, saltation included, against differences of the map over a period."""
+    contacts = [Contact(Coulomb(0.3), [1, 0]), Contact(Coulomb(0.2, static=0.25), [0, 1])]
+    system = Structure(
+        np.diag([1.0, 1.5]),
+        0.05 * np.eye(2),
+        [[3, -1], [-1, 2]],
+        contacts=contacts,
+        drive=HarmonicForce(1.2, frequency=0.13),
+    )
+    steady = steady_state(system)
+    assert steady.status == "unique"
+    point = steady.orbit.states[0, :4]
+
+    def lap(state: np.ndarray) -> np.ndarray:
+        run = simulate(system, cycles=1, start=dict(zip(("x1", "x2", "v1", "v2"), state, strict=True)))
+        return np.asarray(run.sample([run.duration], ("state",))[0][:, 0])
+
+    assert np.allclose(lap(point), point, rtol=0, atol=1e-12)
+    jacobian = np.array([(lap(point + h) - lap(point - h)) / 2e-6 for h in 1e-6 * np.eye(4)]).T
+    known = np.linalg.eigvals(jacobian)
+    assert np.allclose(np.sort_complex(steady.multipliers), np.sort_complex(known), rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize(("excess", "flights"), [(-1e-12, 0), (1e-12, 1), (1e-6, 1)])
+def test_a_load_that_just_vanishes(excess: float, flights: int) -> None:
+    """The normal motion is A cos(wt) while closed: the load's least value is preload - k_n A."""
+    pad = Contact(Coulomb(0.0), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    structure = Structure(np.eye(2), np.zeros((2, 2)), np.diag([1.0, 3.0]), contacts=[pad])
+    amplitude, omega = 5.0 / 11.0 * (1 + excess), math.sqrt(14.0)
+    run = simulate(structure, duration=1.5 * math.pi / omega, start={"x2": amplitude, "v1": 1.0})
+    lifts = [event.time for event in run.events if event.mode == "lifted"]
+    assert len(lifts) == flights
+    if flights:
+        # the crossing is at acos(-1 / (1 + excess)): its own rounding is that of the excess
+        assert lifts[0] * omega == pytest.approx(math.acos(-1 / (1 + excess)), abs=1e-3 * math.sqrt(2 * excess) + 1e-12)
+
+
 GOOD = {"mass": np.eye(2), "damping": np.zeros((2, 2)), "stiffness": np.eye(2)}
 
 
@@ -442,6 +499,10 @@ GOOD = {"mass": np.eye(2), "damping": np.zeros((2, 2)), "stiffness": np.eye(2)}
         (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.0]]}), "mass of shape"),
         (lambda: Structure(**{**GOOD, "stiffness": np.eye(3)}), "2 by 2"),
         (lambda: Structure(**{**GOOD, "damping": 1.0}), "2 by 2"),
+        (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.0], [0.0]]}), "rows of equal length"),
+        (lambda: Structure(**{**GOOD, "stiffness": [["soft", 0.0], [0.0, 1.0]]}), "stiffness = "),
+        (lambda: Structure(**GOOD, contacts=Contact(Coulomb(1.0), [1, 0])), "list of Contact"),  # type: ignore[arg-type]
+        (lambda: Structure(**GOOD, contacts=[Coulomb(1.0)]), "list of Contact"),  # type: ignore[list-item]
         (lambda: Structure(**GOOD, contacts=[Contact(Coulomb(1.0), [1.0])]), "degree of freedom"),
         (lambda: Structure(**GOOD, contacts=[Contact(Coulomb(1.0), [1, 0], normal=[1], stiffness=1.0)]), "normal of 1"),
         (lambda: Structure(**GOOD, acts_on=[1.0]), "acts_on"),
@@ -469,6 +530,14 @@ def test_what_has_no_meaning_is_refused(call: Any, words: str) -> None:
     assert refused.value.value
     assert refused.value.rule
     assert refused.value.next_step
+
+
+def test_changes_reach_their_owner() -> None:
+    changed = hoffmann(0.6).having(kinetic=0.3, speed=0.5, preload=2.0, damping=0.1 * np.eye(2))
+    (pad,) = changed.contacts
+    assert (pad.law, pad.preload, changed.drive) == (Coulomb(0.3), 2.0, Belt(0.5))
+    assert np.array_equal(changed.damping, 0.1 * np.eye(2))
+    assert np.array_equal(changed.stiffness, hoffmann(0.6).stiffness)
 
 
 def test_more_joint_modes_than_fit_are_refused() -> None:

@@ -138,7 +138,12 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    r"""Several degrees of freedom: :math:`M\ddot q + C\,(\dot q - r\dot d) + K\,(q - r z) + \sum W f = r P(t)`.
+    r"""Several degrees of freedom that rub at several contacts.
+
+    .. math:: M\ddot q + C\,(\dot q - r\dot d) + K\,(q - r z) + \sum w_t f + \sum w_n (N - N_0) = r P(t)
+
+    z is the base's displacement and d the dampers' other ends'; each contact adds its friction f and its load N, as in
+    :class:`Contact`. Contacts that hold rigidly share their forces through M.
 
     Attributes
     ----------
@@ -165,9 +170,17 @@ class Structure:
 
     Examples
     --------
-    >>> two = Structure([[1, 0], [0, 2]], 0 * np.eye(2), [[3, -1], [-1, 2]], contacts=[Contact(Coulomb(0.5), [1, 0])])
-    >>> two.size, round(two.frequency, 6)
-    (2, 0.139961)
+    A mass on a belt, sprung along it and across it, pressed by the contact it slides on; above a critical friction
+    coefficient both motions couple and grow:
+
+    >>> from stickslip.drives import Belt
+    >>> from stickslip.solve.simulate import simulate
+    >>> pad = Contact(Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    >>> springs = [[23.25, 3.9], [3.9, 7.75]]
+    >>> mass = Structure([[1, 0], [0, 1]], [[0, 0], [0, 0]], springs, contacts=[pad], drive=Belt(0.8))
+    >>> run = simulate(mass, duration=25, start={"x1": 0.3, "v1": 0.0})
+    >>> sorted({event.mode for event in run.events})
+    ['back', 'forward', 'lifted', 'stuck']
     """
 
     mass: ArrayLike
@@ -179,9 +192,10 @@ class Structure:
     damper: str = "ground"
 
     def __post_init__(self) -> None:
-        mass = np.atleast_2d(np.array(self.mass, dtype=np.float64))
+        mass = _matrix("mass", self.mass)
         size = len(mass)
-        for name in ("mass", "damping", "stiffness"):
+        object.__setattr__(self, "mass", mass)
+        for name in ("damping", "stiffness"):
             object.__setattr__(self, name, _matrix(name, getattr(self, name), size))
         if not np.array_equal(mass, mass.T) or not _positive(mass):
             raise ModelError(
@@ -189,6 +203,8 @@ class Structure:
                 "a mass matrix is symmetric and positive definite",
                 "correct mass=: every degree of freedom needs a mass",
             )
+        if isinstance(self.contacts, Contact) or not all(isinstance(contact, Contact) for contact in self.contacts):
+            raise ModelError(f"contacts = {self.contacts!r}", "contacts are a list of Contact", "give contacts=[...]")
         object.__setattr__(self, "contacts", tuple(self.contacts))
         for contact in self.contacts:
             for name in ("tangent", "normal"):
@@ -278,20 +294,29 @@ def _names(part: Any) -> set[str]:
     return {f.name for f in fields(part)}
 
 
+def _numbers(name: str, values: ArrayLike) -> Array:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as reason:
+        raise ModelError(f"{name} = {values!r}", f"{name} is numbers in rows of equal length", "correct it") from reason
+
+
 def _direction(name: str, values: ArrayLike) -> Array:
-    row = np.atleast_1d(np.array(values, dtype=np.float64))
+    row = np.atleast_1d(_numbers(name, values))
     if row.ndim != 1 or not np.all(np.isfinite(row)) or not np.any(row):
         raise ModelError(f"{name} = {row.tolist()}", f"{name} is a row of finite numbers, not all zero", "correct it")
     row.flags.writeable = False
     return row
 
 
-def _matrix(name: str, values: ArrayLike, size: int) -> Array:
-    matrix = np.atleast_2d(np.array(values, dtype=np.float64))
-    if matrix.shape != (size, size) or not np.all(np.isfinite(matrix)):
+def _matrix(name: str, values: ArrayLike, size: int | None = None) -> Array:
+    """A square matrix; of `size` rows where given."""
+    matrix = np.atleast_2d(_numbers(name, values))
+    count = len(matrix) if size is None else size
+    if matrix.shape != (count, count) or not np.all(np.isfinite(matrix)):
         raise ModelError(
             f"{name} of shape {matrix.shape}: {matrix.tolist()}",
-            f"it is {size} by {size} finite numbers: one row for each degree of freedom",
+            f"it is {count} by {count} finite numbers: one row for each degree of freedom",
             f"correct {name}=",
         )
     matrix.flags.writeable = False

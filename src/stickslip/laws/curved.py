@@ -102,6 +102,29 @@ class Expression:
             return float(parts[0] ** self.value)
         return float(getattr(math, self.kind)(*parts))
 
+    def slope(self, name: str) -> Expression:
+        """The partial derivative by a symbol.
+
+        Parameters
+        ----------
+        name : str
+            The symbol.
+
+        Returns
+        -------
+        Expression
+        """
+        if self.kind in ("number", "symbol"):
+            return lifted(1.0 if self.kind == "symbol" and self.name == name else 0.0)
+        a, d = self.parts[0], self.parts[0].slope(name)
+        if self.kind in ("sum", "product", "quotient"):
+            b, e = self.parts[1], self.parts[1].slope(name)
+            return {"sum": d + e, "product": d * b + a * e, "quotient": (d - self * e) / b}[self.kind]
+        if self.kind == "power":
+            return self.value * a ** (self.value - 1) * d if self.value else lifted(0.0)
+        inner = {"exp": self, "log": 1 / a, "tanh": 1 - self**2, "asinh": 1 / sqrt(1 + a**2), "sqrt": 0.5 / self}
+        return inner[self.kind] * d
+
 
 def lifted(value: Expression | float) -> Expression:
     """A number as an expression; an expression as it is."""

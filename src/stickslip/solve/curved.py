@@ -5,8 +5,8 @@ the step, and exits are searched on it with the same certificate as in the exact
 tolerance allows: the last two terms of every entry's series, relative to the largest value that the entry has had.
 
 The method is explicit. A contact whose fastest rate is far above the motion's own (rate-and-state friction at creep
-speed under a light mass) takes steps of about order/3 over that rate; where that would need more than `STEPS` steps
-in a period, the run ends with an error that says so instead of crawling.
+speed under a light mass) takes steps of about order/3 over that rate; where that foretells more than `STEPS` steps, the run
+ends with an error that says so instead of crawling.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Form = tuple[dict[int, float], float]  # weights of nodes, and a constant
 Stops = Iterable[tuple[tuple[float, float], tuple[Any, Any]]]
 
 CHUNK = 4096  # steps between two looks at the clock and the keyboard
-STEPS = 5_000_000  # most steps in one period
+PATIENCE, STEPS = 200_000, 200_000_000  # steps before a run's number of steps is foretold, and the most there may be
 
 
 @dataclass(frozen=True, eq=False)
@@ -427,7 +427,8 @@ def run_curved(
                 )  # fmt: skip
                 kept.append(tuple(column[:written] for column in room))
                 passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
-                _refuse(outcome, table, state, clock, passed, scale)
+                ahead = total - clock[1] - (clock[0] * period if clock[0] else 0.0)
+                _refuse(outcome, table, state, clock, passed, ahead, CHUNK * len(kept))
                 left = int(np.sum(room[5][:written] >= 0))
                 if outcome == taylor.FULL and left > budget * max(1.0, passed / scale):
                     raise SolveError(
@@ -482,7 +483,7 @@ def _at_rest(table: Tape, state: Array, mode: int, series: Array) -> bool:
     return bool(np.all(series[1 : 2 * len(state) : 2] == 0.0))
 
 
-def _refuse(outcome: int, table: Tape, state: Array, clock: Array, passed: float, scale: float) -> None:
+def _refuse(outcome: int, table: Tape, state: Array, clock: Array, passed: float, ahead: float, done: int) -> None:
     place = f"lap {clock[0]:g}, {clock[1]:g} s, at {_named(table, state)}"
     if outcome == taylor.CHATTER:
         raise SolveError(
@@ -496,10 +497,10 @@ def _refuse(outcome: int, table: Tape, state: Array, clock: Array, passed: float
             "friction and its rates are finite and smooth within a mode",
             "check the law there (a logarithm or a power of nothing)",
         )
-    if outcome == taylor.FULL and passed * STEPS < CHUNK * scale:
+    if outcome == taylor.FULL and done >= PATIENCE and passed * STEPS < CHUNK * ahead:
         raise SolveError(
-            f"steps of {passed / CHUNK:.1e} s, {place}",
-            f"an explicit method takes at most {STEPS:g} steps in {scale:g} s; the law is stiff here",
+            f"steps of {passed / CHUNK:.1e} s with {ahead:g} s ahead, {place}",
+            f"a run takes at most {STEPS:g} steps; the law is stiff here for an explicit method",
             "take a larger mass, a larger rtol=, or a shorter time",
         )
 

@@ -21,7 +21,7 @@ MOST = 4096  # joint modes; more would not fit a desk
 
 @dataclass(frozen=True)
 class JointMode(Mode):
-    """A mode of every contact at once; named after them, its kind and side those of the only one.
+    """A mode of every contact at once, named after them; its side is that of the first contact that slides.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class JointMode(Mode):
         return cls(
             name=" + ".join(part.name for part in parts) or "free",
             kind=" + ".join(part.kind for part in parts) or "free",
-            side=parts[0].side if len(parts) == 1 else 0,
+            side=next((part.side for part in parts if part.side), 0),
             friction=None if parts and all(part.friction is None for part in parts) else {},
             exits=tuple(exit_ for exit_, _ in taken),
             parts=parts,

@@ -196,15 +196,13 @@ def _guarded(tape, guards, mode, u, tolerance, order, width, s, c, noise):
         g = tape[8][mode] + node[j]
         a = left[g] * width
         if kinds[g] == POWER:
-            if s[a] <= STILL and s[a + 1] != 0.0:
-                u = min(u, STILL / abs(s[a + 1]))
-            continue
-        level = 4.0 - math.log(tolerance)
-        sign = 1.0
+            level, sign = (-2.0 * STILL, 1.0) if s[a] <= STILL else (0.5 * STILL, -1.0)
+        else:
+            level, sign = 4.0 - math.log(tolerance), 1.0
         if kinds[g] == TANH:
             level *= 0.5
             sign = -1.0 if s[a] > 0.0 else 1.0
-        if sign * s[a] > -level - 0.25 or _surely_below(s, a, order - 1, sign, -level, u):
+        if (kinds[g] != POWER and sign * s[a] > -level - 0.25) or _surely_below(s, a, order - 1, sign, -level, u):
             continue
         power = 1.0
         for k in range(order):
@@ -263,6 +261,33 @@ def _first_exit(tape, exits, mode, size, h, u, order, width, big, s, c, noise):
 
 
 @njit(**EXACT)
+def _set_tones(tones, time, state):
+    """The drive's tones by the clock: they gather no error of the steps."""
+    for j in range(len(tones)):
+        angle = tones[j, 2] * time + tones[j, 3]
+        state[int(tones[j, 0])], state[int(tones[j, 1])] = math.cos(angle), math.sin(angle)
+
+
+@njit(**EXACT)
+def _polish(tape, node, tones, mode, h, time, state, s):
+    """Newton's step onto the zero of an exit that holds the drive: the delay [s], and the state at it.
+
+    The step's series has the drive to the tolerance only; what follows a release must not hang on that.
+    """
+    total, size = 0.0, len(state)
+    for _ in range(2):
+        _set_tones(tones, time + total, state)
+        expand(tape, mode, state, h, 2, 3, s)
+        value, slope = s[3 * node], s[3 * node + 1]
+        if not abs(value) <= 1e-2 * abs(slope):
+            return total
+        delay = -value / slope
+        advance(s, 3, size, 2, delay, state)
+        total += delay * h
+    return total
+
+
+@njit(**EXACT)
 def march(tape, exits, guards, tones, clock, state, mode, until, period, tolerance, order, big, steps, work):
     """Steps from `clock` to `until` (laps, offset): the outcome, the steps written, and the mode.
 
@@ -271,7 +296,7 @@ def march(tape, exits, guards, tones, clock, state, mode, until, period, toleran
     laps, offsets, lengths, modes, states, ends = steps
     s, c, noise = work
     width = order + 1
-    _, target, _, held, _, face = exits
+    node, target, _, held, _, face = exits
     size, room, written, chain = len(state), len(laps), 0, 0
     while True:
         remaining = until[1] - clock[1]
@@ -279,11 +304,7 @@ def march(tape, exits, guards, tones, clock, state, mode, until, period, toleran
             remaining += (until[0] - clock[0]) * period
         if remaining <= 4e-16 * (clock[1] + clock[2]):
             return DONE, written, mode
-        if written == room:
-            return FULL, written, mode
-        for j in range(len(tones)):
-            angle = tones[j, 2] * clock[1] + tones[j, 3]
-            state[int(tones[j, 0])], state[int(tones[j, 1])] = math.cos(angle), math.sin(angle)
+        _set_tones(tones, clock[1], state)
         h = clock[2]
         expand(tape, mode, state, h, order, width, s)
         u = _length(s, width, order, size, tolerance, big)
@@ -293,6 +314,8 @@ def march(tape, exits, guards, tones, clock, state, mode, until, period, toleran
         u = min(_guarded(tape, guards, mode, u, tolerance, order, width, s, c, noise), remaining / h)
         leaving, u = _first_exit(tape, exits, mode, size, h, u, order, width, big, s, c, noise)
         if u > 0.0:
+            if written == room:
+                return FULL, written, mode
             chain = 0
             laps[written], offsets[written], lengths[written] = clock[0], clock[1], u * h
             modes[written], ends[written] = mode, leaving
@@ -310,14 +333,18 @@ def march(tape, exits, guards, tones, clock, state, mode, until, period, toleran
                 clock[1] -= period
             clock[2] = full * h
         else:
+            if written > 0 and ends[written - 1] < 0:
+                ends[written - 1] = leaving
             chain += 1
             if chain > CHAIN:
                 return CHATTER, written, mode
         if leaving >= 0:
+            if u > 0.0 and not held[leaving]:
+                delay = _polish(tape, node[leaving], tones, mode, h, clock[1], state, s)
+                lengths[written - 1] += delay
+                clock[1] += delay
             if held[leaving]:
-                for j in range(len(tones)):
-                    angle = tones[j, 2] * clock[1] + tones[j, 3]
-                    state[int(tones[j, 0])], state[int(tones[j, 1])] = math.cos(angle), math.sin(angle)
+                _set_tones(tones, clock[1], state)
                 speed = 0.0
                 for i in range(size):
                     speed += face[i] * state[i]
