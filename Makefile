@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+export PIP_ROOT_USER_ACTION := ignore
 # Record sets beside the checkout are used where they are; without them each is fetched when it is asked for by name.
 ifneq ($(wildcard ../shared/data),)
 export STICKSLIP_DATA ?= $(abspath ../shared/data)
@@ -38,13 +39,16 @@ $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.user: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[io]"
-	touch $@
+	@echo "setting up $(VENV)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[io]"
+	@touch $@
 
 $(VENV)/.dev: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
-	touch $@ $(VENV)/.user
+	@echo "setting up $(VENV) with what the tests need"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
+	@touch $@ $(VENV)/.user
 
 $(VENV)/.docs: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[io,docs]"
-	touch $@
+	@echo "setting up $(VENV) with what the documentation needs"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[io,docs]"
+	@touch $@

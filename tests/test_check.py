@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from corpus import FS, Damaged, clean_records, damaged_records
-from stickslip import Record, read_record
+from stickslip import Record, read_record, repair_clock
+from stickslip.record.check import Fault
+from stickslip.record.clock import fit_clock
 
 SEEDS = (0, 2)
 DAMAGED = [(seed, each) for seed in SEEDS for each in damaged_records(seed)]
@@ -120,3 +124,49 @@ def test_stamps_by_clock_strings_are_seen_through_too(dataset):
     (fault,) = record.check()
     assert fault.kind == "clock"
     assert "259.5 Hz" in fault.message
+
+
+# ---- stamps are kept where the check-up names a fault of the clock, and nowhere else
+
+
+CLOCK_KINDS = {"clock", "rate", "backwards", "repeated stamps", "jitter", "gap", "missing"}
+
+
+def clock_faults(stamps: np.ndarray) -> list[Fault]:
+    record = replace(Record.of({"x": np.sin(np.arange(len(stamps)) / 30)}, fs=250.0), stamps=stamps)
+    return [fault for fault in record.check() if fault.channel is None and fault.kind in CLOCK_KINDS]
+
+
+@settings(deadline=None, max_examples=150, derandomize=True)
+@given(
+    jitter=st.sampled_from([0, 1e-5, 1e-4, 5e-4, 2e-3, 5e-3, 1e-2, 3e-2, 0.1, 0.4]),
+    odd=st.sampled_from([0, 0.02, 0.3, 0.8, 1.0, 5.0, -0.5, -1.0, -3.0]),
+    digits=st.sampled_from([3, 4, 6, 9]),
+    drift=st.sampled_from([0, 1e-6, 1e-4]),
+    seed=st.integers(0, 99),
+)
+def test_stamps_are_kept_where_the_check_up_says_why(
+    jitter: float, odd: float, digits: int, drift: float, seed: int
+) -> None:
+    rows = np.arange(600)
+    late = jitter * np.random.default_rng(seed).normal(size=600) + odd * (rows > 300) + drift * rows**2 / 600
+    stamps = np.round((rows + late) / 250, digits)
+    faults = clock_faults(stamps)
+    assert (fit_clock(stamps).stamps is not None) == bool(faults)
+    assert all(fault.severity == "error" and "(record" in fault.message for fault in faults)
+
+
+@pytest.mark.parametrize("jitter", [2e-3, 5e-3, 1e-2])
+def test_a_small_jitter_is_told_and_mended(jitter: float):
+    rows = np.arange(2000)
+    stamps = (rows + jitter * np.random.default_rng(3).uniform(-1, 1, 2000)) / 250
+    (fault,) = clock_faults(stamps)
+    assert fault.kind == "jitter"
+    record = replace(Record.of({"x": np.sin(rows / 30)}, fs=250.0), stamps=stamps)
+    repair_clock(record).require_clean("x")
+
+
+def test_one_long_interval_is_told():
+    stamps = (np.arange(2000) + 0.3 * (np.arange(2000) > 1200)) / 250
+    (fault,) = clock_faults(stamps)
+    assert (fault.kind, fault.rows) == ("jitter", ((1200, 1201),))

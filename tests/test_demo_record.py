@@ -79,7 +79,14 @@ def test_every_answer_is_found_under_its_name_and_within_its_interval() -> None:
     found = {estimate.name: estimate for estimate in analyze(record, **rig).estimates}
     answers = set(record.truth) - {*rig, "static friction", "sticks"}
     assert answers <= set(found)
-    for name in answers:
+    missed = []
+    for name in sorted(answers):
         low, high = found[name].interval
-        reach = (high - low) / 2  # of nine intervals of 95 % one may miss; none by its own width
-        assert low - reach <= record.truth[name] <= high + reach, found[name]
+        true = record.truth[name]
+        if not low <= true <= high:
+            missed.append(name)
+        reach = (high - low) / 2  # at twice its interval's width an answer is wrong, not unlucky
+        assert low - reach <= true <= high + reach, found[name]
+    assert len(missed) <= 1, (
+        "of nine intervals of 95 % two or more miss once in fourteen records, and this one is fixed"
+    )

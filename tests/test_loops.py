@@ -121,6 +121,18 @@ def test_interval_of_the_level_holds_the_truth(rho):
     assert np.mean(held) >= 0.88  # 3 binomial standard deviations below 0.95
 
 
+@pytest.mark.parametrize("rho", [0.0, 0.5])
+def test_interval_of_a_level_that_wanders_from_cycle_to_cycle_holds_its_mean(rho):
+    rng, trials, held = np.random.default_rng(5), 100, 0
+    record = sliding(seconds=10.0, noise=0.02)
+    cycle = np.floor(FREQUENCY * record.time + 0.25).astype(int)  # the level changes at a reversal
+    for _ in range(trials):
+        level = 0.05 * lfilter([1], [1, -rho], rng.standard_normal(cycle.max() + 501))[500:]
+        wandering = record["friction"] + level[cycle] * np.sign(np.cos(2 * np.pi * FREQUENCY * record.time))
+        held += friction_loops(Record.of({"x": record["x"], "friction": wandering}, fs=FS)).level.includes(1.5)
+    assert held / trials >= 0.88  # 3 binomial standard deviations below 0.95
+
+
 def test_scale_and_sampling_do_not_matter():
     plain = friction_loops(sliding(fs=2000.0, slope=4.0))
     record = sliding(fs=2000.0, slope=4.0)

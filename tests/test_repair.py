@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -271,3 +272,24 @@ def test_refusals_say_what_to_do():
     still = replace(record, stamps=np.zeros(100))
     with pytest.raises(RecordError, match="pass fs= when reading"):
         repair_clock(still)
+
+
+def test_many_scattered_losses_are_bridged_in_their_time():
+    rng = np.random.default_rng(4)
+    rows = np.arange(300_000)
+    wave = np.sin(0.05 * rows) + 0.3 * np.sin(0.131 * rows)
+    lost = np.zeros(len(rows), dtype=bool)
+    lost[rng.choice(len(rows), 600, replace=False)] = True
+    begun = time.process_time()
+    filled = bridge(np.where(lost, np.nan, wave), lost)
+    assert time.process_time() - begun < 2.0  # as one problem of all rows it took several times that
+    assert np.max(np.abs(filled - wave)) < 1e-3
+
+
+def test_a_channel_that_was_filtered_does_not_claim_its_old_noise():
+    rows = np.arange(4000)
+    record = Record.of({"x": np.sin(rows / 30)}, fs=250.0).with_details("x", noise=1e-3)
+    dropped = replace(record.rows(0, 3999), stamps=np.delete(rows, 1000) / 250)
+    assert resample(record, 100.0).channels["x"].noise is None
+    assert fill_gaps(dropped).channels["x"].noise is None
+    assert remove_drift(record, "x").channels["x"].noise == 1e-3

@@ -200,12 +200,13 @@ def test_directions_that_differ_are_told_of_a_regression_too() -> None:
     v, a = np.gradient(x, 1e-3), np.gradient(np.gradient(x, 1e-3), 1e-3)
     noise = np.random.default_rng(0).normal(0, 0.05, time.size)
     for back in (2.0, 3.0):
-        force = 3.0 * a + 5.0 * v + np.where(v > 0, 2.0, -back) + noise
+        force = 3.0 * a + np.where(v > 0, 5.0, 3.0 + back) * v + np.where(v > 0, 2.0, -back) + noise
         told = " ".join(headline(analyze(ss.Record.of({"x": x, "force": force}, fs=1000))))
         differ = re.search(r"The two directions differ: ([\d.]+) N forward and ([\d.]+) N back", told)
         assert (differ is not None) == (back == 3.0), told
         if differ is not None:
             assert [float(force) for force in differ.groups()] == pytest.approx([2.0, 3.0], abs=0.01)
+        assert ("The two directions differ in viscous friction: 5.0" in told) == (back == 3.0), told
 
 
 def test_a_folder_holds_all_and_only_what_it_lists(demo: Findings, tmp_path: Path) -> None:

@@ -95,6 +95,16 @@ def test_every_public_name_stands_in_the_reference(name: str) -> None:
     assert name == "__version__" or re.search(rf"^   {name}$", page.read_text("utf-8"), flags=re.MULTILINE)
 
 
+def test_the_map_of_the_house_names_files_that_stand() -> None:
+    page = (PACKAGE.parents[1] / "docs" / "architecture.md").read_text("utf-8")
+    standing = {
+        file.name for folder in ("src", "tests", "tools") for file in (PACKAGE.parents[1] / folder).rglob("*.py")
+    }
+    assert set(re.findall(r"\b\w+\.py\b", page)) <= standing
+    folders = re.findall(r"^  (\w+)/", page, flags=re.MULTILINE)
+    assert set(folders) == {file.parent.name for file in FILES} - {PACKAGE.name}
+
+
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_public_function_is_documented(name: str) -> None:
     function = FUNCTIONS[name]

@@ -463,6 +463,7 @@ def _combined(wanted: Wanted, data: Mapping[tuple[int, str], Array]) -> Array:
             values += data[key] * scale
         values += wanted.offset
         values *= wanted.scale
+    values.flags.writeable = False  # nobody else holds it: the record need not copy
     return values
 
 

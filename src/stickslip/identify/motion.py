@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate
+from stickslip.record.flaws import runs_of
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import differentiate
 from stickslip.signals.noise import noise_level
@@ -296,8 +297,8 @@ def require_fit(record: Record, *forces: str, length: str, question: str) -> Non
 
 def stretches(inside: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """First samples of the stretches where `inside` holds, and the samples after their last."""
-    turns = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
-    return turns[::2], turns[1::2]
+    runs = np.array(runs_of(inside), dtype=np.intp).reshape(-1, 2)
+    return runs[:, 0], runs[:, 1] + 1
 
 
 def away_from(events: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:

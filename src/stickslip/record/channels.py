@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
+from numbers import Real
 
 from stickslip.errors import RecordError
 
@@ -35,6 +37,9 @@ VOCABULARY: dict[str, Quantity] = {
 class Channel:
     """What is known of one channel beside its samples.
 
+    What makes no sense is refused with a RecordError: words that are no text, a delay that is not finite, a noise
+    below zero, a unit that does not fit the vocabulary.
+
     Attributes
     ----------
     name : str
@@ -62,10 +67,33 @@ class Channel:
     delay: float = 0.0
     noise: float | None = None
 
+    def __post_init__(self) -> None:
+        described(checked_name(self.name), self.unit)
+        for detail in ("unit", "quantity", "source", "sensitivity"):
+            value = getattr(self, detail)
+            if not isinstance(value, str) or (detail == "unit" and not value):
+                raise RecordError(
+                    f"{detail} = {value!r} of channel {self.name}", f"the {detail} is stated in words", "pass a text"
+                )
+        if not _is_finite(self.delay):
+            raise RecordError(
+                f"delay = {self.delay!r} of channel {self.name}", "a delay is a finite time in seconds", "pass a number"
+            )
+        if self.noise is not None and not (_is_finite(self.noise) and self.noise >= 0):
+            raise RecordError(
+                f"noise = {self.noise!r} of channel {self.name}",
+                f"noise is a standard deviation in {self.unit}, zero or more",
+                "pass a number, or None where it is not known",
+            )
+
+
+def _is_finite(value: object) -> bool:
+    return type(value) is not bool and isinstance(value, Real) and math.isfinite(value)
+
 
 def checked_name(name: str) -> str:
     """`name`, if it can name a channel."""
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
         raise RecordError(
             f"channel name '{name}'",
             "a channel is named by letters, digits and _",

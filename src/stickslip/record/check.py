@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.record import flaws
+from stickslip.record.clock import Stamps, fit_line, inspect, is_uniform
 from stickslip.record.flaws import Runs
-from stickslip.record.stamps import Stamps, fit_line, inspect
 
 if TYPE_CHECKING:
     from stickslip.record.record import Record
@@ -83,7 +83,7 @@ def find_faults(record: Record) -> list[Fault]:
     ['constant']
     """
     faults = _short(record)
-    if record.stamps is not None:
+    if record.stamps is not None and not is_uniform(record.stamps):
         faults += _clock_faults(record.stamps)
     for name in record:
         faults += _channel_faults(name, record.channels[name].unit, record[name])
@@ -156,7 +156,8 @@ def _clock_faults(stamps: Array) -> list[Fault]:
     if len(clock.uneven):
         off = np.abs(np.diff(stamps)[clock.uneven] / clock.step - 1)
         usual = f"{1e3 * clock.step:.4g} ms"
-        what = f"{len(clock.uneven)} intervals are uneven, off by up to {100 * np.max(off):.0f} % of {usual}"
+        many = _several(len(clock.uneven), "interval is uneven", "intervals are uneven")
+        what = f"{many}, off by up to {100 * np.max(off):.2g} % of {usual}"
         cure = "fill_gaps(record)" if len(clock.gaps) else "repair_clock(record)"
         faults.append(_clock_fault("jitter", _pairs(clock.uneven), what, cure, "error"))
     return faults

@@ -83,6 +83,8 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
     with _trusting():
         _require_version(metadata)
         channels = {entry["name"]: Channel(**_restored(entry)) for entry in metadata["channels"]}
+        if not isinstance(metadata["stamps"], bool):
+            raise TypeError("stamps are kept or not")
         stamps = samples[metadata["time"]] if metadata["stamps"] else None
         start = float(metadata["start"])
         if first:
@@ -136,7 +138,12 @@ def require_rows(metadata: Mapping[str, Any], found: int) -> None:
 def history_of(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
     """The history that the metadata tells; empty where there is none."""
     with _trusting():
-        return tuple(Step(**_restored(step)) for step in metadata.get("history", ()))
+        steps = tuple(Step(**_restored(step)) for step in metadata.get("history", ()))
+        for step in steps:
+            for file in step.arguments.get("files", ()):
+                if not isinstance(file["name"], str):
+                    raise TypeError("a file without name")
+        return steps
 
 
 def _require_version(metadata: Mapping[str, Any]) -> None:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+DETAILS = ("delay", "noise", "sensitivity", "quantity")  # of a channel, that a user may know better than the file
+
 
 @dataclass(frozen=True)
 class Step:
@@ -41,6 +43,15 @@ class Step:
     action: str
     arguments: Mapping[str, Any] = field(default_factory=dict)
     outcome: str = ""
+
+    def __post_init__(self) -> None:
+        named = isinstance(self.arguments, Mapping) and all(isinstance(key, str) for key in self.arguments)
+        if not (named and isinstance(self.action, str) and isinstance(self.outcome, str)):
+            raise RecordError(
+                f"a step {str(self.action)[:40]!r} with {str(self.arguments)[:40]!r}",
+                "a step is a function's name, its arguments by name, and what came of it in words",
+                "pass a text, a mapping and a text",
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -109,6 +120,10 @@ class Record:
             )
         if min(lengths.values()) == 0:
             raise RecordError("a record without samples", "at least one sample is needed", "check rows= and the file")
+        if not isinstance(self.truth, Mapping):
+            raise RecordError(
+                f"truth = {str(self.truth)[:40]!r}", "true values are given by their names", "pass a mapping"
+            )
         object.__setattr__(self, "samples", MappingProxyType(frozen))
         object.__setattr__(self, "channels", MappingProxyType({name: self.channels[name] for name in frozen}))
         object.__setattr__(self, "history", tuple(self.history))
@@ -238,9 +253,13 @@ class Record:
             history=(*self.history, *([step] if step else [])),
         )
 
-    def with_details(self, name: str, **details: Any) -> Record:
+    def with_details(self, name: str, /, **details: Any) -> Record:
         """This record with details of a channel stated: ``delay``, ``noise``, ``sensitivity``, ``quantity``."""
         self.require(name)
+        if unknown := set(details) - set(DETAILS):
+            raise RecordError(
+                f"{', '.join(sorted(unknown))} of channel {name}", f"the details are {', '.join(DETAILS)}", "choose one"
+            )
         channels = {**self.channels, name: replace(self.channels[name], **details)}
         return replace(
             self, channels=channels, history=(*self.history, Step("with_details", {"name": name, **details}))
@@ -254,10 +273,15 @@ class Record:
         fs: float | None = None,
         start: float | None = None,
         stamps: Array | None = None,
+        filtered: bool = False,
     ) -> Record:
-        """This record's channels with new samples (all of them, on a new clock if given), logged as `step`."""
+        """This record's channels with new samples (all of them, on a new clock if given), logged as `step`.
+
+        Samples that were `filtered` have no longer the noise that was stated.
+        """
         fs, start = self.fs if fs is None else fs, self.start if start is None else start
-        return Record(samples, self.channels, fs, start, (*self.history, step), stamps, self.truth)
+        channels = {n: replace(c, noise=None) for n, c in self.channels.items()} if filtered else self.channels
+        return Record(samples, channels, fs, start, (*self.history, step), stamps, self.truth)
 
     def rows(self, first: int = 0, last: int | None = None) -> Record:
         """Rows ``first`` up to, not including, ``last`` (negative from the end, as in a slice)."""
@@ -336,6 +360,10 @@ def _frozen(values: ArrayLike) -> Array:
         raise RecordError(
             f"a channel of shape {array.shape}", "a channel is one row of numbers", "pass one-dimensional samples"
         )
-    view = array.view()
-    view.flags.writeable = False
-    return view
+    owner: Any = array
+    while isinstance(owner, np.ndarray) and not owner.flags.writeable:
+        owner = owner.base
+    if owner is not None:  # somebody else can still change it
+        array = array.copy()
+    array.flags.writeable = False
+    return array

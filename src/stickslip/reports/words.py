@@ -82,20 +82,22 @@ def _of_findings(findings: Findings) -> Iterator[str]:
             f"of {value_of(found.coulomb)} explain the measured force{share}."
         )
     apart = findings.asymmetric
-    if findings.loops is None and apart is not None:
+    if apart is not None and findings.loops is None:
         yield from _of_directions(apart.coulomb_forward, apart.coulomb_back)
+        yield from _of_directions(apart.viscous_forward, apart.viscous_back, "in viscous friction")
     if findings.sticks is not None:
         yield from _of_sticks(findings)
 
 
-def _of_directions(forward: Estimate | None, back: Estimate | None) -> Iterator[str]:
+def _of_directions(forward: Estimate | None, back: Estimate | None, what: str = "") -> Iterator[str]:
     if forward is None or back is None:
         return
     apart = abs(forward.value - back.value)
-    if apart > SAME * (forward.value + back.value) / 2 and apart > 2 * forward.sd + 2 * back.sd:
+    if apart > SAME * abs(forward.value + back.value) / 2 and apart > 2 * forward.sd + 2 * back.sd:
+        alike = "" if what else "; a zero offset of a sensor or a sloping rig looks the same"
         yield (
-            f"The two directions differ: {value_of(forward)} forward and {value_of(back)} back; a zero offset of a "
-            "sensor or a sloping rig looks the same."
+            f"The two directions differ{what and ' ' + what}: {value_of(forward)} forward and {value_of(back)} "
+            f"back{alike}."
         )
 
 

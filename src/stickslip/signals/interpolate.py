@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import RecordError
+from stickslip.record.flaws import runs_of
 
 Array = NDArray[np.float64]
 
@@ -105,24 +106,33 @@ def _neighbourhoods(lost: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _bridged(values: Array, lost: NDArray[np.bool_]) -> Array:
-    from scipy.sparse import diags
-    from scipy.sparse.linalg import spsolve
-
     mean = float(np.mean(values[~lost]))
     signal = values - mean
     order = min(ORDER, int(np.sum(~lost)) // 6)
     coefficients = _autoregression(signal, lost, order) if order >= 2 else None
     if coefficients is None:
         return values
-    n = len(signal)
+    result = values.copy()
+    # lost samples further apart than the order do not meet in any prediction: each group is a problem of its own
+    near = np.convolve(lost, np.ones(2 * order + 1), "same") > 0.5
+    for first, last in runs_of(near):
+        part = slice(first, last + 1)
+        result[part][lost[part]] = _solved(signal[part], lost[part], coefficients) + mean
+    return result
+
+
+def _solved(signal: Array, lost: NDArray[np.bool_], coefficients: Array) -> Array:
+    """The lost samples by least squares of all predictions that they are part of."""
+    from scipy.sparse import diags
+    from scipy.sparse.linalg import spsolve
+
+    n, order = len(signal), len(coefficients)
     backward = np.concatenate([[1.0], -coefficients])
     predictors = [diags(list(f), list(range(order + 1)), shape=(n - order, n)) for f in (backward, backward[::-1])]
     normal = (predictors[0].T @ predictors[0] + predictors[1].T @ predictors[1]).tocsc()
     unknown, known = np.flatnonzero(lost), np.flatnonzero(~lost)
     rows = normal[unknown]
-    result = values.copy()
-    result[unknown] = np.atleast_1d(spsolve(rows[:, unknown].tocsc(), -(rows[:, known] @ signal[known]))) + mean
-    return result
+    return np.atleast_1d(spsolve(rows[:, unknown].tocsc(), -(rows[:, known] @ signal[known])))
 
 
 def _autoregression(signal: Array, lost: NDArray[np.bool_], order: int) -> Array | None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import EstimateError
+from stickslip.record.flaws import quantum
 
 Array = NDArray[np.float64]
 
@@ -113,7 +114,7 @@ def quantisation_step(values: ArrayLike) -> float:
     Parameters
     ----------
     values : array_like, shape (n,)
-        Samples, finite. At most 20000 of them, from all over the record, are looked at.
+        Samples, finite.
 
     Returns
     -------
@@ -126,16 +127,7 @@ def quantisation_step(values: ArrayLike) -> float:
     >>> round(quantisation_step(np.round(np.sin(t) / 0.002) * 0.002), 6), quantisation_step(np.sin(t))
     (0.002, 0.0)
     """
-    samples = np.asarray(values, dtype=float)
-    levels = np.unique(samples[:: max(1, samples.size // 20000)])
-    gaps = np.diff(levels)
-    gaps = np.sort(gaps[gaps > 1e-9 * max(np.ptp(levels), np.abs(levels).max())]) if levels.size > 1 else gaps
-    if gaps.size < 8:
-        return 0.0
-    step = float(np.median(gaps[gaps < 1.5 * gaps[0]]))
-    counts = np.round(gaps / step)
-    step = float(gaps.sum() / counts.sum())
-    return step if np.all(np.abs(gaps / step - np.round(gaps / step)) < 0.05) else 0.0
+    return quantum(np.asarray(values, dtype=float))
 
 
 def checked_samples(values: ArrayLike, fs: float, *, least: int) -> Array:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from stickslip.errors import RecordError
 from stickslip.record import flaws
 from stickslip.record.check import SHARP_UNITS, in_words
+from stickslip.record.clock import Line, fit_line, inspect
 from stickslip.record.record import Record, Step
-from stickslip.record.stamps import Line, fit_line, inspect
 from stickslip.signals.interpolate import band_limited, bridge
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ def repair_clock(record: Record, *, fs: float | None = None, trust: str | None =
     """Give a record one sampling rate where its stamps stand still and jump, repeat, go back or jitter.
 
     An instrument samples evenly; the host stamps late. The uniform clock ``start + k / fs`` is fitted to the stamps
-    (Huber's line, see :func:`stickslip.record.stamps.fit_line`) and the samples are kept as they are, on that clock.
+    (Huber's line, see :func:`stickslip.record.clock.fit_line`) and the samples are kept as they are, on that clock.
     Where intervals jitter, the stamps may be right and the sampling uneven: the record itself tells, by which of the
     two clocks makes its channels smoother, and then the samples are interpolated from the stamps onto a uniform clock.
 
@@ -224,7 +224,7 @@ def _from_stamps(
     arguments: dict[str, Any] = {"fs": fs, "fs_interval": [fs, fs], "trust": "stamps"}
     if action == "fill_gaps":
         arguments = {"fs": fs, "longest": limit}
-    return record.with_samples(samples, Step(action, arguments, outcome), fs=fs, start=float(times[0]))
+    return record.with_samples(samples, Step(action, arguments, outcome), fs=fs, start=float(times[0]), filtered=True)
 
 
 def fill_missing(record: Record, *channels: str, longest: int | None = None) -> Record:
@@ -270,18 +270,13 @@ def fill_missing(record: Record, *channels: str, longest: int | None = None) -> 
             continue
         runs = flaws.runs_of(lost)
         long = tuple(run for run in runs if longest is not None and run[1] - run[0] + 1 > longest)
-        samples[name] = _replaced(record[name], lost, keep_lost=flaws.rows_of(long, len(record)))
+        samples[name] = np.where(flaws.rows_of(long, len(record)), np.nan, bridge(record[name], lost))
         filled = int(lost.sum()) - sum(last - first + 1 for first, last in long)
         stay = f", {in_words(long)} stay NaN, being longer than {longest}" if long else ""
         parts.append(f"{filled} values of {name} filled ({in_words(runs)}{stay})")
     outcome = "; ".join(parts) or "no value was missing"
     return record.with_samples(samples, Step("fill_missing", {"channels": list(names), "longest": longest}, outcome),
                                stamps=record.stamps)  # fmt: skip
-
-
-def _replaced(values: Array, lost: Mask, *, keep_lost: Mask | None = None) -> Array:
-    result = bridge(values, lost)
-    return result if keep_lost is None else np.where(keep_lost, np.nan, result)
 
 
 def remove_spikes(record: Record, *channels: str) -> Record:
@@ -476,7 +471,7 @@ def resample(record: Record, fs: float) -> Record:
     cutoff = 1.0 if ratio >= 1 else 0.9 * ratio
     samples: Mapping[str, Array] = {name: band_limited(record[name], times, cutoff=cutoff) for name in record}
     outcome = f"{len(record)} samples at {record.fs:g} Hz became {len(times)} at {fs:g} Hz"
-    return record.with_samples(samples, Step("resample", {"fs": float(fs)}, outcome), fs=float(fs))
+    return record.with_samples(samples, Step("resample", {"fs": float(fs)}, outcome), fs=float(fs), filtered=True)
 
 
 def _runs(rows: NDArray[np.intp]) -> flaws.Runs:

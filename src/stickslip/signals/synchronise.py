@@ -153,7 +153,7 @@ def synchronise(
     for name in b:
         mine = f"{name}_b" if name in samples else name
         samples[mine] = band_limited(b[name], rows[shared], cutoff=cutoff)
-        channels[mine] = replace(b.channels[name], name=mine)
+        channels[mine] = replace(b.channels[name], name=mine, noise=None)  # the filter took part of it
     interval = list(found.interval) if isinstance(found, Estimate) else [seconds, seconds]
     known = "found" if offset is None else "given"
     outcome = (
