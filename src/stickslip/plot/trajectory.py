@@ -119,7 +119,8 @@ def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = Non
             words = {"x": "mass", "z": "spring's end"}.get(name)
             ax.plot(times, factor * row, color=_COLOURS[name], label=words, linestyle="--" if name == "z" else "-")
         ax.set_ylabel(axis_label(_WORDS[names[0]], unit, between="\n"))
-        ax.axhline(0, color=FAINT, linewidth=0.8, zorder=0.5)
+        if np.min(values) < 0 < np.max(values):
+            ax.axhline(0, color=FAINT, linewidth=0.8, zorder=0.5)
         _shade(ax, run, first, last)
     handles = [
         h for h in axes[0].get_legend_handles_labels()[0] if motion.base or h.get_label() in ("sticks", "microsticks")
@@ -234,8 +235,9 @@ def _portrait(run: Trajectory, across: str, up: str, ax: Axes) -> Axes:
         )  # at rest, a stick is a point of the portrait
         dot = "o" if point else ""
         ax.plot(x, y, marker=dot, markevery=_middles(held), color=colour, linewidth=3, markersize=6, label=words)
-    for line in (ax.axhline, ax.axvline):
-        line(0, color=FAINT, linewidth=0.8, zorder=0.5)
+    for line, row in ((ax.axvline, before[0]), (ax.axhline, before[1])):
+        if row.min() < 0 < row.max():  # an axis far from the motion would only squeeze it
+            line(0, color=FAINT, linewidth=0.8, zorder=0.5)
     if up == "v" and "way" in run.table.motion.face:
         belt = y_factor * run.table.motion.face["way"]
         ax.axhline(belt, color=INK, linewidth=0.9, linestyle=":", zorder=1, label="belt")

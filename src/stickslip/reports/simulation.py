@@ -29,6 +29,7 @@ A_PERIOD = 200  # samples of the record in the shortest period of drive, system 
 MOST_ROWS = 200_000  # of a record whose rate was not asked for
 REFUSED_ROWS = 100_000_000
 MOST_PIECES = 200_000  # of a run whose energy is integrated: beyond, it takes longer than the run
+MOST_TOLD = 10_000  # events in JSON; events.csv has them all
 PEAKS = 4001  # instants looked at for the largest values of the last cycle
 
 
@@ -64,6 +65,7 @@ class Outcome:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: SI numbers, None where a number does not exist."""
         system = self.case.system
+        events = self.run.events
         parts = {"system": system, "law": system.law, "drive": system.drive}
         return {
             "name": self.case.name,
@@ -76,7 +78,8 @@ class Outcome:
                 {"name": name, "value": _plain(value), "unit": unit} for name, (value, unit) in self.values.items()
             ],
             "known_answers": _plain(self.known),
-            "events": [event._asdict() for event in self.run.events],
+            "event_count": len(events),
+            "events": [event._asdict() for event in events[:MOST_TOLD]],
         }
 
 
