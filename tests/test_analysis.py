@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.analysis import Comparison, Findings, analyze, compare, mend
+from stickslip.analysis import Comparison, Findings, analyze, compare, mend, record_name
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, ModelError
 
@@ -241,6 +241,14 @@ def test_answers_print_as_their_estimates() -> None:
         assert "array" not in repr(answer)
     assert str(findings.loops).startswith("Loops:\n  sliding friction 1.49")
     assert str(findings).startswith("record:\n  friction coefficient 0.5")
+
+
+def test_a_joined_record_bears_the_name_of_the_first(tmp_path: Path) -> None:
+    for name, shift in (("first", 0), ("second", 7)):
+        table = np.column_stack([TIME, np.roll(sliding()["x"], shift)])
+        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header="time [s],x [m]", comments="")
+    first, second = (ss.read_record(tmp_path / f"{name}.csv") for name in ("first", "second"))
+    assert record_name(ss.synchronise(first, second, on="x")) == "first.csv"
 
 
 def test_mending_is_asked_for_and_logged() -> None:

@@ -14,6 +14,7 @@ from corpus import FS, Damaged, clean_records, damaged_records
 from stickslip import Record, read_record, repair_clock
 from stickslip.record.check import Fault
 from stickslip.record.clock import fit_clock
+from stickslip.record.flaws import spikes
 
 SEEDS = (0, 2)
 DAMAGED = [(seed, each) for seed in SEEDS for each in damaged_records(seed)]
@@ -170,3 +171,14 @@ def test_one_long_interval_is_told():
     stamps = (np.arange(2000) + 0.3 * (np.arange(2000) > 1200)) / 250
     (fault,) = clock_faults(stamps)
     assert (fault.kind, fault.rows) == ("jitter", ((1200, 1201),))
+
+
+@pytest.mark.parametrize(("share", "found"), [(0.002, 1.0), (0.012, 1.0), (0.05, 0.0)])
+def test_spikes_are_found_up_to_one_sample_in_sixty(share: float, found: float):
+    rng = np.random.default_rng(8)
+    rows = np.arange(20, 3980, 20)[rng.permutation(198)[: round(4000 * share)]]  # two within ten rows may hide
+    values = np.sin(np.arange(4000) / 60)
+    values[rows] += 5.0
+    assert sum(last - first + 1 for first, last in spikes(values)) >= found * 0.95 * len(rows)
+    if not found:
+        assert not spikes(values)

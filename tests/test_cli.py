@@ -202,6 +202,21 @@ def test_a_record_converted_is_the_same_record() -> None:
     assert np.array_equal(ss.read_record("run.parquet")["x"], expected["x"])
 
 
+def test_a_conversion_writes_over_nothing_unless_told_to() -> None:
+    path = slide("run.csv")
+    before = path.read_bytes()
+    Path("kept.csv").write_text("mine")
+    refused(run("convert", "run.csv", "kept.csv", *MAP), code=2)
+    assert Path("kept.csv").read_text() == "mine"
+    for out in ("run.csv", "./run.csv"):
+        refused(run("convert", "run.csv", out, "--force", *MAP), code=2)
+    assert path.read_bytes() == before
+    assert run("convert", "run.csv", "kept.csv", "--force", *MAP).exit_code == 0
+    assert ss.read_record("kept.csv").equals(
+        ss.read_record("run.csv", channels={"x": "pos [mm]", "friction": "fr [N]"})
+    )
+
+
 def test_a_record_that_comes_back_whole_is_named_by_its_file() -> None:
     slide("run.csv")
     run("convert", "run.csv", "kept.parquet", *MAP)

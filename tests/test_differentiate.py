@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from motions import stick_slip
-from stickslip.errors import EstimateError
+from stickslip.errors import EstimateError, RecordError
 from stickslip.signals.differentiate import (
     Filter,
     best_bandwidth,
@@ -169,12 +169,14 @@ def test_a_record_at_rest_has_no_derivative():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"order": 3}, {"method": "spline"}, {"noise": -1.0}, {"noise": np.ones(7)}, {"bandwidth": 0.0},
+        {"order": 3}, {"method": "spline"}, {"noise": -1.0}, {"noise": "x"}, {"noise": np.ones(7)}, {"bandwidth": 0.0},
         {"bandwidth": 80.0}, {"bandwidth": 10.0, "method": "five-point"},
     ],
 )  # fmt: skip
 def test_wrong_use_is_refused(wrong):
     with pytest.raises(EstimateError):
         differentiate(np.random.default_rng(0).standard_normal(200), 100.0, **wrong)
+    with pytest.raises(RecordError, match="'x' is not a finite number"):
+        differentiate(np.zeros(200), 100.0, bandwidth="x")
     with pytest.raises(EstimateError):
         differentiate(np.zeros(10), 100.0)

@@ -1,4 +1,4 @@
-"""Damaged and hostile files: read_record gives a Record or a StickslipError, nothing else."""
+"""Damaged and hostile files: read_record gives a Record that can be checked up, or a StickslipError."""
 
 from __future__ import annotations
 
@@ -58,11 +58,15 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], bytes]:
 
 
 def read_or_refuse(path: Path) -> ss.Record | None:
-    """The record, or None for a refusal in one sentence; any other end, a warning too, fails the test."""
+    """The record, or None for a refusal in one sentence; any other end, a warning too, fails the test.
+
+    What could be read is also checked up.
+    """
     began = time.perf_counter()
     record, sentence = None, ""
     try:
         record = ss.read_record(path, fs=250 if path.name in CLOCKLESS else None)
+        record.check()
     except ss.StickslipError as error:
         sentence = str(error)
     assert "\n" not in sentence

@@ -14,6 +14,7 @@ from stickslip import (
     RecordError,
     fill_gaps,
     fill_missing,
+    friction_force,
     remove_drift,
     remove_spikes,
     repair_clock,
@@ -293,3 +294,14 @@ def test_a_channel_that_was_filtered_does_not_claim_its_old_noise():
     assert resample(record, 100.0).channels["x"].noise is None
     assert fill_gaps(dropped).channels["x"].noise is None
     assert remove_drift(record, "x").channels["x"].noise == 1e-3
+
+
+def test_a_repair_drops_what_was_derived_from_the_old_samples():
+    x = np.sin(np.arange(2000) / 30) + 1e-3 * np.arange(2000)
+    x[700] = 9.0
+    made = friction_force(Record.of({"x": x, "load": x}, fs=250.0), mass=1.0, stiffness=10.0)
+    mended = remove_spikes(made, "x")
+    assert set(mended) == {"x", "load"}
+    assert mended.history[-1].outcome.endswith("derived from what was mended: a, friction, friction_sd, v")
+    assert set(remove_spikes(made, "load")) == set(made)
+    assert set(remove_drift(made, "x")) == {"x", "load"}

@@ -357,8 +357,9 @@ def compare(findings: Sequence[Findings]) -> Comparison:
 
 
 def record_name(record: Record) -> str:
-    """The names of the files that the record was last read from, as its history tells them."""
-    reads = [step.arguments["files"] for step in record.history if step.arguments.get("files")]
+    """The names of the files that the record was last read from; of the first record, where two were joined."""
+    own = (step.arguments for step in record.history if step.arguments.get("record") != "b")
+    reads = [arguments["files"] for arguments in own if arguments.get("files")]
     if reads:
         return " + ".join(file["name"] for file in reads[-1])
     return "simulated record" if record.truth else "record"

@@ -286,12 +286,17 @@ def check(file: str, **options: Any) -> None:
 @main.command()
 @click.argument("file")
 @click.argument("out", type=click.Path(path_type=Path))
+@click.option("--force", is_flag=True, help="Write over OUT if it is there.")
 @_reading
-def convert(file: str, out: Path, **options: Any) -> None:
+def convert(file: str, out: Path, force: bool, **options: Any) -> None:
     """Read FILE and write it as OUT: CSV, HDF5 or Parquet by its suffix, with units and history."""
     groups = _groups(file)
     if len(groups) != 1:
         raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is converted at a time", param_hint="FILE")
+    if out.exists() and any(out.samefile(path) for path in groups[0]):
+        raise click.BadParameter(f"'{out}' is the file to be read", param_hint="OUT")
+    if out.exists() and not force:
+        raise click.BadParameter(f"'{out}' is there already; --force writes over it", param_hint="OUT")
     click.echo(ss.write_record(_read(groups[0], _rig(**options)), out))
 
 

@@ -166,19 +166,11 @@ def friction_loops(
     friction, unit = record["friction"], record.channels["friction"].unit
     sliding = _sliding(motion, cycles)
     label = cycles.labels(len(friction))
-    levels = _levels(friction, motion, sliding, label, len(cycles.edges) - 1)
-    how = "speed-weighted median, mean of cycles"
-    forward, back = (
-        mean_of_cycles(f"sliding friction {side}", values, unit=unit, method=how)
-        for side, values in zip(("forward", "back"), levels, strict=True)
-    )
+    found = _magnitudes(friction, motion, sliding, label, len(cycles.edges) - 1, unit)
     energy = _energy(friction, motion, cycles)
     folded = cycles.folded(friction)
     return Loops(
-        level=mean_of_cycles("sliding friction", (levels[0] + levels[1]) / 2, unit=unit, method=how),
-        forward=forward,
-        back=back,
-        offset=mean_of_cycles("friction offset", (levels[0] - levels[1]) / 2, unit=unit, method=how),
+        **found,
         slope=_slope(friction, motion, sliding, label, unit),
         energy_per_cycle=energy,
         frequency=cycles.frequency,
@@ -190,7 +182,7 @@ def friction_loops(
         curve=_curve(friction, motion, cycles, label, bins),
         cycles=motion.start + cycles.edges[:-1] / motion.fs,
         unit=motion.unit,
-        status=_status(cycles, forward, back, energy),
+        status=_status(cycles, found, energy),
     )
 
 
@@ -202,25 +194,36 @@ def _sliding(motion: Motion, cycles: Cycles) -> NDArray[np.bool_]:
     return clear if clear.sum() > fast.sum() / 2 else fast
 
 
+def _magnitudes(
+    friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], count: int, unit: str
+) -> dict[str, Estimate]:
+    """The friction forward and back, half of their sum, and half of their difference."""
+    forward, back = (_levels(sign, friction, motion, sliding & (label >= 0), label, count) for sign in (1.0, -1.0))
+    wanted = {
+        "forward": ("sliding friction forward", forward),
+        "back": ("sliding friction back", back),
+        "level": ("sliding friction", (forward + back) / 2),
+        "offset": ("friction offset", (forward - back) / 2),
+    }
+    how = "speed-weighted median, mean of cycles"
+    return {key: mean_of_cycles(name, values, unit=unit, method=how) for key, (name, values) in wanted.items()}
+
+
 def _levels(
-    friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], count: int
-) -> tuple[Array, Array]:
-    """Magnitude of the friction forward and back, per cycle; NaN where a cycle does not slide that way."""
-    found = []
-    for sign in (1.0, -1.0):
-        chosen = sliding & (sign * motion.velocity > 0) & (label >= 0)
-        levels = np.full(count, np.nan)
-        held = np.flatnonzero(np.bincount(label[chosen], minlength=count))
-        values, weights, cycle = sign * friction[chosen], np.abs(motion.velocity[chosen]), label[chosen]
-        order = np.lexsort((values, cycle))
-        values, weights, cycle = values[order], weights[order], cycle[order]
-        starts = np.searchsorted(cycle, held)
-        total = np.concatenate([[0.0], np.cumsum(weights)])
-        ends = np.searchsorted(cycle, held, side="right")
-        middle = np.searchsorted(total, (total[starts] + total[ends]) / 2) - 1
-        levels[held] = values[np.clip(middle, starts, ends - 1)]
-        found.append(levels)
-    return found[0], found[1]
+    sign: float, friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], count: int
+) -> Array:
+    """Magnitude of the friction to one side, per cycle; NaN where a cycle does not slide that way."""
+    chosen = sliding & (sign * motion.velocity > 0)
+    levels = np.full(count, np.nan)
+    held = np.flatnonzero(np.bincount(label[chosen], minlength=count))
+    values, weights, cycle = sign * friction[chosen], np.abs(motion.velocity[chosen]), label[chosen]
+    order = np.lexsort((values, cycle))
+    values, weights, cycle = values[order], weights[order], cycle[order]
+    starts, ends = (np.searchsorted(cycle, held, side=side) for side in ("left", "right"))
+    total = np.concatenate([[0.0], np.cumsum(weights)])
+    middle = np.searchsorted(total, (total[starts] + total[ends]) / 2) - 1
+    levels[held] = values[np.clip(middle, starts, ends - 1)]
+    return levels
 
 
 def _energy(friction: Array, motion: Motion, cycles: Cycles) -> Estimate:
@@ -317,10 +320,10 @@ def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.in
     return Curve(((edges[1:] + edges[:-1]) / 2)[visited], middle, low, high, visits.astype(np.intp))
 
 
-def _status(cycles: Cycles, forward: Estimate, back: Estimate, energy: Estimate) -> str:
-    words = [] if forward.status == "ok" else [forward.status]
+def _status(cycles: Cycles, found: dict[str, Estimate], energy: Estimate) -> str:
+    words = [] if found["forward"].status == "ok" else [found["forward"].status]
     if cycles.status != "ok":
         words.append(cycles.status)
-    if forward.value + back.value < 0 or energy.value < 0:
+    if found["level"].value < 0 or energy.value < 0:
         words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
     return "; ".join(words) or "ok"

@@ -90,7 +90,8 @@ def spikes(values: Array) -> Runs:
 
     A sample is a spike where it differs from the line between its neighbours by 2.5 times the second largest step
     nearby, by eight robust standard deviations and by three times what one sample in twenty does, while the neighbours
-    agree with each other.
+    agree with each other. Where more than one sample in sixty stands off (each disturbs three such differences), they
+    count as what the channel does, and none is found: such a channel has no spikes but a fault of its cable.
     """
     found = np.zeros(len(values), dtype=bool)
     for width in (1, 2):

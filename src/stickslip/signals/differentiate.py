@@ -397,10 +397,13 @@ def noise_along(samples: Array, fs: float, noise: ArrayLike | None) -> Array:
     """The noise's standard deviation at every sample: as given, or estimated."""
     if noise is None:
         return local_noise(samples, fs)
-    level = np.asarray(noise, dtype=float)
+    try:
+        level = np.asarray(noise, dtype=float)
+    except (TypeError, ValueError):
+        level = np.array(np.nan)
     if level.shape not in ((), samples.shape) or not np.isfinite(level).all() or (level < 0).any():
         raise EstimateError(
-            f"noise of shape {level.shape}",
+            f"noise = {np.array2string(np.asarray(noise), threshold=4)}",
             "a noise level is one number, or one per sample, finite and not negative",
             "pass noise= in the unit of the samples, or leave it out",
         )

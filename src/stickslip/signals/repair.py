@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ from stickslip.signals.interpolate import band_limited, bridge
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+DERIVED = "friction_force"  # the source of channels that were computed from
+SOURCES = ("x", "z", "v", "a", "force")
 
 
 def repair_clock(record: Record, *, fs: float | None = None, trust: str | None = None) -> Record:
@@ -275,8 +279,7 @@ def fill_missing(record: Record, *channels: str, longest: int | None = None) -> 
         stay = f", {in_words(long)} stay NaN, being longer than {longest}" if long else ""
         parts.append(f"{filled} values of {name} filled ({in_words(runs)}{stay})")
     outcome = "; ".join(parts) or "no value was missing"
-    return record.with_samples(samples, Step("fill_missing", {"channels": list(names), "longest": longest}, outcome),
-                               stamps=record.stamps)  # fmt: skip
+    return _mended(record, samples, Step("fill_missing", {"channels": list(names), "longest": longest}, outcome))
 
 
 def remove_spikes(record: Record, *channels: str) -> Record:
@@ -321,7 +324,7 @@ def remove_spikes(record: Record, *channels: str) -> Record:
                 f"{int(spiked.sum())} samples of {name} replaced, by up to {height:.3g} {unit} ({in_words(runs)})"
             )
     outcome = "; ".join(parts) or "no spike was found"
-    return record.with_samples(samples, Step("remove_spikes", {"channels": list(names)}, outcome))
+    return _mended(record, samples, Step("remove_spikes", {"channels": list(names)}, outcome))
 
 
 def restore_clipped(record: Record, channel: str, *, method: str = "rebuild", level: float | None = None) -> Record:
@@ -370,12 +373,12 @@ def restore_clipped(record: Record, channel: str, *, method: str = "rebuild", le
     count = f"{int(cut.sum())} clipped samples of {channel} ({in_words(runs)})"
     if method == "mark":
         marked = {**record.samples, channel: np.where(cut, np.nan, values)}
-        return record.with_samples(marked, Step("restore_clipped", arguments, f"{count} marked as NaN"))
+        return _mended(record, marked, Step("restore_clipped", arguments, f"{count} marked as NaN"))
     sign = np.sign(values - np.median(values))
     rebuilt = np.where(cut, sign * np.maximum(sign * bridge(values, cut), sign * values), values)
     beyond = float(np.max(np.abs(rebuilt - values)))
     outcome = f"{count} rebuilt by autoregression, by up to {beyond:.3g} {unit}: a guess, not a measurement"
-    return record.with_samples({**record.samples, channel: rebuilt}, Step("restore_clipped", arguments, outcome))
+    return _mended(record, {**record.samples, channel: rebuilt}, Step("restore_clipped", arguments, outcome))
 
 
 def remove_drift(record: Record, channel: str, *, order: int | None = None) -> Record:
@@ -419,7 +422,7 @@ def remove_drift(record: Record, channel: str, *, order: int | None = None) -> R
     drifted = along - along[0]
     outcome = f"a polynomial of order {order} taken off {channel}, {float(np.ptp(drifted)):.3g} {unit} over the record"
     step = Step("remove_drift", {"channel": channel, "order": order}, outcome)
-    return record.with_samples({**record.samples, channel: values - drifted}, step)
+    return _mended(record, {**record.samples, channel: values - drifted}, step)
 
 
 def _best_order(rows: Array, slow: Array) -> int:
@@ -476,3 +479,15 @@ def resample(record: Record, fs: float) -> Record:
 
 def _runs(rows: NDArray[np.intp]) -> flaws.Runs:
     return tuple((int(row), int(row) + 1) for row in rows)
+
+
+def _mended(record: Record, samples: Mapping[str, Array], step: Step) -> Record:
+    """The record with the samples mended, on its clock, without what was derived from samples that were not yet."""
+    changed = {name for name in record if samples[name] is not record[name]}
+    derived = {name for name in record if record.channels[name].source == DERIVED}
+    stale = derived if changed & set(SOURCES) - derived else set()
+    kept = {name: values for name, values in samples.items() if name not in stale}
+    if stale:
+        words = f"{step.outcome}; dropped, being derived from what was mended: {', '.join(sorted(stale))}"
+        step = replace(step, outcome=words)
+    return record.with_samples(kept, step, stamps=record.stamps)
