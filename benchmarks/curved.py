@@ -47,7 +47,11 @@ def rates(system: ss.Oscillator) -> Callable[[float, np.ndarray, float], list[fl
     cos, exp, tanh = math.cos, math.exp, math.tanh
     if isinstance(law, ss.SmoothStateVariable):
         f, pull, steep = law.kinetic, law.kinetic * law.rate, law.steepness
-        return lambda t, s, side: [s[1], (K * (z * cos(w * t) - s[0]) - s[2]) / M, -pull * (s[2] - f * tanh(steep * s[1]))]
+        return lambda t, s, side: [
+            s[1],
+            (K * (z * cos(w * t) - s[0]) - s[2]) / M,
+            -pull * (s[2] - f * tanh(steep * s[1])),
+        ]
     if isinstance(law, ss.LuGre):
         stiff, loss, oil = law.stiffness, law.damping, law.viscous
 
@@ -85,7 +89,8 @@ def general(method: type) -> Solver:
                             events=turn if kink else None)  # fmt: skip
             t, state = run.t[-1], run.y[:, -1]
             if t < end:
-                state[1], side = 0.0, -side
+                side = -side
+                state[1] = 1e-300 * side  # an event at the very start of a step breaks solve_ivp
         return time.process_time() - begin, state[:2]
 
     return solve
@@ -104,7 +109,7 @@ def heyoka(system: ss.Oscillator, tolerance: float) -> tuple[float, np.ndarray]:
             rate = -law.kinetic * law.rate * (b - law.kinetic * hy.tanh(law.steepness * v))
             equations, force = [(b, rate)], b
         else:
-            level = law.kinetic + (law.static - law.kinetic) * hy.exp(-((v / law.speed) ** 2))
+            level = law.kinetic + (law.static - law.kinetic) * hy.exp(-(v * v) / law.speed**2)
             if isinstance(law, ss.LuGre):
                 rate = v - law.stiffness * side * v * b / level
                 equations, force = [(b, rate)], law.stiffness * b + law.damping * rate + law.viscous * v
@@ -116,13 +121,15 @@ def heyoka(system: ss.Oscillator, tolerance: float) -> tuple[float, np.ndarray]:
             ta.state[1] = 0.0
             return True
 
-        events = [] if isinstance(law, ss.SmoothStateVariable) else [hy.t_event(v, callback=turned)]
+        smooth = isinstance(law, ss.SmoothStateVariable)
+        extra = {} if smooth else {"t_events": [hy.t_event(v, callback=turned)], "pars": [1.0]}
         COMPILED[key] = hy.taylor_adaptive([(x, v), (v, (pull - force) / M), *equations],
-                                           [0.0] * (2 + len(equations)), tol=tolerance, pars=[1.0], t_events=events)  # fmt: skip
+                                           [0.0] * (2 + len(equations)), tol=tolerance, **extra)  # fmt: skip
     stepper = COMPILED[key]
-    stepper.time, stepper.pars[0] = 0.0, 1.0
+    stepper.time = 0.0
     stepper.state[:] = 0.0
     if stepper.with_events:
+        stepper.pars[0] = 1.0
         stepper.reset_cooldowns()
     end = CYCLES / system.drive.frequency
     begin = time.process_time()

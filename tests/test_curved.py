@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -86,7 +87,7 @@ def test_dahl_loop_is_the_closed_one() -> None:
     assert peaks == pytest.approx([1.0979589461346143] * 3, rel=1e-12)
     nodes, weights = np.polynomial.legendre.leggauss(60)
     work = 0.0
-    for begin, end in zip(turns[:-1], turns[1:], strict=True):
+    for begin, end in itertools.pairwise(turns):
         friction, slip = run.sample(begin + (end - begin) * (nodes + 1) / 2, ("friction", "slip"))[0]
         work += float(np.sum(weights * friction * slip)) * (end - begin) / 2
     assert work == pytest.approx(6.2838440817748423e-5, rel=1e-11)
@@ -207,7 +208,7 @@ def mean_friction(run: ss.Trajectory, begin: float, end: float) -> float:
     cuts = [begin, *(event.time for event in run.events if begin < event.time < end), end]
     nodes, weights = np.polynomial.legendre.leggauss(40)
     total = 0.0
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+    for low, high in itertools.pairwise(cuts):
         if high > low:
             friction = run.sample(low + (high - low) * (nodes + 1) / 2, ("friction",))[0][0]
             total += float(weights @ friction) * (high - low) / 2

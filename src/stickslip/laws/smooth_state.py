@@ -35,8 +35,8 @@ class SmoothStateVariable(Sliding):
     Examples
     --------
     >>> law = SmoothStateVariable(1.1, rate=100.0, steepness=3000.0)
-    >>> law.rates()[0].rates["theta"].at(v=1.0, theta=0.0)
-    -121.00000000000001
+    >>> round(law.rates()[0].rates["theta"].at(v=1.0, theta=0.0), 9)
+    121.0
     """
 
     kinetic: float

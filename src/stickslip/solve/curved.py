@@ -5,8 +5,8 @@ the step, and exits are searched on it with the same certificate as in the exact
 tolerance allows: the last two terms of every entry's series, relative to the largest value that the entry has had.
 
 The method is explicit. A contact whose fastest rate is far above the motion's own (rate-and-state friction at creep
-speed under a light mass) takes steps of about order/3 over that rate; where that foretells more than `STEPS` steps, the run
-ends with an error that says so instead of crawling.
+speed under a light mass) takes steps of about order/3 over that rate; where that foretells more than `STEPS` steps,
+the run ends with an error that says so instead of crawling.
 """
 
 from __future__ import annotations
@@ -29,8 +29,10 @@ from stickslip.solve.trajectory import Trajectory
 Array = NDArray[np.float64]
 Form = tuple[dict[int, float], float]  # weights of nodes, and a constant
 
+Scaled = tuple[int, float]  # a node and a factor
 Stops = Iterable[tuple[tuple[float, float], tuple[Any, Any]]]
 
+DTYPES = (np.int64, np.float64)
 CHUNK = 4096  # steps between two looks at the clock and the keyboard
 PATIENCE, STEPS = 200_000, 200_000_000  # steps before a run's number of steps is foretold, and the most there may be
 
@@ -61,11 +63,11 @@ class Tape:
         Linear forms of the state.
     nodes : tuple of ndarray
         Operation, left, right, exponent, first weight, weights, their nodes, constant, first node of each mode, and
-        the rate of each state entry, for the march.
+        node and factor of each state entry's rate, for the march.
     watched : tuple of ndarray
         As `nodes`, with the nodes of all outputs as well.
     exits : tuple of ndarray
-        Node, target, crossing, held, first exit of each mode, and the counter-face's velocity.
+        Node, target, crossing, held, first exit of each mode, the counter-face's velocity, and the node's factor.
     guards : tuple of ndarray
         Nodes that fall asleep (exponentials, powers near 0), and the first of each mode.
     places : mapping of str to ndarray (M,)
@@ -123,6 +125,13 @@ class _Nodes:
             return next(iter(weights))
         return self.put(taylor.LINEAR, form=form)
 
+    def scaled(self, form: Form) -> Scaled:
+        """A linear form as a node and a factor: a multiple of a node needs none of its own."""
+        weights, constant = form
+        if constant == 0.0 and len(weights) == 1:
+            return next(iter(weights.items()))
+        return self.node(form), 1.0
+
     def form(self, expression: Expression) -> Form:
         """An expression as a linear form of nodes."""
         kind, parts = expression.kind, expression.parts
@@ -163,7 +172,8 @@ class _Nodes:
         if not base[0]:
             return {}, float(base[1] ** exponent)
         if exponent == int(exponent) and 0 <= exponent <= 64:
-            result, square, left = ({}, 1.0), base, int(exponent)
+            result: Form = ({}, 1.0)
+            square, left = base, int(exponent)
             while left:
                 result = self.product(result, square) if left % 2 else result
                 left //= 2
@@ -254,7 +264,7 @@ class _Builder:
         row[self.one] += form[1]
         return row
 
-    def mode(self, mode: CurvedMode) -> tuple[_Nodes, _Nodes, list[int], list[int], dict[str, int]]:
+    def mode(self, mode: CurvedMode) -> tuple[_Nodes, _Nodes, list[Scaled], list[Scaled], dict[str, int]]:
         """Nodes for the march and with outputs, rates of the entries, nodes of the exits and of the outputs."""
         symbols = self.symbols()
         march = _Nodes(self.size, symbols)
@@ -268,10 +278,12 @@ class _Builder:
         for j, name in enumerate(self.memory):
             rates[2 + j] = march.form(mode.rates[name]) if name in mode.rates else ({}, 0.0)
         rates |= self.signal
-        entries = [march.node(rates[j]) if j in rates and rates[j] != ({}, 0.0) else -1 for j in range(self.size)]
+        still: Form = ({}, 0.0)
+        entries = [march.scaled(rates[j]) if rates.get(j, still) != still else (-1, 0.0) for j in range(self.size)]
         known = {**symbols, "f": friction}
         exits = [
-            march.node(combined((value, known[name]) for name, value in exit_.quantity.items())) for exit_ in mode.exits
+            march.scaled(combined((value, known[name]) for name, value in exit_.quantity.items()))
+            for exit_ in mode.exits
         ]
         watched = _Nodes(self.size, symbols)
         watched.rows, watched.known = list(march.rows), dict(march.known)
@@ -284,17 +296,18 @@ class _Builder:
     def build(self) -> Tape:
         order = {mode.name: j for j, mode in enumerate(self.modes)}
         parts = [self.mode(mode) for mode in self.modes]
-        rate = np.array([part[2] for part in parts], dtype=np.int64)
+        rate = tuple(np.array([[r[c] for r in part[2]] for part in parts], dtype=d) for c, d in enumerate(DTYPES))
         leaving = [exit_ for mode in self.modes for exit_ in mode.exits]
         # an exit at zero velocity leaves exactly none: rounding must not decide what follows
         held = [set(e.quantity) == {"v"} or self.modes[order[e.to]].friction is None for e in leaving]
         exits = (
-            np.array([node for part in parts for node in part[3]], dtype=np.int64),
+            np.array([node for part in parts for node, _ in part[3]], dtype=np.int64),
             np.array([order[e.to] for e in leaving], dtype=np.int64),
             np.array([e.crossing for e in leaving], dtype=np.bool_),
             np.array(held, dtype=np.bool_),
             np.cumsum([0, *(len(mode.exits) for mode in self.modes)]),
             self.row(self.face[1]),
+            np.array([factor for part in parts for _, factor in part[3]]),
         )
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
         entry = self.law.entry
@@ -315,8 +328,8 @@ class _Builder:
             ]),
             tones=np.array(tones, dtype=np.float64).reshape(len(tones), 4),
             outputs={"face_rate": self.row(self.face[1]), "slip": self.row(self.symbols()["v"])},
-            nodes=(*_flat([part[0] for part in parts]), rate),
-            watched=(*_flat([part[1] for part in parts]), rate),
+            nodes=(*_flat([part[0] for part in parts]), *rate),
+            watched=(*_flat([part[1] for part in parts]), *rate),
             exits=exits,
             guards=_guards([part[0] for part in parts]),
             places={name: np.array([part[4][name] for part in parts], dtype=np.int64) for name in parts[0][4]},
@@ -325,9 +338,12 @@ class _Builder:
 
 def _flat(modes: list[_Nodes]) -> tuple[NDArray[Any], ...]:
     """The nodes of all modes, one after the other."""
-    kinds, left, right, power, low, weights, index, constant, first = [], [], [], [], [0], [], [], [], [0]
+    kinds, left, right, power, constant, low, first = [], [], [], [], [], [0], [0]
+    weights: list[float] = []
+    index: list[int] = []
+    none: Form = ({}, 0.0)
     for mode in modes:
-        blank = [(taylor.LINEAR, 0, 0, 0.0, ({}, 0.0))] * mode.size
+        blank = [(taylor.LINEAR, 0, 0, 0.0, none)] * mode.size
         for kind, a, b, exponent, form in [*blank, *mode.rows]:
             kinds.append(kind)
             left.append(a)
@@ -388,7 +404,8 @@ class CurvedTrajectory(Trajectory):
         count = int(np.max(np.diff(table.watched[8])))
         taylor.sample(
             table.watched, self.order, self.step_starts, self.step_lengths, self.step_modes, self.step_states, times,
-            nodes, out, step, (np.empty(count * (self.order + 1)), np.empty(self.step_states.shape[1]), np.empty(count)),
+            nodes, out, step,
+            (np.empty(count * (self.order + 1)), np.empty(self.step_states.shape[1]), np.empty(count)),
         )  # fmt: skip
         piece = np.searchsorted(self.starts, self.step_starts[step], side="right") - 1
         return out, piece

@@ -32,7 +32,7 @@ def simulate(
     """How does the system move?
 
     Every mode is linear, so the motion between events is a closed form, and the first exit of each mode is found with
-    a certificate that none was jumped over. A law with curved modes is followed by Taylor series to a tolerance instead.
+    a certificate that none was jumped over. A law with curved modes is followed by Taylor series, to a tolerance.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from numba import njit
 
 from stickslip.solve.roots import NOISE, NONE, first_rise
 
-OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "reassoc"}}
+OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}}
 EXACT = {"cache": True, "error_model": "numpy"}
 
 LINEAR, PRODUCT, SQUARE, QUOTIENT, POWER, EXP, TANH, SLOPE, LOG, ASINH = range(10)
@@ -50,7 +50,7 @@ def expand(tape, mode, state, h, order, width, s):
     With order 0 all nodes are evaluated. Row j of the series starts at ``s[j * width]``: views would cost more than
     the arithmetic.
     """
-    kinds, left, right, power, low, weight, index, constant, first, rate = tape
+    kinds, left, right, power, low, weight, index, constant, first, rate, factor = tape
     size = len(state)
     begin = first[mode]
     count = first[mode + 1] - begin
@@ -61,7 +61,7 @@ def expand(tape, mode, state, h, order, width, s):
             step = h / k
             for i in range(size):
                 r = rate[mode, i]
-                s[i * width + k] = s[r * width + k - 1] * step if r >= 0 else 0.0
+                s[i * width + k] = s[r * width + k - 1] * (step * factor[mode, i]) if r >= 0 else 0.0
             if k == order:
                 return
         for j in range(size, count):
@@ -119,7 +119,7 @@ def expand(tape, mode, state, h, order, width, s):
 @njit(**EXACT)
 def _entry_rounding(tape, mode, i, k, size, h, width, big, s):
     """Noise of coefficient k of a state entry: what rounds the sum that is its rate."""
-    kinds, _, _, _, low, weight, index, constant, first, rate = tape
+    kinds, _, _, _, low, weight, index, constant, first, rate, factor = tape
     if k == 0:
         return NOISE * 1e-2 * big[i]
     r = rate[mode, i]
@@ -127,11 +127,11 @@ def _entry_rounding(tape, mode, i, k, size, h, width, big, s):
         return 0.0
     g = first[mode] + r
     if r < size or kinds[g] != LINEAR:
-        return NOISE * abs(s[r * width + k - 1]) * h / k
+        return NOISE * abs(s[r * width + k - 1] * factor[mode, i]) * h / k
     total = abs(constant[g]) if k == 1 else 0.0
     for t in range(low[g], low[g + 1]):
         total += abs(weight[t] * s[index[t] * width + k - 1])
-    return NOISE * total * h / k
+    return NOISE * total * abs(factor[mode, i]) * h / k
 
 
 @njit(**EXACT)
@@ -145,10 +145,8 @@ def _rounding(tape, mode, node, k, size, h, width, big, s):
     total = NOISE * 1e-2 * abs(tape[7][g]) if k == 0 else 0.0
     for t in range(tape[4][g], tape[4][g + 1]):
         i = tape[6][t]
-        if i < size:
-            noise = _entry_rounding(tape, mode, i, k, size, h, width, big, s)
-        else:
-            noise = NOISE * abs(s[i * width + k])
+        entry = i < size
+        noise = _entry_rounding(tape, mode, i, k, size, h, width, big, s) if entry else NOISE * abs(s[i * width + k])
         total += abs(tape[5][t]) * noise
     return total
 
@@ -188,7 +186,7 @@ def _length(s, width, order, size, tolerance, big):
 
 
 @njit(**EXACT)
-def _guarded(tape, guards, mode, u, tolerance, order, width, s, c, noise):
+def _guarded(tape, guards, mode, u, asleep, order, width, s, c, noise):
     """The step, shortened to where a saturated exponential wakes: until then its series does not know of it."""
     kinds, left = tape[0], tape[1]
     node, bound = guards
@@ -198,7 +196,7 @@ def _guarded(tape, guards, mode, u, tolerance, order, width, s, c, noise):
         if kinds[g] == POWER:
             level, sign = (-2.0 * STILL, 1.0) if s[a] <= STILL else (0.5 * STILL, -1.0)
         else:
-            level, sign = 4.0 - math.log(tolerance), 1.0
+            level, sign = asleep, 1.0
         if kinds[g] == TANH:
             level *= 0.5
             sign = -1.0 if s[a] > 0.0 else 1.0
@@ -229,14 +227,15 @@ def advance(s, width, size, order, u, state):
 @njit(**EXACT)
 def _first_exit(tape, exits, mode, size, h, u, order, width, big, s, c, noise):
     """The exit that ends the mode first within u, and when; -1 where none does."""
-    node, _, crossing, _, bound, _ = exits
+    node, _, crossing, _, bound, _, scale = exits
     found, best = -1, u
     for e in range(bound[mode], bound[mode + 1]):
         j = node[e] * width
         top = order if node[e] < size else order - 1
         low = 0
+        sign = scale[e]
         floor = _rounding(tape, mode, node[e], 0, size, h, width, big, s)
-        if s[j] < -floor and _surely_below(s, j, top, 1.0, 0.0, best):
+        if sign * s[j] < -floor and _surely_below(s, j, top, sign, 0.0, best):
             continue
         while abs(s[j + low]) <= floor:
             low += 1
@@ -245,13 +244,13 @@ def _first_exit(tape, exits, mode, size, h, u, order, width, big, s, c, noise):
             floor = _rounding(tape, mode, node[e], low, size, h, width, big, s)
         if low > top:
             continue
-        if s[j + low] > 0.0:
+        if sign * s[j + low] > 0.0:
             if not crossing[e]:
                 return e, 0.0
             continue
         power = 1.0
         for k in range(top + 1):
-            c[k] = s[j + k] * power
+            c[k] = sign * s[j + k] * power
             noise[k] = floor * power
             power *= best
         at = first_rise(c, noise, top + 1, low, 1.0, 0.0, 1.0)
@@ -295,8 +294,8 @@ def march(tape, exits, guards, tones, clock, state, mode, until, period, toleran
     """
     laps, offsets, lengths, modes, states, ends = steps
     s, c, noise = work
-    width = order + 1
-    node, target, _, held, _, face = exits
+    width, asleep = order + 1, 4.0 - math.log(tolerance)
+    node, target, _, held, _, face, _ = exits
     size, room, written, chain = len(state), len(laps), 0, 0
     while True:
         remaining = until[1] - clock[1]
@@ -311,7 +310,7 @@ def march(tape, exits, guards, tones, clock, state, mode, until, period, toleran
         if not (u * h > 1e-15 * (clock[1] + 1e-300)) or u <= 0.0:
             return STALL, written, mode
         full = u
-        u = min(_guarded(tape, guards, mode, u, tolerance, order, width, s, c, noise), remaining / h)
+        u = min(_guarded(tape, guards, mode, u, asleep, order, width, s, c, noise), remaining / h)
         leaving, u = _first_exit(tape, exits, mode, size, h, u, order, width, big, s, c, noise)
         if u > 0.0:
             if written == room:
