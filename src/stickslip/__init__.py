@@ -96,6 +96,12 @@ if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory as Trajectory
     from stickslip.structure import Contact as Contact, Structure as Structure
     from stickslip.system_file import Case as Case, read_system as read_system, scenario_case as scenario_case
+    from stickslip.laws.dahl import Dahl as Dahl
+    from stickslip.laws.lugre import LuGre as LuGre
+    from stickslip.laws.rate_state import RateState as RateState
+    from stickslip.laws.smooth_state import SmoothStateVariable as SmoothStateVariable
+    from stickslip.laws.stribeck import FrictionCurve as FrictionCurve, Stribeck as Stribeck
+    from stickslip.solve.sliding import SteadySliding as SteadySliding, steady_sliding as steady_sliding
 
 _ROOMS = {
     "StickslipError": "errors", "RecordError": "errors", "FormatError": "errors",
