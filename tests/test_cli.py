@@ -375,11 +375,11 @@ def test_work_that_lasts_is_told_to_who_watches() -> None:
 INTERRUPTED_WHILE_WRITING = """
 import os, signal
 from stickslip.reports import folder
-write = folder._write_figures
+write = folder.write_figures
 def interrupted(*arguments):
     write(*arguments)
     os.kill(os.getpid(), signal.SIGINT)
-folder._write_figures = interrupted
+folder.write_figures = interrupted
 from stickslip.cli import main
 main()
 """

@@ -15,7 +15,8 @@ import stickslip as ss
 from stickslip.analysis import Findings, analyze, compare
 from stickslip.plot.comparison import plot_load_dependence
 from stickslip.plot.contact import plot_velocity_loop
-from stickslip.plot.figures import Plate, figures
+from stickslip.plot.figures import figures
+from stickslip.plot.plate import Plate
 from stickslip.plot.style import COLUMNS, STYLE, envelope, prefixed, thinned
 from stickslip.plot.traces import close_up, plot_force_balance, plot_traces
 

@@ -50,6 +50,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         comments="",
         fmt="%.7f",
     )
+    for page in PAGES:
+        for block in blocks(page.read_text("utf-8"), "toml"):
+            if named := re.match(r"# (\w+\.toml)\n", block):
+                (folder / named[1]).write_text(block, encoding="utf-8")
     return folder
 
 
@@ -88,6 +92,10 @@ def test_the_commands_run(folder: Path, line: str) -> None:
         if command[1] == "check":
             assert "samples" in run.stdout
             assert "nothing wrong was found" in run.stdout
+        elif command[1:] == ["simulate"]:
+            assert "FD-4" in run.stdout
+        elif command[1] == "simulate":
+            assert (folder / run.stdout.split()[-1] / "results.json").is_file(), "the folder that it names is there"
         else:
             assert command[1] == "analyze", f"a command whose answer no test looks at: {line}"
             assert "sliding friction" in run.stdout

@@ -246,7 +246,7 @@ def test_nothing_stays_of_a_folder_that_was_not_finished(
 
     publish(light, folder=tmp_path / "earlier")
     before = everything(tmp_path)
-    monkeypatch.setattr(folder_module, "_write_figures", fails)
+    monkeypatch.setattr(folder_module, "write_figures", fails)
     for name in ("new", "earlier"):
         with pytest.raises((StickslipError, KeyboardInterrupt)):
             publish(light, folder=tmp_path / name)

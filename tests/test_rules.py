@@ -83,7 +83,7 @@ def test_type_checkers_see_what_is_imported() -> None:
         for alias in node.names
     }
     rooms = {
-        name: "stickslip.datasets" if room == name else f"stickslip.{room}.{name}"
+        name: f"stickslip.{name}" if room == name else f"stickslip.{room}.{name}"
         for name, room in stickslip._ROOMS.items()
     }
     assert seen == rooms

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         FormatError as FormatError,
         ModelError as ModelError,
         RecordError as RecordError,
+        SolveError as SolveError,
         StickslipError as StickslipError,
     )
     from stickslip.estimate import Estimate as Estimate
@@ -63,10 +64,48 @@ if TYPE_CHECKING:
         clock_rate as clock_rate,
         synchronise as synchronise,
     )
+    from stickslip.drives import (
+        Belt as Belt,
+        HarmonicBase as HarmonicBase,
+        HarmonicForce as HarmonicForce,
+        MultiTone as MultiTone,
+        Ramp as Ramp,
+        RecordedBase as RecordedBase,
+        Release as Release,
+    )
+    from stickslip.laws.compliant import CompliantContact as CompliantContact
+    from stickslip.laws.coulomb import Coulomb as Coulomb
+    from stickslip.laws.elastoslip import ElastoSlip as ElastoSlip
+    from stickslip.laws.inertial import InertialContact as InertialContact
+    from stickslip.laws.linear_slope import LinearSlope as LinearSlope
+    from stickslip.laws.position_load import PositionLoad as PositionLoad
+    from stickslip.laws.state_variable import StateVariable as StateVariable
+    from stickslip.laws.tabulated import Tabulated as Tabulated
+    from stickslip.oscillator import Oscillator as Oscillator
+    from stickslip.plot.animation import animate as animate
+    from stickslip.reports.simulation import Outcome as Outcome, outcome as outcome, publish_run as publish_run
+    from stickslip import scenarios as scenarios
+    from stickslip.solve.energy import energy as energy
+    from stickslip.solve.lyapunov import lyapunov as lyapunov
+    from stickslip.solve.periodic import (
+        SteadyState as SteadyState,
+        attractors as attractors,
+        steady_state as steady_state,
+    )
+    from stickslip.solve.simulate import simulate as simulate
+    from stickslip.solve.trajectory import Trajectory as Trajectory
+    from stickslip.structure import Contact as Contact, Structure as Structure
+    from stickslip.system_file import Case as Case, read_system as read_system, scenario_case as scenario_case
+    from stickslip.laws.dahl import Dahl as Dahl
+    from stickslip.laws.lugre import LuGre as LuGre
+    from stickslip.laws.rate_state import RateState as RateState
+    from stickslip.laws.smooth_state import SmoothStateVariable as SmoothStateVariable
+    from stickslip.laws.stribeck import FrictionCurve as FrictionCurve, Stribeck as Stribeck
+    from stickslip.solve.sliding import SteadySliding as SteadySliding, steady_sliding as steady_sliding
 
 _ROOMS = {
     "StickslipError": "errors", "RecordError": "errors", "FormatError": "errors",
-    "EstimateError": "errors", "ModelError": "errors",
+    "EstimateError": "errors", "ModelError": "errors", "SolveError": "errors",
     "Estimate": "estimate",
     "Record": "record.record", "Channel": "record.channels", "Step": "record.record", "Fault": "record.check",
     "from_pandas": "record.exchange", "from_xarray": "record.exchange", "from_sep005": "record.exchange",
@@ -80,6 +119,21 @@ _ROOMS = {
     "regress_friction": "identify.regression",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
     "analyze": "analysis", "compare": "analysis", "mend": "analysis", "Findings": "analysis", "Comparison": "analysis",
+    "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",
+    "Tabulated": "laws.tabulated", "StateVariable": "laws.state_variable", "InertialContact": "laws.inertial",
+    "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load",
+    "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
+    "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
+    "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",
+    "Release": "drives", "HarmonicBase": "drives", "HarmonicForce": "drives", "MultiTone": "drives",
+    "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives",
+    "Oscillator": "oscillator", "Structure": "structure", "Contact": "structure",
+    "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
+    "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
+    "energy": "solve.energy", "attractors": "solve.periodic",
+    "scenarios": "scenarios", "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
+    "outcome": "reports.simulation", "Outcome": "reports.simulation", "publish_run": "reports.simulation",
+    "animate": "plot.animation",
     "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder",
     "summary": "reports.summary", "datasets": "datasets",
 }  # fmt: skip

@@ -11,7 +11,7 @@ import json
 import re
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +20,10 @@ import click
 import stickslip as ss
 
 if TYPE_CHECKING:
-    from stickslip import Comparison, Findings, Record, RigSettings
+    from stickslip import Case, Comparison, Findings, Outcome, Record, RigSettings
 
 INTERRUPTED = 130
+SHOWN_EVENTS = 12
 PATIENCE = 2.0  # seconds of silence before a progress bar is shown
 
 # What a sentence says to a Python user, and how the command line says it.
@@ -205,6 +206,65 @@ def demo(output: Path, as_json: bool) -> None:
 
 
 @main.command()
+@click.argument("case", required=False, metavar="[SCENARIO|FILE.toml]")
+@click.option("--duration", metavar="TIME", help="Time to simulate in s, or with its unit.")
+@click.option("--cycles", type=click.FloatRange(min=0, min_open=True), help="The same in periods of the drive.")
+@click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar='"NAME=VALUE"',
+    help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm". Repeatable.',
+)
+@click.option("--fs", metavar="HZ", help="Sampling rate of the record; fine enough for the motion unless given.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["csv", "h5", "parquet"]),
+    default="csv",
+    show_default=True,
+    help="Format of the record.",
+)
+@click.option("--animate", "animation", type=click.Choice(["gif", "mp4"]), help="Add a moving picture; mp4 by ffmpeg.")
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for the results; NAME-stickslip unless given.",
+)
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print the results as JSON and nothing else; a folder is written only with --output.",
+)
+def simulate(case: str | None, output: Path | None, as_json: bool, **options: Any) -> None:
+    """Simulate a mass that rubs, exactly, event by event.
+
+    What to simulate is a named scenario, or a TOML file of an oscillator, its friction law and its drive. Without
+    a name the scenarios are listed.
+
+    Results go into a folder: results.json, the events, the sampled record with friction, and the figures.
+
+    \b
+    stickslip simulate FD-4
+    stickslip simulate slider.toml --cycles 100 --set "kinetic=1.3 N" --animate gif
+    """
+    if case is None:
+        _list_scenarios(as_json=as_json)
+        return
+    wanted = _case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
+    folder = output or (None if as_json else Path(f"{_fit_for_a_file(wanted.name)}-stickslip"))
+    with _progress(4 if options["animation"] else 3) as tell:
+        tell("simulating", 0)
+        result = ss.outcome(wanted)
+        written = ss.publish_run(result, folder=folder, tell=tell, **options) if folder else None
+    _show_run(result, written, as_json=as_json)
+    if result.run.status == "interrupted":
+        raise SystemExit(INTERRUPTED)
+
+
+@main.command()
 @click.argument("file")
 @_reading
 def check(file: str, **options: Any) -> None:
@@ -250,6 +310,27 @@ def datasets(name: str | None) -> None:
         return
     for each in ss.datasets.names():
         click.echo(f"{ss.datasets.info(each)}\n")
+
+
+def _case(name: str, *, duration: str | None, cycles: float | None, changes: Sequence[str], fs: str | None) -> Case:
+    """The scenario or the file of that name, with what the command line changes."""
+    case = ss.read_system(name) if name.endswith(".toml") or Path(name).is_file() else ss.scenario_case(name)
+    case = case.having(**dict(_pair(change, "--set") for change in changes))
+    return case.lasting(duration=duration, cycles=cycles, fs=fs)
+
+
+def _fit_for_a_file(name: str) -> str:
+    return "".join(sign if sign.isalnum() or sign in "-_." else "-" for sign in name)
+
+
+def _list_scenarios(*, as_json: bool) -> None:
+    found = {name: ss.scenarios.get(name).about for name in ss.scenarios.names()}
+    if as_json:
+        click.echo(json.dumps(found, indent=2, ensure_ascii=False))
+        return
+    width = max(map(len, found))
+    for name, about in found.items():
+        click.echo(f"{name:{width}}  {about}")
 
 
 def _rig(
@@ -365,7 +446,7 @@ def _with_source(record: Record, files: Sequence[Path]) -> Record:
 
 
 @contextlib.contextmanager
-def _progress(steps: int) -> Iterator[Callable[[str, int], None]]:
+def _progress(steps: int) -> Iterator[Callable[[str, float], None]]:
     """What is being done, on the error stream, for work that lasts; silent where nobody watches."""
     if not sys.stderr.isatty():
         yield lambda words, done: None
@@ -403,19 +484,57 @@ def _show(results: Findings | Comparison, written: Path | None, *, as_json: bool
 
 def _print_table(console: Any, results: Findings | Comparison) -> None:
     from rich.markup import escape
-    from rich.table import Table
 
     summary = ss.summary(results)
     console.print(f"\n[bold]{escape(summary.title)}[/bold]")
     for sentence in (*summary.headline, *summary.cautions, *(f"- {fault}" for fault in summary.faults or ())):
         console.print(escape(_spoken(sentence)))
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     truth = summary.has_truth
-    for heading in ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure"):
-        table.add_column(heading, overflow="fold")
-    for line in summary.lines:
-        cells = [line.name, line.value, line.interval, *([line.true or "-"] if truth else []), line.status]
-        table.add_row(*(escape(cell) for cell in cells))
-    console.print(table)
+    headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")
+    rows = (
+        [line.name, line.value, line.interval, *([line.true or "-"] if truth else []), line.status]
+        for line in summary.lines
+    )
+    console.print(_table(headings, rows))
     for note in summary.notes:
         console.print(f"[dim]Note: {escape(_spoken(note))}[/dim]")
+
+
+def _show_run(result: Outcome, written: Path | None, *, as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps(result.to_dict(), indent=2, ensure_ascii=False, allow_nan=False))
+        return
+    from rich.console import Console
+    from rich.markup import escape
+
+    console = Console(highlight=False, soft_wrap=False)
+    console.print(f"\n[bold]{escape(result.case.name)}[/bold]  {escape(result.case.about)}")
+    for sentence in result.sentences:
+        console.print(escape(sentence))
+    console.print(_table(("quantity", "value"), result.rows))
+    if result.known:
+        answers = [(name, str(pair["known"]), str(pair["found"])) for name, pair in result.known.items()]
+        console.print("\nKnown of this scenario, and what the engine finds:")
+        console.print(_table(("answer", "known", "found"), answers))
+    events = result.run.events
+    if events:
+        rows = [(f"{event.time:.9g}", event.kind, event.mode) for event in events[:SHOWN_EVENTS]]
+        console.print("")
+        console.print(_table(("time [s]", "event", "mode that begins"), rows))
+        rest = len(events) - len(rows)
+        if rest:
+            click.echo(f"... and {rest} more{', in events.csv' if written is not None else ''}")
+    if written is not None:
+        click.echo(f"Results: {written}")
+
+
+def _table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Any:
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in headings:
+        table.add_column(heading, overflow="fold")
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    return table

@@ -4,31 +4,15 @@ from __future__ import annotations
 
 import fnmatch
 import re
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, Field
 
-from stickslip.errors import ModelError, RecordError
-from stickslip.units import parse_value
+from stickslip.settings import STRICT, checked, quantity, read_toml
 
 REPAIRS = ("clock", "gaps", "missing", "spikes", "clipping", "drift")
-
-
-def _in(unit: str) -> BeforeValidator:
-    """A number in `unit`, or text with its own unit ("3.08 kg")."""
-
-    def read(value: object) -> object:
-        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-            raise ValueError(f"a number in {unit}, or text like '2.5 {unit}', is needed")
-        try:
-            return parse_value(value, unit)
-        except RecordError as error:
-            raise ValueError(str(error).rstrip(".")) from error
-
-    return BeforeValidator(read)
 
 
 def _row_range(value: object) -> object:
@@ -84,17 +68,17 @@ class RigSettings(BaseModel):
     (0.25, 2.45, None)
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = STRICT
 
-    mass: Annotated[float, _in("kg"), Field(gt=0)] | None = None
-    stiffness: Annotated[float, _in("N/m"), Field(ge=0)] | None = None
-    damping: Annotated[float, _in("N s/m"), Field(ge=0)] | None = None
+    mass: Annotated[float, quantity("kg"), Field(gt=0)] | None = None
+    stiffness: Annotated[float, quantity("N/m"), Field(ge=0)] | None = None
+    damping: Annotated[float, quantity("N s/m"), Field(ge=0)] | None = None
     damper: Literal["ground", "base"] = "ground"
     contact: Literal["ground", "base"] = "ground"
     channels: dict[str, str] = Field(default_factory=dict)
-    fs: Annotated[float, _in("Hz"), Field(gt=0)] | None = None
+    fs: Annotated[float, quantity("Hz"), Field(gt=0)] | None = None
     units: dict[str, str] = Field(default_factory=dict)
-    normal: Annotated[dict[str, Annotated[float, _in("N"), Field(gt=0)]], BeforeValidator(_one_or_many)] = Field(
+    normal: Annotated[dict[str, Annotated[float, quantity("N"), Field(gt=0)]], BeforeValidator(_one_or_many)] = Field(
         default_factory=dict
     )
     repair: tuple[Annotated[str, BeforeValidator(_repair)], ...] = ()
@@ -116,7 +100,7 @@ class RigSettings(BaseModel):
         return int(first or 0), int(last) if last.strip() else None
 
 
-def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lines: Iterable[str] = ()) -> RigSettings:
+def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lines: Sequence[str] = ()) -> RigSettings:
     """Check settings given as plain data; the first fault found is told in one sentence.
 
     Parameters
@@ -125,7 +109,7 @@ def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lin
         Keys as in :class:`RigSettings`.
     source : str
         Where they come from, for the message.
-    lines : iterable of str
+    lines : sequence of str
         The text they were read from, so that the message can name the line.
 
     Returns
@@ -142,24 +126,7 @@ def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lin
     >>> rig_settings({"mass": "250 g"}).mass
     0.25
     """
-    try:
-        return RigSettings.model_validate(dict(values))
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        path = [str(part) for part in first["loc"] if not str(part).startswith("function-")]
-        where = f"{source}{_line_of(path, list(lines))}"
-        key = ".".join(path[:2]) if path[0] in ("channels", "units", "normal") else path[0]
-        if first["type"] == "extra_forbidden":
-            raise ModelError(
-                f"{where} has the key '{key}'",
-                f"the keys known are {', '.join(RigSettings.model_fields)}",
-                _nearest(key, RigSettings.model_fields),
-            ) from error
-        raise ModelError(
-            f"{where} sets {key} = {first['input']!r}",
-            first["msg"].removeprefix("Value error, ").replace("Input should", "it should"),
-            f"correct {key}",
-        ) from error
+    return checked(RigSettings, values, source=source, lines=lines)
 
 
 def read_rig(path: str | Path) -> RigSettings:
@@ -196,51 +163,5 @@ def read_rig(path: str | Path) -> RigSettings:
     1191.0
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        values = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise ModelError(
-            f"{path.name} can not be read ({reason})", "a rig's settings are a TOML file", "check the path"
-        ) from error
-    except tomllib.TOMLDecodeError as error:
-        raise _not_toml(path.name, text, str(error)) from error
-    return rig_settings(values, source=path.name, lines=text.splitlines())
-
-
-def _not_toml(name: str, text: str, reason: str) -> ModelError:
-    found = re.search(r"line (\d+)", reason)
-    lines = text.splitlines()
-    number = int(found[1]) if found else len(lines)
-    line = lines[number - 1].strip() if 0 < number <= len(lines) else ""
-    bare_point = re.search(r"(?:^|[=\[,\s])([-+]?)\.(\d+)", line)
-    if bare_point:
-        sign, digits = bare_point.groups()
-        return ModelError(
-            f"{name}, line {number}: '{line}'",
-            f"TOML does not take a number like {sign}.{digits}",
-            f"write {sign}0.{digits}",
-        )
-    return ModelError(
-        f"{name}, line {number}: '{line}'",
-        f"this is not TOML ({re.sub(r' ?[(]at .*[)]', '', reason)})",
-        "write KEY = VALUE, with text in quotes",
-    )
-
-
-def _line_of(path: list[str], lines: list[str]) -> str:
-    """ ", line N" of the innermost key that the text shows."""
-    for key in reversed(path):
-        pattern = re.compile(rf"""^\s*(\[\s*)?["']?{re.escape(key)}["']?\s*[\]=.]""")
-        for number, line in enumerate(lines, start=1):
-            if pattern.match(line):
-                return f", line {number},"
-    return ""
-
-
-def _nearest(key: str, known: Iterable[str]) -> str:
-    import difflib
-
-    close = difflib.get_close_matches(key, list(known), n=1, cutoff=0.5)
-    return f"perhaps {close[0]} is meant" if close else "remove it or correct its name"
+    values, lines = read_toml(path, what="a rig's settings are")
+    return rig_settings(values, source=path.name, lines=lines)

@@ -48,3 +48,7 @@ class ModelError(StickslipError):
     """A parameter of a rig or model has no meaning (a negative mass, a typo in a settings file)."""
 
     exit_code = 2
+
+
+class SolveError(StickslipError):
+    """A simulation can not go on, or can not be trusted (too many events, transitions that chase each other)."""

@@ -2,98 +2,26 @@
 
 from __future__ import annotations
 
-import functools
-import io
-import re
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from stickslip.analysis import Comparison, Findings
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.contact import plot_displacement_loop, plot_sticks, plot_velocity_loop
+from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
-from stickslip.plot.style import styled
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from stickslip.solve.trajectory import Trajectory
 
 
-@dataclass(frozen=True, eq=False)
-class Plate:
-    """A figure with its words.
-
-    Attributes
-    ----------
-    name : str
-        Short name, fit for a file.
-    figure : Figure
-        The matplotlib figure.
-    title, caption : str
-        What it shows, and how to read it.
-    """
-
-    name: str
-    figure: Figure
-    title: str
-    caption: str
-
-    def svg(self) -> str:
-        """The figure as an SVG image, the same for the same data."""
-        return self._svg
-
-    @functools.cached_property
-    def _svg(self) -> str:
-        return _svg_of(self.figure)
-
-    @styled
-    def png(self) -> bytes:
-        """The figure as a PNG image on white."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-        drawn = io.BytesIO()
-        with _kept(self.figure) as figure:
-            figure.set_dpi(150)
-            figure.set_facecolor("white")
-            canvas: Any = FigureCanvasAgg(figure)
-            canvas.print_png(drawn)
-        return drawn.getvalue()
-
-
-@styled
-def _svg_of(figure: Figure) -> str:
-    """Hundredths of a point are fine enough for a path, and keep a page small."""
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    drawn = io.StringIO()
-    with _kept(figure):
-        canvas: Any = FigureCanvasSVG(figure)
-        canvas.print_svg(drawn, metadata={"Date": None, "Creator": None})
-    return re.sub(r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), drawn.getvalue())
-
-
-@contextmanager
-def _kept(figure: Figure) -> Iterator[Figure]:
-    """The figure, drawn on a canvas of its own and left as it was; ``savefig`` would draw it twice."""
-    canvas, dpi, colour = figure.canvas, figure.dpi, figure.get_facecolor()
-    try:
-        yield figure
-    finally:
-        figure.set_canvas(canvas)
-        figure.set_dpi(dpi)
-        figure.set_facecolor(colour)
-
-
-def figures(result: Findings | Comparison) -> tuple[Plate, ...]:
+def figures(result: Findings | Comparison | Trajectory) -> tuple[Plate, ...]:
     """The figures that show a result, in reading order.
 
     Parameters
     ----------
-    result : Findings or Comparison
-        What :func:`analyze` or :func:`compare` returned.
+    result : Findings, Comparison or Trajectory
+        What :func:`analyze`, :func:`compare` or :func:`simulate` returned.
 
     Returns
     -------
@@ -108,7 +36,13 @@ def figures(result: Findings | Comparison) -> tuple[Plate, ...]:
     >>> [plate.name for plate in plates][:2]
     ['friction-velocity', 'friction-displacement']
     """
-    return tuple(_of_comparison(result) if isinstance(result, Comparison) else _of_findings(result))
+    if isinstance(result, Comparison):
+        return tuple(_of_comparison(result))
+    if isinstance(result, Findings):
+        return tuple(_of_findings(result))
+    from stickslip.plot.trajectory import plates_of
+
+    return plates_of(result)
 
 
 def _of_findings(findings: Findings) -> list[Plate]:
@@ -119,13 +53,13 @@ def _of_findings(findings: Findings) -> list[Plate]:
     shaded = stuck if len(sticks) <= MOST_SHADES else ""
     if findings.loops is not None:
         plates += [
-            _plate(
+            plate(
                 "friction-velocity", plot_velocity_loop(findings), "Friction against velocity",
                 "Dry friction is a step: about the same force (dotted) at every speed, against the motion. A slope to "
                 "either side is friction that changes with speed; points between the levels at zero velocity are the "
                 "sticking contact, which bears any force up to the level.",
             ),
-            _plate(
+            plate(
                 "friction-displacement", plot_displacement_loop(findings), "Friction against displacement",
                 "One turn is one cycle and its area is the work lost to friction. Flat top and bottom: sliding. Steep "
                 "sides: the contact sticks, and their slope is the contact's own stiffness. The band is the scatter "
@@ -134,28 +68,28 @@ def _of_findings(findings: Findings) -> list[Plate]:
         ]  # fmt: skip
     if findings.regression is not None:
         plates.append(
-            _plate(
+            plate(
                 "regression", plot_regression(findings), "Does the friction model explain the force?",
                 "Top: the measured force and the force that inertia, viscous and dry friction together give. Bottom: "
                 "what is left over; a pattern there is friction that the model does not hold.",
             )
         )  # fmt: skip
     plates.append(
-        _plate("record", plot_traces(findings), "The record", f"Every channel used, over the whole time.{shaded}")
+        plate("record", plot_traces(findings), "The record", f"Every channel used, over the whole time.{shaded}")
     )
     if near is not None:
         plates.append(
-            _plate("close-up", plot_traces(findings, record=near), "A closer look",
+            plate("close-up", plot_traces(findings, record=near), "A closer look",
                    f"A few cycles from the middle of the record.{stuck}")
         )  # fmt: skip
     if force_balance(findings.record) is not None:
         plates.append(
-            _plate("force-balance", plot_force_balance(findings, record=near), "Where the friction force comes from",
+            plate("force-balance", plot_force_balance(findings, record=near), "Where the friction force comes from",
                    f"At every moment the other terms add up to the friction.{stuck}")
         )  # fmt: skip
     if sticks:
         plates.append(
-            _plate("sticks", plot_sticks(findings), "How long it sticks and slips",
+            plate("sticks", plot_sticks(findings), "How long it sticks and slips",
                    "Each mark is one stretch of sticking or slipping; the bars count how often each duration occurred.")
         )  # fmt: skip
     return plates
@@ -165,25 +99,12 @@ def _of_comparison(comparison: Comparison) -> list[Plate]:
     plates = []
     if comparison.coefficient is not None:
         plates.append(
-            _plate("friction-load", plot_load_dependence(comparison), "Friction against normal load",
+            plate("friction-load", plot_load_dependence(comparison), "Friction against normal load",
                    "Points on a line through the origin mean one coefficient of friction for all records.")
         )  # fmt: skip
     if any(findings.level is not None for findings in comparison.findings):
         plates.append(
-            _plate("levels", plot_levels(comparison), "Friction of each record",
+            plate("levels", plot_levels(comparison), "Friction of each record",
                    "The sliding friction found in each record, with its 95 % interval.")
         )  # fmt: skip
     return plates
-
-
-@styled
-def _plate(name: str, drawn: Figure | Axes, title: str, caption: str) -> Plate:
-    from matplotlib.figure import Figure
-
-    figure = drawn if isinstance(drawn, Figure) else drawn.get_figure(root=True)
-    assert isinstance(figure, Figure)
-    layout = figure.get_layout_engine()
-    if layout is not None:
-        layout.execute(figure)  # once for both formats
-    figure.set_layout_engine("none")
-    return Plate(re.sub(r"\W+", "-", name), figure, title, caption)

@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from stickslip import __version__
 from stickslip.analysis import Comparison, Findings
 from stickslip.errors import ModelError, RecordError
-from stickslip.plot.figures import Plate
+from stickslip.plot.plate import Plate
 from stickslip.reports.page import render, sections_of
 
 PROGRAM = "stickslip"
@@ -55,17 +56,25 @@ def publish(results: Findings | Comparison, *, folder: str | Path) -> Path:
     folder = Path(folder)
     check_folder(folder)
     sections = sections_of(results)
-    with _whole_folder(folder) as draft:
+    with results_folder(folder, results.to_dict()) as draft:
         (draft / "report.html").write_text(render(sections), encoding="utf-8")
         (draft / "figures").mkdir()
         for number, section in enumerate(sections):
             prefix = f"{number}-{_fit_for_a_file(section.words.title)}-" if len(sections) > 1 else ""
-            _write_figures(draft / "figures", prefix, section.plates)
+            write_figures(draft / "figures", prefix, section.plates)
+    return folder
+
+
+@contextmanager
+def results_folder(folder: Path, results: Mapping[str, Any]) -> Iterator[Path]:
+    """A folder to fill; with `results` and the list of its files in ``results.json`` it appears at the end, whole."""
+    check_folder(folder)
+    with _whole_folder(folder) as draft:
+        yield draft
         files = sorted(str(path.relative_to(draft).as_posix()) for path in draft.rglob("*") if path.is_file())
-        told = {"program": PROGRAM, "version": __version__, "files": [*files, NUMBERS], **results.to_dict()}
+        told = {"program": PROGRAM, "version": __version__, "files": [*files, NUMBERS], **results}
         text = json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False)
         (draft / NUMBERS).write_text(text + "\n", encoding="utf-8")
-    return folder
 
 
 def check_folder(folder: Path) -> None:
@@ -120,7 +129,8 @@ def _whole_folder(folder: Path) -> Iterator[Path]:
         ) from error
 
 
-def _write_figures(folder: Path, prefix: str, plates: Sequence[Plate]) -> None:
+def write_figures(folder: Path, prefix: str, plates: Sequence[Plate]) -> None:
+    """Each figure as SVG and PNG."""
     for plate in plates:
         (folder / f"{prefix}{plate.name}.svg").write_text(plate.svg(), encoding="utf-8")
         (folder / f"{prefix}{plate.name}.png").write_bytes(plate.png())

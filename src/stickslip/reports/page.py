@@ -13,7 +13,8 @@ from stickslip.analysis import Comparison, Findings
 from stickslip.estimate import Estimate
 from stickslip.files.write import whole
 from stickslip.plot import style
-from stickslip.plot.figures import Plate, figures
+from stickslip.plot.figures import figures
+from stickslip.plot.plate import Plate
 from stickslip.record.record import Record
 from stickslip.reports.summary import Summary, summary
 

@@ -1,0 +1,363 @@
+"""What moves the spring's end, the counter-face or the mass itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.errors import ModelError
+
+Row = Mapping[str, float]
+LARGEST_FREQUENCY = 1e9  # Hz; above it a period is shorter than what the clock of a long run resolves
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A drive as the solver reads it: signals with linear rates, and what each of them moves.
+
+    Attributes
+    ----------
+    rates : mapping of str to mapping
+        Each signal's time derivative as a linear form of the signals and "1".
+    start : mapping of str to float
+        Value of each signal at time 0.
+    tones : tuple of (str, str, float, float)
+        Pairs of signals that turn: cosine, sine, angular frequency [rad/s], phase [rad].
+    period : float
+        Period [s]; infinite where the drive does not repeat.
+    force, base, face : mapping of str to float
+        Force on the mass [N], displacement of the spring's end [m], displacement of the counter-face [m].
+    knots : ndarray or None
+        Times [s] (first column) at which the signals in `knotted` take new values (further columns).
+    knotted : tuple of str
+        The signals of `knots`.
+    """
+
+    rates: Mapping[str, Row] = field(default_factory=dict)
+    start: Mapping[str, float] = field(default_factory=dict)
+    tones: tuple[tuple[str, str, float, float], ...] = ()
+    period: float = math.inf
+    force: Row = field(default_factory=dict)
+    base: Row = field(default_factory=dict)
+    face: Row = field(default_factory=dict)
+    knots: NDArray[np.float64] | None = None
+    knotted: tuple[str, ...] = ()
+
+
+class Drive(Protocol):
+    """What the solver asks of a drive."""
+
+    def motion(self) -> Motion:
+        """The drive as signals with linear rates."""
+
+
+def _require(condition: bool, value: str, rule: str, next_step: str) -> None:
+    if not condition:
+        raise ModelError(value, rule, next_step)
+
+
+def _check_frequency(frequency: float) -> None:
+    _require(
+        math.isfinite(frequency) and 0 < frequency <= LARGEST_FREQUENCY,
+        f"frequency = {frequency} Hz",
+        f"a drive repeats between 0 and {LARGEST_FREQUENCY:g} times a second",
+        "give frequency= in Hz",
+    )
+
+
+def _check_finite(**values: float) -> None:
+    for name, value in values.items():
+        _require(math.isfinite(value), f"{name} = {value}", f"{name} is a finite number", f"correct {name}=")
+
+
+def _check_contact(contact: str) -> None:
+    _require(
+        contact in ("ground", "base"),
+        f"contact = '{contact}'",
+        "the mass rubs on the 'ground' or on the 'base'",
+        "choose one of the two",
+    )
+
+
+def _tones(tones: Sequence[tuple[float, float, float]]) -> tuple[Motion, Row]:
+    """Signals of a sum of cosines (amplitude, frequency [Hz], phase [rad]) and the sum as a linear form."""
+    rates: dict[str, Row] = {}
+    start: dict[str, float] = {}
+    turning = []
+    row = {}
+    for j, (amplitude, frequency, phase) in enumerate(tones):
+        _check_frequency(frequency)
+        _check_finite(amplitude=amplitude, phase=phase)
+        cosine, sine, omega = f"cos{j}", f"sin{j}", 2 * math.pi * frequency
+        rates |= {cosine: {sine: -omega}, sine: {cosine: omega}}
+        start |= {cosine: math.cos(phase), sine: math.sin(phase)}
+        turning.append((cosine, sine, omega, phase))
+        row[cosine] = amplitude
+    period = 1 / tones[0][1] if len(tones) == 1 else math.inf
+    return Motion(rates, start, tuple(turning), period), row
+
+
+@dataclass(frozen=True)
+class Release:
+    """Nothing moves: free decay from wherever the mass is let go.
+
+    Examples
+    --------
+    >>> Release().motion().period
+    inf
+    """
+
+    def motion(self) -> Motion:
+        """No signals."""
+        return Motion()
+
+
+@dataclass(frozen=True)
+class HarmonicBase:
+    r"""The spring's end moves as :math:`z = Z \cos(2\pi F t + \varphi)` (thesis, equation 3.8).
+
+    Attributes
+    ----------
+    amplitude : float
+        Z [m].
+    frequency : float
+        F [Hz].
+    phase : float
+        Phase [rad].
+    contact : {"ground", "base"}
+        Whether the mass rubs on the ground or on the moving base.
+
+    Examples
+    --------
+    >>> HarmonicBase(0.65e-3, frequency=2.5).motion().period
+    0.4
+    """
+
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+    contact: str = "ground"
+
+    def __post_init__(self) -> None:
+        _check_contact(self.contact)
+        self.motion()
+
+    def motion(self) -> Motion:
+        """One turning pair."""
+        motion, row = _tones([(self.amplitude, self.frequency, self.phase)])
+        return _moved(motion, base=row, face=row if self.contact == "base" else {})
+
+
+@dataclass(frozen=True)
+class HarmonicForce:
+    r"""A force :math:`P \cos(2\pi F t + \varphi)` on the mass.
+
+    Attributes
+    ----------
+    amplitude : float
+        P [N].
+    frequency : float
+        F [Hz].
+    phase : float
+        Phase [rad].
+
+    Examples
+    --------
+    >>> HarmonicForce(1.5, frequency=2.0).motion().period
+    0.5
+    """
+
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.motion()
+
+    def motion(self) -> Motion:
+        """One turning pair."""
+        motion, row = _tones([(self.amplitude, self.frequency, self.phase)])
+        return _moved(motion, force=row)
+
+
+@dataclass(frozen=True)
+class MultiTone:
+    """Several tones at once: a drive with dither, two shakers.
+
+    Attributes
+    ----------
+    tones : sequence of (float, float, float)
+        Amplitude [m or N], frequency [Hz] and phase [rad] of each.
+    on : {"base", "force", "face"}
+        What they move: the spring's end, the mass (a force), or the counter-face.
+    contact : {"ground", "base"}
+        For ``on="base"``: what the mass rubs on.
+
+    Examples
+    --------
+    >>> len(MultiTone([(1e-3, 2.0, 0.0), (1e-5, 180.0, 0.0)]).motion().tones)
+    2
+    """
+
+    tones: Sequence[tuple[float, float, float]]
+    on: str = "base"
+    contact: str = "ground"
+
+    def __post_init__(self) -> None:
+        _check_contact(self.contact)
+        _require(len(self.tones) > 0, "no tones", "at least one tone is needed", "give (amplitude, frequency, phase)")
+        _require(
+            self.on in ("base", "force", "face"),
+            f"on = '{self.on}'",
+            "tones move the 'base', the 'face' or act as 'force'",
+            "choose one of the three",
+        )
+        object.__setattr__(self, "tones", tuple((a, f, p) for a, f, p in self.tones))
+        self.motion()
+
+    def motion(self) -> Motion:
+        """A turning pair for each tone."""
+        motion, row = _tones(self.tones)
+        if self.on == "base":
+            return _moved(motion, base=row, face=row if self.contact == "base" else {})
+        return _moved(motion, force=row) if self.on == "force" else _moved(motion, face=row)
+
+
+@dataclass(frozen=True)
+class Belt:
+    """The counter-face runs at a steady speed under a mass whose spring is held.
+
+    Attributes
+    ----------
+    speed : float
+        Speed of the belt [m/s]; not zero.
+
+    Examples
+    --------
+    >>> Belt(0.01).motion().face
+    {'way': 0.01}
+    """
+
+    speed: float
+
+    def __post_init__(self) -> None:
+        _check_finite(speed=self.speed)
+        _require(
+            self.speed != 0, "speed = 0 m/s", "a belt runs", "give its speed=, or use Release() for a mass at rest"
+        )
+
+    def motion(self) -> Motion:
+        """The time that has passed, as the belt's way."""
+        return Motion({"way": {"1": 1.0}}, {"way": 0.0}, face={"way": self.speed})
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """The spring's end is pulled at a steady speed over a counter-face at rest.
+
+    Attributes
+    ----------
+    speed : float
+        Speed of the spring's end [m/s]; not zero.
+
+    Examples
+    --------
+    >>> Ramp(1e-4).motion().base
+    {'way': 0.0001}
+    """
+
+    speed: float
+
+    def __post_init__(self) -> None:
+        _check_finite(speed=self.speed)
+        _require(
+            self.speed != 0, "speed = 0 m/s", "a ramp moves", "give its speed=, or use Release() for a mass at rest"
+        )
+
+    def motion(self) -> Motion:
+        """The time that has passed, as the ramp's way."""
+        return Motion({"way": {"1": 1.0}}, {"way": 0.0}, base={"way": self.speed})
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedBase:
+    """A recorded base motion: between samples a linear or a cubic (natural spline) piece, solved in closed form.
+
+    Before the first sample's time and after the last one there is no motion to follow: simulate within the record.
+
+    Attributes
+    ----------
+    samples : array_like
+        Displacement of the spring's end [m], n values, at least two (four for cubic).
+    fs : float
+        Sampling rate [Hz]; the first sample is at time 0.
+    order : {3, 1}
+        Degree of the pieces. Linear pieces kick the base's velocity at every sample: use them with the contact and
+        the damper on the ground only.
+    contact : {"ground", "base"}
+        Whether the mass rubs on the ground or on the moving base.
+
+    Examples
+    --------
+    >>> RecordedBase([0.0, 1e-3, 0.0, -1e-3], fs=10.0).motion().knots.shape
+    (3, 5)
+    """
+
+    samples: ArrayLike
+    fs: float
+    order: int = 3
+    contact: str = "ground"
+
+    def __post_init__(self) -> None:
+        _check_contact(self.contact)
+        _require(math.isfinite(self.fs) and self.fs > 0, f"fs = {self.fs} Hz", "the rate is positive", "give fs= in Hz")
+        _require(self.order in (1, 3), f"order = {self.order}", "pieces are linear (1) or cubic (3)", "choose one")
+        _require(
+            self.order == 3 or self.contact == "ground",
+            "linear pieces under a contact on the base",
+            "the base's acceleration must be finite there",
+            "use order=3",
+        )
+        values = np.array(self.samples, dtype=np.float64)
+        _require(
+            values.ndim == 1 and len(values) >= self.order + 1 and bool(np.all(np.isfinite(values))),
+            f"samples of shape {values.shape}",
+            f"at least {self.order + 1} finite numbers in one row are needed",
+            "cut or mend the record",
+        )
+        values.flags.writeable = False
+        object.__setattr__(self, "samples", values)
+
+    def motion(self) -> Motion:
+        """Displacement and its derivatives, set anew at every sample."""
+        values = np.asarray(self.samples)
+        names = ("z0", "z1", "z2", "z3")
+        knots = np.zeros((len(values) - 1, 5))
+        knots[:, 0] = np.arange(len(values) - 1) / self.fs
+        knots[:, 1] = values[:-1]
+        if self.order == 1:
+            knots[:, 2] = np.diff(values) * self.fs
+        else:
+            from scipy.interpolate import CubicSpline
+
+            spline = CubicSpline(np.arange(len(values)) / self.fs, values, bc_type="natural")
+            knots[:, 2:] = np.column_stack([spline.c[2], 2 * spline.c[1], 6 * spline.c[0]])
+        rates = {"z0": {"z1": 1.0}, "z1": {"z2": 1.0}, "z2": {"z3": 1.0}, "z3": {}}
+        row = {"z0": 1.0}
+        return Motion(
+            rates,
+            dict(zip(names, knots[0, 1:], strict=True)),
+            base=row,
+            face=row if self.contact == "base" else {},
+            knots=knots,
+            knotted=names,
+        )
+
+
+def _moved(motion: Motion, *, force: Row | None = None, base: Row | None = None, face: Row | None = None) -> Motion:
+    return Motion(motion.rates, motion.start, motion.tones, motion.period, force or {}, base or {}, face or {})

@@ -1,0 +1,1 @@
+"""Friction laws: each one a table of linear modes with exits, one file per law."""

@@ -1,0 +1,110 @@
+"""What a friction law is: a table of linear modes, each with the exits that end it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from stickslip.errors import ModelError
+
+Row = Mapping[str, float]
+"""A linear form: coefficients over "x", "v" (displacement and velocity of the mass relative to the counter-face),
+"f" and "df" (the friction force of the mode and its rate), "1" (the constant) and the names of the law's memory."""
+
+
+@dataclass(frozen=True)
+class Exit:
+    """One way out of a mode: it ends at the instant when `quantity` rises above zero.
+
+    Attributes
+    ----------
+    quantity : mapping of str to float
+        The linear form that is negative while the mode lasts.
+    to : str
+        Name of the mode that follows.
+    reset : mapping of str to mapping
+        Memory that takes a new value on the way, as a linear form of the state before.
+    crossing : bool
+        Only a crossing counts: a quantity that is positive on arrival does not end the mode.
+    """
+
+    quantity: Row
+    to: str
+    reset: Mapping[str, Row] = field(default_factory=dict)
+    crossing: bool = False
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A regime of the contact in which friction is a linear form of the state.
+
+    Attributes
+    ----------
+    name : str
+        "forward", "back", "stuck" ...
+    kind : str
+        "slip", "stick" or "microstick": what an event that leads here is called.
+    side : int
+        +1 or -1, the direction of slip; 0 where there is none.
+    friction : mapping of str to float, or None
+        Friction force [N], positive against positive velocity; None: whatever holds the mass to the counter-face.
+    exits : tuple of Exit
+        In order of precedence, should two be due at the same instant.
+    rates : mapping of str to mapping
+        Time derivative of the memory that moves in this mode.
+    """
+
+    name: str
+    kind: str
+    side: int
+    friction: Row | None
+    exits: tuple[Exit, ...]
+    rates: Mapping[str, Row] = field(default_factory=dict)
+
+    def changes(self, before: Mode, leaving: int) -> Iterator[tuple[int, Mode, Mode]]:
+        """Contact, its mode before and its mode now: what an event by exit `leaving` into this mode has changed."""
+        yield 0, before, self
+
+
+class Law(Protocol):
+    """What the solver asks of a friction law."""
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """The law's own state, with its value at the start as a linear form of "x", "v" and "1"."""
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Memory that is a place on the counter-face [m] and moves with it."""
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Names of the modes in which motion starts: with v < 0, v = 0 and v > 0."""
+
+    def modes(self) -> tuple[Mode, ...]:
+        """The table."""
+
+
+def finite(name: str, value: float, *, unit: str, positive: bool = False, signed: bool = False) -> float:
+    """`value`, if the parameter can have it: finite, and not negative unless `signed`, not zero if `positive`."""
+    number = float(value)
+    if not math.isfinite(number) or (number < 0 and not signed) or (number == 0 and positive):
+        rule = (
+            "is a finite number" if signed else "is finite and positive" if positive else "is finite and not negative"
+        )
+        raise ModelError(f"{name} = {value} {unit}", f"{name} {rule}", f"correct {name}=")
+    return number
+
+
+def static_level(static: float | None, kinetic: float) -> float:
+    """The break-away force [N]: `static` where given, else the kinetic level."""
+    level = kinetic if static is None else finite("static", static, unit="N")
+    if level < kinetic:
+        raise ModelError(
+            f"static = {level} N below kinetic = {kinetic} N",
+            "static friction is at least the kinetic friction",
+            "raise static=, or leave it out to make both equal",
+        )
+    return level

@@ -1,0 +1,99 @@
+"""The tangential compliant contact of chapters 3 and 4: friction through a spring and a damper without mass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from stickslip.errors import ModelError
+from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+from stickslip.laws.coulomb import held_until
+
+
+@dataclass(frozen=True)
+class CompliantContact:
+    r"""Coulomb friction through a massless contact of stiffness :math:`K_y` and damping :math:`c`.
+
+    In slip :math:`f = f_k\,\mathrm{sgn}\,\dot x`; in microstick :math:`f = K_y y + c\,\dot x` with
+    :math:`y = x - X`, X the place where the contact holds (thesis, equations 3.9 to 3.11). Microstick ends when
+    :math:`|f|` reaches `static`; slip then goes in the direction of f. Should the mass move against that direction
+    (possible only with much damping; it does not happen in the thesis's cases), friction keeps its sign until the
+    velocity has reversed and come back to zero.
+
+    Attributes
+    ----------
+    kinetic : float
+        Friction force while sliding [N].
+    stiffness : float
+        Tangential contact stiffness [N/m].
+    damping : float
+        Damping coefficient of the contact [N s/m].
+    static : float or None
+        Friction force at which microstick ends [N]; None: as `kinetic`.
+    rule : {"literal", "consistent"}
+        "literal": during slip the contact stays at its full deflection :math:`f_k/K_y`, as the thesis has it.
+        "consistent": a Kelvin-Voigt contact whose deflection relaxes in slip, :math:`c\dot y + K_y y = \pm f_k`;
+        it sticks when the slider's velocity :math:`\dot x - \dot y` vanishes. Equal where c is zero.
+
+    Raises
+    ------
+    ModelError
+        A value has no meaning, or the rule is not one of the two.
+
+    Examples
+    --------
+    >>> contact = CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9)
+    >>> contact.memory["anchor"]
+    {'x': 1.0}
+    """
+
+    kinetic: float
+    stiffness: float
+    damping: float = 0.0
+    static: float | None = None
+    rule: str = "literal"
+
+    def __post_init__(self) -> None:
+        finite("kinetic", self.kinetic, unit="N")
+        finite("stiffness", self.stiffness, unit="N/m", positive=True)
+        finite("damping", self.damping, unit="N s/m")
+        static_level(self.static, self.kinetic)
+        if self.rule not in ("literal", "consistent"):
+            raise ModelError(f"rule = '{self.rule}'", "the rule is 'literal' or 'consistent'", "choose one of the two")
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """Where the contact holds [m]; relaxed under the mass at the start."""
+        return {"anchor": {"x": 1.0}}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """The anchor."""
+        return ("anchor",)
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Motion starts in microstick, whatever the velocity: the contact is relaxed."""
+        return "microstuck", "microstuck", "microstuck"
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Slip on either side, and microstick."""
+        level = static_level(self.static, self.kinetic)
+        force = {"x": self.stiffness, "anchor": -self.stiffness, "v": self.damping}
+        relaxing = self.rule == "consistent" and self.damping > 0
+        slip = self._relaxing_slip if relaxing else self._slip
+        return slip(-1), Mode("microstuck", "microstick", 0, force, held_until(level)), slip(1)
+
+    def _slip(self, side: int) -> Mode:
+        full = side * self.kinetic / self.stiffness
+        stop = Exit({"v": float(-side)}, "microstuck", {"anchor": {"x": 1.0, "1": -full}}, crossing=True)
+        return Mode(_NAMES[side], "slip", side, {"1": side * self.kinetic}, (stop,))
+
+    def _relaxing_slip(self, side: int) -> Mode:
+        relax = self.stiffness / self.damping
+        slider = {"v": 1.0, "x": relax, "anchor": -relax, "1": -side * self.kinetic / self.damping}
+        stop = Exit({name: -side * value for name, value in slider.items()}, "microstuck")
+        return Mode(_NAMES[side], "slip", side, {"1": side * self.kinetic}, (stop,), {"anchor": slider})
+
+
+_NAMES = {-1: "back", 1: "forward"}

@@ -1,0 +1,70 @@
+"""Dry friction on a rigid contact: Coulomb's law, with static above kinetic friction if wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+
+
+@dataclass(frozen=True)
+class Coulomb:
+    r"""Rigid dry friction: :math:`f = f_k\,\mathrm{sgn}\,v` in slip, :math:`|f| \le f_s` in stick.
+
+    A slip that comes to rest passes through the stuck mode; where the holding force would exceed `static` it goes on
+    at once, in the direction of that force.
+
+    Attributes
+    ----------
+    kinetic : float
+        Friction force while sliding [N].
+    static : float or None
+        Largest friction force while stuck [N]; None: as `kinetic`.
+
+    Raises
+    ------
+    ModelError
+        A level is negative or not finite, or `static` is below `kinetic`.
+
+    Examples
+    --------
+    >>> [mode.name for mode in Coulomb(1.1).modes()]
+    ['back', 'stuck', 'forward']
+    """
+
+    kinetic: float
+    static: float | None = None
+
+    def __post_init__(self) -> None:
+        finite("kinetic", self.kinetic, unit="N")
+        static_level(self.static, self.kinetic)
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """None: the rigid contact remembers nothing."""
+        return {}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, by the sign of the velocity."""
+        return "back", "stuck", "forward"
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Slip on either side, and stick."""
+        level = static_level(self.static, self.kinetic)
+        return (
+            Mode("back", "slip", -1, {"1": -self.kinetic}, (Exit({"v": 1.0}, "stuck"),)),
+            Mode("stuck", "stick", 0, None, held_until(level)),
+            Mode("forward", "slip", 1, {"1": self.kinetic}, (Exit({"v": -1.0}, "stuck"),)),
+        )
+
+
+def held_until(level: float, *, back: str = "back", forward: str = "forward") -> tuple[Exit, Exit]:
+    """The exits of a stuck mode: the friction force reaches `level` [N] on either side."""
+    return Exit({"f": 1.0, "1": -level}, forward), Exit({"f": -1.0, "1": -level}, back)

@@ -1,0 +1,245 @@
+"""What a curved law is: modes like any other law's, with friction and rates as expressions instead of linear forms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+from stickslip.errors import ModelError
+from stickslip.laws.base import Exit, Row
+
+FUNCTIONS = ("exp", "log", "tanh", "asinh", "sqrt")
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A formula over the state of the contact: what the numeric solver expands into Taylor series.
+
+    Built with ``+ - * / **`` from :func:`symbol`, numbers, and the functions of this module.
+
+    Attributes
+    ----------
+    kind : str
+        "number", "symbol", "sum", "product", "quotient", "power", or a function's name.
+    parts : tuple of Expression
+        What it is made of.
+    value : float
+        The number, or the exponent of a power.
+    name : str
+        The symbol.
+
+    Examples
+    --------
+    >>> speed = symbol("v")
+    >>> force = 1.0 + 0.5 * exp(-((speed / 0.1) ** 2))
+    >>> round(force.at(v=0.1), 6)
+    1.18394
+    """
+
+    kind: str
+    parts: tuple[Expression, ...] = ()
+    value: float = 0.0
+    name: str = ""
+
+    def __add__(self, other: Expression | float) -> Expression:
+        return Expression("sum", (self, lifted(other)))
+
+    def __radd__(self, other: float) -> Expression:
+        return lifted(other) + self
+
+    def __neg__(self) -> Expression:
+        return -1.0 * self
+
+    def __sub__(self, other: Expression | float) -> Expression:
+        return self + -1.0 * lifted(other)
+
+    def __rsub__(self, other: float) -> Expression:
+        return lifted(other) - self
+
+    def __mul__(self, other: Expression | float) -> Expression:
+        return Expression("product", (self, lifted(other)))
+
+    def __rmul__(self, other: float) -> Expression:
+        return lifted(other) * self
+
+    def __truediv__(self, other: Expression | float) -> Expression:
+        return Expression("quotient", (self, lifted(other)))
+
+    def __rtruediv__(self, other: float) -> Expression:
+        return lifted(other) / self
+
+    def __pow__(self, exponent: float) -> Expression:
+        return Expression("power", (self,), float(exponent))
+
+    def at(self, **values: float) -> float:
+        """The value where the symbols have these values.
+
+        Parameters
+        ----------
+        **values : float
+            By symbol.
+
+        Returns
+        -------
+        float
+        """
+        if self.kind == "number":
+            return self.value
+        if self.kind == "symbol":
+            if self.name not in values:
+                raise ModelError(f"no value for '{self.name}'", "every symbol has a value", f"give {self.name}=")
+            return float(values[self.name])
+        parts = [part.at(**values) for part in self.parts]
+        if self.kind == "sum":
+            return math.fsum(parts)
+        if self.kind == "product":
+            return math.prod(parts)
+        if self.kind == "quotient":
+            return parts[0] / parts[1]
+        if self.kind == "power":
+            return float(parts[0] ** self.value)
+        return float(getattr(math, self.kind)(*parts))
+
+    def slope(self, name: str) -> Expression:
+        """The partial derivative by a symbol.
+
+        Parameters
+        ----------
+        name : str
+            The symbol.
+
+        Returns
+        -------
+        Expression
+        """
+        if self.kind in ("number", "symbol"):
+            return lifted(1.0 if self.kind == "symbol" and self.name == name else 0.0)
+        a, d = self.parts[0], self.parts[0].slope(name)
+        if self.kind in ("sum", "product", "quotient"):
+            b, e = self.parts[1], self.parts[1].slope(name)
+            return {"sum": d + e, "product": d * b + a * e, "quotient": (d - self * e) / b}[self.kind]
+        if self.kind == "power":
+            return self.value * a ** (self.value - 1) * d if self.value else lifted(0.0)
+        inner = {"exp": self, "log": 1 / a, "tanh": 1 - self**2, "asinh": 1 / sqrt(1 + a**2), "sqrt": 0.5 / self}
+        return inner[self.kind] * d
+
+
+def lifted(value: Expression | float) -> Expression:
+    """A number as an expression; an expression as it is."""
+    return value if isinstance(value, Expression) else Expression("number", value=float(value))
+
+
+def symbol(name: str) -> Expression:
+    """A quantity of the state: "x", "v" (relative to the counter-face), or the law's memory by name."""
+    return Expression("symbol", name=name)
+
+
+def _function(kind: str, of: Expression | float) -> Expression:
+    return Expression(kind, (lifted(of),))
+
+
+def exp(of: Expression | float) -> Expression:
+    """The exponential."""
+    return _function("exp", of)
+
+
+def log(of: Expression | float) -> Expression:
+    """The natural logarithm."""
+    return _function("log", of)
+
+
+def tanh(of: Expression | float) -> Expression:
+    """The hyperbolic tangent."""
+    return _function("tanh", of)
+
+
+def asinh(of: Expression | float) -> Expression:
+    """The inverse hyperbolic sine."""
+    return _function("asinh", of)
+
+
+def sqrt(of: Expression | float) -> Expression:
+    """The square root."""
+    return _function("sqrt", of)
+
+
+@dataclass(frozen=True)
+class CurvedMode:
+    """A regime of the contact in which friction is a smooth function of the state.
+
+    Attributes
+    ----------
+    name : str
+        "forward", "back", "stuck" ...
+    kind : str
+        "slip", "stick" or "microstick": what an event that leads here is called.
+    side : int
+        +1 or -1, the direction of slip; 0 where there is none.
+    friction : Expression or None
+        Friction force [N], positive against positive velocity; None: whatever holds the mass to the counter-face.
+    exits : tuple of Exit
+        As of a linear mode.
+    rates : mapping of str to Expression
+        Time derivative of the memory.
+    """
+
+    name: str
+    kind: str
+    side: int
+    friction: Expression | None
+    exits: tuple[Exit, ...] = ()
+    rates: Mapping[str, Expression] = field(default_factory=dict)
+
+    def changes(self, before: CurvedMode, leaving: int) -> Iterator[tuple[int, CurvedMode, CurvedMode]]:
+        """Contact, its mode before and its mode now, as of a linear mode."""
+        yield 0, before, self
+
+
+@runtime_checkable
+class CurvedLaw(Protocol):
+    """What the numeric solver asks of a friction law."""
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """The law's own state, with its value at the start as a linear form of "x", "v" and "1"."""
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Memory that is a place on the counter-face [m]; curved laws have none."""
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Names of the modes in which motion starts: with v < 0, v = 0 and v > 0."""
+
+    def rates(self) -> tuple[CurvedMode, ...]:
+        """The modes."""
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """A curved law's usual ground: no places, slip to either side."""
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """None."""
+        return {}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, by the sign of the velocity."""
+        return "back", "forward", "forward"
+
+
+def either_side() -> tuple[tuple[str, int, Exit], ...]:
+    """Name, side and exit of the two slips of a law that never holds the mass: they meet where the velocity turns."""
+    return (
+        ("back", -1, Exit({"v": 1.0}, "forward")),
+        ("forward", 1, Exit({"v": -1.0}, "back")),
+    )

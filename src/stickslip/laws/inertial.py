@@ -1,0 +1,82 @@
+"""The compliant contact with inertia of section 4.5, in series with the mass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+
+
+@dataclass(frozen=True)
+class InertialContact:
+    r"""A contact with a mass of its own: spring and damper to the slider, Coulomb friction to the counter-face.
+
+    :math:`m_c\ddot y = K_y(x-y) + c(\dot x-\dot y) - f_k\,\mathrm{sgn}\,\dot y`; the slider feels
+    :math:`f = K_y(x-y) + c(\dot x-\dot y)` (thesis, equation 4.3, with the imposed motion replaced by the slider's).
+
+    Attributes
+    ----------
+    kinetic : float
+        Friction force under the contact while it slides [N].
+    stiffness : float
+        Contact stiffness [N/m].
+    mass : float
+        Mass of the contact [kg].
+    damping : float
+        Damping of the contact [N s/m].
+    static : float or None
+        Largest friction force while the contact holds [N]; None: as `kinetic`.
+
+    Examples
+    --------
+    >>> sorted(InertialContact(1.1, stiffness=192000, mass=0.01).memory)
+    ['u', 'y']
+    """
+
+    kinetic: float
+    stiffness: float
+    mass: float
+    damping: float = 0.0
+    static: float | None = None
+
+    def __post_init__(self) -> None:
+        finite("kinetic", self.kinetic, unit="N")
+        finite("stiffness", self.stiffness, unit="N/m", positive=True)
+        finite("mass", self.mass, unit="kg", positive=True)
+        finite("damping", self.damping, unit="N s/m")
+        static_level(self.static, self.kinetic)
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """Displacement y [m] and velocity u [m/s] of the contact; at the start relaxed and at rest."""
+        return {"y": {"x": 1.0}, "u": {}}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """The contact's displacement."""
+        return ("y",)
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """The contact starts held."""
+        return "stuck", "stuck", "stuck"
+
+    def modes(self) -> tuple[Mode, ...]:
+        """The contact slides to either side, or holds."""
+        force = {"x": self.stiffness, "y": -self.stiffness, "v": self.damping, "u": -self.damping}
+        level = static_level(self.static, self.kinetic)
+        held = (
+            Exit({"x": self.stiffness, "y": -self.stiffness, "v": self.damping, "1": -level}, "forward"),
+            Exit({"x": -self.stiffness, "y": self.stiffness, "v": -self.damping, "1": -level}, "back"),
+        )
+        return (
+            self._slip("back", -1, force),
+            Mode("stuck", "microstick", 0, force, held),
+            self._slip("forward", 1, force),
+        )
+
+    def _slip(self, name: str, side: int, force: Row) -> Mode:
+        push = {key: value / self.mass for key, value in force.items()} | {"1": -side * self.kinetic / self.mass}
+        stop = Exit({"u": float(-side)}, "stuck", {"u": {}})
+        return Mode(name, "slip", side, force, (stop,), {"y": {"u": 1.0}, "u": push})

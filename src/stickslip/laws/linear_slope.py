@@ -1,0 +1,62 @@
+"""Friction that rises or falls in proportion to the sliding speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+from stickslip.laws.coulomb import held_until
+
+
+@dataclass(frozen=True)
+class LinearSlope:
+    r"""Rigid contact with :math:`f = f_k\,\mathrm{sgn}\,v + s\,v` in slip, :math:`|f| \le f_s` in stick.
+
+    Attributes
+    ----------
+    kinetic : float
+        Friction force at vanishing speed [N].
+    slope : float
+        s [N s/m]; negative: friction falls with speed and feeds vibration.
+    static : float or None
+        Largest friction force while stuck [N]; None: as `kinetic`.
+
+    Examples
+    --------
+    >>> LinearSlope(1.0, slope=-0.2, static=1.5).modes()[2].friction
+    {'1': 1.0, 'v': -0.2}
+    """
+
+    kinetic: float
+    slope: float
+    static: float | None = None
+
+    def __post_init__(self) -> None:
+        finite("kinetic", self.kinetic, unit="N")
+        finite("slope", self.slope, unit="N s/m", signed=True)
+        static_level(self.static, self.kinetic)
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """None."""
+        return {}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, by the sign of the velocity."""
+        return "back", "stuck", "forward"
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Slip on either side, and stick."""
+        level = static_level(self.static, self.kinetic)
+        return (
+            Mode("back", "slip", -1, {"1": -self.kinetic, "v": self.slope}, (Exit({"v": 1.0}, "stuck"),)),
+            Mode("stuck", "stick", 0, None, held_until(level)),
+            Mode("forward", "slip", 1, {"1": self.kinetic, "v": self.slope}, (Exit({"v": -1.0}, "stuck"),)),
+        )

@@ -1,0 +1,92 @@
+"""The state-variable law of chapter 4: friction follows Coulomb's law with a lag."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from stickslip.laws.base import Exit, Mode, Row, finite
+
+
+@dataclass(frozen=True)
+class StateVariable:
+    r"""Friction that tracks Coulomb's: :math:`\dot\theta = -f_k\gamma(\theta - f_k\,\mathrm{sgn}\,v)`.
+
+    Thesis, equations 4.1 and 4.2, where the backbone lacks its factor :math:`f_k`; `printed` keeps it out, which
+    limits friction to 1 N. The product :math:`f_k\gamma` is the rate. Where velocity and acceleration vanish together
+    the mass may be held: :math:`\mathrm{sgn}\,0` takes whatever value between -1 and 1 keeps it at rest.
+
+    Attributes
+    ----------
+    kinetic : float
+        f_k [N].
+    rate : float
+        gamma [1/(N s)].
+    printed : bool
+        Backbone of 1 N, as printed.
+    steepness : float or None
+        alpha [s/m]: the backbone rises as :math:`\alpha v` to its full level instead of jumping, a polygon for the
+        thesis's :math:`\tanh\alpha v`. None: it jumps. The jump makes a strongly damped rest tremble ever faster,
+        without end; a steepness ends that.
+
+    Examples
+    --------
+    >>> [mode.name for mode in StateVariable(1.1, rate=100.0).modes()]
+    ['back', 'held', 'forward']
+    """
+
+    kinetic: float
+    rate: float
+    printed: bool = False
+    steepness: float | None = None
+
+    def __post_init__(self) -> None:
+        finite("kinetic", self.kinetic, unit="N", positive=True)
+        finite("rate", self.rate, unit="1/(N s)", positive=True)
+        if self.steepness is not None:
+            finite("steepness", self.steepness, unit="s/m", positive=True)
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """The friction force [N], zero at the start."""
+        return {"theta": {}}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, by the sign of the velocity."""
+        return ("back", "held", "forward") if self.steepness is None else ("slow", "slow", "slow")
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Slip on either side, and the rest in which friction follows the load."""
+        decay = self.kinetic * self.rate
+        pull = decay * (1.0 if self.printed else self.kinetic)
+        if self.steepness is not None:
+            edge = 1 / self.steepness
+            slow = (Exit({"v": 1.0, "1": -edge}, "forward"), Exit({"v": -1.0, "1": -edge}, "back"))
+            rates = {"theta": {"theta": -decay, "v": pull * self.steepness}}
+            return (
+                self._slip("back", -1, decay, pull, edge),
+                Mode("slow", "microstick", 0, {"theta": 1.0}, slow, rates),
+                self._slip("forward", 1, decay, pull, edge),
+            )
+        held = (
+            Exit({"f": 1.0, "theta": -1.0}, "forward"),
+            Exit({"f": -1.0, "theta": 1.0}, "back"),
+            Exit({"df": 1.0, "theta": decay, "1": -pull}, "forward"),
+            Exit({"df": -1.0, "theta": -decay, "1": -pull}, "back"),
+        )
+        return (
+            self._slip("back", -1, decay, pull),
+            Mode("held", "stick", 0, None, held, {"theta": {"df": 1.0}}),
+            self._slip("forward", 1, decay, pull),
+        )
+
+    def _slip(self, name: str, side: int, decay: float, pull: float, edge: float = 0.0) -> Mode:
+        rates = {"theta": {"theta": -decay, "1": side * pull}}
+        stop = Exit({"v": float(-side), "1": edge}, "slow") if edge else Exit({"v": float(-side)}, "held")
+        return Mode(name, "slip", side, {"theta": 1.0}, (stop,), rates)

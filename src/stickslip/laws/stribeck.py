@@ -1,0 +1,162 @@
+"""Rigid contact whose sliding friction follows a smooth curve over the speed; sticking is exact."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from stickslip.errors import ModelError
+from stickslip.laws.base import Exit, finite
+from stickslip.laws.coulomb import held_until
+from stickslip.laws.curved import CurvedMode, Expression, Sliding, exp, symbol
+
+Curve = Callable[[Expression], Expression]
+
+
+def slips_and_stick(curve: Curve, level: float) -> tuple[CurvedMode, ...]:
+    """The modes of a rigid contact: slip on either side with the friction of `curve`, stick up to `level` [N]."""
+    v = symbol("v")
+    return (
+        CurvedMode("back", "slip", -1, -curve(-v), (Exit({"v": 1.0}, "stuck"),)),
+        CurvedMode("stuck", "stick", 0, None, held_until(level)),
+        CurvedMode("forward", "slip", 1, curve(v), (Exit({"v": -1.0}, "stuck"),)),
+    )
+
+
+@dataclass(frozen=True)
+class _Rigid(Sliding):
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, by the sign of the velocity."""
+        return "back", "stuck", "forward"
+
+
+@dataclass(frozen=True)
+class Stribeck(_Rigid):
+    r"""Friction that falls with the speed: :math:`f = f_k + (f_s - f_k) e^{-(|v|/v_s)^\delta} + \sigma |v|` in slip.
+
+    Stribeck's curve in the form of Bo and Pavelescu (Wear 82, 1982); in stick :math:`|f| \le f_s`, held exactly.
+
+    Attributes
+    ----------
+    kinetic : float
+        f_k [N], the level at high speed.
+    static : float
+        f_s [N], the level at rest.
+    speed : float
+        v_s [m/s], the Stribeck speed.
+    exponent : float
+        delta; 2 is Gauss's curve, 1 Tustin's.
+    viscous : float
+        sigma [N s/m].
+
+    Raises
+    ------
+    ModelError
+        A value has no meaning, or `static` is below `kinetic`.
+
+    Examples
+    --------
+    >>> round(Stribeck(1.0, 1.5, speed=0.1).friction(0.1), 6)
+    1.18394
+    """
+
+    kinetic: float
+    static: float
+    speed: float
+    exponent: float = 2.0
+    viscous: float = 0.0
+
+    def __post_init__(self) -> None:
+        finite("kinetic", self.kinetic, unit="N")
+        finite("static", self.static, unit="N")
+        finite("speed", self.speed, unit="m/s", positive=True)
+        finite("exponent", self.exponent, unit="", positive=True)
+        finite("viscous", self.viscous, unit="N s/m")
+        if self.static < self.kinetic:
+            raise ModelError(
+                f"static = {self.static} N below kinetic = {self.kinetic} N",
+                "static friction is at least the kinetic friction",
+                "raise static=",
+            )
+
+    def _curve(self, speed: Expression) -> Expression:
+        fall = exp(-((speed / self.speed) ** self.exponent))
+        return self.kinetic + (self.static - self.kinetic) * fall + self.viscous * speed
+
+    def friction(self, speed: float) -> float:
+        """Friction force while sliding at a speed.
+
+        Parameters
+        ----------
+        speed : float
+            Sliding speed [m/s], not negative.
+
+        Returns
+        -------
+        float
+            Force [N].
+        """
+        return self._curve(symbol("v")).at(v=speed)
+
+    def rates(self) -> tuple[CurvedMode, ...]:
+        """Slip on either side, and stick."""
+        return slips_and_stick(self._curve, self.static)
+
+
+@dataclass(frozen=True)
+class FrictionCurve(_Rigid):
+    """Any smooth curve of friction over the sliding speed, odd in the velocity, with exact sticking.
+
+    Attributes
+    ----------
+    curve : callable
+        Takes the sliding speed as an Expression and returns the friction force [N] as one.
+    static : float or None
+        Largest friction force while stuck [N]; None: the curve at speed 0.
+
+    Raises
+    ------
+    ModelError
+        The curve has no finite value at rest, or `static` is below it.
+
+    Examples
+    --------
+    >>> popp = FrictionCurve(lambda v: 3.0 / (1 + 1.42 * v) + 1.0 + 0.1 * v * v)
+    >>> round(popp.friction(1.0), 6)
+    2.339669
+    """
+
+    curve: Curve = field(repr=False)
+    static: float | None = None
+
+    def __post_init__(self) -> None:
+        rest = finite("curve at rest", self.friction(0.0), unit="N")
+        if self.static is not None and finite("static", self.static, unit="N") < rest:
+            raise ModelError(
+                f"static = {self.static} N below the curve's {rest:g} N at rest",
+                "static friction is at least the friction of the slowest slip",
+                "raise static=, or leave it out to take the curve's own",
+            )
+
+    def friction(self, speed: float) -> float:
+        """Friction force while sliding at a speed.
+
+        Parameters
+        ----------
+        speed : float
+            Sliding speed [m/s], not negative.
+
+        Returns
+        -------
+        float
+            Force [N].
+        """
+        if not math.isfinite(speed):
+            raise ModelError(f"speed = {speed} m/s", "a speed is finite", "correct it")
+        return self.curve(symbol("v")).at(v=speed)
+
+    def rates(self) -> tuple[CurvedMode, ...]:
+        """Slip on either side, and stick."""
+        return slips_and_stick(self.curve, self.friction(0.0) if self.static is None else self.static)

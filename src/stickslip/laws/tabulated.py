@@ -1,0 +1,118 @@
+"""Any friction-velocity curve as a table: straight lines between its points, each solved exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip.errors import ModelError
+from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+from stickslip.laws.coulomb import held_until
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """Rigid contact whose friction follows a polygon over the sliding speed, odd in the velocity.
+
+    Beyond the last speed the force stays as it is there.
+
+    Attributes
+    ----------
+    speeds : tuple of float
+        Sliding speeds [m/s], increasing, the first one 0.
+    forces : tuple of float
+        Friction force at each speed [N].
+    static : float or None
+        Largest friction force while stuck [N]; None: the force at speed 0.
+    error : float
+        Largest distance [N] to the smooth curve the table stands for; 0 where the table is the law.
+
+    Examples
+    --------
+    >>> stribeck = Tabulated.of(lambda v: 1.0 + 0.5 * 2.718281828 ** -(v / 0.1), np.linspace(0, 0.5, 101))
+    >>> len(stribeck.modes()), round(stribeck.error, 6)
+    (203, 0.000152)
+    """
+
+    speeds: Sequence[float]
+    forces: Sequence[float]
+    static: float | None = None
+    error: float = 0.0
+
+    def __post_init__(self) -> None:
+        speeds, forces = tuple(map(float, self.speeds)), tuple(map(float, self.forces))
+        if len(speeds) < 2 or len(speeds) != len(forces):
+            raise ModelError(
+                f"{len(speeds)} speeds, {len(forces)} forces",
+                "two points at least, a force for each speed",
+                "complete it",
+            )
+        if speeds[0] != 0 or not all(a < b for a, b in pairwise(speeds)):
+            raise ModelError(
+                "the speeds do not increase from 0", "a friction curve starts at 0 and is sorted", "sort it"
+            )
+        for force in forces:
+            finite("forces", force, unit="N")
+        finite("speeds", speeds[-1], unit="m/s")
+        static_level(self.static, forces[0])
+        object.__setattr__(self, "speeds", speeds)
+        object.__setattr__(self, "forces", forces)
+
+    @classmethod
+    def of(cls, curve: Callable[[float], float], speeds: Sequence[float], static: float | None = None) -> Tabulated:
+        """The polygon through a smooth curve, with its largest distance from it.
+
+        Parameters
+        ----------
+        curve : callable
+            Friction force [N] at a speed [m/s].
+        speeds : sequence of float
+            Where the polygon meets the curve.
+        static : float, optional
+            As in the class.
+
+        Returns
+        -------
+        Tabulated
+        """
+        points = [float(v) for v in speeds]
+        forces = [float(curve(v)) for v in points]
+        fine = np.concatenate([np.linspace(a, b, 33) for a, b in pairwise(points)])
+        error = float(np.max(np.abs([curve(float(v)) for v in fine] - np.interp(fine, points, forces))))
+        return cls(points, forces, static, error)
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """None."""
+        return {}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, by the sign of the velocity."""
+        return "back 0", "stuck", "forward 0"
+
+    def modes(self) -> tuple[Mode, ...]:
+        """A mode for each straight piece on either side, and stick."""
+        stuck = Mode("stuck", "stick", 0, None, held_until(static_level(self.static, self.forces[0]), back="back 0",
+                                                           forward="forward 0"))  # fmt: skip
+        return (*self._side(-1, "back"), stuck, *self._side(1, "forward"))
+
+    def _side(self, side: int, name: str) -> list[Mode]:
+        found = []
+        last = len(self.speeds) - 1
+        for j in range(last + 1):
+            low, high = self.speeds[j], self.speeds[min(j + 1, last)]
+            slope = (self.forces[j + 1] - self.forces[j]) / (high - low) if j < last else 0.0
+            friction = {"1": side * (self.forces[j] - slope * low), "v": slope}
+            slower = Exit({"v": -side, "1": low}, f"{name} {j - 1}") if j else Exit({"v": float(-side)}, "stuck")
+            faster = (Exit({"v": float(side), "1": -high}, f"{name} {j + 1}"),) if j < last else ()
+            found.append(Mode(f"{name} {j}", "slip", side, friction, (slower, *faster)))
+        return found

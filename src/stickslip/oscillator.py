@@ -1,0 +1,88 @@
+"""The oscillator: a mass on a spring, with what moves it and what it rubs on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from stickslip.drives import Drive, Release
+from stickslip.errors import ModelError
+from stickslip.laws.base import Law, finite
+
+
+@dataclass(frozen=True)
+class Oscillator:
+    r"""One mass: :math:`m\ddot x + c\,(\dot x - \dot d) + k\,(x - z) + f = P(t)`, z the spring's end, d the damper's.
+
+    Attributes
+    ----------
+    mass : float
+        m [kg].
+    stiffness : float
+        k [N/m]; zero: no spring.
+    law : Law
+        Friction law of the contact.
+    drive : Drive
+        What moves; nothing (free decay) where left out.
+    damping : float
+        c [N s/m]; negative: a self-excited oscillator.
+    damper : {"ground", "base"}
+        What the damper's other end is fixed to.
+
+    Raises
+    ------
+    ModelError
+        A value has no meaning.
+
+    Examples
+    --------
+    >>> from stickslip.laws.coulomb import Coulomb
+    >>> slider = Oscillator(mass=2.42, stiffness=2310, law=Coulomb(1.1))
+    >>> round(slider.frequency, 3), slider.having(kinetic=1.28, mass=3.0).law
+    (4.917, Coulomb(kinetic=1.28, static=None))
+    """
+
+    mass: float
+    stiffness: float
+    law: Law
+    drive: Drive = field(default_factory=Release)
+    damping: float = 0.0
+    damper: str = "ground"
+
+    def __post_init__(self) -> None:
+        finite("mass", self.mass, unit="kg", positive=True)
+        finite("stiffness", self.stiffness, unit="N/m")
+        finite("damping", self.damping, unit="N s/m", signed=True)
+        if self.damper not in ("ground", "base"):
+            raise ModelError(
+                f"damper = '{self.damper}'", "the damper is fixed to the 'ground' or the 'base'", "choose one"
+            )
+
+    @property
+    def frequency(self) -> float:
+        """Natural frequency without friction and damping [Hz]."""
+        return math.sqrt(self.stiffness / self.mass) / (2 * math.pi)
+
+    def having(self, **changes: Any) -> Oscillator:
+        """The same oscillator with other values; a name is looked for in the oscillator, its law, then its drive.
+
+        Parameters
+        ----------
+        **changes
+            New values by name (``mass=3.0, kinetic=1.28, frequency=5.61``).
+
+        Returns
+        -------
+        Oscillator
+        """
+        parts: dict[str, dict[str, Any]] = {"": {}, "law": {}, "drive": {}}
+        owners = {"drive": self.drive, "law": self.law, "": self}
+        place = {f.name: part for part, owner in owners.items() for f in fields(owner)}  # type: ignore[arg-type]
+        for name, value in changes.items():
+            if name not in place:
+                raise ModelError(f"no parameter is called '{name}'", f"it is one of {', '.join(place)}", "correct it")
+            parts[place[name]][name] = value
+        law, drive = parts[""].get("law", self.law), parts[""].get("drive", self.drive)
+        inner = {"law": replace(law, **parts["law"]), "drive": replace(drive, **parts["drive"])}
+        return replace(self, **{**parts[""], **inner})

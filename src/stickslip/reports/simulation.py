@@ -1,0 +1,295 @@
+"""What is told of a simulated run: sentences, a table, the events; and the folder that holds it all."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip import scenarios
+from stickslip.errors import ModelError
+from stickslip.files.write import WRITERS, write_record
+from stickslip.plot.figures import figures
+from stickslip.plot.style import prefixed
+from stickslip.plot.trajectory import cycle_of, last_cycles
+from stickslip.reports.folder import results_folder, write_figures
+from stickslip.solve.automaton import Automaton
+from stickslip.solve.curved import CurvedTrajectory
+from stickslip.solve.energy import energy
+from stickslip.solve.simulate import simulate
+from stickslip.solve.trajectory import Event, Trajectory
+from stickslip.system_file import Case
+
+A_PERIOD = 200  # samples of the record in the shortest period of drive, system or contact
+MOST_ROWS = 200_000  # of a record whose rate was not asked for
+REFUSED_ROWS = 100_000_000
+MOST_PIECES = 200_000  # of a run whose energy is integrated: beyond, it takes longer than the run
+MOST_TOLD = 10_000  # events in JSON; events.csv has them all
+PEAKS = 4001  # instants looked at for the largest values of the last cycle
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """A run and what is told of it.
+
+    Attributes
+    ----------
+    case : Case
+        What was run.
+    run : Trajectory
+        The motion.
+    sentences : tuple of str
+        What happened, in words.
+    values : mapping of str to (float, str)
+        Quantities with their SI units.
+    known : mapping of str to mapping
+        Of a scenario as it is named: the answers "known" and "found".
+    """
+
+    case: Case
+    run: Trajectory
+    sentences: tuple[str, ...]
+    values: Mapping[str, tuple[float, str]]
+    known: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """The quantities as text, in readable units."""
+        return [(name, _text(value, unit)) for name, (value, unit) in self.values.items()]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: SI numbers, None where a number does not exist."""
+        system = self.case.system
+        events = self.run.events
+        parts = {"system": system, "law": system.law, "drive": system.drive}
+        return {
+            "name": self.case.name,
+            "about": self.case.about,
+            "status": self.run.status,
+            **{part: {"name": type(thing).__name__, **_fields(thing)} for part, thing in parts.items()},
+            "start": dict(self.case.start),
+            "run": dict(self.case.run),
+            "quantities": [
+                {"name": name, "value": _plain(value), "unit": unit} for name, (value, unit) in self.values.items()
+            ],
+            "known_answers": _plain(self.known),
+            "event_count": len(events),
+            "events": [event._asdict() for event in events[:MOST_TOLD]],
+        }
+
+
+def outcome(case: Case) -> Outcome:
+    """Run a case, and say what happened.
+
+    Parameters
+    ----------
+    case : Case
+        As :func:`read_system` or :func:`scenario_case` gives it.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    SolveError
+        The run can not go on, or can not be trusted.
+    ModelError
+        The run has no length.
+
+    Examples
+    --------
+    >>> from stickslip.system_file import scenario_case
+    >>> outcome(scenario_case("FD-4")).sentences[0]
+    'The mass comes to rest after 3.142 s, at a displacement of 250 mm.'
+    """
+    run = simulate(case.system, start=case.start, **case.run)  # type: ignore[arg-type]
+    found = scenarios.answers(scenarios.get(case.name)) if case.known else {}
+    known = {question: {"known": case.known[question], "found": found[question]} for question in found}
+    values = _values(run)
+    return Outcome(case, run, tuple(_sentences(run, values)), values, known)
+
+
+def default_rate(run: Trajectory) -> float:
+    """A sampling rate [Hz] that shows the fastest of drive, system and contact, on a round number."""
+    fastest = max(
+        (1 / cycle_of(run), *(tone[2] / (2 * math.pi) for tone in run.table.motion.tones), _fastest_contact(run) / 8)
+    )
+    wanted = A_PERIOD * fastest
+    size = 10.0 ** math.floor(math.log10(wanted))
+    rate = next(step * size for step in (1, 2, 5, 10) if step * size >= wanted * (1 - 1e-9))
+    return min(rate, MOST_ROWS / run.duration)
+
+
+def publish_run(
+    result: Outcome,
+    *,
+    folder: str | Path,
+    fs: float | None = None,
+    form: str = "csv",
+    animation: str | None = None,
+    tell: Callable[[str, float], None] = lambda words, done: None,
+) -> Path:
+    """Write a run into a folder: results.json, events.csv, the sampled record, the figures, and a moving picture.
+
+    The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
+    is left alone.
+
+    Parameters
+    ----------
+    result : Outcome
+        The run.
+    folder : path
+        The folder to make.
+    fs : float, optional
+        Sampling rate of the record [Hz]; that of the case, or one fine enough for the motion.
+    form : {"csv", "h5", "parquet"}
+        Format of the record.
+    animation : {"gif", "mp4"}, optional
+        A moving picture beside the figures.
+    tell : callable
+        Called before each part of the work with a few words and how many parts are done; the run counts as one.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ModelError
+        A format is not known, the record would be too long, or the folder holds something that is not ours.
+    RecordError
+        The folder can not be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from stickslip.system_file import scenario_case
+    >>> folder = publish_run(outcome(scenario_case("FD-4")), folder=Path(tempfile.mkdtemp()) / "decay")
+    >>> sorted(path.name for path in folder.iterdir())
+    ['events.csv', 'figures', 'record.csv', 'results.json']
+    """
+    run = result.run
+    rate = check_output(run, fs=fs or result.case.fs, form=form, animation=animation)
+    with results_folder(Path(folder), {**result.to_dict(), "fs": rate}) as draft:
+        tell("writing the record", 1)
+        write_record(run.record(fs=rate), draft / f"record.{form}")
+        (draft / "events.csv").write_text(_events_text(run), encoding="utf-8")
+        tell("drawing the figures", 2)
+        (draft / "figures").mkdir()
+        write_figures(draft / "figures", "", figures(run))
+        if animation is not None:
+            from stickslip.plot.animation import animate
+
+            animate(run, draft / f"animation.{animation}", tell=lambda n, of: tell("animating", 3 + n / of))
+    return Path(folder)
+
+
+def _events_text(run: Trajectory) -> str:
+    headings = ",".join(["time [s]", *Event._fields[1:]])
+    return "\n".join([headings, *(",".join(map(str, event)) for event in run.events)]) + "\n"
+
+
+def check_output(run: Trajectory, *, fs: float | None, form: str, animation: str | None) -> float:
+    """The sampling rate, once everything asked for can be written."""
+    if f".{form}" not in WRITERS:
+        raise ModelError(f"a record as '{form}'", f"it is written as {', '.join(w[1:] for w in WRITERS)}", "choose one")
+    if animation is not None:
+        from stickslip.plot.animation import require_writer
+
+        require_writer(f".{animation}")
+    rate = default_rate(run) if fs is None else fs
+    if not (math.isfinite(rate) and rate > 0 and rate * run.duration <= REFUSED_ROWS):
+        raise ModelError(
+            f"fs = {rate:g} Hz over {run.duration:g} s",
+            f"a record has at most {REFUSED_ROWS:g} rows, at a positive rate",
+            "give a lower --fs or a shorter run",
+        )
+    return rate
+
+
+def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
+    cycle = cycle_of(run)
+    first, last = last_cycles(run, 1)
+    times = np.linspace(first, last, PEAKS)
+    (x, v), _ = run.sample(times, ("x", "v"))
+    values = {
+        "simulated time": (run.duration, "s"),
+        "cycles": (run.duration / cycle, "1"),
+        "events": (float(np.count_nonzero(run.exits[:-1] >= 0)), "1"),
+        **{f"share of time in {kind}": (share, "1") for kind, share in _shares(run).items()},
+        "displacement, from": (float(x.min()), "m"),
+        "displacement, to": (float(x.max()), "m"),
+        "largest speed": (float(np.abs(v).max()), "m/s"),
+    }
+    if len(run.modes) <= MOST_PIECES and isinstance(run.table, Automaton):  # a closed form to integrate
+        work = energy(run)
+        values["work against friction"] = (work.friction, "J")
+        values["energy unaccounted for, relative"] = (work.residual, "1")
+    return values
+
+
+def _shares(run: Trajectory) -> dict[str, float]:
+    kinds = [mode.kind for mode in run.table.modes]
+    spent = np.bincount(run.modes, weights=run.durations, minlength=len(kinds)) / run.duration
+    shares = {
+        kind: float(sum(s for s, k in zip(spent, kinds, strict=True) if k == kind)) for kind in dict.fromkeys(kinds)
+    }
+    return {kind: shares[kind] for kind in ("slip", "microstick", "stick") if kind in shares}
+
+
+def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list[str]:
+    found = []
+    if run.status == "interrupted":
+        found.append(f"Interrupted: the run holds the {_text(run.duration, 's')} simulated until then.")
+    if run.status == "at rest":
+        place = _text(float(run.state(run.duration)["x"]), "m")
+        found.append(f"The mass comes to rest after {_text(float(run.starts[-1]), 's')}, at a displacement of {place}.")
+    else:
+        low, high, speed = (_text(*values[n]) for n in ("displacement, from", "displacement, to", "largest speed"))
+        found.append(f"In the last cycle the mass moves between {low} and {high}, at up to {speed}.")
+    counts = Counter(event.kind for event in run.events)
+    if counts:
+        told = ", ".join(f"{count} × {kind}" for kind, count in counts.most_common())
+        found.append(f"On the way the contact changes {sum(counts.values())} times: {told}.")
+    elif len(run.modes) == 1:
+        found.append("The contact never changes its mode.")
+    return found
+
+
+def _fastest_contact(run: Trajectory) -> float:
+    """The highest frequency at which a mode rings [Hz]; under a curved law, as its steps tell."""
+    if isinstance(run, CurvedTrajectory):
+        return 1 / (2 * math.pi * float(np.median(run.step_lengths)))
+    return max(float(np.abs(np.linalg.eigvals(flow).imag).max()) for flow in run.table.flow) / (2 * math.pi)
+
+
+def _fields(thing: Any) -> dict[str, Any]:
+    values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.name not in ("law", "drive")}
+    return {name: _plain(np.size(value) if name == "samples" else value) for name, value in values.items()}
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it."""
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value
+
+
+def _text(value: float, unit: str) -> str:
+    """Four figures in a readable unit."""
+    if not math.isfinite(value):
+        return "unknown"
+    factor, text = prefixed(value, unit)
+    shown = factor * value
+    figures = f"{shown:.4g}" if abs(shown) < 1e4 else f"{shown:.0f}" if abs(shown) < 1e9 else f"{shown:.3e}"
+    return figures if text == "1" else f"{figures} {text}"

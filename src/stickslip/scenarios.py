@@ -1,0 +1,247 @@
+"""Named systems with known answers: for tests, documentation, the command line, and every other engine."""
+
+from __future__ import annotations
+
+import functools
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from stickslip.drives import Belt, HarmonicBase, HarmonicForce, MultiTone, Ramp, RecordedBase, Release
+from stickslip.errors import ModelError
+from stickslip.laws.compliant import CompliantContact
+from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.dahl import Dahl
+from stickslip.laws.elastoslip import ElastoSlip
+from stickslip.laws.inertial import InertialContact
+from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.lugre import LuGre
+from stickslip.laws.position_load import PositionLoad
+from stickslip.laws.rate_state import RateState
+from stickslip.laws.smooth_state import SmoothStateVariable
+from stickslip.laws.state_variable import StateVariable
+from stickslip.laws.stribeck import Stribeck
+from stickslip.laws.tabulated import Tabulated
+from stickslip.oscillator import Oscillator
+from stickslip.solve.periodic import SteadyState, steady_state
+from stickslip.solve.simulate import simulate
+from stickslip.solve.trajectory import Trajectory
+
+LAWS: dict[str, Callable[..., Any]] = {
+    "Coulomb": Coulomb, "CompliantContact": CompliantContact, "LinearSlope": LinearSlope, "Tabulated": Tabulated,
+    "StateVariable": StateVariable, "InertialContact": InertialContact, "ElastoSlip": ElastoSlip,
+    "PositionLoad": PositionLoad, "Stribeck": Stribeck, "Dahl": Dahl, "LuGre": LuGre, "RateState": RateState,
+    "SmoothStateVariable": SmoothStateVariable,
+}  # fmt: skip
+DRIVES: dict[str, Callable[..., Any]] = {
+    "Release": Release, "HarmonicBase": HarmonicBase, "HarmonicForce": HarmonicForce, "MultiTone": MultiTone,
+    "Belt": Belt, "Ramp": Ramp, "RecordedBase": RecordedBase,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A system and what is known of its motion.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    about : str
+        What it is and where it comes from.
+    system : Oscillator
+        What moves.
+    start : mapping
+        State at time 0, as ``simulate`` takes it.
+    run : mapping
+        ``duration=`` or ``cycles=`` of a run; empty where the steady state is asked.
+    known : mapping
+        Answers by name: numbers (SI), lists of numbers, or words.
+    tolerance : float
+        Relative agreement that the reference supports.
+    """
+
+    name: str
+    about: str
+    system: Oscillator
+    start: Mapping[str, float]
+    run: Mapping[str, float]
+    known: Mapping[str, Any]
+    tolerance: float
+
+
+def names() -> tuple[str, ...]:
+    """Which scenarios are there?
+
+    Returns
+    -------
+    tuple of str
+
+    Examples
+    --------
+    >>> "FD-4" in names()
+    True
+    """
+    return tuple(name for name, entry in _table().items() if "system" in entry)
+
+
+def get(name: str) -> Scenario:
+    """One scenario.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`names`.
+
+    Returns
+    -------
+    Scenario
+
+    Raises
+    ------
+    ModelError
+        No scenario has that name.
+
+    Examples
+    --------
+    >>> get("FD-4").system.law
+    Coulomb(kinetic=1.0, static=None)
+    """
+    if name not in names():
+        raise ModelError(f"no scenario is called '{name}'", f"there are {', '.join(names())}", "choose one")
+    entry = _table()[name]
+    law, drive = dict(entry["law"]), dict(entry.get("drive", {"name": "Release"}))
+    system = Oscillator(**entry["system"], law=LAWS[law.pop("name")](**law), drive=DRIVES[drive.pop("name")](**drive))
+    return Scenario(name, entry["about"], system, entry.get("start", {}), entry.get("run", {}), entry["known"],
+                    entry.get("tolerance", 1e-10))  # fmt: skip
+
+
+def answers(scenario: Scenario) -> dict[str, Any]:
+    """What does the engine say to the questions whose answers are known?
+
+    Parameters
+    ----------
+    scenario : Scenario
+        One of them.
+
+    Returns
+    -------
+    dict
+        As `known`, from the engine.
+
+    Examples
+    --------
+    >>> answers(get("FD-4"))["half_cycles"]
+    2
+    """
+    if scenario.run:
+        motion = simulate(scenario.system, start=scenario.start, **scenario.run)  # type: ignore[arg-type]
+        return {question: OF_RUNS[question](motion) for question in scenario.known}
+    orbit = steady_state(scenario.system, start=scenario.start)
+    return {question: OF_ORBITS[question](orbit) for question in scenario.known}
+
+
+def grid(name: str) -> dict[str, Any]:
+    """A table of known answers over two parameters.
+
+    Parameters
+    ----------
+    name : str
+        "HL-1" (stops per cycle over frequency ratio and friction) or "DH-2" (the non-stop boundary).
+
+    Returns
+    -------
+    dict
+        Lists of numbers by name.
+
+    Examples
+    --------
+    >>> len(grid("HL-1")["ratios"]), len(grid("HL-1")["loads"])
+    (18, 11)
+    """
+    grids = {key: entry for key, entry in _table().items() if "system" not in entry}
+    if name not in grids:
+        raise ModelError(f"no grid is called '{name}'", f"there are {', '.join(grids)}", "choose one")
+    return dict(grids[name])
+
+
+def forced(ratio: float, load: float, *, damping_ratio: float = 0.0, static_ratio: float = 1.0) -> Oscillator:
+    """The oscillator of the classical literature: unit mass, stiffness and force.
+
+    Parameters
+    ----------
+    ratio : float
+        b, driving over natural frequency.
+    load : float
+        r, friction over the force's amplitude.
+    damping_ratio : float
+        Viscous damping ratio.
+    static_ratio : float
+        Static over kinetic friction.
+
+    Returns
+    -------
+    Oscillator
+
+    Examples
+    --------
+    >>> forced(0.8, 0.5).law.kinetic
+    0.5
+    """
+    law = Coulomb(load, None if static_ratio == 1 else static_ratio * load)
+    drive = HarmonicForce(1.0, ratio / (2 * math.pi))
+    return Oscillator(mass=1, stiffness=1, law=law, drive=drive, damping=2 * damping_ratio)
+
+
+@functools.cache
+def _table() -> dict[str, Any]:
+    text = resources.files("stickslip").joinpath("data/scenarios.toml").read_text("utf-8")
+    return tomllib.loads(text)
+
+
+def _lengths(motion: Trajectory, kinds: tuple[str, ...]) -> list[float]:
+    """Durations of the pieces between two events, by kind of mode."""
+    modes = motion.table.modes
+    return [float(d) for d, m in zip(motion.durations[1:-1], motion.modes[1:-1], strict=True) if modes[m].kind in kinds]
+
+
+def _around(orbit: SteadyState, kinds: tuple[str, ...]) -> list[float]:
+    """Durations around the orbit: the piece that the start of the period cuts is put together."""
+    motion, modes = orbit.orbit, orbit.orbit.table.modes
+    if motion.modes[0] != motion.modes[-1] or len(motion.modes) == 1:
+        return _lengths(motion, kinds) + [
+            float(motion.durations[j]) for j in {0, len(motion.modes) - 1} if modes[motion.modes[j]].kind in kinds
+        ]
+    whole = [float(motion.durations[0] + motion.durations[-1])] if modes[motion.modes[0]].kind in kinds else []
+    return _lengths(motion, kinds) + whole
+
+
+def _extrema(motion: Trajectory) -> list[float]:
+    return [float(state[0]) for state in motion.states]
+
+
+OF_ORBITS: dict[str, Callable[[SteadyState], Any]] = {
+    "status": lambda orbit: orbit.status,
+    "amplitude": lambda orbit: orbit.amplitude,
+    "v_max": lambda orbit: orbit.largest("v"),
+    "a_max": lambda orbit: orbit.largest("a"),
+    "period": lambda orbit: orbit.period,
+    "stops": lambda orbit: list(orbit.stops),
+    "transition_speed": lambda orbit: orbit.transition_speed,
+    "multiplier": lambda orbit: float(abs(orbit.multipliers[0])),
+    "multiplier_product": lambda orbit: float(np.prod(orbit.multipliers).real),
+    "slips": lambda orbit: _around(orbit, ("slip",)),
+    "sticks": lambda orbit: _around(orbit, ("stick", "microstick")),
+}
+OF_RUNS: dict[str, Callable[[Trajectory], Any]] = {
+    "half_cycles": lambda motion: len(motion.events),
+    "rest": lambda motion: motion.state(motion.duration)["x"],
+    "stop_time": lambda motion: motion.events[-1].time,
+    "extrema": _extrema,
+    "stuck_positions": lambda motion: [p.state["x"] for p in motion.pieces if p.mode == "stuck"],
+}

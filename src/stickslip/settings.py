@@ -1,0 +1,146 @@
+"""Files of settings: TOML read key by key, each mistake one sentence with its line and the keys that are known."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+
+from stickslip.errors import ModelError, RecordError
+from stickslip.units import parse_value
+
+STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+Settings = TypeVar("Settings", bound=BaseModel)
+
+
+def quantity(unit: str) -> BeforeValidator:
+    """A number in `unit`, or text with its own unit ("3.08 kg")."""
+
+    def read(value: object) -> object:
+        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+            raise ValueError(f"a number in {unit}, or text like '2.5 {unit}', is needed")
+        try:
+            return parse_value(value, unit)
+        except RecordError as error:
+            raise ValueError(str(error).rstrip(".")) from error
+
+    return BeforeValidator(read)
+
+
+def read_toml(path: Path, *, what: str) -> tuple[dict[str, Any], list[str]]:
+    """The values of a TOML file, and its lines, so that a message can name one; `what` it holds is for the message."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        return tomllib.loads(text), text.splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise ModelError(f"{path.name} can not be read ({reason})", f"{what} a TOML file", "check the path") from error
+    except tomllib.TOMLDecodeError as error:
+        raise _not_toml(path.name, text, str(error)) from error
+
+
+def checked(
+    model: type[Settings], values: Mapping[str, Any], *, source: str, lines: Sequence[str] = (), table: str = ""
+) -> Settings:
+    """`values` as `model` has them; the first fault found is told in one sentence.
+
+    Parameters
+    ----------
+    model : subclass of BaseModel
+        The keys known.
+    values : mapping
+        Plain data.
+    source : str
+        Where it comes from, for the message.
+    lines : sequence of str
+        The text it was read from, so that the message can name the line.
+    table : str
+        The table of the file that holds the values; "" for the top.
+
+    Returns
+    -------
+    BaseModel
+
+    Raises
+    ------
+    ModelError
+        An unknown key, or a value that has no meaning.
+
+    Examples
+    --------
+    >>> class Spring(BaseModel):
+    ...     model_config = STRICT
+    ...     stiffness: float
+    >>> checked(Spring, {"stiffness": 3}, source="spring.toml").stiffness
+    3.0
+    """
+    try:
+        return model.model_validate(dict(values))
+    except ValidationError as error:
+        faults = error.errors(include_url=False, include_context=False)
+        first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")  # a typo explains what is missing
+        path = [str(part) for part in first["loc"] if not str(part).startswith("function-")]
+        within = [table, *path] if table else path
+        where = f"{source}{line_of(within, lines)}"
+        inner = path[:2] if isinstance(values.get(path[0]), Mapping) else path[:1]
+        key = ".".join([table, *inner] if table else inner)
+        if first["type"] == "extra_forbidden":
+            known = model.model_fields
+            raise ModelError(
+                f"{where} has the key '{key}'", f"the keys known are {', '.join(known)}", nearest(path[0], known)
+            ) from error
+        if first["type"] == "missing":
+            raise ModelError(f"{where} has no {key}", f"{key} is needed", f"add {path[0]} = VALUE") from error
+        raise ModelError(
+            f"{where} sets {key} = {first['input']!r}",
+            first["msg"].removeprefix("Value error, ").replace("Input should", "it should"),
+            f"correct {key}",
+        ) from error
+
+
+def line_of(path: Sequence[str], lines: Sequence[str]) -> str:
+    """ ", line N," of the innermost key of `path` that the text shows."""
+    found, first, last = None, 0, len(lines)
+    for depth, key in enumerate(path):
+        dotted = r"\s*\.\s*".join(rf"""["']?{re.escape(part)}["']?""" for part in path[: depth + 1])
+        alone = rf"""["']?{re.escape(key)}["']?"""
+        pattern = re.compile(rf"^\s*(\[\s*)?(?:{dotted}|{alone})\s*[\]=.]")
+        number = next((n for n in range(first, last) if pattern.match(lines[n])), None)
+        if number is None:
+            continue
+        found = number
+        if lines[number].lstrip().startswith("["):  # the keys of a table stand between its heading and the next one
+            first = number + 1
+            last = next((n for n in range(first, len(lines)) if lines[n].lstrip().startswith("[")), len(lines))
+    return "" if found is None else f", line {found + 1},"
+
+
+def nearest(key: str, known: Iterable[str]) -> str:
+    """What was perhaps meant by a key that is not known."""
+    close = difflib.get_close_matches(key, list(known), n=1, cutoff=0.5)
+    return f"perhaps {close[0]} is meant" if close else "remove it or correct its name"
+
+
+def _not_toml(name: str, text: str, reason: str) -> ModelError:
+    found = re.search(r"line (\d+)", reason)
+    lines = text.splitlines()
+    number = int(found[1]) if found else len(lines)
+    line = lines[number - 1].strip() if 0 < number <= len(lines) else ""
+    bare_point = re.search(r"(?:^|[=\[,\s])([-+]?)\.(\d+)", line)
+    if bare_point:
+        sign, digits = bare_point.groups()
+        return ModelError(
+            f"{name}, line {number}: '{line}'",
+            f"TOML does not take a number like {sign}.{digits}",
+            f"write {sign}0.{digits}",
+        )
+    return ModelError(
+        f"{name}, line {number}: '{line}'",
+        f"this is not TOML ({re.sub(r' ?[(]at .*[)]', '', reason)})",
+        "write KEY = VALUE, with text in quotes",
+    )

@@ -1,0 +1,1 @@
+"""The exact solver: closed forms between events, first exits that are certified."""

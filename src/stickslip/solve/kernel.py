@@ -1,0 +1,334 @@
+"""The compiled march through the mode tables: plain scalar loops on arrays the caller owns, no allocation.
+
+The same functions run on the CPU and, called from a CUDA kernel, on a GPU.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from stickslip.solve.phasors import HISTORY, glide
+from stickslip.solve.roots import NOISE, NONE, OPTIONS, first_rise, opening_order
+
+DONE, FULL, CHATTER, LOST = 0, 1, 2, 3
+CHAIN = 64  # transitions without time in between before a run is given up
+
+
+@njit(**OPTIONS)
+def set_tones(tones, state, time):
+    """Keep the turning signals of the drive true.
+
+    One tone is put where it is at `time`, which stays within its period. Several have no period in common: each is
+    only brought back to unit length, because far from zero a time no longer tells its phase to the last digit.
+    """
+    for j in range(tones.shape[0]):
+        c, s = int(tones[j, 0]), int(tones[j, 1])
+        if tones.shape[0] == 1:
+            angle = tones[j, 2] * time + tones[j, 3]
+            state[c], state[s] = math.cos(angle), math.sin(angle)
+        else:
+            length = 1.5 - 0.5 * (state[c] * state[c] + state[s] * state[s])
+            state[c] *= length
+            state[s] *= length
+
+
+@njit(**OPTIONS)
+def multiply(matrix, state, out):
+    """out = matrix state."""
+    n = state.shape[0]
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += matrix[i, j] * state[j]
+        out[i] = total
+
+
+@njit(**OPTIONS)
+def advance(flow, state, time, work):
+    """state = exp(flow time) state by the Taylor series, for a time within one cell; `work` is (2, N)."""
+    n = state.shape[0]
+    for i in range(n):
+        work[0, i] = state[i]
+    for k in range(1, 24):
+        scale = time / k
+        for i in range(n):
+            total = 0.0
+            for j in range(n):
+                total += flow[i, j] * work[0, j]
+            work[1, i] = total * scale
+        small = True
+        for i in range(n):
+            work[0, i] = work[1, i]
+            before = state[i]
+            state[i] = before + work[1, i]
+            small = small and state[i] == before
+        if small and k > 4:
+            break
+
+
+@njit(**OPTIONS)
+def expand(series, state, scale, cell, c, noise):
+    """Coefficients of an exit in the cell ahead, with the rounding noise of each.
+
+    An entry of the state carries the rounding of what it was a moment ago (`scale`), though it be next to zero now.
+    """
+    power = 1.0
+    for k in range(series.shape[0]):
+        total, size = 0.0, 0.0
+        for j in range(state.shape[0]):
+            total += series[k, j] * state[j]
+            size += abs(series[k, j]) * max(scale[j], abs(state[j]))
+        c[k] = total * power
+        noise[k] = NOISE * size * power
+        power *= cell / (k + 1)
+
+
+@njit(**OPTIONS)
+def settle(tables, mode, state, scale, cell, work, c, noise):
+    """Take every exit that is due at once; returns the mode in which time passes, or -1 if the chain does not end."""
+    _, _, _, series, target, crossing, reset, first, _ = tables
+    for _ in range(CHAIN):
+        fired = -1
+        for e in range(first[mode], first[mode + 1]):
+            if crossing[e]:
+                continue
+            expand(series[e], state, scale, cell, c, noise)
+            order = opening_order(c, noise, c.shape[0])
+            if order < c.shape[0] and c[order] > 0.0:
+                fired = e
+                break
+        if fired < 0:
+            return mode
+        multiply(reset[fired], state, work[0])
+        for i in range(state.shape[0]):
+            state[i] = work[0, i]
+        mode = target[fired]
+    return -1
+
+
+@njit(**OPTIONS)
+def next_exit(tables, mode, state, scale, opened, armed, span, c, noise):
+    """The first exit within `span` [s] of the cell ahead: (time, exit, armed), or (-1, -1, armed).
+
+    `opened` is true in the first cell of a piece, where roots at the very start are the way in, not the way out.
+    `armed` has a bit for each exit that has been below zero, so that a crossing at the seam of two cells is seen.
+    """
+    _, cells, _, series, _, crossing, _, first, _ = tables
+    cell = min(cells[mode], span)
+    best, which = NONE, -1
+    count = c.shape[0]
+    for e in range(first[mode], first[mode + 1]):
+        expand(series[e], state, scale, cell, c, noise)
+        low = opening_order(c, noise, count) if opened else 0
+        if low == count:
+            continue
+        limit = min(1.0, best)
+        start = 0.0
+        bit = 1 << (e - first[mode])
+        if c[low] < -noise[low]:
+            armed |= bit
+        elif c[low] > 0.0:
+            if opened or (crossing[e] and not armed & bit):
+                # above zero by the rule of the crossing, or by rounding on the tie: wait for it to fall first
+                start = first_rise(c, noise, count, low, -1.0, 0.0, limit)
+                if start == NONE:
+                    continue
+                start = min(limit, start + 1e-12)
+            elif c[low] > noise[low]:
+                return 0.0, e, armed
+        root = first_rise(c, noise, count, low, 1.0, start, limit)
+        if root < best:
+            best, which = root, e
+    return (best * cell, which, armed) if which >= 0 else (-1.0, -1, armed)
+
+
+@njit(**OPTIONS)
+def march(tables, fast, clock, state, mode, limit, period, past, out, work):
+    """March until `limit` or until the buffers are full.
+
+    Parameters
+    ----------
+    tables : tuple of arrays
+        See :class:`stickslip.solve.automaton.Automaton`.
+    fast : tuple of arrays
+        See :class:`stickslip.solve.phasors.Phasors`; with an empty table of nodes there is no fast path.
+    clock : ndarray (3,)
+        Laps of the drive, time [s] within the lap, its compensation; updated.
+    state : ndarray (N,)
+        Updated.
+    mode : int
+        Mode in which time passes (settled).
+    limit : tuple of (float, float)
+        Laps and time within the lap at which the march ends.
+    period : float
+        Period of the drive [s]; infinite where there is none.
+    past : tuple of arrays
+        Ring of pieces gone by, see :func:`stickslip.solve.phasors.glide`.
+    out : tuple of arrays
+        Laps, times, modes, durations, states, exits of the pieces; of the state as many entries as there is room.
+    work : ndarray (15, N or more)
+        Scratch.
+
+    Returns
+    -------
+    tuple of int
+        Status, number of pieces, mode.
+    """
+    flow, cells, hop, series, target, _, reset, _, tones = tables
+    laps, times, modes, durations, states, exits = out
+    n = state.shape[0]
+    c, noise = work[4], work[5]
+    scratch = work[:2, :n]
+    held, scale = work[2, :n], work[3, :n]
+    count, capacity = 0, laps.shape[0]
+    quick = fast[5].shape[0] > 0
+    past_mode, past_exit, past_time, past_parts, ring = past
+    while True:
+        if quick:
+            count, came = glide(fast, tables, clock, state, mode, limit, period, past, out, count, work[6:])
+            mode = settle(tables, came, state, scale, cells[came], scratch, c, noise)
+            if mode < 0:
+                return CHATTER, count, came
+        if count == capacity:
+            return FULL, count, mode
+        left = (limit[0] - clock[0]) * period if limit[0] != clock[0] else 0.0
+        left += limit[1] - clock[1]
+        if left <= 4e-16 * limit[1]:
+            return DONE, count, mode
+        set_tones(tones, state, clock[1])
+        laps[count], times[count], modes[count] = clock[0], clock[1], mode
+        for i in range(states.shape[1]):
+            states[count, i] = state[i]
+        for i in range(n):
+            held[i] = state[i]
+        gone, leaving, armed = 0.0, -1, 0
+        opened = True
+        while True:
+            span = left - gone
+            cell = cells[mode]
+            dt, leaving, armed = next_exit(tables, mode, held, scale, opened, armed, span, c, noise)
+            opened = False
+            if leaving >= 0:
+                advance(flow[mode], held, dt, scratch)
+                gone += dt
+                # the last digits: where the state itself, not the polynomial, has the exit at zero
+                g, d = 0.0, 0.0
+                for j in range(n):
+                    g += series[leaving, 0, j] * held[j]
+                    d += series[leaving, 1, j] * held[j]
+                if d > 0.0 and abs(g) < 1e-9 * d * min(cell, dt):
+                    advance(flow[mode], held, -g / d, scratch)
+                    gone -= g / d
+                break
+            if span <= cell:
+                advance(flow[mode], held, span, scratch)
+                gone = left
+                break
+            multiply(hop[mode], held, scratch[0])
+            for i in range(n):
+                held[i] = scratch[0, i]
+                scale[i] = max(scale[i], abs(held[i]))
+            gone += cell
+            set_tones(tones, held, clock[1] + gone)
+        durations[count] = gone
+        exits[count] = leaving
+        count += 1
+        slot = ring[0]
+        past_mode[slot], past_exit[slot], past_time[slot], past_parts[slot] = mode, leaving, gone, 1
+        ring[0] = (slot + 1) & (HISTORY - 1)
+        ring[1] = (ring[1] + 1) & (HISTORY - 1)
+        # compensated clock, wrapped at the period
+        step = gone - clock[2]
+        now = clock[1] + step
+        clock[2] = (now - clock[1]) - step
+        if now >= period:
+            whole = math.floor(now / period)
+            now -= whole * period
+            clock[0] += whole
+            ring[1] = ring[2]
+            ring[2] = ring[0]
+        clock[1] = now
+        for i in range(n):
+            state[i] = held[i]
+        if leaving < 0:
+            clock[0], clock[1], clock[2] = limit[0], limit[1], 0.0
+            set_tones(tones, state, clock[1])
+            return DONE, count, mode
+        set_tones(tones, state, now)
+        multiply(reset[leaving], state, held)
+        for i in range(n):
+            state[i] = held[i]
+            scale[i] = max(abs(state[i]), 0.5 * scale[i])
+        cell = cells[target[leaving]]
+        mode = settle(tables, target[leaving], state, scale, min(cell, left), scratch, c, noise)
+        if mode < 0:
+            return CHATTER, count, target[leaving]
+        if gone <= 0.0:
+            return LOST, count, mode
+
+
+@njit(**OPTIONS)
+def follow(tables, mode, state, time, work):
+    """state = exp(A time) state, however long the time."""
+    flow, cells, hop, _, _, _, _, _, _ = tables
+    n = state.shape[0]
+    cell = cells[mode]
+    while time > cell:
+        multiply(hop[mode], state, work[0])
+        for i in range(n):
+            state[i] = work[0, i]
+        time -= cell
+    advance(flow[mode], state, time, work)
+
+
+@njit(**OPTIONS)
+def sample(tables, begin, modes, states, times, rows, piece, out, work):
+    """Values of linear forms at increasing `times` [s].
+
+    Parameters
+    ----------
+    tables : tuple of arrays
+        See :class:`stickslip.solve.automaton.Automaton`.
+    begin, modes, states : ndarray
+        Start [s], mode and state of each piece.
+    times : ndarray (T,)
+        Where to look, increasing, not before the first piece.
+    rows : ndarray (M, R, N)
+        Linear forms, by mode.
+    piece : ndarray (T,)
+        Set to the piece each time falls in.
+    out : ndarray (R, T)
+        Set to the values.
+    work : ndarray (4, N)
+        Scratch.
+    """
+    flow, cells, hop, _, _, _, _, _, _ = tables
+    n, last = states.shape[1], begin.shape[0] - 1
+    scratch, held, state = work[:2], work[2], work[3]
+    j, at = 0, begin[0]
+    for i in range(n):
+        held[i] = states[0, i]
+    for t in range(times.shape[0]):
+        if j < last and begin[j + 1] <= times[t]:
+            while j < last and begin[j + 1] <= times[t]:
+                j += 1
+            at = begin[j]
+            for i in range(n):
+                held[i] = states[j, i]
+        mode = modes[j]
+        while times[t] - at > cells[mode]:
+            multiply(hop[mode], held, scratch[0])
+            for i in range(n):
+                held[i] = scratch[0, i]
+            at += cells[mode]
+        for i in range(n):
+            state[i] = held[i]
+        advance(flow[mode], state, times[t] - at, scratch)
+        piece[t] = j
+        for r in range(rows.shape[1]):
+            total = 0.0
+            for i in range(n):
+                total += rows[mode, r, i] * state[i]
+            out[r, t] = total

@@ -1,0 +1,99 @@
+"""How fast neighbouring motions part for good."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from stickslip.errors import ModelError, SolveError
+from stickslip.estimate import Estimate
+from stickslip.solve.automaton import System, automaton
+from stickslip.solve.periodic import end_of
+from stickslip.solve.simulate import opening, run
+from stickslip.solve.tangent import carry_tangents
+
+BATCHES = 25  # of which the scatter gives the interval
+STUDENT = 2.064  # two-sided 95 % quantile at 24 degrees of freedom
+
+
+def lyapunov(
+    system: System,
+    *,
+    cycles: int = 5000,
+    transient: int = 100,
+    start: Mapping[str, float | str] | None = None,
+) -> Estimate:
+    """Does the motion forget its beginning, or does it part from its neighbours (chaos)?
+
+    The largest Lyapunov exponent that differs from the neutral one of time: the growth rate of a small difference of
+    the state at fixed phase of the drive, carried along the exact motion, saltation at events included.
+
+    A stick forgets the velocity and with it one direction; a rigid contact that sticks in every period may forget
+    everything, and the exponent is minus infinity.
+
+    Parameters
+    ----------
+    system : Oscillator or Structure
+        What moves, with a periodic drive.
+    cycles : int
+        Periods over which the growth is averaged.
+    transient : int
+        Periods before that.
+    start : mapping, optional
+        As in ``simulate``.
+
+    Returns
+    -------
+    Estimate
+        In 1/s; positive for chaos.
+
+    Raises
+    ------
+    SolveError
+        The drive has no period.
+
+    Examples
+    --------
+    >>> from stickslip.drives import HarmonicForce
+    >>> from stickslip.laws.coulomb import Coulomb
+    >>> drive = HarmonicForce(1.0, frequency=0.6 / 6.283185307)
+    >>> from stickslip.oscillator import Oscillator
+    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.3), drive=drive)
+    >>> lyapunov(slider, cycles=500).value < 0
+    True
+    """
+    if cycles < BATCHES or transient < 0:
+        raise ModelError(f"cycles = {cycles}", f"the interval needs {BATCHES} cycles at least", "raise cycles=")
+    table = automaton(system)
+    period = table.motion.period
+    if not math.isfinite(period):
+        raise SolveError("the drive has no period", "growth is counted from period to period", "use a periodic drive")
+    state, mode = opening(table, start or {})
+    size = len(table.names)
+    difference = np.zeros((1, size))
+    difference[0, : table.physical] = np.linspace(1.0, 0.5, table.physical)
+    work = np.empty((8, size))
+    scale = 1 / system.frequency / (2 * math.pi) if system.frequency else period
+    weights = np.ones(table.physical)
+    weights[table.degrees : 2 * table.degrees] = scale
+    growth = []
+    for lap in range(transient + cycles):
+        orbit = run(system, table, state, mode, laps=1.0, offset=0.0, budget=10_000)
+        state, mode = end_of(orbit)
+        carry_tangents(table.tables, table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, mode,
+                       difference, work)  # fmt: skip
+        length = float(np.linalg.norm(difference[0, : table.physical] * weights))
+        if length == 0.0:
+            return Estimate("Lyapunov exponent", -math.inf, (-math.inf, -math.inf), 0.0, "1/s", "exact tangent",
+                            checks=(f"every difference was forgotten in lap {lap}",))  # fmt: skip
+        difference /= length
+        if lap >= transient:
+            growth.append(math.log(length) / period)
+    batches = np.array([np.mean(part) for part in np.array_split(growth, BATCHES)])
+    spread = float(np.std(batches, ddof=1) / math.sqrt(BATCHES))
+    method = f"exact tangent over {cycles} periods, scatter of {BATCHES} batches"
+    return Estimate.normal(
+        "Lyapunov exponent", float(np.mean(growth)), sd=spread, unit="1/s", method=method, quantile=STUDENT
+    )

@@ -1,0 +1,383 @@
+"""The motion that repeats: periodic orbits by Newton on the exact map, their stability, and what they do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import ModelError, SolveError
+from stickslip.solve.automaton import Array, Automaton, System, automaton, exponential
+from stickslip.solve.simulate import opening, run
+from stickslip.solve.tangent import carry_tangents
+from stickslip.solve.trajectory import Event, Trajectory
+
+UNIT = 1e-7  # a multiplier this close to 1 is 1: its rounding grows with the square root of a double eigenvalue
+GRAZING = 1e-9  # an exit crossed this slowly, relative to the terms of its rate, is a tangency
+CLOSED = 1e-12  # an orbit closes when it returns this close, relative to its own size
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyState:
+    """A periodic orbit, or why there is none.
+
+    Attributes
+    ----------
+    status : str
+        "unique" (isolated and stable), "unstable", "grazing" (an exit is met at a tangent: no
+        derivative, no multipliers), "not unique" (a family of orbits: a multiplier is 1), "rest" (held
+        all the time), "unbounded" (the amplitude grows without end), "not periodic" (no orbit found).
+    period : float
+        Period [s]; of several periods of the drive where `order` is above 1.
+    order : int
+        Period over the drive's; 1 for a self-excited orbit.
+    orbit : Trajectory
+        One period, from phase zero of the drive.
+    multipliers : ndarray of complex
+        Eigenvalues of the map over one period, largest first; saltation at events included.
+    """
+
+    status: str
+    period: float
+    order: int
+    orbit: Trajectory
+    multipliers: NDArray[np.complex128]
+
+    @property
+    def amplitude(self) -> float:
+        """Largest displacement from zero [m]."""
+        return self.largest("x")
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The changes of mode within one period."""
+        return self.orbit.events
+
+    @property
+    def stops(self) -> tuple[int, int]:
+        """Sticks per period: normal (motion goes on in the other direction) and abnormal (in the same one).
+
+        A reversal without time at rest is no stop. In a compliant contact microsticks are counted.
+        """
+        counts = [0, 0]
+        for before, after in self._rests():
+            counts[int(before * after > 0)] += 1
+        return counts[0], counts[1]
+
+    def _rests(self) -> list[tuple[int, int]]:
+        """Direction of slip before and after each rest, around the orbit."""
+        sides = [self.orbit.table.modes[m].side for m in self.orbit.modes]
+        if len(sides) > 1 and self.orbit.modes[0] == self.orbit.modes[-1]:
+            sides.pop()
+        moving = [j for j, side in enumerate(sides) if side]
+        if not moving:
+            return []
+        turned = sides[moving[0] :] + sides[: moving[0] + 1]
+        found = []
+        for j in range(1, len(turned) - 1):
+            if not turned[j]:
+                after = next(side for side in turned[j + 1 :] if side)
+                before = next(side for side in reversed(turned[:j]) if side)
+                found.append((before, after))
+        return found
+
+    @property
+    def transition_speed(self) -> float:
+        """Largest speed at which a microstick goes over into slip, V_s of the thesis [m/s]; nan without microsticks."""
+        table, speeds = self.orbit.table, []
+        for j in range(len(self.orbit.modes) - 1):
+            before, after = (table.modes[self.orbit.modes[i]] for i in (j, j + 1))
+            if before.kind == "microstick" and after.kind == "slip":
+                speeds.append(abs(float(table.outputs["slip"] @ self.orbit.states[j + 1])))
+        return max(speeds, default=math.nan)
+
+    def largest(self, output: str, *, points: int = 65) -> float:
+        """Largest modulus of an output over the orbit.
+
+        Parameters
+        ----------
+        output : str
+            As in :meth:`Trajectory.sample`.
+        points : int
+            Instants looked at in each piece before the largest is refined.
+
+        Returns
+        -------
+        float
+        """
+        ends = np.append(self.orbit.starts, self.orbit.duration)
+        inner = np.linspace(0.0, 1.0, points)[:-1] * (1 - 1e-12)
+        times = np.append((ends[:-1, None] + np.diff(ends)[:, None] * inner).ravel(), self.orbit.duration)
+        times = np.unique(np.concatenate([times, np.maximum(ends[1:] * (1 - 1e-13), 0.0)]))
+        values, _ = self.orbit.sample(times, (output,))
+        best = int(np.argmax(np.max(np.abs(values), axis=0)))
+        low, high = times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)]
+        top = float(np.max(np.abs(values[:, best])))
+        for _ in range(12):
+            grid = np.linspace(low, high, 33)
+            fine = np.max(np.abs(self.orbit.sample(grid, (output,))[0]), axis=0)
+            peak = int(np.argmax(fine))
+            top = max(top, float(fine[peak]))
+            low, high = grid[max(peak - 1, 0)], grid[min(peak + 1, 32)]
+        return top
+
+
+def steady_state(
+    system: System,
+    *,
+    start: Mapping[str, float | str] | None = None,
+    transient: int = 64,
+    orders: int = 4,
+    patience: int = 4096,
+) -> SteadyState:
+    """Which motion is left when the beginning is forgotten?
+
+    The exact map over a period of the drive is iterated through a transient, then closed by Newton's method with its
+    exact derivative. A system without a periodic drive (a belt, a ramp) is followed until a stick ends as the one
+    before did.
+
+    Parameters
+    ----------
+    system : Oscillator or Structure
+        What moves.
+    start : mapping, optional
+        Where the transient starts, as in ``simulate``; another start can lead to another orbit.
+    transient : int
+        Periods before the first attempt to close the orbit.
+    orders : int
+        Longest orbit looked for, in periods of the drive.
+    patience : int
+        Periods after which no orbit is expected any more.
+
+    Returns
+    -------
+    SteadyState
+
+    Raises
+    ------
+    SolveError
+        No motion repeats because nothing drives the system.
+
+    Examples
+    --------
+    >>> from stickslip.drives import HarmonicForce
+    >>> from stickslip.laws.coulomb import Coulomb
+    >>> drive = HarmonicForce(1.0, frequency=0.8 / 6.283185307)
+    >>> from stickslip.oscillator import Oscillator
+    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=drive)
+    >>> orbit = steady_state(slider)
+    >>> orbit.status, round(orbit.amplitude, 6), orbit.stops
+    ('unique', 2.332235, (0, 0))
+    """
+    if transient < 1 or orders < 1:
+        raise ModelError(f"transient = {transient}, orders = {orders}", "both are at least 1", "raise them")
+    table = automaton(system)
+    if not math.isfinite(table.motion.period):
+        return _self_excited(system, table, start or {}, transient)
+    state, mode = opening(table, start or {})
+    laps, sizes = 0, []
+    count = transient
+    while laps < patience:
+        state, mode, size = _iterate(system, table, state, mode, count)
+        laps += count
+        sizes.append(size)
+        found = _closed(system, table, state, mode, orders)
+        if found is None and _repeats_freely(table):
+            found = _family(system, table, state, mode, size, orders)
+        if found is not None:
+            return found
+        count = laps
+    orbit = _lap(system, table, state, mode, 1)
+    growing = len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:]))
+    none = np.full(table.physical, np.nan, dtype=np.complex128)
+    return SteadyState("unbounded" if growing else "not periodic", math.nan, 0, orbit, none)
+
+
+def attractors(
+    system: System, *, starts: Sequence[Mapping[str, float | str]], transient: int = 64, orders: int = 4
+) -> tuple[SteadyState, ...]:
+    """Which steady motions exist beside each other?
+
+    Parameters
+    ----------
+    system : Oscillator
+        What moves.
+    starts : sequence of mapping
+        Where the transients start, as in ``simulate``; each leads to one motion.
+    transient, orders : int
+        As in :func:`steady_state`.
+
+    Returns
+    -------
+    tuple of SteadyState
+        The different ones among them, in the order they were found.
+
+    Examples
+    --------
+    >>> from stickslip.drives import HarmonicForce
+    >>> from stickslip.laws.coulomb import Coulomb
+    >>> from stickslip.oscillator import Oscillator
+    >>> drive = HarmonicForce(1.0, frequency=0.8 / 6.283185307)
+    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.7, static=1.05), drive=drive)
+    >>> [orbit.status for orbit in attractors(slider, starts=[{}, {"x": 3.0}])]
+    ['rest', 'unique']
+    """
+    found: list[SteadyState] = []
+    for start in starts:
+        orbit = steady_state(system, start=start, transient=transient, orders=orders)
+        if not any(_same(orbit, other) for other in found):
+            found.append(orbit)
+    return tuple(found)
+
+
+def _same(one: SteadyState, other: SteadyState) -> bool:
+    """Whether two steady motions are one: alike in status, order, modes and, at phase zero, state."""
+    if (one.status, one.order) != (other.status, other.order):
+        return False
+    if one.status == "rest":
+        return True  # a set of equilibria counts once
+    if list(one.orbit.modes) != list(other.orbit.modes):
+        return False
+    scale = np.max(np.abs(one.orbit.states), axis=0)
+    return bool(np.all(np.abs(one.orbit.states[0] - other.orbit.states[0]) <= 1e-8 * scale))
+
+
+def _lap(system: System, table: Automaton, state: Array, mode: int, laps: int) -> Trajectory:
+    return run(system, table, state, mode, laps=float(laps), offset=0.0, budget=10_000)
+
+
+def end_of(orbit: Trajectory) -> tuple[Array, int]:
+    """State and mode at the end of whole laps, the event that falls on it included."""
+    from stickslip.solve.kernel import follow
+
+    last = orbit.states[-1].copy()
+    mode, size = int(orbit.modes[-1]), len(last)
+    follow(orbit.table.tables, mode, last, float(orbit.durations[-1]), np.empty((2, size)))
+    if orbit.exits[-1] >= 0:
+        leaving = int(orbit.exits[-1])
+        last, mode = orbit.table.reset[leaving] @ last, int(orbit.table.target[leaving])
+    last[orbit.table.physical :] = orbit.states[0, orbit.table.physical :]
+    return last, mode
+
+
+def _iterate(system: System, table: Automaton, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
+    orbit = _lap(system, table, state, mode, laps)
+    return *end_of(orbit), float(np.max(np.abs(orbit.states[-64:, 0])))
+
+
+def _closed(system: System, table: Automaton, state: Array, mode: int, orders: int) -> SteadyState | None:
+    """The orbit near a state, of the least order that closes; None where Newton finds none."""
+    for order in range(1, orders + 1):
+        best: tuple[float, Trajectory | None, int] = (math.inf, None, 0)
+        point, where = state, mode
+        for _ in range(12):
+            orbit = _lap(system, table, point, where, order)
+            end, after = end_of(orbit)
+            size = np.max(np.abs(orbit.states), axis=0)[: table.physical]
+            gap = (end - point)[: table.physical]
+            relative = float(np.max(np.abs(gap) / np.maximum(size, 1e-300), initial=0.0, where=size > 0))
+            if relative >= best[0]:
+                break
+            best = (relative, orbit, after)
+            jacobian, _ = _jacobian(orbit, after)
+            step, *_ = np.linalg.lstsq(np.eye(table.physical) - jacobian, gap, rcond=UNIT)
+            if np.any(np.abs(step) > 2 * size):
+                break
+            point, where = point.copy(), int(orbit.modes[0])
+            point[: table.physical] += step
+        if best[0] <= CLOSED and best[1] is not None:
+            return _judged(best[1], order, *_jacobian(best[1], best[2]))
+    return None
+
+
+def _repeats_freely(table: Automaton) -> bool:
+    """Whether free motion in every slip mode repeats after one period of the drive: b = 1/2n without damping."""
+    own = 2 * table.degrees
+    free = [flow[:own, :own] for flow, mode in zip(table.flow, table.modes, strict=True) if mode.kind == "slip"]
+    turns = [exponential(flow, table.motion.period) for flow in free]
+    return bool(turns) and all(np.allclose(turn, np.eye(own), rtol=0, atol=1e-9) for turn in turns)
+
+
+def _family(system: System, table: Automaton, state: Array, mode: int, size: float, orders: int) -> SteadyState | None:
+    """An orbit inside a family whose edge is approached forever: a push off the edge closes at once."""
+    for push in (0.05, 0.1, 0.2):
+        pushed = state.copy()
+        pushed[0] += math.copysign(push * size, state[0])
+        point, where, _ = _iterate(system, table, pushed, mode, 32)
+        found = _closed(system, table, point, where, orders)
+        if found is not None and found.status == "not unique":
+            return found
+    return None
+
+
+def _jacobian(orbit: Trajectory, after: int) -> tuple[Array, float]:
+    table, size = orbit.table, len(orbit.table.names)
+    tangents = np.eye(size)[: table.physical].copy()
+    slowest = carry_tangents(
+        table.tables, table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
+        np.empty((8, size)),
+    )  # fmt: skip
+    return tangents[:, : table.physical].T, slowest
+
+
+def _judged(orbit: Trajectory, order: int, jacobian: Array, slowest: float) -> SteadyState:
+    """An orbit that closes, with what its multipliers say; where it grazes they say nothing."""
+    table = orbit.table
+    multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
+    multipliers = multipliers[np.argsort(-np.abs(multipliers))]
+    if slowest < GRAZING:
+        multipliers[:] = np.nan
+    sides = {table.modes[m].side for m in orbit.modes}
+    if sides == {0}:
+        status = "rest" if all(table.modes[m].friction is None for m in orbit.modes) else "unique"
+    elif slowest < GRAZING:
+        status = "grazing"
+    elif np.any(np.abs(multipliers - 1) < UNIT):
+        status = "not unique"
+    else:
+        status = "unique" if abs(multipliers[0]) < 1 else "unstable"
+    return SteadyState(status, order * table.motion.period, order, orbit, multipliers)
+
+
+def _self_excited(system: System, table: Automaton, start: Mapping[str, float | str], transient: int) -> SteadyState:
+    """The orbit between two equal ends of a stick."""
+    if not table.motion.rates:
+        raise SolveError("nothing drives the system", "only a driven motion repeats", "give a drive=")
+    state, mode = opening(table, start)
+    scale = 1 / system.frequency if system.frequency else 1.0
+    # the way of the belt moves on, so the relative coordinate is compared, not the signals
+    duration = transient * scale
+    for _ in range(8):
+        motion = run(system, table, state, mode, laps=0.0, offset=duration, budget=10_000)
+        ends = [
+            j
+            for j in range(1, len(motion.modes))
+            if table.modes[motion.modes[j - 1]].friction is None and motion.exits[j - 1] >= 0
+        ]
+        if len(ends) > 2:
+            first, last = ends[-2], ends[-1]
+            own = slice(0, 2 * table.degrees)
+            gap = np.abs(motion.states[last, own] - motion.states[first, own])
+            if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, own]), axis=0)):
+                return _between(motion, first, last)
+        duration *= 2
+    none = np.full(table.physical, np.nan, dtype=np.complex128)
+    steady = len(motion.modes) == 1 or motion.durations[-1] > 0.5 * duration
+    return SteadyState("rest" if steady and table.modes[motion.modes[-1]].side == 0 else "not periodic",
+                       math.nan, 0, motion, none)  # fmt: skip
+
+
+def _between(motion: Trajectory, first: int, last: int) -> SteadyState:
+    part = slice(first, last)
+    begin = motion.starts[first]
+    orbit = Trajectory(
+        motion.system, motion.table, np.zeros(last - first, np.int32), motion.starts[part] - begin, motion.modes[part],
+        motion.durations[part], motion.states[part], motion.exits[part],
+        float(motion.starts[last] - begin), "complete",
+    )  # fmt: skip
+    # a stick ends in one state alone: whatever came before is forgotten
+    return SteadyState("unique", orbit.duration, 1, orbit, np.zeros(motion.table.physical, dtype=np.complex128))

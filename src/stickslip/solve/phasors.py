@@ -1,0 +1,445 @@
+"""The fast path through the same tables: two phasors for each piece, one that the drive turns and one that runs free.
+
+Where the memory rests, one tone drives and the free motion turns (no mode aperiodic, none at resonance), an exit is
+
+    g(t) = G + Re(D e^{i w t}) + Re(W e^{l t}),
+
+displacement, velocity and every derivative come from the same two phasors, and the duration found one lap of the drive
+earlier is an excellent guess for the next one: one Halley step polishes it, quartic bounds in Bernstein form from both
+ends certify that no exit lies before it. Where any of this fails, the general march takes over for one piece.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from stickslip.solve.automaton import Array, Automaton
+from stickslip.solve.roots import NOISE, OPTIONS
+
+FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
+KEEPS, STOPS, CARRIES = 0.0, 1.0, 2.0  # what an exit does to velocity and memory
+HALF_STEP = 0.09  # rad between a node and the edge of its polynomial; degree 9 leaves 1e-17
+LONGEST = 8192  # nodes of one table
+HISTORY = 4096  # pieces remembered; the guess is one lap old
+SLIDING, HELD = 1.0, 0.0
+SPLITS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Phasors:
+    """The tables of the fast path; M modes, E exits, C entries that rest (memory and the constant).
+
+    Attributes
+    ----------
+    drive : ndarray (4,)
+        Angular frequency [rad/s], phase [rad], nodes per second and number of nodes of the drive's table.
+    mode : ndarray (M, 12)
+        Kind, real and imaginary part of l, real and imaginary part of the forced amplitude, 1 / (k/m), |l|, nodes
+        per second, first node, number of nodes, 1 / (imaginary part of l), modulus sum of the forced amplitude.
+    level : ndarray (M, C)
+        Constant forcing of each mode as a linear form of what rests.
+    exit : ndarray (E, 9)
+        Coefficient of x and v, D (complex), W per unit of free amplitude (complex), its modulus, modulus of D, what it
+        does to velocity and memory.
+    rest : ndarray (E, C)
+        G of each exit as a linear form of what rests.
+    nodes : ndarray (K, 3)
+        e^{i w t} and, mode by mode, e^{l t} at their nodes, and the node's time.
+    """
+
+    drive: Array
+    mode: Array
+    level: Array
+    exit: Array
+    rest: Array
+    nodes: Array
+
+    @property
+    def tables(self) -> tuple[Array, ...]:
+        """The arrays the kernel reads, in their order."""
+        return self.drive, self.mode, self.level, self.exit, self.rest, self.nodes
+
+
+def phasors(table: Automaton) -> Phasors | None:
+    """The tables of the fast path, or None where the system is not of its kind."""
+    size, resting = len(table.names), slice(2, table.physical + 1)
+    if len(table.tones) != 1 or size != table.physical + 3 or len(table.target) == 0:
+        return None
+    omega, phase = table.tones[0, 2:]
+    period = 2 * math.pi / omega
+    turning = slice(size - 2, size)
+    turning_nodes = _nodes(1j * omega, period)
+    if turning_nodes is None:
+        return None
+    nodes: list[NDArray[np.complex128]] = [turning_nodes]
+    times = [_times(omega, len(nodes[0]))]
+    modes, levels, exits, rests = [], [], [], []
+    for j, flow in enumerate(table.flow):
+        if np.any(flow[resting]):
+            return None
+        rows = table.series[table.first[j] : table.first[j + 1], 0]
+        if not np.any(flow[:2]):
+            modes.append([HELD, *[0.0] * 11])
+            levels.append(np.zeros(resting.stop - 2))
+            exits += [[q[0], q[1], q[-2], -q[-1], 0.0, 0.0, 0.0, math.hypot(q[-2], q[-1])] for q in rows]
+            rests += [q[resting] for q in rows]
+            continue
+        stiffness, damping = -flow[1, 0], -flow[1, 1]
+        turn = stiffness - damping**2 / 4
+        response = stiffness - omega**2 + 1j * omega * damping
+        if turn <= 1e-3 * abs(stiffness) or abs(response) < 1e-2 * max(stiffness, omega**2) or flow[0, 1] != 1.0:
+            return None
+        free = complex(-damping / 2, math.sqrt(turn))
+        forced = complex(flow[1, turning][0], -flow[1, turning][1]) / response
+        grid = _nodes(free, period)
+        if grid is None:
+            return None
+        offset = sum(len(known) for known in nodes)
+        nodes.append(grid)
+        times.append(_times(abs(free), len(grid)))
+        modes.append([SLIDING, free.real, free.imag, forced.real, forced.imag, 1 / stiffness, abs(free),
+                      abs(free) / (2 * HALF_STEP), offset, len(grid), 1 / free.imag,
+                      abs(forced.real) + abs(forced.imag)])  # fmt: skip
+        levels.append(flow[1, resting])
+        for q in rows:
+            drive = complex(q[-2], -q[-1]) + (q[0] + 1j * omega * q[1]) * forced
+            weight = q[0] + q[1] * free
+            exits.append([q[0], q[1], drive.real, drive.imag, weight.real, weight.imag, abs(weight), abs(drive)])
+            rests.append(q[resting] + q[0] * flow[1, resting] / stiffness)
+    values = np.concatenate(nodes)
+    return Phasors(
+        np.array([omega, phase, omega / (2 * HALF_STEP), len(nodes[0])]),
+        np.array(modes),
+        np.array(levels),
+        np.column_stack([np.array(exits), [_deed(reset, table.physical) for reset in table.reset]]),
+        np.array(rests),
+        np.ascontiguousarray(np.column_stack([values.real, values.imag, np.concatenate(times)])),
+    )
+
+
+def fast_tables(table: Automaton) -> tuple[Array, ...]:
+    """The arrays of the fast path; with no nodes at all where the system has none."""
+    found = phasors(table)
+    if found is not None:
+        return found.tables
+    return np.zeros(4), np.zeros((1, 12)), np.zeros((1, 1)), np.zeros((1, 9)), np.zeros((1, 1)), np.zeros((0, 3))
+
+
+def blank_past() -> tuple[NDArray[Any], ...]:
+    """The ring of pieces before the first one."""
+    return (np.full(HISTORY, -1, np.int64), np.full(HISTORY, -1, np.int64), np.zeros(HISTORY),
+            np.ones(HISTORY, np.int64), np.zeros(3, np.int64))  # fmt: skip
+
+
+def _nodes(rate: complex, period: float) -> NDArray[np.complex128] | None:
+    """e^{rate t} at distances that the polynomial bridges, over one period."""
+    count = int(period * abs(rate) / (2 * HALF_STEP)) + 3
+    if count > LONGEST:
+        return None
+    steps = np.asarray(_times(abs(rate), count), dtype=np.longdouble)
+    turned = np.exp(np.longdouble(rate.real) * steps)
+    angle = np.longdouble(rate.imag) * steps
+    return np.asarray(turned * np.cos(angle), np.float64) + 1j * np.asarray(turned * np.sin(angle), np.float64)
+
+
+def _deed(reset: Array, physical: int) -> float:
+    """Whether an exit keeps velocity and memory, only stops the mass, or carries them over in another way."""
+    inner = reset[1:physical]
+    if np.array_equal(inner, np.eye(len(reset))[1:physical]):
+        return KEEPS
+    stopped = np.eye(len(reset))[1:physical]
+    stopped[0] = 0.0
+    return STOPS if np.array_equal(inner, stopped) else CARRIES
+
+
+def _times(rate: float, count: int) -> Array:
+    """Times of the nodes, as the compiled code sees them."""
+    return np.arange(count, dtype=np.float64) * (2 * HALF_STEP / rate)
+
+
+@njit(**FAST, forceinline=True)
+def _turn(nodes, first, count, density, decay, turn, t):
+    """e^{(decay + i turn) t} from the nearest node."""
+    j = min(count - 1, int(t * density + 0.5))
+    r = t - nodes[first + j, 2]
+    z = turn * r
+    q = z * z
+    c = 1.0 + q * (-0.5 + q * (1 / 24 + q * (-1 / 720 + q * (1 / 40320))))
+    s = z * (1.0 + q * (-1 / 6 + q * (1 / 120 + q * (-1 / 5040 + q * (1 / 362880)))))
+    if decay != 0.0:
+        y = decay * r
+        e = 1 / 120
+        if abs(y) > 5e-4:
+            e += y * (1 / 720 + y * (1 / 5040 + y * (1 / 40320 + y * (1 / 362880))))
+        e = 1.0 + y * (1.0 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * e))))
+        c *= e
+        s *= e
+    a, b = nodes[first + j, 0], nodes[first + j, 1]
+    return a * c - b * s, a * s + b * c
+
+
+@njit(**FAST, forceinline=True)
+def _below(g, d, h, j, fourth, length):
+    """Whether g + d t + h t^2/2 + j t^3/6 + fourth t^4/24 stays below zero on (0, length]: Bernstein coefficients."""
+    a, b, c = d * length, h * length * length, j * length * length * length
+    e = fourth * length * length * length * length
+    return (
+        (g <= 0.0)
+        & (g + 0.25 * a <= 0.0)
+        & (g + 0.5 * a + b * (1 / 12) <= 0.0)
+        & (g + 0.75 * a + 0.25 * b + c * (1 / 24) <= 0.0)
+        & (g + a + 0.5 * b + c * (1 / 6) + e * (1 / 24) < 0.0)
+    )
+
+
+@njit(**FAST, forceinline=True)
+def _certified(grid, piece, exits, leaving, w, lr, li, t, end, parts, nodes):
+    """Whether every exit stays below zero on (0, t): quartic bounds from both ends of `parts` intervals.
+
+    `grid` holds number and density of the drive's nodes, then first, number and density of the mode's (0: held).
+    """
+    half = 0.5 * t / parts
+    cr, ci, yr, yi = end
+    for j in range(parts, -1, -1):
+        if j == parts:
+            nr, ni, mr, mi = cr, ci, yr, yi
+        elif j > 0:
+            at = t * j / parts
+            nr, ni = _turn(nodes, 0, grid[0], grid[1], 0.0, w, at)
+            mr, mi = 0.0, 0.0
+            if grid[3] > 0:
+                mr, mi = _turn(nodes, grid[2], grid[3], grid[4], lr, li, at)
+        else:
+            nr, ni, mr, mi = 0.0, 0.0, 0.0, 0.0
+        for q in range(exits):
+            fourth = piece[q, 9]
+            if j == 0:
+                if not _below(piece[q, 5], piece[q, 6], piece[q, 7], piece[q, 8], fourth, half):
+                    return False
+                continue
+            dr, di = piece[q, 1] * nr - piece[q, 2] * ni, piece[q, 1] * ni + piece[q, 2] * nr
+            wr, wi = piece[q, 3] * mr - piece[q, 4] * mi, piece[q, 3] * mi + piece[q, 4] * mr
+            ar, ai = lr * wr - li * wi, lr * wi + li * wr
+            br, bi = lr * ar - li * ai, lr * ai + li * ar
+            g, d = piece[q, 0] + dr + wr, ar - w * di
+            h, jerk = br - w * w * dr, w * w * w * di + lr * br - li * bi
+            if j == parts:
+                if q == leaving:
+                    g = 0.0
+            elif not _below(g, d, h, jerk, fourth, half):
+                return False
+            if not _below(g, -d, h, -jerk, fourth, half):
+                return False
+    return True
+
+
+@njit(**FAST)
+def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, work):
+    """March by phasors as far as every piece is certified.
+
+    Parameters
+    ----------
+    fast : tuple of arrays
+        See :class:`Phasors`.
+    tables : tuple of arrays
+        See :class:`stickslip.solve.automaton.Automaton`.
+    clock, state, mode, limit, period, out
+        As in :func:`stickslip.solve.kernel.march`.
+    past : tuple of arrays
+        Modes, exits, durations and certificate parts of the pieces gone by, in a ring, and (newest, guess, start of
+        the lap) within it.
+    begun : int
+        Pieces already in `out`.
+    work : ndarray (9, 16 or more)
+        Scratch.
+
+    Returns
+    -------
+    tuple of int
+        Number of pieces in `out`, and the mode; the general march settles it and takes the next piece.
+    """
+    drive, modes, level, exits, rest, nodes = fast
+    target, crossing, reset, first = tables[4], tables[5], tables[6], tables[7]
+    laps_out, times_out, modes_out, durations_out, states_out, exits_out = out
+    past_mode, past_exit, past_time, past_parts, ring = past
+    size = state.shape[0]
+    resting = level.shape[1]
+    w, phase, density, turns = drive[0], drive[1], drive[2], int(drive[3])
+    # a row per exit: G, D, D, W, W, g and three derivatives at the start, a bound of the fourth
+    piece, fresh = work[:8], work[8]
+    count, capacity = begun, laps_out.shape[0]
+    x, v = state[0], state[1]
+    ec, es = state[size - 2], state[size - 1]
+    since, chain = 0, 0
+    while count < capacity and chain < 8:
+        sliding = modes[mode, 0] == SLIDING
+        lr, li, lam = modes[mode, 1], modes[mode, 2], modes[mode, 6]
+        hr, hi = modes[mode, 3], modes[mode, 4]
+        low = first[mode]
+        number = first[mode + 1] - low
+        zr, zi, centre, free, free_noise = 0.0, 0.0, 0.0, 0.0, 0.0
+        if number > 8:
+            break
+        if sliding:
+            force = 0.0
+            for i in range(resting):
+                force += level[mode, i] * state[2 + i]
+            centre = force * modes[mode, 5]
+            fr, fi = hr * ec - hi * es, hr * es + hi * ec
+            zr = x - centre - fr
+            zi = -(v + w * fi - lr * zr) * modes[mode, 10]
+            free = math.sqrt(zr * zr + zi * zi)
+            reach = abs(x) + abs(centre) + modes[mode, 11]
+            free_noise = NOISE * (reach + (abs(v) + w * modes[mode, 11] + abs(lr) * reach) * modes[mode, 10])
+        # an exit due at once is taken; one too close to call goes to the general march
+        fired, doubtful = -1, False
+        for q in range(number):
+            e = low + q
+            g, scale = 0.0, 0.0
+            for i in range(resting):
+                term = rest[e, i] * state[2 + i]
+                g += term
+                scale += abs(term)
+            if not sliding:
+                g += exits[e, 0] * x + exits[e, 1] * v
+                scale += abs(exits[e, 0] * x)
+            dr, di = exits[e, 2] * ec - exits[e, 3] * es, exits[e, 2] * es + exits[e, 3] * ec
+            wr, wi = exits[e, 4] * zr - exits[e, 5] * zi, exits[e, 4] * zi + exits[e, 5] * zr
+            # derivatives at the start: (i w)^k D and l^k W
+            ar, ai = lr * wr - li * wi, lr * wi + li * wr
+            br, bi = lr * ar - li * ai, lr * ai + li * ar
+            g0, g1, g2 = g + dr + wr, ar - w * di, br - w * w * dr
+            doubt = exits[e, 6] * free_noise
+            sure = g0
+            if abs(g0) <= NOISE * (scale + exits[e, 7]) + doubt:
+                g0, sure = 0.0, g1
+                if abs(g1) <= NOISE * exits[e, 7] * w + doubt * lam:
+                    g1, sure = 0.0, g2
+                    if abs(g2) <= NOISE * exits[e, 7] * w * w + doubt * lam * lam:
+                        doubtful = True
+                        break
+            if sure > 0.0:
+                doubtful = crossing[e]
+                fired = e
+                break
+            piece[q, 0], piece[q, 1], piece[q, 2], piece[q, 3], piece[q, 4] = g, dr, di, wr, wi
+            piece[q, 5], piece[q, 6], piece[q, 7] = g0, g1, g2
+            piece[q, 8] = w * w * w * di + lr * br - li * bi
+            piece[q, 9] = exits[e, 7] * w * w * w * w + exits[e, 6] * free * lam * lam * lam * lam
+        if doubtful:
+            break
+        if fired >= 0:
+            if exits[fired, 8] == STOPS:
+                v = 0.0
+            elif exits[fired, 8] == CARRIES:
+                state[0], state[1], state[size - 2], state[size - 1] = x, v, ec, es
+                _carry(reset[fired], state, fresh, size)
+                v = state[1]
+            mode = target[fired]
+            chain += 1
+            continue
+        # the same piece one lap ago is the guess
+        slot = ring[1]
+        if past_mode[slot] != mode or past_exit[slot] < 0:
+            break
+        t, leaving = past_time[slot], past_exit[slot]
+        left = (limit[0] - clock[0]) * period if limit[0] != clock[0] else 0.0
+        left += limit[1] - clock[1]
+        if not t < 0.999 * min(left, period):
+            break
+        first_node, mode_nodes, mode_density = int(modes[mode, 8]), int(modes[mode, 9]), modes[mode, 7]
+        if lr > 0.0:
+            grown = math.exp(1.1 * lr * t)
+            for q in range(number):
+                piece[q, 9] *= grown
+        k = leaving - low
+        done = False
+        cr, ci, yr, yi = 1.0, 0.0, 0.0, 0.0
+        for _ in range(6):
+            cr, ci = _turn(nodes, 0, turns, density, 0.0, w, t)
+            if sliding:
+                yr, yi = _turn(nodes, first_node, mode_nodes, mode_density, lr, li, t)
+            dr, di = piece[k, 1] * cr - piece[k, 2] * ci, piece[k, 1] * ci + piece[k, 2] * cr
+            wr, wi = piece[k, 3] * yr - piece[k, 4] * yi, piece[k, 3] * yi + piece[k, 4] * yr
+            ar, ai = lr * wr - li * wi, lr * wi + li * wr
+            g, d, h = piece[k, 0] + dr + wr, ar - w * di, lr * ar - li * ai - w * w * dr
+            step = -2.0 * g * d / (2.0 * d * d - g * h)
+            if not (d > 0.0 and abs(step) < 0.2 * t):
+                break
+            t += step
+            if abs(step) * max(w, lam) < 2e-6:
+                # the phasors follow the last correction by their Taylor polynomials
+                z = w * step
+                cr, ci = cr - z * ci - 0.5 * z * z * cr, ci + z * cr - 0.5 * z * z * ci
+                p, q = lr * step, li * step
+                p, q = p + 0.5 * (p * p - q * q), q + p * q
+                yr, yi = yr + p * yr - q * yi, yi + p * yi + q * yr
+                done = True
+                break
+        if not done or t >= 0.9999 * left or t >= period:
+            break
+        parts = past_parts[slot]
+        grid = (turns, density, first_node, mode_nodes, mode_density)
+        end = (cr, ci, yr, yi)
+        while parts <= SPLITS and not _certified(grid, piece, number, k, w, lr, li, t, end, parts, nodes):
+            parts *= 2
+        if parts > SPLITS:
+            break
+        # the piece stands: write it, carry the state over
+        laps_out[count], times_out[count], modes_out[count] = clock[0], clock[1], mode
+        durations_out[count], exits_out[count] = t, leaving
+        states_out[count, 0], states_out[count, 1] = x, v
+        for i in range(2, states_out.shape[1]):
+            states_out[count, i] = state[i]
+        count += 1
+        slot = ring[0]
+        past_mode[slot], past_exit[slot], past_time[slot], past_parts[slot] = mode, leaving, t, parts
+        ring[0] = (slot + 1) & (HISTORY - 1)
+        ring[1] = (ring[1] + 1) & (HISTORY - 1)
+        ec, es = ec * cr - es * ci, ec * ci + es * cr
+        gap = t - clock[2]
+        now = clock[1] + gap
+        clock[2] = (now - clock[1]) - gap
+        if now >= period:
+            now -= period
+            clock[0] += 1.0
+            ring[1] = ring[2]
+            ring[2] = ring[0]
+        clock[1] = now
+        since += 1
+        if since >= 64:
+            ec, es = math.cos(w * now + phase), math.sin(w * now + phase)
+            since = 0
+        if sliding:
+            fr, fi = hr * ec - hi * es, hr * es + hi * ec
+            ar, ai = zr * yr - zi * yi, zr * yi + zi * yr
+            x = centre + fr + ar
+            v = -w * fi + lr * ar - li * ai
+        if exits[leaving, 8] == STOPS:
+            v = 0.0
+        elif exits[leaving, 8] == CARRIES:
+            state[0], state[1], state[size - 2], state[size - 1] = x, v, ec, es
+            _carry(reset[leaving], state, fresh, size)
+            v = state[1]
+        mode = target[leaving]
+        chain = 0
+    state[0], state[1], state[size - 2], state[size - 1] = x, v, ec, es
+    return count, mode
+
+
+@njit(**FAST)
+def _carry(matrix, state, fresh, size):
+    """Take the velocity and the memory over an exit; displacement and drive go on."""
+    for i in range(1, size - 3):
+        total = 0.0
+        for q in range(size):
+            total += matrix[i, q] * state[q]
+        fresh[i] = total
+    for i in range(1, size - 3):
+        state[i] = fresh[i]

@@ -1,0 +1,94 @@
+"""The first root of an exit, certified: no earlier one was jumped over.
+
+Rules
+-----
+An exit quantity g is negative while its mode lasts. In a cell it is a polynomial c[0] + c[1] u + ... on 0 <= u <= 1,
+with a noise level per coefficient that bounds its rounding.
+
+* At the start: leading coefficients within their noise are exact zeros (a velocity that has just vanished; the double
+  zero when a stick is released). The first coefficient that is not decides: positive fires at once, negative is
+  inside the mode, and the zeros are divided out so that the root at the start is not found again. All zero: the
+  quantity is constant and on the tie (a rest exactly at the break-away force); the mode lasts.
+* Marching: where g < 0, and g'' <= M on the rest of the cell, g + g' d + M d^2/2 < 0 certifies that no root lies
+  within d. Steps of that length never pass a root and converge to it quadratically.
+* A near tangency whose crest stays within the noise counts as no crossing.
+* A root at the very end of the time span belongs to the span.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+OPTIONS = {"cache": True, "error_model": "numpy", "_nrt": False}
+NONE = 2.0  # no root in the cell
+NOISE = 64 * 2.220446049250313e-16
+
+
+@njit(**OPTIONS)
+def opening_order(c, noise, count):
+    """Number of leading coefficients that are zeros within their noise (`count` if all are)."""
+    order = 0
+    while order < count and abs(c[order]) <= noise[order]:
+        order += 1
+    return order
+
+
+@njit(**OPTIONS)
+def _curve(c, low, count, u):
+    """Value, slope and curvature at u of the polynomial whose coefficients start at `low`."""
+    g, d, h = 0.0, 0.0, 0.0
+    for k in range(count - 1, low - 1, -1):
+        h = h * u + d
+        d = d * u + g
+        g = g * u + c[k]
+    return g, d, 2.0 * h
+
+
+@njit(**OPTIONS)
+def first_rise(c, noise, count, low, sign, start, limit):
+    """First u in (start, limit] at which sign * polynomial rises through zero; `NONE` where there is none.
+
+    The polynomial starts at coefficient `low` (the zeros at the start divided out) and is negative at `start` once
+    multiplied by `sign`.
+    """
+    third = 0.0
+    for k in range(low + 3, count):
+        j = k - low
+        third += j * (j - 1) * (j - 2) * abs(c[k])
+    floor = noise[low]
+    u = start
+    for _ in range(200):
+        g, d, h = _curve(c, low, count, u)
+        g, d, h = sign * g, sign * d, sign * h
+        left = limit - u
+        most = h + third * left
+        if g >= -floor:
+            if d > 0.0 and (g >= 0.0 or d * d >= 2.0 * floor * abs(h)):
+                return min(limit, max(start, u - g / d))
+            # a tangency within the noise: walk past its crest, and count it only if the crest stands out
+            reach = 2.0 * math.sqrt(2.0 * floor / max(abs(h), 1e-300)) + abs(d) / max(abs(h), 1e-300)
+            ahead = min(limit, u + max(reach, 1e-9))
+            if ahead >= limit:
+                return NONE
+            if sign * _curve(c, low, count, ahead)[0] > floor:
+                return ahead
+            u = ahead
+            continue
+        if g + max(d, 0.0) * left + 0.5 * max(most, 0.0) * left * left < 0.0:
+            return NONE
+        if most > 0.0:
+            root = math.sqrt(d * d - 2.0 * most * g)
+            step = -2.0 * g / (d + root) if d > 0.0 else (root - d) / most
+        elif d > 0.0:
+            step = -g / d
+        else:
+            return NONE
+        if step >= left:
+            end = sign * _curve(c, low, count, limit)[0]
+            return limit if end >= 0.0 else NONE
+        if step <= 4e-16 * max(u, 1e-3):
+            return u if d > 0.0 else NONE
+        u += step
+    return u

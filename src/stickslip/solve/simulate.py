@@ -1,0 +1,251 @@
+"""Run a system through its events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import ModelError, SolveError
+from stickslip.laws.curved import CurvedLaw
+from stickslip.oscillator import Oscillator
+from stickslip.solve import kernel
+from stickslip.solve.automaton import DEGREE, Array, Automaton, System, automaton
+from stickslip.solve.phasors import blank_past, fast_tables
+from stickslip.solve.trajectory import Trajectory
+
+CHUNK = 16384  # pieces between two looks at the clock and the keyboard
+
+
+def simulate(
+    system: System,
+    *,
+    duration: float | None = None,
+    cycles: float | None = None,
+    start: Mapping[str, float | str] | None = None,
+    budget: int = 10_000,
+    rtol: float = 1e-12,
+) -> Trajectory:
+    """How does the system move?
+
+    Every mode is linear, so the motion between events is a closed form, and the first exit of each mode is found with
+    a certificate that none was jumped over. A law with curved modes is followed by Taylor series, to a tolerance.
+
+    Parameters
+    ----------
+    system : Oscillator or Structure
+        What moves.
+    duration : float, optional
+        Time to simulate [s]. Give this or `cycles`.
+    cycles : float, optional
+        Time in periods of the drive; without a periodic drive, in natural periods.
+    start : mapping, optional
+        State at time 0: "x" [m], "v" [m/s] (of a structure "x1", "v1" ...), memory of the law by name, "mode". Where
+        left out: displacement 0, at rest on the counter-face.
+    budget : int
+        Most events in one period; more is taken for chatter.
+    rtol : float
+        For curved laws: error of a step relative to the largest value each entry of the state has had.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    ModelError
+        The time or the start has no meaning.
+    SolveError
+        More events than the budget, or transitions that chase each other; the message names the state.
+
+    Examples
+    --------
+    >>> from stickslip.laws.coulomb import Coulomb
+    >>> from stickslip.oscillator import Oscillator
+    >>> slider = Oscillator(mass=1, stiffness=4, law=Coulomb(1.0))
+    >>> run = simulate(slider, duration=10, start={"x": 1.25})
+    >>> [(round(event.time, 6), event.kind) for event in run.events]
+    [(1.570796, 'reversal'), (3.141593, 'stick')]
+    >>> run.status, run.state(10)["x"]
+    ('at rest', 0.25)
+    """
+    if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
+        return _simulate_curved(system, duration, cycles, start or {}, budget, rtol)
+    table = automaton(system)
+    laps, offset = _end(system, table, duration, cycles)
+    state, mode = opening(table, start or {})
+    return run(system, table, state, mode, laps=laps, offset=offset, budget=budget)
+
+
+def _simulate_curved(
+    system: Oscillator, duration: float | None, cycles: float | None, start: Mapping[str, float | str], budget: int,
+    rtol: float,
+) -> Trajectory:
+    from stickslip.solve.curved import run_curved, tape
+
+    table: Any = tape(system)
+    span = _end(system, table, duration, cycles)
+    state, mode = opening(table, start)
+    return run_curved(table, state, mode, span=span, stops=_stops(table, *span), budget=budget, rtol=rtol)
+
+
+def _end(system: System, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
+    """The time to simulate, as full periods of the drive and a rest [s]."""
+    if (duration is None) == (cycles is None):
+        raise ModelError(f"duration = {duration}, cycles = {cycles}", "one of the two is given", "give one of them")
+    given = duration if cycles is None else cycles
+    assert given is not None
+    if not (math.isfinite(given) and given > 0):
+        raise ModelError(
+            f"{'duration' if cycles is None else 'cycles'} = {given}", "the time is finite and positive", "give more"
+        )
+    period = table.motion.period
+    if math.isfinite(period):
+        count = given if cycles is not None else given / period
+        laps = math.floor(count)
+        return float(laps), (count - laps) * period if cycles is not None else max(0.0, given - laps * period)
+    if cycles is None:
+        return 0.0, given
+    if system.frequency == 0:
+        raise ModelError(f"cycles = {cycles}", "a system without period has no cycles", "give duration= [s]")
+    return 0.0, given / system.frequency
+
+
+def opening(table: Automaton, start: Mapping[str, float | str]) -> tuple[Array, int]:
+    """The state at time 0 and its mode, before any exit that is due at once."""
+    state = np.zeros(len(table.names))
+    state[table.names.index("1")] = 1.0
+    for name, value in table.motion.start.items():
+        state[table.names.index(name)] = value
+    given: dict[str, Any] = dict(start)
+    mode_name = given.pop("mode", None)
+    for name in given:
+        if name not in table.names[: table.physical]:
+            raise ModelError(
+                f"start has '{name}'", f"it may have {', '.join(table.names[: table.physical])} and mode", "correct it"
+            )
+        if not math.isfinite(given[name]):
+            raise ModelError(f"start has {name} = {given[name]}", "a start is finite", f"correct {name}")
+    for j, name in enumerate(table.names[: table.physical]):
+        state[j] = given.get(name, table.opening[j] @ state)
+    if mode_name is not None:
+        return state, table.index(mode_name)
+    if len(set(table.entry)) == 1:
+        return state, table.entry[1]
+    return state, table.entry[int(np.sign(table.outputs["slip"] @ state)) + 1]
+
+
+def run(
+    system: System, table: Automaton, state: Array, mode: int, *, laps: float, offset: float, budget: int
+) -> Trajectory:
+    """March from a state at time 0 to the end of the time, in chunks."""
+    size = len(table.names)
+    work = np.zeros((15, max(size, DEGREE + 1)))
+    fast, past = fast_tables(table), blank_past()
+    clock, state = np.zeros(3), state.copy()
+    period = table.motion.period
+    total = offset + (laps * period if math.isfinite(period) else 0.0)
+    scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
+    pieces = _Pieces(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
+    status = "complete"
+    try:
+        for at, (signals, values) in _stops(table, laps, offset):
+            state[signals] = values
+            work[3, :size] = np.maximum(np.abs(state), work[3, :size])  # what rounding is measured by
+            cell = min(table.cell[mode], total)
+            mode = kernel.settle(
+                table.tables, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]
+            )
+            _refuse_chatter(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock, mode)
+            outcome = kernel.FULL
+            while outcome == kernel.FULL:
+                before = clock.copy()
+                outcome, count, mode = kernel.march(
+                    table.tables, fast, clock, state, mode, at, period, past, pieces.room(), work
+                )
+                passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
+                pieces.keep(count, passed, total)
+                _refuse_chatter(outcome, table, state, clock, mode)
+                if outcome == kernel.FULL and count > budget * max(1.0, passed / scale):
+                    raise SolveError(
+                        f"{count} events within {passed:g} s at {_named(table, state)}",
+                        f"a period of {scale:g} s has at most {budget} events",
+                        "check the law there (chatter), or raise budget=",
+                    )
+    except KeyboardInterrupt:
+        status = "interrupted"
+        total = clock[1] + (clock[0] * period if math.isfinite(period) else 0.0)
+        if not pieces.count:
+            raise
+    laps_, offsets, modes, durations, states, exits = pieces.done()
+    if status == "complete" and _at_rest(table, state, mode):
+        status = "at rest"
+    return Trajectory(system, table, laps_, offsets, modes, durations, states, exits, total, status)
+
+
+class _Pieces:
+    """Room for the pieces of a run; grows by what the run so far foretells."""
+
+    def __init__(self, size: int, room: int) -> None:
+        self.count, self.passed, self.least = 0, 0.0, room
+        self.columns = _columns(256, size)
+
+    def room(self) -> tuple[NDArray[Any], ...]:
+        """The part that is free, at most one chunk."""
+        return tuple(column[self.count : self.count + self.least] for column in self.columns)
+
+    def keep(self, count: int, passed: float, total: float) -> None:
+        """Take the pieces just written, and make room for those to come."""
+        self.count += count
+        self.passed += passed
+        if self.count < len(self.columns[0]):
+            return
+        foretold = self.count * min(64.0, 1.05 * total / self.passed) if self.passed > 0 else 0.0
+        grown = _columns(max(int(foretold), self.count + self.least), self.columns[4].shape[1])
+        for new, old in zip(grown, self.columns, strict=True):
+            new[: self.count] = old[: self.count]
+        self.columns = grown
+
+    def done(self) -> tuple[NDArray[Any], ...]:
+        """The pieces alone."""
+        return tuple(column[: self.count] for column in self.columns)
+
+
+def _columns(room: int, size: int) -> tuple[NDArray[Any], ...]:
+    return (
+        np.empty(room, np.int32), np.empty(room), np.empty(room, np.int16), np.empty(room), np.empty((room, size)),
+        np.empty(room, np.int16),
+    )  # fmt: skip
+
+
+def _stops(table: Automaton, laps: float, offset: float) -> Any:
+    """The times to which the march goes in turn, with the signals that take new values at each start."""
+    knots = table.motion.knots
+    if knots is None:
+        yield (laps, offset), ([], [])
+        return
+    places = [table.names.index(name) for name in table.motion.knotted]
+    ends = np.append(knots[1:, 0], np.inf)
+    for row, end in zip(knots, ends, strict=True):
+        if row[0] < offset:
+            yield (0.0, min(end, offset)), (places, row[1:])
+
+
+def _at_rest(table: Automaton, state: Array, mode: int) -> bool:
+    return bool(np.all(table.flow[mode] @ state == 0.0))
+
+
+def _refuse_chatter(outcome: int, table: Automaton, state: Array, clock: Array, mode: int) -> None:
+    if outcome in (kernel.CHATTER, kernel.LOST):
+        raise SolveError(
+            f"transitions without time between them, lap {clock[0]:g}, {clock[1]:g} s, at {_named(table, state)}",
+            "a law leaves every state in one direction",
+            "check the law's exits there",
+        )
+
+
+def _named(table: Automaton, state: Array) -> str:
+    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(table.names[: table.physical], state, strict=False))

@@ -1,0 +1,252 @@
+"""What a simulation is: pieces of closed-form motion, the events between them, and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.errors import SolveError
+from stickslip.record.channels import Channel, described
+from stickslip.record.record import Record, Step
+from stickslip.solve.automaton import Array, Automaton, System
+from stickslip.solve.kernel import sample
+
+
+class Event(NamedTuple):
+    """One change of mode: when [s], what it is called, the mode it leads to, that mode's side, and which contact."""
+
+    time: float
+    kind: str
+    mode: str
+    side: int
+    contact: int = 0
+
+
+class Piece(NamedTuple):
+    """One stretch in one mode: start [s], duration [s], mode, and the state at its start by name."""
+
+    start: float
+    duration: float
+    mode: str
+    state: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory:
+    """A simulated motion, exact at every instant.
+
+    Attributes
+    ----------
+    system : Oscillator or Structure
+        What moved.
+    table : Automaton
+        Its flat mode tables.
+    laps, offsets : ndarray (n,)
+        Start of each piece: full periods of the drive, and time [s] within the period. Kept apart, so that long runs
+        lose no digits.
+    modes : ndarray (n,)
+        Number of each piece's mode.
+    durations : ndarray (n,)
+        Length of each piece [s].
+    kept : ndarray (n, K)
+        State at the start of each piece; of a single tone's signals nothing is kept, the clock has them.
+    exits : ndarray (n,)
+        Number of the exit that ended each piece; -1 where the time was over.
+    duration : float
+        Simulated time [s].
+    status : str
+        "complete", "at rest" (nothing more will happen), or "interrupted".
+    """
+
+    system: System
+    table: Automaton
+    laps: NDArray[np.int32]
+    offsets: Array
+    modes: NDArray[np.int16]
+    durations: Array
+    kept: Array
+    exits: NDArray[np.int16]
+    duration: float
+    status: str
+
+    @cached_property
+    def starts(self) -> Array:
+        """Start of each piece [s]."""
+        period = self.table.motion.period
+        return self.offsets + (self.laps * period if np.isfinite(period) else 0.0)
+
+    @cached_property
+    def states(self) -> Array:
+        """Whole state at the start of each piece (n, N)."""
+        table = self.table
+        if self.kept.shape[1] == len(table.names):
+            return self.kept
+        angle = table.tones[0, 2] * self.offsets + table.tones[0, 3]
+        return np.column_stack([self.kept, np.ones(len(self.kept)), np.cos(angle), np.sin(angle)])
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The stretches between events."""
+        names, modes = self.table.names, self.table.modes
+        return tuple(
+            Piece(float(t), float(d), modes[m].name, dict(zip(names, map(float, s), strict=True)))
+            for t, d, m, s in zip(self.starts, self.durations, self.modes, self.states, strict=True)
+        )
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The changes of mode, in order of time.
+
+        Kinds: the kind of the mode that begins ("stick", "slip", "microstick"), or "reversal" where a slip goes
+        straight over into a slip to the other side.
+        """
+        return tuple(self._events())
+
+    def _events(self) -> Iterator[Event]:
+        modes = self.table.modes
+        for j in range(1, len(self.modes)):
+            if self.exits[j - 1] < 0:
+                continue
+            before, after = modes[self.modes[j - 1]], modes[self.modes[j]]
+            for contact, old, new in after.changes(before, self.exits[j - 1] - self.table.first[self.modes[j - 1]]):
+                turned = old.side * new.side < 0
+                yield Event(float(self.starts[j]), "reversal" if turned else new.kind, new.name, new.side, contact)
+
+    def state(self, time: float) -> dict[str, float]:
+        """The exact state at one instant: x [m], v [m/s], the law's memory, a [m/s^2], friction [N], and the mode.
+
+        Parameters
+        ----------
+        time : float
+            Instant [s] within the simulated time; at an event, the state after it.
+
+        Returns
+        -------
+        dict of str to float
+            By name; "mode" is the number of the piece's mode in ``table.modes``.
+
+        Raises
+        ------
+        SolveError
+            The instant lies outside the simulated time.
+        """
+        names = self.table.names[: self.table.physical]
+        values, piece = self.sample([time], ("state", "a", "friction"))
+        names = (*names, *self.labels("a"), *self.labels("friction"))
+        named = dict(zip(names, map(float, values[:, 0]), strict=True))
+        return {**named, "mode": int(self.modes[piece[0]])}
+
+    def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, NDArray[np.int64]]:
+        """Exact values at increasing instants.
+
+        Parameters
+        ----------
+        times : array_like
+            T instants [s], increasing, within the simulated time.
+        outputs : tuple of str
+            Of "x", "v", "a", "friction", "z", "slip" (velocity relative to the counter-face), "force", the names of
+            the law's memory, and "state" (all physical entries of the state). Of a structure "x", "v" and "a" are
+            those of every degree of freedom, "friction", "slip" and "load" those of every contact.
+
+        Returns
+        -------
+        values : ndarray (R, T)
+        piece : ndarray (T,)
+            Number of the piece each instant falls in.
+        """
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        if len(times) and not (times[0] >= 0 and times[-1] <= self.duration * (1 + 1e-12)):
+            raise SolveError(
+                f"instants from {times[0]:g} to {times[-1]:g} s",
+                f"the motion is known from 0 to {self.duration:g} s",
+                "simulate longer, or ask within it",
+            )
+        rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
+        out, piece = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
+        work = np.empty((4, self.states.shape[1]))
+        sample(self.table.tables, self.starts, self.modes, self.states, times, rows, piece, out, work)
+        return out, piece
+
+    def section(self, *, phase: float = 0.0) -> Array:
+        """The Poincare section: the physical state once in each period of the drive.
+
+        Parameters
+        ----------
+        phase : float
+            Where in the period to look [rad].
+
+        Returns
+        -------
+        ndarray (n, K)
+            x [m], v [m/s] and the law's memory, a row for each period.
+
+        Raises
+        ------
+        SolveError
+            The drive has no period.
+        """
+        period = self.table.motion.period
+        if not np.isfinite(period):
+            raise SolveError("the drive has no period", "a section looks once in each", "use a periodic drive")
+        offset = phase % (2 * np.pi) / (2 * np.pi) * period
+        count = int(np.floor((self.duration - offset) / period * (1 + 1e-12))) + 1
+        times = np.minimum(offset + np.arange(max(count, 0)) * period, self.duration)
+        return self.sample(times, ("state",))[0].T
+
+    def rows(self, name: str) -> Array:
+        """An output as linear forms of the state, by mode: (M, R, N)."""
+        table = self.table
+        count, size = len(table.modes), len(table.names)
+        degrees = table.degrees
+        spans = {"x": range(degrees), "v": range(degrees, 2 * degrees), "state": range(table.physical)}
+        if name == "a":
+            return table.flow[:, degrees : 2 * degrees]
+        if name == "friction":
+            return table.friction.reshape(count, -1, size)
+        if name in table.outputs:
+            forms = np.atleast_2d(table.outputs[name])
+            return np.broadcast_to(forms, (count, *forms.shape[-2:]))
+        places = list(spans[name]) if name in spans else [table.names.index(name)]
+        return np.broadcast_to(np.eye(size)[places], (count, len(places), size))
+
+    def labels(self, name: str) -> tuple[str, ...]:
+        """What the rows of an output are called: the name alone where there is one, else name1, name2 ..."""
+        count = self.rows(name).shape[1]
+        return (name,) if count == 1 else tuple(f"{name}{j + 1}" for j in range(count))
+
+    def record(self, *, fs: float) -> Record:
+        """The motion sampled at a rate, as a Record.
+
+        Parameters
+        ----------
+        fs : float
+            Sampling rate [Hz].
+
+        Returns
+        -------
+        Record
+            Channels x, v, a, friction, and z where the base moves, force where a force acts; x1, x2 ... of a
+            structure.
+        """
+        count = int(np.floor(self.duration * fs * (1 + 1e-12))) + 1
+        times = np.minimum(np.arange(count) / fs, self.duration)
+        names = ["x", "v", "a", "friction"]
+        names += ["z"] * bool(self.table.motion.base) + ["force"] * bool(self.table.motion.force)
+        values, _ = self.sample(times, tuple(names))
+        units = {"x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N"}
+        labels = {label: name for name in names for label in self.labels(name)}
+        channels = {
+            label: Channel(label, units[name], described(name, units[name]), source="simulate")
+            for label, name in labels.items()
+        }
+        step = Step("simulate", {"system": repr(self.system), "fs": fs}, f"{len(self.modes)} pieces, {self.status}")
+        samples: Mapping[str, Array] = dict(zip(labels, values, strict=True))
+        return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(self.system)})
+
+    def __repr__(self) -> str:
+        return f"Trajectory({self.duration:g} s, {len(self.modes)} pieces, {self.status})"

@@ -1,0 +1,323 @@
+"""The structure: several degrees of freedom that rub at several contacts, under loads that follow the motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.drives import Drive, Release
+from stickslip.errors import ModelError
+from stickslip.laws.base import Exit, Law, Mode, finite
+from stickslip.laws.compliant import CompliantContact
+from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.elastoslip import ElastoSlip
+from stickslip.laws.inertial import InertialContact
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    r"""One place where a structure rubs: a direction of sliding, a friction law, and the load that presses it.
+
+    The load is :math:`N = N_0 + k_n\,w_n\cdot q`, and the contact pushes back with it; the preload comes from outside
+    and balances it at q = 0. Every force level of the law is multiplied by N: a friction coefficient in place of a
+    force. At N = 0 the contact separates, and it closes again where N would rise above zero. Without `normal` the
+    load is the preload; as that is 1 where left out, the levels of the law are then forces [N], as in an Oscillator.
+
+    Attributes
+    ----------
+    law : Law
+        Friction law. Under a load that follows the motion: Coulomb or CompliantContact; under a preload also ElastoSlip
+        and InertialContact; any other with linear modes where its levels are forces.
+    tangent : array_like (n,)
+        Direction of sliding, :math:`w_t`: the contact slides by :math:`w_t\cdot q` less the counter-face's motion.
+    normal : array_like (n,), optional
+        Direction that presses the contact, :math:`w_n`.
+    stiffness : float
+        Normal contact stiffness k_n [N/m]; positive where `normal` is given. It is not part of the structure's K.
+    preload : float
+        N_0 [N].
+    carried : float
+        Share of the counter-face's motion (belt, moving base) seen here; 0: the counter-face is at rest here.
+
+    Raises
+    ------
+    ModelError
+        A value has no meaning, or the law's forces can not follow a load.
+
+    Examples
+    --------
+    >>> pad = Contact(Coulomb(0.4), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    >>> [mode.name for mode in pad.modes()]
+    ['back', 'stuck', 'forward', 'lifted', 'landing']
+    """
+
+    law: Law
+    tangent: ArrayLike
+    normal: ArrayLike | None = None
+    stiffness: float = 0.0
+    preload: float = 1.0
+    carried: float = 1.0
+
+    def __post_init__(self) -> None:
+        finite("preload", self.preload, unit="N")
+        finite("carried", self.carried, unit="", signed=True)
+        object.__setattr__(self, "tangent", _direction("tangent", self.tangent))
+        if isinstance(self.law, CurvedLaw):
+            raise ModelError(
+                f"{type(self.law).__name__} in a structure",
+                "the contacts of a structure have linear modes",
+                "use Tabulated, or an Oscillator",
+            )
+        if self.normal is None:
+            if self.stiffness != 0:
+                raise ModelError(
+                    f"stiffness = {self.stiffness} N/m without normal",
+                    "a load follows the motion in a direction",
+                    "give normal=, or leave out stiffness=",
+                )
+            if self.preload != 1:
+                self._require("under a preload", Coulomb, CompliantContact, ElastoSlip, InertialContact)
+            return
+        object.__setattr__(self, "normal", _direction("normal", self.normal))
+        finite("stiffness", self.stiffness, unit="N/m", positive=True)
+        self._require("under a load that follows the motion", Coulomb, CompliantContact)
+
+    def _require(self, where: str, *proportional: type) -> None:
+        """Refuse a law whose forces are not all proportional to the load."""
+        if not isinstance(self.law, proportional):
+            raise ModelError(
+                f"{type(self.law).__name__} {where}",
+                "its forces are not proportional to the load in every mode",
+                f"use {' or '.join(law.__name__ for law in proportional)}, or leave out normal= and preload=",
+            )
+
+    def modes(self) -> tuple[Mode, ...]:
+        """The law's table with "1" meaning the load, and what a contact adds to it.
+
+        A load that follows the motion adds flight. Where the law starts in different modes by the sign of velocity,
+        "landing" decides between them; no time passes in it.
+        """
+        law, entry = self.law.modes(), self.law.entry
+        lands = len(set(entry)) > 1
+        landing = Mode(
+            "landing", "landing", 0, {},
+            (Exit({"v": 1.0}, entry[2]), Exit({"v": -1.0}, entry[0]), Exit({"always": 1.0}, entry[1])),
+        )  # fmt: skip
+        if self.normal is None:
+            return (*law, landing) if lands else law
+        lift = Exit({"1": -1.0}, "lifted")
+        close = Exit({"1": 1.0}, "landing" if lands else entry[1], self.law.memory)
+        lifted = Mode("lifted", "flight", 0, {}, (close,))
+        every = (*law, landing) if lands else law
+        closed = tuple(replace(mode, exits=(lift, *map(self._followed, mode.exits))) for mode in every)
+        return (*closed[: len(law)], lifted, *closed[len(law) :])
+
+    def _followed(self, exit_: Exit) -> Exit:
+        """A stop at zero velocity, as it is while the load changes the deflection of a compliant contact.
+
+        The slider is where a stop would leave it, at the place that the exit resets: it stops when that place does.
+        """
+        if not (exit_.crossing and set(exit_.quantity) == {"v"} and len(exit_.reset) == 1):
+            return exit_
+        (place,) = exit_.reset.values()
+        return replace(exit_, quantity={**exit_.quantity, "d1": exit_.quantity["v"] * place.get("1", 0.0)})
+
+    @property
+    def entry(self) -> str:
+        """Name of the mode in which the contact starts, before any exit that is due at once."""
+        return "landing" if len(set(self.law.entry)) > 1 else self.law.entry[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    r"""Several degrees of freedom that rub at several contacts.
+
+    .. math:: M\ddot q + C\,(\dot q - r\dot d) + K\,(q - r z) + \sum w_t f + \sum w_n (N - N_0) = r P(t)
+
+    z is the base's displacement and d the dampers' other ends'; each contact adds its friction f and its load N, as in
+    :class:`Contact`. Contacts that hold rigidly share their forces through M.
+
+    Attributes
+    ----------
+    mass : array_like (n, n)
+        M [kg], symmetric and positive definite; a number for one degree of freedom.
+    damping : array_like (n, n)
+        C [N s/m].
+    stiffness : array_like (n, n)
+        K [N/m], without the contacts'.
+    contacts : sequence of Contact
+        Where it rubs.
+    drive : Drive
+        What moves; nothing where left out.
+    acts_on : array_like (n,), optional
+        r: the share of the drive's force on each degree of freedom, or of the base's motion in it; 1 for all where
+        left out.
+    damper : {"ground", "base"}
+        What the dampers' other ends are fixed to.
+
+    Raises
+    ------
+    ModelError
+        A value has no meaning, shapes do not fit, or rigid contacts slide along dependent directions.
+
+    Examples
+    --------
+    A mass on a belt, sprung along it and across it, pressed by the contact it slides on; above a critical friction
+    coefficient both motions couple and grow:
+
+    >>> from stickslip.drives import Belt
+    >>> from stickslip.solve.simulate import simulate
+    >>> pad = Contact(Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    >>> springs = [[23.25, 3.9], [3.9, 7.75]]
+    >>> mass = Structure([[1, 0], [0, 1]], [[0, 0], [0, 0]], springs, contacts=[pad], drive=Belt(0.8))
+    >>> run = simulate(mass, duration=25, start={"x1": 0.3, "v1": 0.0})
+    >>> sorted({event.mode for event in run.events})
+    ['back', 'forward', 'lifted', 'stuck']
+    """
+
+    mass: ArrayLike
+    damping: ArrayLike
+    stiffness: ArrayLike
+    contacts: Sequence[Contact] = ()
+    drive: Drive = field(default_factory=Release)
+    acts_on: ArrayLike | None = None
+    damper: str = "ground"
+
+    def __post_init__(self) -> None:
+        mass = _matrix("mass", self.mass)
+        size = len(mass)
+        object.__setattr__(self, "mass", mass)
+        for name in ("damping", "stiffness"):
+            object.__setattr__(self, name, _matrix(name, getattr(self, name), size))
+        if not np.array_equal(mass, mass.T) or not _positive(mass):
+            raise ModelError(
+                f"mass = {mass.tolist()} kg",
+                "a mass matrix is symmetric and positive definite",
+                "correct mass=: every degree of freedom needs a mass",
+            )
+        if isinstance(self.contacts, Contact) or not all(isinstance(contact, Contact) for contact in self.contacts):
+            raise ModelError(f"contacts = {self.contacts!r}", "contacts are a list of Contact", "give contacts=[...]")
+        object.__setattr__(self, "contacts", tuple(self.contacts))
+        for contact in self.contacts:
+            for name in ("tangent", "normal"):
+                row = getattr(contact, name)
+                if row is not None and len(row) != size:
+                    raise ModelError(
+                        f"{name} of {len(row)} numbers in a structure of {size} degrees of freedom",
+                        "a direction has a number for each degree of freedom",
+                        f"correct {name}= of the contact",
+                    )
+        share = np.ones(size) if self.acts_on is None else _direction("acts_on", self.acts_on)
+        if share.shape != (size,):
+            raise ModelError(f"acts_on of {len(share)} numbers", f"it has {size}", "correct acts_on=")
+        object.__setattr__(self, "acts_on", share)
+        if self.damper not in ("ground", "base"):
+            raise ModelError(
+                f"damper = '{self.damper}'", "the dampers are fixed to the 'ground' or the 'base'", "choose one"
+            )
+        rigid = [contact.tangent for contact in self.contacts if any(m.friction is None for m in contact.modes())]
+        if rigid and np.linalg.matrix_rank(np.array(rigid)) < len(rigid):
+            raise ModelError(
+                f"{len(rigid)} rigid contacts whose directions of sliding depend on each other",
+                "the forces that hold them would be undetermined",
+                "give one of them a tangential stiffness (CompliantContact)",
+            )
+
+    @property
+    def size(self) -> int:
+        """Number of degrees of freedom."""
+        return len(np.asarray(self.mass))
+
+    @property
+    def tangents(self) -> Array:
+        """Directions of sliding, a row for each contact (m, n)."""
+        return np.array([contact.tangent for contact in self.contacts]).reshape(len(self.contacts), self.size)
+
+    @property
+    def frequency(self) -> float:
+        """Lowest natural frequency of M and K above zero [Hz]; 0 where there is none."""
+        squares = np.linalg.eigvals(np.linalg.solve(np.asarray(self.mass), np.asarray(self.stiffness))).real
+        real = squares[squares > 1e-12 * np.max(np.abs(squares), initial=0.0)]
+        return math.sqrt(float(np.min(real))) / (2 * math.pi) if len(real) else 0.0
+
+    def having(self, **changes: Any) -> Structure:
+        """The same structure with other values; a name is looked for in the structure, its drive, then its contacts.
+
+        Parameters
+        ----------
+        **changes
+            New values by name; one that belongs to contacts or their laws is changed in every one that has it.
+
+        Returns
+        -------
+        Structure
+        """
+        own = {name: changes.pop(name) for name in _names(self) & changes.keys()}
+        drive, contacts = own.pop("drive", self.drive), own.pop("contacts", self.contacts)
+        inner = {name: changes.pop(name) for name in _names(drive) & changes.keys()}
+        unknown = changes.keys() - {name for contact in contacts for name in _names(contact) | _names(contact.law)}
+        if unknown:
+            raise ModelError(
+                f"no parameter is called '{min(unknown)}'",
+                "it belongs to the structure, its drive, its contacts or their laws",
+                "correct it",
+            )
+        return replace(
+            self, **own, drive=replace(drive, **inner), contacts=[_contact_having(c, changes) for c in contacts]
+        )
+
+
+def _positive(mass: Array) -> bool:
+    """Whether a symmetric matrix is positive definite beyond rounding, whatever the units of its rows."""
+    units = np.sqrt(np.maximum(np.diag(mass), 0.0))
+    if not np.all(units > 0):
+        return False
+    return bool(np.min(np.linalg.eigvalsh(mass / np.outer(units, units))) > 1e-14 * len(mass))
+
+
+def _contact_having(contact: Contact, changes: Mapping[str, Any]) -> Contact:
+    own = {name: value for name, value in changes.items() if name in _names(contact)}
+    law = own.pop("law", contact.law)
+    inner = {name: value for name, value in changes.items() if name in _names(law) and name not in _names(contact)}
+    return replace(contact, **own, law=replace(law, **inner))
+
+
+def _names(part: Any) -> set[str]:
+    return {f.name for f in fields(part)}
+
+
+def _numbers(name: str, values: ArrayLike) -> Array:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as reason:
+        raise ModelError(f"{name} = {values!r}", f"{name} is numbers in rows of equal length", "correct it") from reason
+
+
+def _direction(name: str, values: ArrayLike) -> Array:
+    row = np.atleast_1d(_numbers(name, values))
+    if row.ndim != 1 or not np.all(np.isfinite(row)) or not np.any(row):
+        raise ModelError(f"{name} = {row.tolist()}", f"{name} is a row of finite numbers, not all zero", "correct it")
+    row.flags.writeable = False
+    return row
+
+
+def _matrix(name: str, values: ArrayLike, size: int | None = None) -> Array:
+    """A square matrix; of `size` rows where given."""
+    matrix = np.atleast_2d(_numbers(name, values))
+    count = len(matrix) if size is None else size
+    if matrix.shape != (count, count) or not np.all(np.isfinite(matrix)):
+        raise ModelError(
+            f"{name} of shape {matrix.shape}: {matrix.tolist()}",
+            f"it is {count} by {count} finite numbers: one row for each degree of freedom",
+            f"correct {name}=",
+        )
+    matrix.flags.writeable = False
+    return matrix

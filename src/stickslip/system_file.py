@@ -1,0 +1,356 @@
+"""A system written down: oscillator, law, drive, start and length of run, in a TOML file or as a named scenario."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import re
+import typing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, Field, create_model
+
+from stickslip import scenarios
+from stickslip.drives import RecordedBase
+from stickslip.errors import ModelError
+from stickslip.laws.curved import CurvedLaw
+from stickslip.oscillator import Oscillator
+from stickslip.scenarios import DRIVES, LAWS
+from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
+
+# The unit of each parameter of a law or drive; a test holds them to the docstrings.
+UNITS = {
+    "kinetic": "N", "static": "N", "forces": "N", "error": "N", "mass": "kg", "stiffness": "N/m", "stiffnesses": "N/m",
+    "damping": "N s/m", "slope": "N s/m", "gradient": "N/m", "rate": "1/(N s)", "steepness": "s/m", "speeds": "m/s",
+    "speed": "m/s", "amplitude": "m", "frequency": "Hz", "phase": "rad", "fs": "Hz", "samples": "m",
+    "HarmonicForce.amplitude": "N", "viscous": "N s/m", "normal": "N", "distance": "m", "reference": "m/s",
+}  # fmt: skip
+STATE_UNITS = {"x": "m", "v": "m/s", "y": "m", "u": "m/s", "theta": "N"}
+CYCLES = 20.0  # of a run where nothing is said
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A system with what is needed to run it.
+
+    Attributes
+    ----------
+    name, about : str
+        What it is called, and what it is.
+    system : Oscillator
+        What moves.
+    start : mapping
+        State at time 0, as :func:`simulate` takes it.
+    run : mapping
+        ``duration=`` or ``cycles=``.
+    fs : float or None
+        Sampling rate of the record [Hz]; None: fine enough for the system.
+    known : mapping
+        Answers known beforehand, of a scenario.
+    """
+
+    name: str
+    about: str
+    system: Oscillator
+    start: Mapping[str, float | str]
+    run: Mapping[str, float]
+    fs: float | None = None
+    known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    def having(self, **changes: Any) -> Case:
+        """The same case with other values of its system, as text with units or SI numbers; nothing is known of it then.
+
+        Parameters
+        ----------
+        **changes
+            New values by name, as in :meth:`Oscillator.having`.
+
+        Returns
+        -------
+        Case
+        """
+        if not changes:
+            return self
+        owners = (self.system, self.system.law, self.system.drive)
+        known = [f.name for owner in owners for f in dataclasses.fields(owner)]  # type: ignore[arg-type]
+        for name in changes:
+            if name not in known or name in ("law", "drive"):
+                choices = [n for n in dict.fromkeys(known) if n not in ("law", "drive")]
+                raise ModelError(f"no parameter is called '{name}'", f"there are {', '.join(choices)}",
+                                 nearest(name, choices))  # fmt: skip
+        values: dict[str, Any] = {}
+        for name, value in changes.items():
+            owner = next(o for o in owners if name in {f.name for f in dataclasses.fields(o)})  # type: ignore[arg-type]
+            models = create_model("Changes", __config__=STRICT, **{name: (_kind(type(owner), name), ...)})  # type: ignore[call-overload]
+            values[name] = getattr(checked(models, {name: value}, source="the change"), name)
+        return dataclasses.replace(self, system=self.system.having(**values), known={})
+
+    def lasting(
+        self, *, duration: str | float | None = None, cycles: float | None = None, fs: str | float | None = None
+    ) -> Case:
+        """The same case, run for another time or sampled at another rate; text may have its unit.
+
+        Parameters
+        ----------
+        duration : str or float, optional
+            Time [s].
+        cycles : float, optional
+            Time in periods; this or `duration`.
+        fs : str or float, optional
+            Sampling rate [Hz].
+
+        Returns
+        -------
+        Case
+        """
+        given = {"duration": duration, "cycles": cycles, "fs": fs}
+        values = checked(_Run, {name: value for name, value in given.items() if value is not None}, source="the run")
+        run = {name: value for name, value in (("duration", values.duration), ("cycles", values.cycles)) if value}
+        case = dataclasses.replace(self, run=run or self.run, fs=values.fs or self.fs)
+        _check_run(case)
+        return case
+
+
+class _Oscillator(BaseModel):
+    model_config = STRICT
+
+    mass: Annotated[float, quantity("kg"), Field(gt=0)]
+    stiffness: Annotated[float, quantity("N/m"), Field(ge=0)]
+    damping: Annotated[float, quantity("N s/m")] = 0.0
+    damper: Literal["ground", "base"] = "ground"
+
+
+class _Run(BaseModel):
+    model_config = STRICT
+
+    duration: Annotated[float, quantity("s"), Field(gt=0)] | None = None
+    cycles: Annotated[float, Field(gt=0)] | None = None
+    fs: Annotated[float, quantity("Hz"), Field(gt=0)] | None = None
+
+
+class _File(BaseModel):
+    model_config = STRICT
+
+    about: str = ""
+    system: dict[str, Any]
+    law: dict[str, Any]
+    drive: dict[str, Any] = Field(default_factory=lambda: {"name": "Release"})
+    start: dict[str, Any] = Field(default_factory=dict)
+    run: dict[str, Any] = Field(default_factory=dict)
+
+
+class _Source(NamedTuple):
+    """Where values come from: the file's name, lines and folder."""
+
+    name: str
+    lines: Sequence[str]
+    folder: Path
+
+
+def scenario_case(name: str) -> Case:
+    """A named scenario, ready to run.
+
+    Parameters
+    ----------
+    name : str
+        One of ``scenarios.names()``.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    ModelError
+        No scenario has that name.
+
+    Examples
+    --------
+    >>> scenario_case("FD-4").run
+    {'duration': 126.0}
+    """
+    if name not in scenarios.names():
+        raise ModelError(
+            f"no scenario is called '{name}'",
+            "a scenario is named as 'stickslip simulate' lists them, a file of a system ends in .toml",
+            nearest(name, scenarios.names()),
+        )
+    found = scenarios.get(name)
+    return Case(name, found.about, found.system, found.start, found.run or {"cycles": CYCLES}, None, found.known)
+
+
+def read_system(path: str | Path) -> Case:
+    """Read a system and its run from a TOML file.
+
+    Parameters
+    ----------
+    path : path
+        A file such as::
+
+            [system]
+            mass = "2.42 kg"              # a bare number is SI
+            stiffness = "2.31 N/mm"
+            [law]
+            name = "CompliantContact"     # any of scenarios.LAWS, with its parameters
+            kinetic = 1.1
+            stiffness = 192000
+            damping = 23.9
+            [drive]
+            name = "HarmonicBase"         # any of scenarios.DRIVES
+            amplitude = "0.65 mm"
+            frequency = 2.5
+            [start]                       # at rest at 0 where left out
+            x = "0.1 mm"
+            [run]
+            cycles = 40                   # or duration, in seconds
+            fs = 4000                     # of the record; chosen where left out
+
+        A drive ``RecordedBase`` takes its samples from ``record = "file.csv"`` and ``channel = "column [mm]"``.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    ModelError
+        The file can not be read, is not TOML, has a key that is not known or a value without meaning.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> path = Path(tempfile.mkdtemp()) / "slider.toml"
+    >>> _ = path.write_text("system = {mass = 1, stiffness = '4 N/m'}\\nlaw = {name = 'Coulomb', kinetic = 1}")
+    >>> read_system(path).system.law
+    Coulomb(kinetic=1.0, static=None)
+    """
+    path = Path(path)
+    values, lines = read_toml(path, what="a system is")
+    source = _Source(path.name, lines, path.parent)
+    whole = checked(_File, values, source=source.name, lines=lines)
+    oscillator = _part(_Oscillator, "system", whole.system, source)
+    law = _built("law", LAWS, whole.law, source)
+    drive = _built("drive", DRIVES, whole.drive, source)
+    with _placed("system", source):
+        system = Oscillator(**oscillator, law=law, drive=drive)
+    start = _part(_start_of(law), "start", whole.start, source)
+    run = _part(_Run, "run", whole.run, source)
+    fs = run.pop("fs", None)
+    case = Case(path.stem, whole.about, system, start, run or _whole_run(system), fs)
+    with _placed("run", source):
+        _check_run(case)
+    return case
+
+
+def _whole_run(system: Oscillator) -> dict[str, float]:
+    """What is run where nothing is said: the whole recorded motion, else some cycles."""
+    drive = system.drive
+    return {"duration": _length(drive)} if isinstance(drive, RecordedBase) else {"cycles": CYCLES}
+
+
+def _length(drive: RecordedBase) -> float:
+    return (np.size(drive.samples) - 1) / drive.fs
+
+
+def _check_run(case: Case) -> None:
+    if len(case.run) > 1:
+        raise ModelError("duration and cycles are given", "a run has one of the two", "leave one out")
+    drive = case.system.drive
+    if not isinstance(drive, RecordedBase):
+        return
+    natural = 1 / case.system.frequency if case.system.stiffness else 1.0
+    asked = case.run.get("duration", case.run.get("cycles", 0.0) * natural)
+    if asked > _length(drive) * (1 + 1e-9):
+        raise ModelError(
+            f"duration = {asked:g} s", f"the recorded base motion ends at {_length(drive):g} s", "run it no longer"
+        )
+
+
+def _part(model: type[BaseModel], table: str, values: Mapping[str, Any], source: _Source) -> dict[str, Any]:
+    part = checked(model, values, source=source.name, lines=source.lines, table=table)
+    return {name: value for name, value in part.model_dump(exclude_unset=True).items() if value is not None}
+
+
+def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mapping[str, Any], source: _Source) -> Any:
+    """The law or drive named in a table, with its parameters."""
+    name = values.get("name")
+    if not isinstance(name, str) or name not in register:
+        where = f"{source.name}{line_of([table, 'name'], source.lines)}"
+        told = f"sets {table}.name = {name!r}" if "name" in values else f"has no {table}.name"
+        next_step = nearest(str(name), register) if "name" in values else "add name = NAME"
+        raise ModelError(f"{where} {told}", f"a {table} is one of {', '.join(register)}", next_step)
+    factory = register[name]
+    parameters = {key: value for key, value in values.items() if key != "name"}
+    if name == "RecordedBase" and "record" in parameters:
+        parameters |= _recorded(parameters, source)
+        parameters = {key: value for key, value in parameters.items() if key not in ("record", "channel")}
+    given = _part(_model_of(factory, str(values.get("on", ""))), table, parameters, source)
+    with _placed(table, source):
+        return factory(**given)
+
+
+def _recorded(parameters: Mapping[str, Any], source: _Source) -> dict[str, Any]:
+    """Samples and rate of the base motion that stands in a file of its own."""
+    from stickslip.files.read import read_record
+
+    path, channel = parameters["record"], parameters.get("channel")
+    if not isinstance(path, str) or not isinstance(channel, str):
+        where = f"{source.name}{line_of(['drive', 'record'], source.lines)}"
+        raise ModelError(
+            f"{where} names a record = {path!r}, channel = {channel!r}",
+            "a recorded base motion is a file and the column that moves",
+            'write record = "base.csv" and channel = "column [mm]"',
+        )
+    record = read_record(source.folder / path, channels={"z": channel})
+    return {"samples": record["z"].tolist(), "fs": parameters.get("fs", record.fs)}
+
+
+@contextmanager
+def _placed(table: str, source: _Source) -> Iterator[None]:
+    """What a law, a drive or the oscillator refuses, with the line it stands on."""
+    try:
+        yield
+    except ModelError as error:
+        named = re.match(r"(\w+) = ", error.value)
+        where = line_of([table, named[1]] if named else [table], source.lines)
+        raise ModelError(f"{source.name}{where} [{table}]: {error.value}", error.rule, error.next_step) from error
+
+
+@functools.cache
+def _model_of(factory: type, on: str) -> type[BaseModel]:
+    """The parameters of a law or drive as a model: its fields, with their units."""
+    known: dict[str, Any] = {}
+    for field in dataclasses.fields(factory):
+        default = ... if field.default is dataclasses.MISSING else field.default
+        known[field.name] = (_kind(factory, field.name, on), default)
+    return create_model(factory.__name__, __config__=STRICT, **known)
+
+
+def _kind(factory: type, name: str, on: str = "") -> Any:
+    """The type of a parameter, as a file may give it."""
+    hint = typing.get_type_hints(factory)[name]
+    if name == "tones":
+        amplitude = Annotated[float, quantity("N" if on == "force" else "m")]
+        return list[tuple[amplitude, Annotated[float, quantity("Hz")], Annotated[float, quantity("rad")]]]
+    unit = UNITS.get(f"{factory.__name__}.{name}", UNITS.get(name, "1"))
+    number = Annotated[float, quantity(unit)]
+    if name == "samples" or hint == Sequence[float]:
+        return list[number]
+    return {float: number, float | None: number | None}.get(hint, hint)
+
+
+def _start_of(law: Any) -> type[BaseModel]:
+    """The state that a start may set: displacement, velocity, the law's memory, and the mode."""
+    names = {
+        "x": "m",
+        "v": "m/s",
+        **{name: "m" if name in law.places else STATE_UNITS.get(name, "1") for name in law.memory},
+    }
+    known: dict[str, Any] = {name: (Annotated[float, quantity(unit)] | None, None) for name, unit in names.items()}
+    modes = law.rates() if isinstance(law, CurvedLaw) else law.modes()
+    known["mode"] = (Literal[tuple(mode.name for mode in modes)] | None, None)
+    return create_model("Start", __config__=STRICT, **known)

@@ -1,0 +1,119 @@
+"""Each law that is a table of linear modes, against its own closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.laws.base import Law
+
+HEAVY = 1e15  # kg: a mass that the contact can not move, so that the counter-face imposes the motion
+
+
+def loop_energy(law: Law, amplitude: float) -> float:
+    """Energy [J] that a law takes in one closed cycle of imposed harmonic motion."""
+    system = ss.Oscillator(mass=HEAVY, stiffness=0, law=law, drive=ss.MultiTone([(amplitude, 1.0, 0.0)], on="face"))
+    run = ss.simulate(system, cycles=3)
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    total = 0.0
+    for begin, length in zip(run.starts, run.durations, strict=True):
+        low, high = max(begin, 1.0), min(begin + length, 2.0)
+        if low < high:
+            times = low + (high - low) * (nodes + 1) / 2
+            (friction, slip), _ = run.sample(times, ("friction", "slip"))
+            total += (high - low) / 2 * float(weights @ (friction * slip))
+    return total
+
+
+@pytest.mark.parametrize("amplitude", [10e-6, 20e-6, 485e-6])
+def test_one_elasto_slip_element_is_jenkins(amplitude: float) -> None:
+    """HY-2: W = 4 f (X - f/k)."""
+    energy = 4 * 1.1 * (amplitude - 1.1 / 192000)
+    assert loop_energy(ss.ElastoSlip([192000], [1.1]), amplitude) == pytest.approx(energy, rel=1e-9)
+    assert loop_energy(ss.CompliantContact(1.1, 192000), amplitude) == pytest.approx(energy, rel=1e-9)
+
+
+@pytest.mark.parametrize(("amplitude", "energy"), [(20e-6, 1.7777777777777778e-4), (50e-6, 0.0018)])
+def test_many_elements_are_iwan(amplitude: float, energy: float) -> None:
+    """HY-3: W = (2/3) K X^3 / D within the width D, K D (2X - 4D/3) beyond; classes converge at second order."""
+    errors = [
+        abs(loop_energy(ss.ElastoSlip.iwan(1e6, width=30e-6, elements=n), amplitude) - energy) for n in (6, 12, 24)
+    ]
+    assert errors[2] < 3e-3 * energy
+    assert math.log2(errors[0] / errors[2]) / 2 == pytest.approx(2.0, abs=0.3)
+
+
+def test_elements_yield_whatever_their_order() -> None:
+    one, other = ss.ElastoSlip([1e5, 2e5], [1.0, 0.2]), ss.ElastoSlip([2e5, 1e5], [0.2, 1.0])
+    assert loop_energy(one, 3e-5) == loop_energy(other, 3e-5)
+
+
+def test_a_slope_damps_as_a_damper_does() -> None:
+    slope = ss.Oscillator(mass=1, stiffness=100, law=ss.LinearSlope(0.5, slope=0.3))
+    damper = ss.Oscillator(mass=1, stiffness=100, law=ss.Coulomb(0.5), damping=0.3)
+    runs = [ss.simulate(system, duration=5, start={"x": 0.1}) for system in (slope, damper)]
+    assert [e[1:3] for e in runs[0].events] == [e[1:3] for e in runs[1].events]
+    assert np.allclose(runs[0].starts, runs[1].starts, rtol=1e-14, atol=0)
+
+
+def test_a_table_of_a_straight_line_is_the_line() -> None:
+    table = ss.Tabulated(np.linspace(0, 10, 21), 0.5 + 0.3 * np.linspace(0, 10, 21))
+    runs = [
+        ss.simulate(ss.Oscillator(mass=1, stiffness=100, law=law), duration=5, start={"x": 0.1})
+        for law in (table, ss.LinearSlope(0.5, slope=0.3))
+    ]
+    times = np.linspace(0, 5, 501)
+    left, right = (run.sample(times, ("x",))[0] for run in runs)
+    assert np.allclose(left, right, rtol=0, atol=1e-14)
+
+
+def test_a_polygon_converges_to_the_smooth_curve() -> None:
+    """PS-1: friction falling with speed on a belt, period 8.0955494972436 s at V = 1 m/s."""
+
+    def curve(speed: float) -> float:
+        return 10 * (0.3 / (1 + 1.42 * speed) + 0.1 + 0.01 * speed**2)
+
+    errors = []
+    for points in (101, 401):
+        law = ss.Tabulated.of(curve, np.linspace(0, 6, points))
+        orbit = ss.steady_state(ss.Oscillator(mass=1, stiffness=1, law=law, drive=ss.Belt(1.0)))
+        assert orbit.status == "unique"
+        errors.append(abs(orbit.period - 8.0955494972436))
+    assert errors[1] < 1e-3
+    assert math.log(errors[0] / errors[1], 4) == pytest.approx(2.0, abs=0.3)
+
+
+def test_the_state_variable_relaxes_to_its_backbone() -> None:
+    """At constant speed theta = f_k (1 - exp(-f_k gamma t)); printed, the backbone is 1 N."""
+    for printed, level in ((False, 1.1), (True, 1.0)):
+        law = ss.StateVariable(1.1, rate=2.0, printed=printed)
+        run = ss.simulate(ss.Oscillator(mass=HEAVY, stiffness=0, law=law), duration=1.0, start={"v": 5.0})
+        expected = level * (1 - math.exp(-1.1 * 2.0 * 0.7))
+        assert run.state(0.7)["friction"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_light_contact_becomes_massless() -> None:
+    """The contact with inertia tends to the compliant one, at first order in its mass."""
+    drive = ss.HarmonicBase(1.1e-3, frequency=8.7)
+    base = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.CompliantContact(1.1, 181000), drive=drive)
+    reference = ss.simulate(base, cycles=3).sample([0.3], ("x",))[0][0, 0]
+    gaps = []
+    for mass in (1e-3, 1e-4):
+        law = ss.InertialContact(1.1, stiffness=181000, mass=mass, damping=2 * math.sqrt(181000 * mass))
+        run = ss.simulate(base.having(law=law), cycles=3)
+        gaps.append(abs(run.sample([0.3], ("x",))[0][0, 0] - reference))
+    assert gaps[1] < gaps[0] / 2
+    assert gaps[1] < 2e-2 * abs(reference)
+
+
+def test_a_lifted_contact_rubs_no_more() -> None:
+    law = ss.PositionLoad(0.3, gradient=0.4)
+    run = ss.simulate(ss.Oscillator(mass=1, stiffness=1, law=law), duration=12, start={"x": 3.0})
+    values, piece = run.sample(np.linspace(0, 12, 601), ("x", "friction"))
+    lifted = values[0] < -0.75 - 1e-9
+    assert lifted.any()
+    assert np.all(values[1][lifted] == 0)
+    assert len(piece) == 601

@@ -1,0 +1,140 @@
+"""Figures of a simulated motion: what is drawn is the exact motion, and what holds is marked."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import stickslip as ss
+from stickslip.plot.animation import frames
+from stickslip.plot.figures import figures
+from stickslip.plot.style import BLUE, SKY
+from stickslip.plot.trajectory import (
+    curve,
+    cycle_of,
+    last_cycles,
+    plot_loop,
+    plot_motion,
+    plot_phase,
+    stretches,
+)
+from stickslip.solve.energy import energy
+from stickslip.solve.trajectory import Trajectory
+
+
+def motion(name: str, **run: float) -> Trajectory:
+    case = ss.scenario_case(name)
+    return ss.simulate(case.system, start=case.start, **(run or case.run))  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def sticking() -> Trajectory:
+    return motion("DH-3 b=0.25 r=0.9", cycles=20)
+
+
+def test_every_figure_is_drawn_without_pyplot(sticking: Trajectory) -> None:
+    before = dict(mpl.rcParams)
+    plates = figures(sticking)
+    assert [plate.name for plate in plates] == [
+        "whole-run", "motion", "friction-displacement", "friction-velocity", "phase-portrait"
+    ]  # fmt: skip
+    assert dict(mpl.rcParams) == before
+    for plate, again in zip(plates, figures(sticking), strict=True):
+        assert plate.figure.canvas.manager is None
+        assert plate.caption.endswith(".")
+        assert ET.fromstring(plate.svg()).tag.endswith("svg")
+        assert plate.svg() == again.svg()
+        assert len(plate.svg()) < 600_000
+
+
+def test_the_curve_keeps_jumps_upright(sticking: Trajectory) -> None:
+    times, (friction, _) = curve(sticking, ("friction", "x"), first=0.0, last=sticking.duration)
+    assert np.all(np.diff(times) > 0)
+    jumps = np.flatnonzero(np.abs(np.diff(friction)) > 0.2)
+    assert len(jumps) > 20
+    assert np.diff(times)[jumps].max() < 1e-9 * sticking.duration
+
+
+def test_the_area_of_the_drawn_loop_is_the_work_of_a_cycle(sticking: Trajectory) -> None:
+    lines = {str(line.get_label()): line for line in plot_loop(sticking).get_lines()}
+    x, friction = (np.asarray(part, dtype=float) for part in lines["last cycle"].get_data())
+    area = abs(np.sum((x[1:] - x[:-1]) * (friction[1:] + friction[:-1]) / 2))
+    whole, shorter = energy(sticking).friction, energy(motion("DH-3 b=0.25 r=0.9", cycles=19)).friction
+    assert area == pytest.approx(whole - shorter, rel=1e-5)
+
+
+def test_sticks_are_shaded_and_marked_where_they_are(sticking: Trajectory) -> None:
+    first, last = last_cycles(sticking, 3)
+    axes = plot_motion(sticking, first=first, last=last).axes[0]
+    shaded = sum(float(np.ptp(path.vertices[:, 0])) for path in axes.collections[0].get_paths())
+    held = [p for p in sticking.pieces if p.mode == "stuck"]
+    overlaps = [min(p.start + p.duration, last) - max(p.start, first) for p in held if p.start + p.duration > first]
+    assert shaded == pytest.approx(sum(overlaps), rel=1e-9)
+    marked = next(line for line in plot_phase(sticking).get_lines() if line.get_label() == "stick")
+    assert marked.get_color() == BLUE
+    _, v = (np.asarray(part, dtype=float) for part in marked.get_data())
+    assert np.nanmax(np.abs(v)) < 1e-9, "a stick on the ground is at rest"
+    assert len(marked.get_markevery()) == len(stretches(sticking, "stick", first=last - cycle_of(sticking), last=last))
+
+
+def test_microsticks_have_their_own_mark() -> None:
+    run = motion("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)")
+    lines = {str(line.get_label()): line for line in plot_loop(run).get_lines()}
+    assert lines["microstick"].get_color() == SKY
+    x, friction = (np.asarray(part, dtype=float) for part in lines["microstick"].get_data())
+    factor = 1e6 if "µm" in plot_loop(run).get_xlabel() else 1e3
+    sides = np.split(np.column_stack([x, friction]), np.flatnonzero(np.isnan(x)))
+    fits = [np.polyfit(*side[1:].T, 1)[0] * factor for side in sides if len(side) > 10]
+    slope = np.median(fits)
+    assert slope == pytest.approx(192000, rel=0.1), "the side of the loop is the contact's stiffness"
+
+
+def test_on_a_belt_it_sticks_at_the_belt_s_speed() -> None:
+    run = motion("BS-1", cycles=20)
+    axes = plot_phase(run)
+    lines = {str(line.get_label()): line for line in axes.get_lines()}
+    _, v = (np.asarray(part, dtype=float) for part in lines["stick"].get_data())
+    belt = float(np.asarray(lines["belt"].get_ydata(), dtype=float)[0])
+    assert np.nanmin(v) == pytest.approx(belt)
+    assert np.nanmax(v) == pytest.approx(belt)
+    assert cycle_of(run) == pytest.approx(ss.steady_state(run.system, start={"x": 0.3}).period, rel=1e-9)
+    loop = plot_loop(run, against="slip")
+    assert loop.get_xlabel().startswith("sliding velocity")
+    held = next(line for line in loop.get_lines() if line.get_label() == "stick")
+    assert np.nanmax(np.abs(np.asarray(held.get_xdata(), dtype=float))) < 1e-12
+
+
+def test_a_motion_that_ends_is_shown_as_long_as_it_moves() -> None:
+    run = motion("FD-4")
+    plates = figures(run)
+    assert "whole-run" not in [plate.name for plate in plates]
+    left, right = plates[0].figure.axes[0].get_xlim()
+    assert (left, run.starts[-1] < right < 2 * run.starts[-1]) == (0.0, True)
+
+
+def test_of_a_long_run_no_peak_is_lost() -> None:
+    run = motion("DH-1 b=0.8", cycles=5000)
+    _, (x,) = curve(run, ("x",), first=0.0, last=run.duration)
+    late = x[len(x) // 2 :]
+    assert len(x) <= 3000
+    assert late.max() == pytest.approx(2.3322349875413646, rel=0.01)
+
+
+def test_a_figure_goes_where_it_is_told(sticking: Trajectory) -> None:
+    axes = Figure().add_subplot()
+    assert plot_phase(sticking, ax=axes) is axes
+
+
+def test_frames_move_and_count_themselves(sticking: Trajectory) -> None:
+    told: list[int] = []
+    shown = list(frames(sticking, tell=lambda number, count: told.append(number)))
+    assert told == list(range(150))
+    assert {image.shape for image in shown} == {(480, 640, 3)}
+    assert np.any(shown[0] != shown[40])
+    middle = np.array([[np.flatnonzero((image[60:130] == (213, 94, 0)).all(axis=2).any(axis=0)).mean()
+                        for image in shown if (image[60:130] == (213, 94, 0)).all(axis=2).any()]])  # fmt: skip
+    assert np.ptp(middle) > 50, "the sliding mass travels over the picture"

@@ -1,0 +1,234 @@
+"""stickslip simulate: what it prints, what it writes, and how it refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from PIL import Image
+
+import stickslip as ss
+from stickslip.cli import main
+from stickslip.files.write import WRITERS
+from stickslip.reports import simulation
+
+SLIDER = """
+system = { mass = "2.42 kg", stiffness = 2310 }
+law = { name = "Coulomb", kinetic = 1.1 }
+[drive]
+name = "HarmonicBase"
+amplitude = "0.65 mm"
+frequency = 2.5
+[run]
+cycles = 30
+fs = 1000
+"""
+FIGURES = {"whole-run", "motion", "friction-displacement", "friction-velocity", "phase-portrait"}
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("slider.toml").write_text(SLIDER)
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["simulate", *arguments])
+
+
+def told(*arguments: str) -> dict[str, Any]:
+    result = run(*arguments, "--json")
+    assert result.exit_code == 0, result.output
+    found: dict[str, Any] = json.loads(result.stdout)
+    return found
+
+
+def quantities(found: dict[str, Any]) -> dict[str, float]:
+    return {quantity["name"]: quantity["value"] for quantity in found["quantities"]}
+
+
+def test_a_scenario_is_shown_with_its_known_answers() -> None:
+    result = run("FD-4")
+    assert result.exit_code == 0, result.output
+    assert "comes to rest after 3.142 s, at a displacement of 250 mm" in result.stdout
+    assert "3.14159265  stick" in result.stdout
+    assert result.stdout.rstrip().endswith("Results: FD-4-stickslip")
+    for answer in told("FD-4")["known_answers"].values():
+        assert answer["found"] == pytest.approx(answer["known"], rel=1e-12)
+
+
+def test_a_file_gives_a_folder_that_holds_the_motion() -> None:
+    result = run("slider.toml")
+    assert result.exit_code == 0, result.output
+    folder = Path("slider-stickslip")
+    assert {path.name for path in folder.iterdir()} == {"results.json", "events.csv", "record.csv", "figures"}
+    assert {path.stem for path in (folder / "figures").iterdir()} == FIGURES
+    record = ss.read_record(folder / "record.csv")
+    motion = ss.simulate(ss.read_system("slider.toml").system, cycles=30)
+    assert record.equals(motion.record(fs=1000))
+    events = np.genfromtxt(folder / "events.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    assert [tuple(event) for event in events] == [tuple(event) for event in motion.events], "to the last bit"
+    assert run("slider.toml").exit_code == 0, "its own results are replaced"
+
+
+def test_the_loops_of_the_written_record_give_the_friction_back() -> None:
+    run("slider.toml", "--format", "parquet")
+    record = ss.read_record("slider-stickslip/record.parquet")
+    assert ss.friction_loops(record, frequency=2.5).level.value == pytest.approx(1.1, rel=1e-3)
+
+
+@pytest.mark.parametrize("form", ["csv", "h5", "parquet"])
+def test_every_format_holds_the_same_record(form: str) -> None:
+    assert f".{form}" in WRITERS
+    assert run("slider.toml", "--format", form, "--output", "out", "--cycles", "2").exit_code == 0
+    record = ss.read_record(f"out/record.{form}")
+    assert record.equals(ss.simulate(ss.read_system("slider.toml").system, cycles=2).record(fs=1000))
+
+
+def test_the_json_is_the_folder_s_and_alone_writes_nothing() -> None:
+    found = told("slider.toml")
+    assert {path.name for path in Path().iterdir()} == {"slider.toml"}
+    run("slider.toml")
+    kept = json.loads(Path("slider-stickslip/results.json").read_text())
+    assert {key: kept[key] for key in found} == found
+    assert (found["system"]["mass"], found["law"]["name"]) == (2.42, "Coulomb")
+    assert found["drive"]["amplitude"] == pytest.approx(0.65e-3, rel=1e-15)
+
+
+def test_work_and_shares_are_those_of_the_exact_motion() -> None:
+    found = quantities(told("DH-3 b=0.25 r=0.9", "--cycles", "100"))
+    orbit = ss.steady_state(ss.scenario_case("DH-3 b=0.25 r=0.9").system)
+    assert found["displacement, to"] == pytest.approx(orbit.amplitude, rel=1e-9)
+    stuck = sum(piece.duration for piece in orbit.orbit.pieces if piece.mode == "stuck") / orbit.period
+    assert found["share of time in stick"] == pytest.approx(stuck, abs=0.01)
+    assert found["energy unaccounted for, relative"] < 1e-12
+    decay = quantities(told("FD-4"))
+    assert decay["work against friction"] == pytest.approx(3.0, rel=1e-12), "1 N along 2 m and 1 m"
+
+
+def test_options_change_the_run() -> None:
+    found = told("slider.toml", "--set", "kinetic=2 N", "--set", "mass=3", "--duration", "500 ms")
+    assert (found["law"]["kinetic"], found["system"]["mass"], found["run"]) == (2.0, 3.0, {"duration": 0.5})
+    assert run("slider.toml", "--fs", "2 kHz", "--cycles", "1").exit_code == 0
+    assert ss.read_record("slider-stickslip/record.csv").fs == 2000
+
+
+def test_without_a_name_the_scenarios_are_listed() -> None:
+    result = run()
+    assert result.exit_code == 0
+    assert all(name in result.stdout for name in ss.scenarios.names())
+    assert list(told()) == list(ss.scenarios.names())
+
+
+def test_the_moving_picture_shows_what_the_contact_does() -> None:
+    result = run("slider.toml", "--animate", "gif")
+    assert result.exit_code == 0, result.output
+    with Image.open("slider-stickslip/animation.gif") as picture:
+        assert picture.n_frames == 150
+        colours = set()
+        for frame in range(0, 150, 5):
+            picture.seek(frame)
+            shown = np.asarray(picture.convert("RGB"))[30:150]
+            colours |= {name for name, colour in {"slip": (213, 94, 0), "stick": (0, 114, 178)}.items()
+                        if (np.abs(shown - np.array(colour)).max(axis=2) < 12).sum() > 1000}  # fmt: skip
+    assert colours == {"slip", "stick"}
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_an_mp4_is_written_by_ffmpeg() -> None:
+    assert run("FD-4", "--animate", "mp4").exit_code == 0
+    assert Path("FD-4-stickslip/animation.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_an_mp4_without_ffmpeg_is_refused_and_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    result = run("FD-4", "--animate", "mp4")
+    assert (result.exit_code, "ffmpeg is not installed" in result.stderr) == (2, True)
+    assert {path.name for path in Path().iterdir()} == {"slider.toml"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["FD"], "perhaps FD-"),
+        (["absent.toml"], "can not be read"),
+        (["FD-4", "--cycles", "0"], "--cycles"),
+        (["FD-4", "--cycles", "1", "--duration", "1"], "one of the two"),
+        (["FD-4", "--duration", "1 m"], "measured in s"),
+        (["FD-4", "--set", "kinetik=1"], "perhaps kinetic is meant"),
+        (["FD-4", "--set", "mass=-1"], "mass"),
+        (["FD-4", "--set", "mass"], "NAME=VALUE"),
+        (["FD-4", "--fs", "1e12"], "at most 1e+08 rows"),
+        (["FD-4", "--format", "xls"], "--format"),
+    ],
+)
+def test_wrong_use_is_one_sentence_and_leaves_nothing(arguments: list[str], words: str) -> None:
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert result.stderr.startswith("stickslip: ")
+    assert len(result.stderr.splitlines()) == 1
+    assert words in result.stderr
+    assert {path.name for path in Path().iterdir()} == {"slider.toml"}
+
+
+def test_a_run_that_can_not_be_trusted_ends_with_1(monkeypatch: pytest.MonkeyPatch) -> None:
+    def trembling(*_: object, **__: object) -> None:
+        raise ss.SolveError("too many events", "a period has at most 10000", "check the law")
+
+    monkeypatch.setattr(simulation, "simulate", trembling)
+    result = run("FD-4")
+    assert (result.exit_code, result.stderr) == (
+        1, "stickslip: too many events; a period has at most 10000; check the law.\n"
+    )  # fmt: skip
+
+
+def test_an_error_while_writing_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(simulation, "write_figures", full)
+    result = run("slider.toml")
+    assert result.exit_code == 1
+    assert "No space left on device" in result.stderr
+    assert {path.name for path in Path().iterdir()} == {"slider.toml"}
+
+
+def test_a_folder_of_someone_else_is_left_alone() -> None:
+    Path("mine").mkdir()
+    Path("mine/thesis.tex").write_text("x")
+    result = run("FD-4", "--output", "mine")
+    assert result.exit_code == 2
+    assert "thesis.tex" in result.stderr
+    assert [path.name for path in Path("mine").iterdir()] == ["thesis.tex"]
+
+
+def test_an_interrupted_run_keeps_what_was_done_marked_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace
+
+    whole = simulation.simulate
+
+    def interrupted(*arguments: Any, **options: Any) -> ss.Trajectory:
+        return replace(whole(*arguments, **options), status="interrupted")
+
+    monkeypatch.setattr(simulation, "simulate", interrupted)
+    result = run("slider.toml")
+    assert result.exit_code == 130
+    assert "Interrupted" in result.stdout
+    assert json.loads(Path("slider-stickslip/results.json").read_text())["status"] == "interrupted"
+
+
+def test_the_program_starts_and_simulates_as_a_process() -> None:
+    program = [sys.executable, "-m", "stickslip", "simulate", "slider.toml", "--json"]
+    result = subprocess.run(program, capture_output=True, text=True, timeout=120, env=os.environ, check=False)
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)["status"] == "complete"
+    assert result.stderr == ""

@@ -1,0 +1,547 @@
+"""Several degrees of freedom and contacts: against one mass, itself uncoupled, scipy and closed forms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from stickslip.drives import Belt, Drive, HarmonicBase, HarmonicForce, MultiTone, Ramp, RecordedBase, Release
+from stickslip.errors import ModelError
+from stickslip.laws.base import Law
+from stickslip.laws.compliant import CompliantContact
+from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.dahl import Dahl
+from stickslip.laws.elastoslip import ElastoSlip
+from stickslip.laws.inertial import InertialContact
+from stickslip.laws.linear_slope import LinearSlope
+from stickslip.oscillator import Oscillator
+from stickslip.solve.automaton import automaton
+from stickslip.solve.energy import energy
+from stickslip.solve.periodic import steady_state
+from stickslip.solve.simulate import simulate
+from stickslip.solve.trajectory import Trajectory
+from stickslip.structure import Contact, Structure
+
+SWELL = np.cumsum(np.random.default_rng(5).normal(size=40)) * 0.4
+
+LAWS: list[Law] = [
+    Coulomb(0.5, static=0.7),
+    CompliantContact(0.5, stiffness=50.0, damping=0.1),
+    CompliantContact(0.5, stiffness=50.0, damping=0.4, rule="consistent"),
+    ElastoSlip([20.0, 5.0], [0.3, 0.3]),
+    InertialContact(0.5, stiffness=50.0, mass=0.1),
+]
+DRIVES: list[Drive] = [
+    Release(),
+    HarmonicForce(1.2, frequency=0.13),
+    HarmonicBase(1.2, frequency=0.1, contact="base"),
+    MultiTone([(1.0, 0.11, 0.0), (0.3, 0.7, 1.0)]),
+    Belt(0.3),
+    Ramp(0.2),
+    RecordedBase(SWELL, fs=1.0, contact="base"),
+]
+
+
+def same_events(run: Trajectory, other: Trajectory, *, contact: int = 0) -> None:
+    """The events of a contact of a structure are those of an oscillator: sequence first, then times."""
+    own = [event for event in run.events if event.contact == contact]
+    assert [(e.kind, e.mode, e.side) for e in own] == [(e.kind, e.mode, e.side) for e in other.events]
+    assert np.allclose([e.time for e in own], [e.time for e in other.events], rtol=0, atol=1e-12 * run.duration)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize("drive", DRIVES, ids=lambda drive: type(drive).__name__)
+def test_one_degree_of_freedom_is_the_oscillator(law: Law, drive: Drive) -> None:
+    structure = Structure(1.3, 0.03, 1.7, contacts=[Contact(law, [1.0])], drive=drive, damper="base")
+    slider = Oscillator(mass=1.3, stiffness=1.7, law=law, drive=drive, damping=0.03, damper="base")
+    start: dict[str, float | str] = {"x": 2.0} if isinstance(drive, Release) else {}
+    run, other = (simulate(system, duration=39.0, start=start) for system in (structure, slider))
+    same_events(run, other)
+    assert len(run.events) > 0 or isinstance(drive, RecordedBase)
+    times = np.linspace(0, 39.0, 500)
+    far = max(1.0, float(np.max(np.abs(other.sample(times, ("x",))[0]))))
+    # a force is a difference of displacements times the contact's stiffness, 50 N/m: it has their rounding
+    for name, scale in (("x", far), ("v", far), ("friction", 50 * far)):
+        found, known = (r.sample(times, (name,))[0] for r in (run, other))
+        assert np.max(np.abs(found - known)) <= 1e-12 * scale, name
+
+
+@pytest.mark.parametrize("laws", [(LAWS[0], LAWS[0]), (LAWS[0], LAWS[1]), (LAWS[3], LAWS[2])], ids=["rr", "rc", "ec"])
+def test_what_is_not_coupled_does_not_know_of_each_other(laws: tuple[Law, Law]) -> None:
+    drive = HarmonicForce(1.2, frequency=0.13)
+    both = Structure(
+        np.diag([1.3, 0.7]), np.diag([0.03, 0.05]), np.diag([1.7, 2.9]), drive=drive,
+        contacts=[Contact(laws[0], [1, 0]), Contact(laws[1], [0, 1])],
+    )  # fmt: skip
+    run = simulate(both, duration=60)
+    for j, (m, c, k) in enumerate(((1.3, 0.03, 1.7), (0.7, 0.05, 2.9))):
+        alone = simulate(Oscillator(mass=m, stiffness=k, damping=c, law=laws[j], drive=drive), duration=60)
+        times = np.linspace(0, 60, 400)
+        found, known = run.sample(times, ("x",))[0][j], alone.sample(times, ("x",))[0][0]
+        assert np.allclose(found, known, rtol=0, atol=1e-12)
+        own = [event for event in run.events if event.contact == j]
+        assert [(e.kind, e.side) for e in own] == [(e.kind, e.side) for e in alone.events]
+        assert np.allclose([e.time for e in own], [e.time for e in alone.events], rtol=0, atol=1e-11)
+
+
+def some_matrices(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mass and stiffness positive definite, damping small, all full."""
+    full = rng.normal(size=(3, size, size))
+    mass, stiffness = (part @ part.T / size + 0.3 * np.eye(size) for part in full[:2])
+    return mass, 0.01 * full[2] @ full[2].T / size, 2 * stiffness
+
+
+def test_without_contact_it_is_the_matrix_exponential() -> None:
+    mass, damping, stiffness = some_matrices(np.random.default_rng(1), 4)
+    start = np.random.default_rng(2).normal(size=8)
+    run = simulate(
+        Structure(mass, damping, stiffness),
+        duration=50,
+        start=dict(zip(["x1", "x2", "x3", "x4", "v1", "v2", "v3", "v4"], start, strict=True)),
+    )
+    inverse = np.linalg.inv(mass)
+    flow = np.block([[np.zeros((4, 4)), np.eye(4)], [-inverse @ stiffness, -inverse @ damping]])
+    for time in (0.0, 0.3, 7.0, 50.0):
+        assert np.allclose(run.sample([time], ("state",))[0][:, 0], expm(flow * time) @ start, rtol=0, atol=1e-11)
+    assert run.events == ()
+
+
+def sliding(structure: Structure, *modes: str) -> np.ndarray:
+    """A of the modes in which contacts slide, without drive and constant."""
+    table = automaton(structure)
+    return table.flow[table.index(" + ".join(modes))][: table.physical, : table.physical]
+
+
+def hoffmann(friction: float, *, drive: Drive | None = None, preload: float = 10.0) -> Structure:
+    """MC-1: two inclined springs, a contact spring, a belt."""
+    k11, k12, k22, k3 = 23.25, 3.8971143170299739, 18.75, 11.0
+    pad = Contact(Coulomb(friction), [1, 0], normal=[0, 1], stiffness=k3, preload=preload)
+    return Structure(
+        np.eye(2), np.zeros((2, 2)), [[k11, k12], [k12, k22 - k3]], contacts=[pad], drive=drive or Belt(1.0)
+    )
+
+
+def test_mode_coupling_of_two_inclined_springs() -> None:
+    """MC-1: flutter above mu_c, where both frequencies meet at omega_c."""
+    critical, omega = 0.47237749297333017, 4.58257569495584
+    for side, growing in ((-1, False), (1, True)):
+        values = np.linalg.eigvals(sliding(hoffmann(critical * (1 + side * 1e-9)), "back"))
+        assert np.allclose(np.abs(values.imag), omega, rtol=1e-4)
+        assert (np.max(values.real) > 1e-5) == growing
+    # at the critical coefficient the product of both squares is omega_c^4: a double root
+    assert abs(np.linalg.det(sliding(hoffmann(critical), "back"))) == pytest.approx(omega**4, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("eta", "critical", "frequency"),
+    [
+        ((0.02, 0.02), 0.2893671255228094, 86.602540378443865),
+        ((0.02, 0.06), 0.2717900338224474, 93.026050941906342),
+        ((0.001, 0.1), 0.067461045152826729, 99.711755628543196),
+    ],
+)
+def test_mode_coupling_with_damping(eta: tuple[float, float], critical: float, frequency: float) -> None:
+    """MC-2: the critical coefficient of two modes that press each other's contacts."""
+    w1, w2 = 200 * math.pi, 150 * math.pi
+
+    def slowest(friction: float) -> complex:
+        pads = [
+            Contact(Coulomb(friction), [1, 0], normal=[0, 1], stiffness=w2**2, preload=1e3),
+            Contact(Coulomb(friction), [0, 1], normal=[1, 0], stiffness=w1**2, preload=1e3, carried=-1.0),
+        ]
+        damping = np.diag([eta[0] * w1, eta[1] * w2])
+        values = np.linalg.eigvals(
+            sliding(Structure(np.eye(2), damping, np.zeros((2, 2)), contacts=pads, drive=Belt(1.0)), "back", "forward")
+        )
+        return complex(values[np.argmax(values.real)])
+
+    assert slowest(critical * (1 - 1e-6)).real < 0 < slowest(critical * (1 + 1e-6)).real
+    assert abs(slowest(critical).imag) / (2 * math.pi) == pytest.approx(frequency, rel=1e-10)
+
+
+def replay(structure: Structure, start: np.ndarray, duration: float) -> tuple[list[tuple[float, str]], np.ndarray]:
+    """One contact of two degrees of freedom on a belt by scipy's DOP853, its rules written out: events, and the end.
+
+    The contact's own stiffness, where it has one, is followed with the slider's place as a fifth state.
+    """
+    (pad,) = structure.contacts
+    law, speed = pad.law, structure.drive.speed  # type: ignore[attr-defined]
+    tangential = law.stiffness if isinstance(law, CompliantContact) else 0.0  # type: ignore[attr-defined]
+    kinetic, static = law.kinetic, law.static or law.kinetic  # type: ignore[attr-defined]
+    inverse, damping, stiffness = (
+        np.linalg.inv(structure.mass),
+        np.asarray(structure.damping),
+        np.asarray(structure.stiffness),
+    )
+    t, n = np.asarray(pad.tangent), np.asarray(pad.normal)
+
+    def load(y: np.ndarray) -> float:
+        return float(pad.preload + pad.stiffness * n @ y[:2])
+
+    def force(y: np.ndarray, mode: str) -> np.ndarray:
+        pressing = 0.0 if mode == "lifted" else load(y)
+        return -stiffness @ y[:2] - damping @ y[2:4] + n * (pad.preload - pressing)
+
+    def friction(y: np.ndarray, mode: str) -> float:
+        if mode == "stuck":
+            return float(t @ inverse @ force(y, mode) / (t @ inverse @ t))
+        if mode == "microstuck":
+            return float(tangential * (t @ y[:2] - y[4]))
+        return {"forward": 1, "back": -1, "lifted": 0}[mode] * kinetic * load(y)
+
+    def rate(_: float, y: np.ndarray, mode: str) -> np.ndarray:
+        a = inverse @ (force(y, mode) - t * friction(y, mode))
+        return np.concatenate([y[2:4], a, [speed]])
+
+    def slip(y: np.ndarray, mode: str) -> float:
+        own = float(t @ y[2:4] - speed)
+        if tangential:
+            own -= {"forward": 1, "back": -1}[mode] * kinetic * pad.stiffness * float(n @ y[2:4]) / tangential
+        return own
+
+    def exits(mode: str) -> dict[str, Any]:
+        if mode == "lifted":
+            return {"landing": lambda s, y, _: load(y)}
+        lift = {"lifted": lambda s, y, _: -load(y)}
+        if mode in ("forward", "back"):
+            side = 1 if mode == "forward" else -1
+            return {"stop": lambda s, y, _: -side * slip(y, mode), **lift}
+        return {
+            "forward": lambda s, y, _: friction(y, mode) - static * load(y),
+            "back": lambda s, y, _: -friction(y, mode) - static * load(y),
+            **lift,
+        }
+
+    def follow(y: np.ndarray, mode: str, way: str) -> tuple[np.ndarray, str]:
+        y = y.copy()
+        if way == "stop" and tangential:
+            y[4] = t @ y[:2] - friction(y, mode) / tangential
+            return y, "microstuck"
+        if way == "stop":
+            need = friction(y, "stuck")
+            return y, "stuck" if abs(need) <= static * load(y) else "forward" if need > 0 else "back"
+        if way == "landing" and tangential:
+            y[4] = t @ y[:2]
+            # the contact starts to slide at once where its spring would load faster than its friction
+            own, grown = t @ y[2:4] - speed, static * pad.stiffness * float(n @ y[2:4]) / tangential
+            return y, "microstuck" if abs(own) < grown else "forward" if own > 0 else "back"
+        if way == "landing":
+            return y, "forward" if t @ y[2:4] > speed else "back"
+        return y, way
+
+    y = np.concatenate([start, [t @ start[:2]]])
+    mode = "microstuck" if tangential else "forward" if t @ start[2:] > speed else "back"
+    now, events = 0.0, []
+    while now < duration:
+        ways = exits(mode)
+        checks = list(ways.values())
+        for check in checks:
+            check.terminal, check.direction = True, 1
+        # an exit at the very start of a step is the way in: begin a little past it
+        begin = solve_ivp(rate, (now, now + 1e-7), y, "DOP853", rtol=1e-12, atol=1e-14, args=(mode,)).y[:, -1]
+        piece = solve_ivp(
+            rate,
+            (now + 1e-7, duration),
+            begin,
+            "DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+            args=(mode,),
+            events=checks,
+            max_step=0.02,
+        )
+        now, y = float(piece.t[-1]), piece.y[:, -1]
+        if piece.status == 1:
+            way = next(name for name, found in zip(ways, piece.t_events, strict=True) if len(found))
+            y, mode = follow(y, mode, way)
+            events.append((now, mode))
+    return events, y
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        Coulomb(0.6, static=0.7),
+        CompliantContact(0.6, stiffness=300.0),
+        CompliantContact(0.6, stiffness=30.0, static=0.8),
+    ],
+    ids=["rigid", "stiff", "soft"],
+)
+@pytest.mark.parametrize("speed", [0.3, 0.8])
+def test_flutter_grows_to_stick_and_flight_as_scipy_has_it(law: Law, speed: float) -> None:
+    structure = hoffmann(0.6, drive=Belt(speed), preload=5.0).having(law=law)
+    start = np.array([0.3, -0.1, 0.0, 0.0])
+    run = simulate(structure, duration=25.0, start=dict(zip(("x1", "x2", "v1", "v2"), start, strict=True)))
+    events, end = replay(structure, start, 25.0)
+    own = [(event.time, event.mode) for event in run.events]
+    assert [mode for _, mode in own] == [mode for _, mode in events]
+    assert {"lifted", "back"} < {mode for _, mode in own}
+    assert np.allclose([t for t, _ in own], [t for t, _ in events], rtol=0, atol=1e-10)
+    assert np.allclose(run.sample([25.0], ("x", "v"))[0][:, 0], end[:4], rtol=0, atol=1e-10)
+    assert np.min(run.sample(np.linspace(0, 25, 4000), ("load",))[0]) >= -1e-12
+
+
+def some_structure(seed: int) -> Structure:
+    """Two or three degrees of freedom with two or three contacts of every kind, driven."""
+    rng = np.random.default_rng(seed)
+    size, count = int(rng.integers(2, 4)), int(rng.integers(1, 4))
+    laws: list[Law] = [Coulomb(0.4, static=0.4 * rng.uniform(1, 1.5)), CompliantContact(0.3, stiffness=40.0)]
+    contacts = []
+    for j in range(min(count, size)):
+        follows = rng.random() < 0.6
+        contacts.append(
+            Contact(
+                laws[int(rng.integers(2))], rng.normal(size=size) if rng.random() < 0.5 else np.eye(size)[j],
+                normal=rng.normal(size=size) if follows else None, stiffness=rng.uniform(0.5, 5) if follows else 0.0,
+                preload=rng.uniform(0.2, 1.0), carried=rng.uniform(-1, 1),
+            )
+        )  # fmt: skip
+    drives: list[Drive] = [
+        Belt(0.3),
+        HarmonicForce(1.0, frequency=0.2),
+        HarmonicBase(0.5, frequency=0.2, contact="base"),
+    ]
+    mass, damping, stiffness = some_matrices(rng, size)
+    return Structure(mass, damping, stiffness, contacts=contacts, drive=drives[int(rng.integers(3))])
+
+
+def stored(structure: Structure, q: np.ndarray, v: np.ndarray) -> float:
+    """Kinetic energy, and what springs, closed contacts and the preloads hold, at one instant."""
+    total = v @ structure.mass @ v / 2 + q @ structure.stiffness @ q / 2
+    for contact in structure.contacts:
+        if contact.normal is not None:
+            pressed, k, load = contact.normal @ q, contact.stiffness, contact.preload
+            total += k * pressed**2 / 2 if load + k * pressed > 0 else -load * pressed - load**2 / (2 * k)
+    return float(total)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_work_of_friction_damping_and_drive_is_what_the_energy_loses(seed: int) -> None:
+    structure = some_structure(seed)
+    rng = np.random.default_rng(seed + 100)
+    names = [f"{name}{j + 1}" for name in "xv" for j in range(structure.size)]
+    run = simulate(structure, duration=40.0, start=dict(zip(names, rng.normal(size=len(names)), strict=True)))
+    assert energy(run).residual < 1e-12
+    # Gauss's rule of 20 points on short stretches between events: exact to rounding
+    ends = np.append(run.starts, run.duration)
+    edges = np.concatenate([np.linspace(a, b, max(2, int((b - a) / 0.1) + 2))[:-1] for a, b in pairwise(ends)])
+    edges = np.append(edges, run.duration)
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    widths = np.diff(edges)
+    times = np.clip((edges[:-1, None] + widths[:, None] * (nodes + 1) / 2).ravel(), 0, run.duration)
+    v, f, slip = (run.sample(times, (name,))[0] for name in ("v", "friction", "slip"))
+    z, force = (run.sample(times, (name,))[0][0] for name in ("z", "force"))
+    weight = (widths[:, None] * weights / 2).ravel()
+    drive = np.sum(np.outer(structure.acts_on, force) * v, axis=0)
+    drive += np.sum((structure.stiffness @ np.outer(structure.acts_on, z)) * v, axis=0)
+    rates = [drive, -np.sum(v * (structure.damping @ v), axis=0), -np.sum((structure.tangents.T @ f) * v, axis=0)]
+    work = sum(float(weight @ rate) for rate in rates)
+    turnover = sum(float(weight @ np.abs(rate)) for rate in rates)
+    begin, end = (stored(structure, *np.split(run.sample([t], ("x", "v"))[0][:, 0], 2)) for t in (0.0, run.duration))
+    assert abs(end - begin - work) <= 1e-12 * (turnover + abs(begin) + abs(end))
+    loads = run.sample(times, ("load",))[0]
+    levels = np.array([[contact.law.static or contact.law.kinetic] for contact in structure.contacts])
+    assert np.all(np.abs(f) <= levels * loads + 1e-9)
+    assert np.min(loads) >= -1e-9
+    rigid = [j for j, contact in enumerate(structure.contacts) if isinstance(contact.law, Coulomb)]
+    assert np.all((f * slip)[rigid] >= -1e-12), "friction takes energy wherever it slides"
+
+
+def test_contacts_in_series_move_as_one_mass_until_the_weaker_one_slides() -> None:
+    """A block on a block: the upper one rides until the force that carries it, m2 a, would exceed its friction."""
+    drive = HarmonicForce(3.0, frequency=0.1)
+    blocks = {"mass": np.diag([2.0, 0.5]), "damping": np.zeros((2, 2)), "stiffness": np.diag([1.5, 0.0])}
+
+    def pair(upper: float) -> Structure:
+        contacts = [Contact(Coulomb(0.8), [1, 0]), Contact(Coulomb(upper), [-1, 1])]
+        return Structure(**blocks, contacts=contacts, drive=drive, acts_on=[1, 0])
+
+    one = simulate(Oscillator(mass=2.5, stiffness=1.5, law=Coulomb(0.8), drive=drive), duration=50)
+    times = np.linspace(0, 50, 2001)
+    needed = np.max(np.abs(0.5 * one.sample(times, ("a",))[0]))
+    riding = simulate(pair(1.001 * needed), duration=50)
+    assert {event.contact for event in riding.events} == {0}
+    assert np.allclose([e.time for e in riding.events], [e.time for e in one.events], rtol=0, atol=1e-12 * 50)
+    both, alone = riding.sample(times, ("x",))[0], one.sample(times, ("x",))[0][0]
+    assert np.allclose(both, alone, rtol=0, atol=1e-12)
+    assert np.allclose(
+        riding.sample(times, ("friction",))[0][1], -0.5 * one.sample(times, ("a",))[0][0], rtol=0, atol=1e-11
+    )
+    sliding_off = simulate(pair(0.9 * needed), duration=50)
+    assert {event.contact for event in sliding_off.events} == {0, 1}
+    assert np.max(np.abs(sliding_off.sample(times, ("friction",))[0][1])) == pytest.approx(0.9 * needed, rel=1e-12)
+
+
+def test_a_pulled_chain_breaks_away_block_by_block() -> None:
+    """Three blocks on the ground, springs between, the first pulled slowly: each goes when its spring has its force."""
+    stiffness = np.array([[20.0, -10.0, 0.0], [-10.0, 20.0, -10.0], [0.0, -10.0, 10.0]])
+    contacts = [Contact(Coulomb(level), np.eye(3)[j]) for j, level in enumerate((1.0, 0.7, 0.4))]
+    chain = Structure(np.eye(3), 8.0 * np.eye(3), stiffness, contacts=contacts, drive=Ramp(1e-5), acts_on=np.ones(3))
+    # K acts_on = (10, 0, 0): the ramp pulls at the first block's spring alone
+    run = simulate(chain, duration=4e5)
+    first = {}
+    for event in run.events:
+        first.setdefault(event.contact, event.time)
+    assert list(first) == [0, 1, 2]
+    assert first[0] == pytest.approx(1.0 / 10 / 1e-5, rel=1e-12)
+    # quasi-static: springs in series, the viscous force is 1e-4 N
+    assert first[1] == pytest.approx((1.0 / 10 + 2 * 0.7 / 10) / 1e-5, rel=2e-3)
+    assert first[2] == pytest.approx((1.0 / 10 + 2 * 0.7 / 10 + 3 * 0.4 / 10) / 1e-5, rel=2e-3)
+
+
+def test_contacts_that_let_go_at_the_same_instant_all_go() -> None:
+    contacts = [Contact(Coulomb(0.5), row) for row in np.eye(3)]
+    alike = Structure(
+        np.eye(3), np.zeros((3, 3)), np.eye(3), contacts=contacts, drive=HarmonicForce(1.1, frequency=0.1)
+    )
+    alone = simulate(
+        Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=HarmonicForce(1.1, frequency=0.1)), duration=80
+    )
+    run = simulate(alike, duration=80)
+    assert len(alone.events) > 10
+    for contact in range(3):
+        own = [event for event in run.events if event.contact == contact]
+        assert [(e.kind, e.mode) for e in own] == [(e.kind, e.mode) for e in alone.events]
+        assert np.allclose([e.time for e in own], [e.time for e in alone.events], rtol=0, atol=1e-11)
+    moved = run.sample(np.linspace(0, 80, 300), ("x",))[0]
+    assert np.allclose(moved[0], moved[2], rtol=0, atol=1e-12)
+
+
+def test_a_structure_sampled_is_a_record() -> None:
+    run = simulate(hoffmann(0.6), duration=4.0, start={"x1": 0.3})
+    record = run.record(fs=100)
+    assert list(record.channels) == ["x1", "x2", "v1", "v2", "a1", "a2", "friction"]
+    state = run.state(2.5)
+    assert all(record[name][250] == pytest.approx(state[name], rel=1e-12, abs=1e-14) for name in record.channels)
+    middle = (record["x2"][2:] - record["x2"][:-2]) / 0.02
+    assert np.allclose(middle, record["v2"][1:-1], rtol=0, atol=1e-4 / 6 * 5.0**2 * 2)
+
+
+def test_a_start_above_the_counter_face_is_flight() -> None:
+    run = simulate(hoffmann(0.6), duration=1.0, start={"x2": -2.0})
+    assert run.pieces[0].mode == "lifted"
+    assert run.events[0].mode in ("back", "forward")
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+def test_events_keep_when_the_unit_of_force_changes(scale: float) -> None:
+    parts = np.eye(2), 0.01 * np.eye(2), np.array([[23.25, 3.897], [3.897, 7.75]])
+    pad = Contact(Coulomb(0.6, static=0.7), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    runs = []
+    for s in (1.0, scale):
+        contacts = [
+            replace(pad, stiffness=11.0 * s, preload=5.0 * s),
+            Contact(CompliantContact(0.2 * s, stiffness=40.0 * s), [1, 1]),
+        ]
+        system = Structure(*(s * part for part in parts), contacts=contacts, drive=Belt(0.8))
+        runs.append(simulate(system, duration=40.0, start={"x1": 0.3, "x2": -0.1, "v1": 0.0, "v2": 0.0}))
+    assert len(runs[0].events) > 20
+    assert [event[1:] for event in runs[0].events] == [event[1:] for event in runs[1].events]
+    assert np.allclose([e.time for e in runs[0].events], [e.time for e in runs[1].events], rtol=0, atol=1e-12 * 40)
+
+
+def test_a_steady_orbit_and_its_multipliers_are_those_of_the_map() -> None:
+    """Eigenvalues of the exact derivative, saltation included, against differences of the map over a period."""
+    contacts = [Contact(Coulomb(0.3), [1, 0]), Contact(Coulomb(0.2, static=0.25), [0, 1])]
+    system = Structure(
+        np.diag([1.0, 1.5]),
+        0.05 * np.eye(2),
+        [[3, -1], [-1, 2]],
+        contacts=contacts,
+        drive=HarmonicForce(1.2, frequency=0.13),
+    )
+    steady = steady_state(system)
+    assert steady.status == "unique"
+    point = steady.orbit.states[0, :4]
+
+    def lap(state: np.ndarray) -> np.ndarray:
+        run = simulate(system, cycles=1, start=dict(zip(("x1", "x2", "v1", "v2"), state, strict=True)))
+        return np.asarray(run.sample([run.duration], ("state",))[0][:, 0])
+
+    assert np.allclose(lap(point), point, rtol=0, atol=1e-12)
+    jacobian = np.array([(lap(point + h) - lap(point - h)) / 2e-6 for h in 1e-6 * np.eye(4)]).T
+    known = np.linalg.eigvals(jacobian)
+    assert np.allclose(np.sort_complex(steady.multipliers), np.sort_complex(known), rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize(("excess", "flights"), [(-1e-12, 0), (1e-12, 1), (1e-6, 1)])
+def test_a_load_that_just_vanishes(excess: float, flights: int) -> None:
+    """The normal motion is A cos(wt) while closed: the load's least value is preload - k_n A."""
+    pad = Contact(Coulomb(0.0), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    structure = Structure(np.eye(2), np.zeros((2, 2)), np.diag([1.0, 3.0]), contacts=[pad])
+    amplitude, omega = 5.0 / 11.0 * (1 + excess), math.sqrt(14.0)
+    run = simulate(structure, duration=1.5 * math.pi / omega, start={"x2": amplitude, "v1": 1.0})
+    lifts = [event.time for event in run.events if event.mode == "lifted"]
+    assert len(lifts) == flights
+    if flights:
+        # the crossing is at acos(-1 / (1 + excess)): its own rounding is that of the excess
+        assert lifts[0] * omega == pytest.approx(math.acos(-1 / (1 + excess)), abs=1e-3 * math.sqrt(2 * excess) + 1e-12)
+
+
+GOOD = {"mass": np.eye(2), "damping": np.zeros((2, 2)), "stiffness": np.eye(2)}
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: Structure(**{**GOOD, "mass": [[1.0, 1.0], [1.0, 1.0]]}), "positive definite"),
+        (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.0], [0.0, -1.0]]}), "positive definite"),
+        (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.5], [0.0, 1.0]]}), "symmetric"),
+        (lambda: Structure(**{**GOOD, "mass": [[0.0, 0.0], [0.0, 0.0]]}), "positive definite"),
+        (lambda: Structure(**{**GOOD, "mass": [[math.nan, 0.0], [0.0, 1.0]]}), "finite"),
+        (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.0]]}), "mass of shape"),
+        (lambda: Structure(**{**GOOD, "stiffness": np.eye(3)}), "2 by 2"),
+        (lambda: Structure(**{**GOOD, "damping": 1.0}), "2 by 2"),
+        (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.0], [0.0]]}), "rows of equal length"),
+        (lambda: Structure(**{**GOOD, "stiffness": [["soft", 0.0], [0.0, 1.0]]}), "stiffness = "),
+        (lambda: Structure(**GOOD, contacts=Contact(Coulomb(1.0), [1, 0])), "list of Contact"),  # type: ignore[arg-type]
+        (lambda: Structure(**GOOD, contacts=[Coulomb(1.0)]), "list of Contact"),  # type: ignore[list-item]
+        (lambda: Structure(**GOOD, contacts=[Contact(Coulomb(1.0), [1.0])]), "degree of freedom"),
+        (lambda: Structure(**GOOD, contacts=[Contact(Coulomb(1.0), [1, 0], normal=[1], stiffness=1.0)]), "normal of 1"),
+        (lambda: Structure(**GOOD, acts_on=[1.0]), "acts_on"),
+        (lambda: Structure(**GOOD, damper="wall"), "wall"),
+        (lambda: Structure(**GOOD, contacts=[Contact(Coulomb(1.0), row) for row in ([1, 0], [2, 0])]), "tangential"),
+        (lambda: Structure(**GOOD).having(masss=np.eye(2)), "masss"),
+        (lambda: Contact(Coulomb(1.0), [1, 0], preload=-1.0), "preload = -1.0 N"),
+        (lambda: Contact(Coulomb(1.0), [1, 0], preload=math.nan), "preload"),
+        (lambda: Contact(Coulomb(1.0), [0, 0]), "not all zero"),
+        (lambda: Contact(Coulomb(1.0), [1, math.inf]), "finite"),
+        (lambda: Contact(Coulomb(1.0), [1, 0], stiffness=5.0), "without normal"),
+        (lambda: Contact(Coulomb(1.0), [1, 0], normal=[0, 1]), "stiffness = 0"),
+        (lambda: Contact(Coulomb(1.0), [1, 0], normal=[0, 1], stiffness=-1.0), "stiffness = -1"),
+        (lambda: Contact(LinearSlope(1.0, slope=-0.1), [1, 0], normal=[0, 1], stiffness=1.0), "LinearSlope"),
+        (lambda: Contact(LinearSlope(1.0, slope=-0.1), [1, 0], preload=5.0), "under a preload"),
+        (lambda: Contact(Dahl(1.0, stiffness=100.0), [1, 0]), "Dahl in a structure"),
+        (lambda: simulate(Structure(**GOOD), duration=1.0, start={"x3": 1.0}), "x3"),
+        (lambda: simulate(Structure(**{**GOOD, "stiffness": np.zeros((2, 2))}), cycles=1), "no cycles"),
+    ],
+)  # fmt: skip
+def test_what_has_no_meaning_is_refused(call: Any, words: str) -> None:
+    with pytest.raises(ModelError) as refused:
+        call()
+    assert words in str(refused.value)
+    assert refused.value.value
+    assert refused.value.rule
+    assert refused.value.next_step
+
+
+def test_changes_reach_their_owner() -> None:
+    changed = hoffmann(0.6).having(kinetic=0.3, speed=0.5, preload=2.0, damping=0.1 * np.eye(2))
+    (pad,) = changed.contacts
+    assert (pad.law, pad.preload, changed.drive) == (Coulomb(0.3), 2.0, Belt(0.5))
+    assert np.array_equal(changed.damping, 0.1 * np.eye(2))
+    assert np.array_equal(changed.stiffness, hoffmann(0.6).stiffness)
+
+
+def test_more_joint_modes_than_fit_are_refused() -> None:
+    size = 9
+    many = [Contact(Coulomb(1.0), row) for row in np.eye(size)]
+    with pytest.raises(ModelError, match="joint modes"):
+        simulate(Structure(np.eye(size), np.zeros((size, size)), np.eye(size), contacts=many), duration=1.0)
