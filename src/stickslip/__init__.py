@@ -39,7 +39,8 @@ _ROOMS = {
     "Oscillator": "oscillator", "Structure": "structure", "Contact": "structure",
     "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
     "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
-    "energy": "solve.energy", "attractors": "solve.periodic",
+    "energy": "solve.energy", "attractors": "solve.periodic", "continue_orbit": "solve.continuation",
+    "Branch": "solve.continuation",
     "scenarios": "scenarios",
     "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder", "datasets": "datasets",
 }  # fmt: skip
