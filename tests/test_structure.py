@@ -485,6 +485,63 @@ def test_a_load_that_just_vanishes(excess: float, flights: int) -> None:
         assert lifts[0] * omega == pytest.approx(math.acos(-1 / (1 + excess)), abs=1e-3 * math.sqrt(2 * excess) + 1e-12)
 
 
+def test_rounding_does_not_decide_which_contacts_let_go() -> None:
+    """Two rigid contacts that could not both hold at the start, on speeds that differ by a factor of 300.
+
+    The rounding of the fast one in the slow one's velocity would send the contacts back and forth for ever.
+    """
+    contacts = [
+        Contact(Coulomb(0.4, static=1.2), [-1.05671755, -0.00328638], normal=[-0.11354892, -0.45557381],
+                stiffness=16.777666, preload=0.69541498, carried=0.0),
+        Contact(Coulomb(0.4), [0.0, 1.0], normal=[0.04465903, 0.35865158],
+                stiffness=26.42518335, preload=0.68725912, carried=-1.0),
+    ]  # fmt: skip
+    system = Structure(
+        [[0.79583862, -0.88669992], [-0.88669992, 2.43713904]], np.zeros((2, 2)),
+        [[3.49942177, 1.29017092], [1.29017092, 2.02142097]], contacts=contacts,
+        drive=MultiTone([(1.0, 0.2, 0.0), (0.3, 3.0, 1.0)], on="face"),
+    )  # fmt: skip
+    run = simulate(system, duration=10.0)
+    assert run.pieces[0].mode == "stuck + back"
+    friction, load, slip = (run.sample([1e-6], (name,))[0][:, 0] for name in ("friction", "load", "slip"))
+    assert abs(friction[0]) < 1.2 * load[0]
+    assert slip[0] == pytest.approx(0, abs=1e-15)
+    assert slip[1] < 0
+    assert energy(run).residual < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_hard_structures_never_hang(seed: int) -> None:
+    """Masses over six decades, loads and contacts over four, static up to three times kinetic, negative damping."""
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(2, 5))
+    mass, damping, stiffness = some_matrices(rng, size)
+    if seed % 3 == 0:
+        mass = np.diag(10.0 ** rng.uniform(-3, 3, size))
+    contacts = []
+    for j in range(int(rng.integers(1, min(4, size + 1)))):
+        ratio = float(rng.choice([1.0, 1.3, 3.0]))
+        soft = CompliantContact(
+            0.3, stiffness=10 ** rng.uniform(0, 3), damping=float(rng.choice([0, 1])), static=0.3 * ratio
+        )
+        follows = rng.random() < 0.5
+        contacts.append(
+            Contact(
+                Coulomb(0.4, static=0.4 * ratio) if rng.random() < 0.6 else soft,
+                np.eye(size)[j] if rng.random() < 0.3 else rng.normal(size=size),
+                normal=rng.normal(size=size) if follows else None,
+                stiffness=10 ** rng.uniform(-1, 3) if follows else 0.0,
+                preload=rng.uniform(0.1, 2), carried=float(rng.choice([0, 1, -1])),
+            )
+        )  # fmt: skip
+    system = Structure(
+        mass, -0.2 * damping if seed % 7 == 0 else damping, stiffness, contacts=contacts, drive=DRIVES[seed % 6]
+    )
+    run = simulate(system, duration=5.0, budget=2000)
+    assert energy(run).residual < 1e-11
+    assert np.all(run.durations[:-1] > 0)
+
+
 GOOD = {"mass": np.eye(2), "damping": np.zeros((2, 2)), "stiffness": np.eye(2)}
 
 

@@ -79,12 +79,14 @@ if TYPE_CHECKING:
     from stickslip.laws.inertial import InertialContact as InertialContact
     from stickslip.laws.linear_slope import LinearSlope as LinearSlope
     from stickslip.laws.position_load import PositionLoad as PositionLoad
+    from stickslip.laws.series import InSeries as InSeries
     from stickslip.laws.state_variable import StateVariable as StateVariable
     from stickslip.laws.tabulated import Tabulated as Tabulated
     from stickslip.oscillator import Oscillator as Oscillator
     from stickslip.plot.animation import animate as animate
     from stickslip.reports.simulation import Outcome as Outcome, outcome as outcome, publish_run as publish_run
     from stickslip import scenarios as scenarios
+    from stickslip.solve.continuation import Branch as Branch, continue_orbit as continue_orbit
     from stickslip.solve.energy import energy as energy
     from stickslip.solve.lyapunov import lyapunov as lyapunov
     from stickslip.solve.periodic import (
@@ -121,7 +123,7 @@ _ROOMS = {
     "analyze": "analysis", "compare": "analysis", "mend": "analysis", "Findings": "analysis", "Comparison": "analysis",
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",
     "Tabulated": "laws.tabulated", "StateVariable": "laws.state_variable", "InertialContact": "laws.inertial",
-    "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load",
+    "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load", "InSeries": "laws.series",
     "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
     "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",
@@ -131,6 +133,7 @@ _ROOMS = {
     "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
     "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
     "energy": "solve.energy", "attractors": "solve.periodic",
+    "continue_orbit": "solve.continuation", "Branch": "solve.continuation",
     "scenarios": "scenarios", "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
     "outcome": "reports.simulation", "Outcome": "reports.simulation", "publish_run": "reports.simulation",
     "animate": "plot.animation",

@@ -191,7 +191,7 @@ def steady_state(
         if found is not None:
             return found
         count = laps
-    orbit = _lap(system, table, state, mode, 1)
+    orbit = lap(system, table, state, mode, 1)
     growing = len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:]))
     none = np.full(table.physical, np.nan, dtype=np.complex128)
     return SteadyState("unbounded" if growing else "not periodic", math.nan, 0, orbit, none)
@@ -246,7 +246,8 @@ def _same(one: SteadyState, other: SteadyState) -> bool:
     return bool(np.all(np.abs(one.orbit.states[0] - other.orbit.states[0]) <= 1e-8 * scale))
 
 
-def _lap(system: System, table: Automaton, state: Array, mode: int, laps: int) -> Trajectory:
+def lap(system: System, table: Automaton, state: Array, mode: int, laps: int) -> Trajectory:
+    """The motion over whole periods of the drive from a state at phase zero."""
     return run(system, table, state, mode, laps=float(laps), offset=0.0, budget=10_000)
 
 
@@ -265,7 +266,7 @@ def end_of(orbit: Trajectory) -> tuple[Array, int]:
 
 
 def _iterate(system: System, table: Automaton, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
-    orbit = _lap(system, table, state, mode, laps)
+    orbit = lap(system, table, state, mode, laps)
     return *end_of(orbit), float(np.max(np.abs(orbit.states[-64:, 0])))
 
 
@@ -275,7 +276,7 @@ def _closed(system: System, table: Automaton, state: Array, mode: int, orders: i
         best: tuple[float, Trajectory | None, int] = (math.inf, None, 0)
         point, where = state, mode
         for _ in range(12):
-            orbit = _lap(system, table, point, where, order)
+            orbit = lap(system, table, point, where, order)
             end, after = end_of(orbit)
             size = np.max(np.abs(orbit.states), axis=0)[: table.physical]
             gap = (end - point)[: table.physical]
@@ -283,14 +284,14 @@ def _closed(system: System, table: Automaton, state: Array, mode: int, orders: i
             if relative >= best[0]:
                 break
             best = (relative, orbit, after)
-            jacobian, _ = _jacobian(orbit, after)
+            jacobian, _ = derivative(orbit, after)
             step, *_ = np.linalg.lstsq(np.eye(table.physical) - jacobian, gap, rcond=UNIT)
             if np.any(np.abs(step) > 2 * size):
                 break
             point, where = point.copy(), int(orbit.modes[0])
             point[: table.physical] += step
         if best[0] <= CLOSED and best[1] is not None:
-            return _judged(best[1], order, *_jacobian(best[1], best[2]))
+            return judged(best[1], order, *derivative(best[1], best[2]))
     return None
 
 
@@ -314,7 +315,8 @@ def _family(system: System, table: Automaton, state: Array, mode: int, size: flo
     return None
 
 
-def _jacobian(orbit: Trajectory, after: int) -> tuple[Array, float]:
+def derivative(orbit: Trajectory, after: int) -> tuple[Array, float]:
+    """Derivative of the map over an orbit, and the slowest crossing of an exit relative to its terms."""
     table, size = orbit.table, len(orbit.table.names)
     tangents = np.eye(size)[: table.physical].copy()
     slowest = carry_tangents(
@@ -324,7 +326,7 @@ def _jacobian(orbit: Trajectory, after: int) -> tuple[Array, float]:
     return tangents[:, : table.physical].T, slowest
 
 
-def _judged(orbit: Trajectory, order: int, jacobian: Array, slowest: float) -> SteadyState:
+def judged(orbit: Trajectory, order: int, jacobian: Array, slowest: float) -> SteadyState:
     """An orbit that closes, with what its multipliers say; where it grazes they say nothing."""
     table = orbit.table
     multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)

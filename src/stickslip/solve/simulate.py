@@ -81,7 +81,11 @@ def simulate(
 
 
 def _simulate_curved(
-    system: Oscillator, duration: float | None, cycles: float | None, start: Mapping[str, float | str], budget: int,
+    system: Oscillator,
+    duration: float | None,
+    cycles: float | None,
+    start: Mapping[str, float | str],
+    budget: int,
     rtol: float,
 ) -> Trajectory:
     from stickslip.solve.curved import run_curved, tape

@@ -1,0 +1,323 @@
+"""How a periodic orbit changes with a parameter: pseudo-arclength on the exact map, through folds and corners."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from stickslip.errors import ModelError
+from stickslip.solve.automaton import Array, System, automaton
+from stickslip.solve.periodic import CLOSED, SteadyState, derivative, end_of, judged, lap
+from stickslip.solve.simulate import opening
+from stickslip.structure import Structure
+
+NUDGE = 1e-6  # of the parameter, relative to the way ahead: the map is differenced across twice this
+FLOOR = 1e-11  # a step shorter than this, relative to the way ahead, has met a jump of the map
+SLACK = 1e-9  # a corrector may always move this far; beyond it, no farther than the step was long
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A periodic orbit along a parameter.
+
+    Attributes
+    ----------
+    parameter : str
+        What was varied.
+    values : ndarray (K,)
+        The parameter at each orbit, in the order of the branch: after a fold it runs back.
+    orbits : tuple of SteadyState
+        The orbit at each value, with status, events and multipliers of its own.
+    folds : tuple of int
+        Which orbits are at a smooth fold: the branch turns, a multiplier is 1.
+    changes : tuple of int
+        Which orbits are the first with another cycle of modes than the one before.
+    status : str
+        "complete" (the far value was reached), "returned" (back at the first value after a fold), "jump" (the map
+        jumps there: the orbit ends, and motion goes over to another one), "unfinished" (the most orbits were found).
+    """
+
+    parameter: str
+    values: Array
+    orbits: tuple[SteadyState, ...]
+    folds: tuple[int, ...]
+    changes: tuple[int, ...]
+    status: str
+
+    @property
+    def amplitudes(self) -> Array:
+        """Largest displacement of each orbit [m], (K,)."""
+        return np.array([orbit.amplitude for orbit in self.orbits])
+
+    def __repr__(self) -> str:
+        low, high = float(np.min(self.values)), float(np.max(self.values))
+        return f"Branch({self.parameter} {low:g} to {high:g}, {len(self.orbits)} orbits, {self.status})"
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """The map at one point (state over its size, parameter over the way ahead): where it leads, and how steeply."""
+
+    point: Array
+    mode: int
+    gap: Array
+    slope: Array
+    orbit: SteadyState
+    after: int
+
+    @property
+    def miss(self) -> float:
+        return float(np.max(np.abs(self.gap), initial=0.0))
+
+    @property
+    def turn(self) -> float:
+        """Determinant that is zero at a fold."""
+        return float(np.linalg.det(self.slope[:, :-1]))
+
+
+_Map = Callable[[Array, int, Array | None], _Look]
+
+
+def continue_orbit(orbit: SteadyState, parameter: str, *, to: float, step: float = 0.1, most: int = 400) -> Branch:
+    """How does a periodic orbit change with a parameter, stable or not, around folds?
+
+    Newton's method closes the orbit in the plane across the branch's tangent; the derivative by the state is exact, by
+    the parameter a central difference of the exact map. The order of events is free to change: the mode at phase zero
+    is the one the lap ends in, and the branch keeps its orientation (the sign of the determinant of map and tangent,
+    which corners keep too). Where no step however short closes, the tangent of the far side of a corner is tried;
+    where that fails as well, the map jumps and the branch ends.
+
+    Parameters
+    ----------
+    orbit : SteadyState
+        Where the branch starts.
+    parameter : str
+        What varies, a name that ``having`` takes.
+    to : float
+        Value at which the branch ends.
+    step : float
+        Longest step: a part of the way in the parameter, or of the orbit's size in the state.
+    most : int
+        Most orbits.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    ModelError
+        The orbit does not close, has no drive's period, or the parameter's values have no meaning.
+
+    Examples
+    --------
+    >>> from stickslip.scenarios import forced
+    >>> from stickslip.solve.periodic import steady_state
+    >>> branch = continue_orbit(steady_state(forced(0.8, 0.5)), "kinetic", to=0.3)
+    >>> branch.status, round(float(branch.amplitudes[-1]), 6)
+    ('complete', 2.626105)
+    """
+    if orbit.order < 1 or orbit.status == "rest" or not math.isfinite(orbit.orbit.table.motion.period):
+        raise ModelError(
+            f"the orbit is '{orbit.status}'", "a branch starts at an orbit with the period of a drive", "find one"
+        )
+    first = _value(orbit.orbit.system, parameter)
+    if not (math.isfinite(to) and to != first):
+        raise ModelError(f"to = {to}", f"the far value is finite and not the first one, {first}", "give another")
+    if not (0 < step <= 1 and most > 1):
+        raise ModelError(f"step = {step}, most = {most}", "0 < step <= 1 and at least 2 orbits", "correct them")
+    orbit.orbit.system.having(**{parameter: to})
+    map_ = _family(orbit, parameter, first, to - first)
+    begin = _correct(map_, np.append(_scaled(orbit), 0.0), int(orbit.orbit.modes[0]), _along(orbit))
+    if begin is None:
+        raise ModelError(f"the orbit at {first}", "does not close where a branch starts", "find it anew")
+    tangent = _tangent(begin, _along(orbit), 0.0)
+    side = _side(begin, tangent)
+    found, folds, status, length, clean = [begin], [], "unfinished", step, True
+    while len(found) < most:
+        last = found[-1]
+        rest = (float(tangent[-1] > 0) - last.point[-1]) / tangent[-1] if tangent[-1] else math.inf
+        ahead = _step(map_, last, tangent, min(length, rest), _along(orbit) if rest <= length else tangent)
+        if ahead is None and length <= FLOOR:
+            tangent, ahead = _corner(map_, last, tangent, side, step)
+            length = step / 16
+            if ahead is None:
+                status = "jump"
+                break
+        if ahead is None:
+            length, clean = max(min(length, rest) / 2, FLOOR), False
+            continue
+        turned, same = last.turn * ahead.turn < 0, _cycle(last.orbit) == _cycle(ahead.orbit)
+        if turned and not same and length > step / 64:
+            length, clean = length / 2, False  # a fold and a corner in one step are told apart
+            continue
+        if turned and same:
+            fold = _fold(map_, last, tangent, length)
+            if fold is not None:
+                folds.append(len(found))
+                found.append(fold)
+        found.append(ahead)
+        if rest <= length:
+            status = "complete" if tangent[-1] > 0 else "returned"
+            break
+        tangent = _tangent(ahead, tangent, side)
+        length, clean = min(step, 1.4 * length if clean else length), True
+    cycles = [_cycle(look.orbit) for look in found]
+    return Branch(
+        parameter,
+        np.array([first + look.point[-1] * (to - first) for look in found]),
+        tuple(look.orbit for look in found),
+        tuple(folds),
+        tuple(j for j in range(1, len(found)) if cycles[j] != cycles[j - 1]),
+        status,
+    )
+
+
+def _value(system: System, parameter: str) -> float:
+    """The parameter's value now, found where `having` would put it."""
+    laws = [contact.law for contact in system.contacts] if isinstance(system, Structure) else [system.law]
+    for owner in (system, *laws, system.drive):
+        value = getattr(owner, parameter, None) if parameter in {f.name for f in fields(owner)} else None  # type: ignore[arg-type]
+        if isinstance(value, int | float):
+            return float(value)
+    raise ModelError(f"'{parameter}' has no single value", "a branch follows one number", "choose another parameter")
+
+
+def _along(orbit: SteadyState) -> Array:
+    """The direction of the parameter alone."""
+    direction = np.zeros(orbit.orbit.table.physical + 1)
+    direction[-1] = 1.0
+    return direction
+
+
+def _scaled(orbit: SteadyState) -> Array:
+    """The state at phase zero over its size."""
+    return orbit.orbit.states[0, : orbit.orbit.table.physical] / _size(orbit)
+
+
+def _size(orbit: SteadyState) -> Array:
+    """Largest modulus of each entry of the state; 1 where it is always zero."""
+    sizes = np.max(np.abs(orbit.orbit.states[:, : orbit.orbit.table.physical]), axis=0)
+    sizes[0] = max(sizes[0], orbit.amplitude)
+    return np.where(sizes > 0, sizes, 1.0)
+
+
+def _family(orbit: SteadyState, parameter: str, first: float, way: float) -> _Map:
+    """The map over the orbit's period with its slope, for every scaled point and mode at phase zero."""
+    system, order, size = orbit.orbit.system, orbit.order, _size(orbit)
+
+    def end(point: Array, mode: int) -> tuple[Array, int, SteadyState, Array]:
+        varied = system.having(**{parameter: first + point[-1] * way})
+        table = automaton(varied)
+        state, _ = opening(table, {})
+        state[: table.physical] = point[:-1] * size
+        motion = lap(varied, table, state, mode, order)
+        last, after = end_of(motion)
+        slope, slowest = derivative(motion, after)
+        return last[: table.physical] / size, after, judged(motion, order, slope, slowest), slope
+
+    def scaled(slope: Array) -> Array:
+        return slope * size / size[:, None] - np.eye(len(size))
+
+    def look(point: Array, mode: int, change: Array | None) -> _Look:
+        last, after, closed, slope = end(point, mode)
+        if change is not None:
+            return _Look(point, mode, last - point[:-1], np.column_stack([scaled(slope), change]), closed, after)
+        places, ends, alike = [point[-1]], [last], []
+        for nudge in (-NUDGE, NUDGE):
+            place = float(np.clip(point[-1] + nudge, min(0.0, point[-1]), max(1.0, point[-1])))
+            there, _, beside, _ = end(np.append(point[:-1], place), mode)
+            alike.append(_cycle(beside) == _cycle(closed))
+            places.append(place)
+            ends.append(there)
+        # across a corner the map has two slopes: only a side with the point's own order of events counts
+        low = 0 if alike[1] and not alike[0] and places[2] != places[0] else 1
+        high = 0 if alike[0] and not alike[1] and places[1] != places[0] else 2
+        change = (ends[high] - ends[low]) / (places[high] - places[low])
+        return _Look(point, mode, last - point[:-1], np.column_stack([scaled(slope), change]), closed, after)
+
+    return look
+
+
+def _correct(map_: _Map, point: Array, mode: int, normal: Array) -> _Look | None:
+    """The orbit in the plane through a point across `normal`; None where Newton finds none."""
+    best: _Look | None = None
+    for _ in range(12):
+        # the column of the parameter hardly changes from one iteration to the next
+        look = map_(point, mode, None if best is None or best.mode != mode else best.slope[:, -1])
+        if not np.all(np.isfinite(look.gap)) or (best is not None and look.miss >= best.miss):
+            break
+        best = look
+        matrix = np.vstack([look.slope, normal])
+        if not np.all(np.isfinite(matrix)) or np.linalg.matrix_rank(matrix) < len(matrix):
+            break
+        move = np.linalg.solve(matrix, np.append(-look.gap, 0.0))
+        if np.max(np.abs(move)) > 1.0:
+            break
+        point, mode = look.point + move, look.after
+    return best if best is not None and best.miss <= CLOSED and best.after == best.orbit.orbit.modes[0] else None
+
+
+def _step(map_: _Map, last: _Look, tangent: Array, length: float, normal: Array) -> _Look | None:
+    """The orbit one step along the tangent, if it is near where the tangent leads."""
+    aim = last.point + length * tangent
+    try:
+        found = _correct(map_, aim, last.after, normal)
+    except ModelError:
+        return None  # the parameter has no meaning there: a shorter step does
+    if found is None or np.linalg.norm(found.point - aim) > max(0.5 * length, SLACK):
+        return None
+    return found
+
+
+def _side(look: _Look, tangent: Array) -> float:
+    return float(np.sign(np.linalg.det(np.vstack([look.slope, tangent]))))
+
+
+def _tangent(look: _Look, before: Array, side: float) -> Array:
+    """The branch's unit tangent, on the given side of the map."""
+    tangent: Array = np.linalg.svd(look.slope)[2][-1]
+    ahead = _side(look, tangent) == side if side else tangent @ before > 0
+    return tangent if ahead else -tangent
+
+
+def _corner(map_: _Map, last: _Look, tangent: Array, side: float, step: float) -> tuple[Array, _Look | None]:
+    """The way on from a corner: with the tangent that the order of events just ahead has."""
+    for length in (1e-9, 1e-6, step / 16):
+        beyond = _tangent(map_(last.point + length * tangent, last.after, None), tangent, side)
+        found = _step(map_, last, beyond, step / 16, beyond)
+        if found is not None:
+            return beyond, found
+    return tangent, None
+
+
+def _fold(map_: _Map, last: _Look, tangent: Array, length: float) -> _Look | None:
+    """The orbit between two steps at which the determinant is zero, by the rule of false position, kept bracketed."""
+    low, high, best = 0.0, length, None
+    at_low, at_high = last.turn, math.nan
+    for turn in range(80):
+        middle = (low + high) / 2 if turn % 3 == 0 or at_high != at_high else low + (high - low) * at_low / (
+            at_low - at_high
+        )  # fmt: skip
+        look = _correct(map_, last.point + middle * tangent, last.after, tangent)
+        if look is None:
+            return best
+        best = look if best is None or abs(look.turn) < abs(best.turn) else best
+        if look.turn * at_low > 0:
+            low, at_low = middle, look.turn
+        else:
+            high, at_high = middle, look.turn
+        if high - low < FLOOR or look.turn == 0:
+            break
+    return best
+
+
+def _cycle(orbit: SteadyState) -> tuple[str, ...]:
+    """The modes around the orbit, wherever phase zero falls among them."""
+    modes = [orbit.orbit.table.modes[m].name for m in orbit.orbit.modes]
+    if len(modes) > 1 and modes[0] == modes[-1]:
+        modes.pop()
+    return min(tuple(modes[j:] + modes[:j]) for j in range(len(modes)))
