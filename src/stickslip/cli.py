@@ -33,6 +33,7 @@ _REPAIRS = {
 _SPOKEN = (
     (r"\brecord\.check\(\)", "stickslip check"),
     (r"\brecord\.rows\(\)", "--rows"),
+    (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
     (r"\b(channels|units|fs|time|delimiter|decimal|method|damper|contact)=(?=\W|$)", r"--\1"),
 )
