@@ -56,6 +56,23 @@ def test_short_and_empty_records_are_told_in_words():
     assert [(fault.kind, fault.rows) for fault in nothing.check()] == [("missing", ((0, 99),))]
 
 
+def test_what_is_advised_for_missing_values_can_be_done():
+    wave = np.sin(2 * np.pi * np.arange(4000) / 400)
+    wave[:30] = wave[3950:] = np.nan
+    (fault,) = Record.of({"x": wave}, fs=FS).check()
+    assert fault.message.endswith("; cut those at the ends off with record.rows(30, 3950).")
+    assert Record.of({"x": wave}, fs=FS).rows(30, 3950).check() == []
+    wave[1000:1101] = wave[2000] = np.nan
+    (fault,) = Record.of({"x": wave}, fs=FS).check()
+    assert fault.message.endswith(
+        "; cut those at the ends off with record.rows(30, 3950); rows 1000 to 1100 are too many in a row to be told by "
+        "what lies around them (more than 100): keep a part without them with record.rows(); "
+        "fill the others with fill_missing(record)."
+    )
+    (fault,) = Record.of({"x": np.full(100, np.nan)}, fs=FS).check()
+    assert "fill_missing" not in fault.message
+
+
 def test_many_rows_are_counted_not_listed():
     values = np.sin(np.arange(4000) / 30)
     values[::100] = np.nan

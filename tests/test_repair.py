@@ -21,6 +21,7 @@ from stickslip import (
     resample,
     restore_clipped,
 )
+from stickslip.record.flaws import runs_of
 from stickslip.signals.interpolate import band_limited, bridge
 from test_check import read_pendulum, read_seal
 
@@ -58,6 +59,22 @@ def test_filling_is_better_than_holding(damaged: Damaged):
     known = np.isfinite(damaged.record[damaged.channel])
     assert np.array_equal(filled[damaged.channel][known], truth[known])
     assert "filled (row" in filled.history[-1].outcome
+
+
+def test_nothing_is_made_up_beyond_the_ends_or_in_a_gap_too_long():
+    wave = np.sin(2 * np.pi * np.arange(4000) / 400)
+    spoilt = wave.copy()
+    spoilt[:30] = spoilt[500:600] = spoilt[1000:1101] = spoilt[3000] = spoilt[3950:] = np.nan
+    record = Record.of({"x": spoilt}, fs=FS)
+    filled = fill_missing(record)
+    assert runs_of(np.isnan(filled["x"])) == ((0, 29), (1000, 1100), (3950, 3999))
+    assert np.max(np.abs(filled["x"] - wave)[np.isfinite(filled["x"])]) < 1e-3
+    assert filled.history[-1].outcome == (
+        "101 values of x filled (rows 500 to 599, 3000); rows 1000 to 1100 stay NaN, being longer than 100; longest= "
+        "says otherwise; rows 0 to 29, 3950 to 3999 stay NaN, being at the end; record.rows() cuts them off"
+    )
+    assert runs_of(np.isnan(fill_missing(record, longest=101)["x"])) == ((0, 29), (3950, 3999))
+    assert runs_of(np.isnan(fill_missing(record, "x", longest=1)["x"]))[1] == (500, 599)
 
 
 @pytest.mark.parametrize("damaged", planted("spike"), ids=named)

@@ -109,6 +109,16 @@ def test_a_folder_that_is_not_there_is_one_sentence(tmp_path: Path, suffix: str)
         ss.write_record(example(), tmp_path / "nowhere" / f"kept{suffix}")
 
 
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_file_that_is_there_is_replaced_only_when_asked(tmp_path: Path, suffix: str) -> None:
+    path = ss.write_record(example(10), tmp_path / f"kept{suffix}")
+    before = path.read_bytes()
+    with pytest.raises(ss.FormatError, match=r"is there already.*overwrite=True"):
+        ss.write_record(example(20), path)
+    assert path.read_bytes() == before
+    assert len(ss.read_record(ss.write_record(example(20), path, overwrite=True))) == 20
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".h5", ".parquet"])
 def test_a_failure_half_way_leaves_the_old_file(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
     path = ss.write_record(example(10), tmp_path / f"kept{suffix}")
@@ -125,7 +135,7 @@ def test_a_failure_half_way_leaves_the_old_file(tmp_path: Path, suffix: str, mon
 
     monkeypatch.setattr(writer[suffix], full)
     with pytest.raises(ss.FormatError, match="No space left"):
-        ss.write_record(broken, path)
+        ss.write_record(broken, path, overwrite=True)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 

@@ -34,6 +34,7 @@ _REPAIRS = {
 _SPOKEN = (
     (r"\brecord\.check\(\)", "stickslip check"),
     (r"\brecord\.rows\(\)", "--rows"),
+    (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
     (r"\b(channels|units|fs|time|delimiter|decimal|method|damper|contact)=(?=\W|$)", r"--\1"),
 )
@@ -297,7 +298,7 @@ def convert(file: str, out: Path, force: bool, **options: Any) -> None:
         raise click.BadParameter(f"'{out}' is the file to be read", param_hint="OUT")
     if out.exists() and not force:
         raise click.BadParameter(f"'{out}' is there already; --force writes over it", param_hint="OUT")
-    click.echo(ss.write_record(_read(groups[0], _rig(**options)), out))
+    click.echo(ss.write_record(_read(groups[0], _rig(**options)), out, overwrite=force))
 
 
 @main.command()

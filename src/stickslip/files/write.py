@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 ROWS_AT_ONCE = 200_000
 
 
-def write_record(record: Record, path: str | Path) -> Path:
+def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a record, with its channels, clock, history and truth, so that read_record gives it back exactly.
 
     The format follows the suffix: ``.csv`` (a comment line of JSON, then ``name [unit]`` headers),
     ``.h5``/``.hdf5`` (one dataset a channel) or ``.parquet``. Time [s] is written as a column of its own, for
-    other programs. The file appears whole or not at all; an existing one is replaced.
+    other programs. The file appears whole or not at all.
 
     Parameters
     ----------
@@ -34,6 +34,8 @@ def write_record(record: Record, path: str | Path) -> Path:
         The record to keep.
     path : str or Path
         Where to; the folder exists already.
+    overwrite : bool, optional
+        Whether a file that is there already may be replaced; it could be the measurement itself.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def write_record(record: Record, path: str | Path) -> Path:
     Raises
     ------
     FormatError
-        The suffix names no format that can be written, or the folder can not be written to.
+        The suffix names no format that can be written, the file is there already, or the folder can not be written to.
 
     Examples
     --------
@@ -61,6 +63,10 @@ def write_record(record: Record, path: str | Path) -> Path:
             f"'{path.name}' ends in '{path.suffix}'",
             f"a record is written as {', '.join(WRITERS)}",
             "choose one of these endings",
+        )
+    if not overwrite and path.exists():
+        raise FormatError(
+            f"'{path.name}' is there already", "no file is replaced unasked", "choose another name, or overwrite=True"
         )
     columns = {time_column(record): ("s", record.time)}
     columns |= {name: (record.channels[name].unit, values) for name, values in record.samples.items()}

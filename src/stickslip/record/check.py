@@ -198,16 +198,8 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
     lost = ~np.isfinite(values)
     faults = []
     if lost.any():
-        faults.append(
-            _fault(
-                "missing",
-                name,
-                flaws.runs_of(lost),
-                _several(int(lost.sum()), "value that is not a number", "values that are not numbers"),
-                "fill them with fill_missing(record)",
-                "error",
-            )
-        )
+        what = _several(int(lost.sum()), "value that is not a number", "values that are not numbers")
+        faults.append(_fault("missing", name, flaws.runs_of(lost), what, _cure(values), "error"))
     if lost.all() or len(values) < 3:
         return faults
     if lost.any():
@@ -218,6 +210,23 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
         )
         return [*faults, Fault("constant", name, ((0, len(values) - 1),), message)]
     return faults + [fault for fault in _shape_faults(name, unit, values) if not _inside(fault.rows, lost)]
+
+
+def _cure(values: Array) -> str:
+    """What to do about values that are not numbers: fill short runs, cut off those at an end, keep a part else."""
+    numbers = np.flatnonzero(np.isfinite(values))
+    if not len(numbers):
+        return "look at its cable, range and column, or leave it out"
+    short, long, ends = flaws.missing(values)
+    cures = [f"cut those at the ends off with record.rows({numbers[0]}, {numbers[-1] + 1})"] if ends else []
+    if long:
+        cures.append(
+            f"{in_words(long)} are too many in a row to be told by what lies around them "
+            f"(more than {flaws.bridgeable(values)}): keep a part without them with record.rows()"
+        )
+    if short:
+        cures.append(("fill the others" if cures else "fill them") + " with fill_missing(record)")
+    return "; ".join(cures)
 
 
 def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:

@@ -20,6 +20,7 @@ CUBIC_GAIN = float(np.sqrt(np.sum(CUBIC**2)))
 ENOUGH = 400  # plateaus looked at: more of them make a verdict no surer
 SHORTEST_TREND = 64  # samples from which a slow trend can be told from the motion
 TRAVEL = 12.0  # rise in amplitudes from which a trend is travel: eight steps of a pulled block rise by 19
+BRIDGED = 16  # rows that may be filled however fast the signal: half the order of the autoregression that does it
 FEW_LEVELS = 12  # steps of a sensor across the whole motion below which its shape is lost
 
 
@@ -325,6 +326,42 @@ def _period(values: Array) -> int | None:
     if np.sum(power[peak - 2 : peak + 3]) < 0.2 * np.sum(power):
         return None
     return max(2, round(len(values) / peak))
+
+
+def bridgeable(values: Array) -> int:
+    """Rows missing in a row that their surroundings still tell: a quarter of the strongest oscillation's period.
+
+    Sixteen rows where that is shorter, or nothing oscillates.
+    """
+    lost = ~np.isfinite(values)
+    if lost.all():
+        return 0
+    rows = np.arange(len(values))
+    period = _period(np.interp(rows, rows[~lost], values[~lost]))
+    return max(BRIDGED, (period or 0) // 4)
+
+
+def missing(values: Array, longest: int | None = None) -> tuple[Runs, Runs, Runs]:
+    """Runs of values that are not numbers: those that can be filled, longer ones, and those at an end of the record.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    longest : int, optional
+        Rows of the longest run that can be filled; :func:`bridgeable` where left out.
+
+    Examples
+    --------
+    >>> wave = np.sin(0.01 * np.arange(4000))
+    >>> wave[100:110] = wave[500:1500] = wave[3990:] = np.nan
+    >>> missing(wave)
+    (((100, 109),), ((500, 1499),), ((3990, 3999),))
+    """
+    runs = runs_of(~np.isfinite(values))
+    limit = (bridgeable(values) if longest is None else longest) if runs else 0
+    inner = tuple(run for run in runs if run[0] > 0 and run[1] < len(values) - 1)
+    short = tuple(run for run in inner if run[1] - run[0] < limit)
+    return short, tuple(run for run in inner if run not in short), tuple(run for run in runs if run not in inner)
 
 
 def _running_mean(values: Array, length: int) -> Array:

@@ -235,7 +235,8 @@ def fill_missing(record: Record, *channels: str, longest: int | None = None) -> 
     """Fill values that are not numbers from the samples around them.
 
     An autoregression of the channel bridges each gap (:func:`stickslip.signals.interpolate.bridge`), so that an
-    oscillation goes on inside; at the ends of the record the nearest sample is held.
+    oscillation goes on inside. What lies before the first or after the last number of a channel stays NaN: nothing is
+    known there, and ``record.rows()`` cuts it off.
 
     Parameters
     ----------
@@ -243,7 +244,8 @@ def fill_missing(record: Record, *channels: str, longest: int | None = None) -> 
     *channels : str
         Which channels; all where left out.
     longest : int, optional
-        Longest run of rows to fill; longer ones stay NaN. No limit where left out.
+        Longest run of rows to fill; longer ones stay NaN. Where left out, a quarter of the period of the channel's
+        strongest oscillation, and at least 16 rows: what is longer is not told by what lies around it.
 
     Returns
     -------
@@ -272,12 +274,14 @@ def fill_missing(record: Record, *channels: str, longest: int | None = None) -> 
             )
         if not lost.any():
             continue
-        runs = flaws.runs_of(lost)
-        long = tuple(run for run in runs if longest is not None and run[1] - run[0] + 1 > longest)
-        samples[name] = np.where(flaws.rows_of(long, len(record)), np.nan, bridge(record[name], lost))
-        filled = int(lost.sum()) - sum(last - first + 1 for first, last in long)
-        stay = f", {in_words(long)} stay NaN, being longer than {longest}" if long else ""
-        parts.append(f"{filled} values of {name} filled ({in_words(runs)}{stay})")
+        limit = flaws.bridgeable(record[name]) if longest is None else longest
+        short, long, ends = flaws.missing(record[name], limit)
+        stay = [f"{in_words(long)} stay NaN, being longer than {limit}; longest= says otherwise"] if long else []
+        stay += [f"{in_words(ends)} stay NaN, being at the end; record.rows() cuts them off"] if ends else []
+        samples[name] = np.where(flaws.rows_of((*long, *ends), len(record)), np.nan, bridge(record[name], lost))
+        filled = sum(last - first + 1 for first, last in short)
+        where = f" ({in_words(short)})" if short else ""
+        parts.append("; ".join([f"{filled} {'value' if filled == 1 else 'values'} of {name} filled{where}", *stay]))
     outcome = "; ".join(parts) or "no value was missing"
     return _mended(record, samples, Step("fill_missing", {"channels": list(names), "longest": longest}, outcome))
 
