@@ -87,6 +87,26 @@ class Law(Protocol):
         """The table."""
 
 
+@dataclass(frozen=True)
+class Rigid:
+    """What a rigid contact has in common with others: no memory, no places, slip to either side or stick."""
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """None."""
+        return {}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, by the sign of the velocity."""
+        return "back", "stuck", "forward"
+
+
 def finite(name: str, value: float, *, unit: str, positive: bool = False, signed: bool = False) -> float:
     """`value`, if the parameter can have it: finite, and not negative unless `signed`, not zero if `positive`."""
     number = float(value)

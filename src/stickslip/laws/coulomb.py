@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+from stickslip.laws.base import Exit, Mode, Rigid, finite, static_level
 
 
 @dataclass(frozen=True)
-class Coulomb:
+class Coulomb(Rigid):
     r"""Rigid dry friction: :math:`f = f_k\,\mathrm{sgn}\,v` in slip, :math:`|f| \le f_s` in stick.
 
     A slip that comes to rest passes through the stuck mode; where the holding force would exceed `static` it goes on
@@ -39,21 +38,6 @@ class Coulomb:
     def __post_init__(self) -> None:
         finite("kinetic", self.kinetic, unit="N")
         static_level(self.static, self.kinetic)
-
-    @property
-    def memory(self) -> Mapping[str, Row]:
-        """None: the rigid contact remembers nothing."""
-        return {}
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """None."""
-        return ()
-
-    @property
-    def entry(self) -> tuple[str, str, str]:
-        """Modes in which motion starts, by the sign of the velocity."""
-        return "back", "stuck", "forward"
 
     def modes(self) -> tuple[Mode, ...]:
         """Slip on either side, and stick."""

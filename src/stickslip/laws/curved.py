@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Row
+from stickslip.laws.base import Exit, Rigid, Row
 
 FUNCTIONS = ("exp", "log", "tanh", "asinh", "sqrt")
 
@@ -218,18 +218,8 @@ class CurvedLaw(Protocol):
 
 
 @dataclass(frozen=True)
-class Sliding:
+class Sliding(Rigid):
     """A curved law's usual ground: no places, slip to either side."""
-
-    @property
-    def memory(self) -> Mapping[str, Row]:
-        """None."""
-        return {}
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """None."""
-        return ()
 
     @property
     def entry(self) -> tuple[str, str, str]:

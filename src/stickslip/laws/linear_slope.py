@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+from stickslip.laws.base import Exit, Mode, Rigid, finite, static_level
 from stickslip.laws.coulomb import held_until
 
 
 @dataclass(frozen=True)
-class LinearSlope:
+class LinearSlope(Rigid):
     r"""Rigid contact with :math:`f = f_k\,\mathrm{sgn}\,v + s\,v` in slip, :math:`|f| \le f_s` in stick.
 
     Attributes
@@ -36,21 +35,6 @@ class LinearSlope:
         finite("kinetic", self.kinetic, unit="N")
         finite("slope", self.slope, unit="N s/m", signed=True)
         static_level(self.static, self.kinetic)
-
-    @property
-    def memory(self) -> Mapping[str, Row]:
-        """None."""
-        return {}
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """None."""
-        return ()
-
-    @property
-    def entry(self) -> tuple[str, str, str]:
-        """Modes in which motion starts, by the sign of the velocity."""
-        return "back", "stuck", "forward"
 
     def modes(self) -> tuple[Mode, ...]:
         """Slip on either side, and stick."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from stickslip.laws.base import Exit, Mode, Row, finite
+from stickslip.laws.base import Exit, Mode, Rigid, finite
 
 
 @dataclass(frozen=True)
-class PositionLoad:
+class PositionLoad(Rigid):
     r"""Rigid contact with :math:`|f| = n(x)`, :math:`n(x) = f_k + g\,x` where positive, else the contact is lifted.
 
     The oscillator of Feeny and Moon: chaotic under a harmonic drive.
@@ -33,21 +32,6 @@ class PositionLoad:
     def __post_init__(self) -> None:
         finite("kinetic", self.kinetic, unit="N")
         finite("gradient", self.gradient, unit="N/m", signed=True)
-
-    @property
-    def memory(self) -> Mapping[str, Row]:
-        """None."""
-        return {}
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """None."""
-        return ()
-
-    @property
-    def entry(self) -> tuple[str, str, str]:
-        """Modes in which motion starts, by the sign of the velocity."""
-        return "back", "stuck", "forward"
 
     def modes(self) -> tuple[Mode, ...]:
         """Slip and flight on either side, and stick."""

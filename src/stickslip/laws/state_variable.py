@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from stickslip.laws.base import Exit, Mode, Row, finite
+from stickslip.laws.base import Exit, Mode, Rigid, Row, finite
 
 
 @dataclass(frozen=True)
-class StateVariable:
+class StateVariable(Rigid):
     r"""Friction that tracks Coulomb's: :math:`\dot\theta = -f_k\gamma(\theta - f_k\,\mathrm{sgn}\,v)`.
 
     Thesis, equations 4.1 and 4.2, where the backbone lacks its factor :math:`f_k`; `printed` keeps it out, which
@@ -50,11 +50,6 @@ class StateVariable:
     def memory(self) -> Mapping[str, Row]:
         """The friction force [N], zero at the start."""
         return {"theta": {}}
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """None."""
-        return ()
 
     @property
     def entry(self) -> tuple[str, str, str]:

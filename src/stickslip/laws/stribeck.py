@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, finite
+from stickslip.laws.base import Exit, Rigid, finite
 from stickslip.laws.coulomb import held_until
-from stickslip.laws.curved import CurvedMode, Expression, Sliding, exp, symbol
+from stickslip.laws.curved import CurvedMode, Expression, exp, symbol
 
 Curve = Callable[[Expression], Expression]
 
@@ -25,15 +25,7 @@ def slips_and_stick(curve: Curve, level: float) -> tuple[CurvedMode, ...]:
 
 
 @dataclass(frozen=True)
-class _Rigid(Sliding):
-    @property
-    def entry(self) -> tuple[str, str, str]:
-        """Modes in which motion starts, by the sign of the velocity."""
-        return "back", "stuck", "forward"
-
-
-@dataclass(frozen=True)
-class Stribeck(_Rigid):
+class Stribeck(Rigid):
     r"""Friction that falls with the speed: :math:`f = f_k + (f_s - f_k) e^{-(|v|/v_s)^\delta} + \sigma |v|` in slip.
 
     Stribeck's curve in the form of Bo and Pavelescu (Wear 82, 1982); in stick :math:`|f| \le f_s`, held exactly.
@@ -106,7 +98,7 @@ class Stribeck(_Rigid):
 
 
 @dataclass(frozen=True)
-class FrictionCurve(_Rigid):
+class FrictionCurve(Rigid):
     """Any smooth curve of friction over the sliding speed, odd in the velocity, with exact sticking.
 
     Attributes

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+from stickslip.laws.base import Exit, Mode, Rigid, finite, static_level
 from stickslip.laws.coulomb import held_until
 
 
 @dataclass(frozen=True)
-class Tabulated:
+class Tabulated(Rigid):
     """Rigid contact whose friction follows a polygon over the sliding speed, odd in the velocity.
 
     Beyond the last speed the force stays as it is there.
@@ -83,16 +83,6 @@ class Tabulated:
         fine = np.concatenate([np.linspace(a, b, 33) for a, b in pairwise(points)])
         error = float(np.max(np.abs([curve(float(v)) for v in fine] - np.interp(fine, points, forces))))
         return cls(points, forces, static, error)
-
-    @property
-    def memory(self) -> Mapping[str, Row]:
-        """None."""
-        return {}
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """None."""
-        return ()
 
     @property
     def entry(self) -> tuple[str, str, str]:
