@@ -369,6 +369,7 @@ def _open(
     else:
         wanted, more = columns.every(units or {}, times)
         notes += more
+    notes += columns.notes
     columns.check_units(units or {}, [one.channel.name for one in wanted])
     if not wanted:
         raise RecordError(
