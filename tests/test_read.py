@@ -461,3 +461,21 @@ def test_g_of_anything_else_is_gram_and_says_so(tmp_path: Path) -> None:
     record = ss.read_record(tmp_path / "run.csv", channels=spec)
     assert [record.channels[name].unit for name in spec] == ["m/s^2", "kg", "m/s^2"]
     assert "top: g read as a mass" in record.history[-1].outcome
+
+
+def test_an_error_of_the_program_is_not_taken_for_a_damaged_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "run.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,-1\n")
+
+    def broken(*_: object) -> None:
+        raise TypeError("a slip of the program")
+
+    monkeypatch.setattr("stickslip.files.text.find_layout", broken)
+    with pytest.raises(TypeError, match="a slip of the program"):
+        ss.read_record(tmp_path / "run.csv")
+
+
+def test_a_number_too_large_for_a_float_is_no_column(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text('{"t": [0, 1, 2], "x": [1, 2, 3], "y": [1, 2, 1' + "0" * 400 + "]}")
+    assert list(ss.read_record(tmp_path / "run.json")) == ["x"]
