@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from corpus import FS, Damaged, clean_records, damaged_records
-from stickslip import Record, read_record, repair_clock
+from stickslip import Record, RecordError, read_record, repair_clock
 from stickslip.record.check import Fault
 from stickslip.record.clock import fit_clock
 from stickslip.record.flaws import spikes
@@ -199,3 +199,29 @@ def test_spikes_are_found_up_to_one_sample_in_sixty(share: float, found: float):
     assert sum(last - first + 1 for first, last in spikes(values)) >= found * 0.95 * len(rows)
     if not found:
         assert not spikes(values)
+
+
+def test_a_fault_is_shown_briefly_and_told_in_full():
+    values = np.sin(np.arange(4000) / 30)
+    values[7:9] = np.nan
+    (fault,) = Record.of({"x": values}, fs=FS).check()
+    assert repr(fault) == "Fault(error: missing in x, rows 7 to 8)"
+    assert str(fault) == fault.message
+
+
+def test_constant_channels_are_told_once_and_without_a_unit_that_says_nothing():
+    moving = {"x": np.sin(np.arange(4000) / 30)}
+    (fault,) = Record.of({**moving, "trigger": np.zeros(4000)}, fs=FS).check()
+    assert fault.message.startswith("channel trigger is constant at 0 throughout;")
+    (fault,) = Record.of({**moving, **{f"ch{n}": np.full(4000, n) for n in range(12)}}, fs=FS).check()
+    assert (fault.kind, fault.channel, fault.rows) == ("constant", None, ((0, 3999),))
+    assert fault.message.startswith(
+        "12 of 13 channels are constant throughout (ch0, ch1, ch2, ch3, ch4, ch5, ch6, ch7 and 4 more); look at"
+    )
+
+
+def test_one_value_is_told_as_one():
+    values = np.sin(np.arange(4000) / 30)
+    values[7] = np.nan
+    with pytest.raises(RecordError, match="channel x has a value that is no number at row 7;"):
+        Record.of({"x": values}, fs=FS).require_clean("x", question="a loop")

@@ -441,3 +441,41 @@ def test_spectra_are_no_records(dataset: Callable[[str], Path], name: str) -> No
 def test_a_matlab_file_without_a_clock_reads_with_a_rate(dataset: Callable[[str], Path]) -> None:
     record = ss.read_record(dataset("formats") / "testhdf5_7.4_GLNX86.mat", fs=1)
     np.testing.assert_allclose(record["testdouble"], np.arange(9) * np.pi / 4, rtol=1e-14)
+
+
+@pytest.mark.parametrize("title", ["acc", "Accel X", "frame_acc_z", "acc2", "Beschleunigung"])
+def test_g_of_an_acceleration_is_gravity_whatever_its_name(tmp_path: Path, title: str) -> None:
+    (tmp_path / "run.csv").write_text(f"t [s],{title} [g]\n0,1\n1,2\n2,-1\n")
+    record = ss.read_record(tmp_path / "run.csv")
+    (name,) = record
+    assert record.channels[name].unit == "m/s^2"
+    np.testing.assert_allclose(record[name], 9.80665 * np.array([1, 2, -1]))
+
+
+def test_g_of_anything_else_is_gram_and_says_so(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("t [s],top [g],ch [V]\n0,1,1\n1,2,1\n2,-1,2\n")
+    record = ss.read_record(tmp_path / "run.csv")
+    assert record.channels["top"].unit == "kg"
+    assert "top: g read as a mass; call the channel a or acc if it is gravity" in record.history[-1].outcome
+    spec = {"acc": "ch @ 100 mV/g", "top": "ch @ 100 mV/g", "a": "top [g]"}
+    record = ss.read_record(tmp_path / "run.csv", channels=spec)
+    assert [record.channels[name].unit for name in spec] == ["m/s^2", "kg", "m/s^2"]
+    assert "top: g read as a mass" in record.history[-1].outcome
+
+
+def test_an_error_of_the_program_is_not_taken_for_a_damaged_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "run.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,-1\n")
+
+    def broken(*_: object) -> None:
+        raise TypeError("a slip of the program")
+
+    monkeypatch.setattr("stickslip.files.text.find_layout", broken)
+    with pytest.raises(TypeError, match="a slip of the program"):
+        ss.read_record(tmp_path / "run.csv")
+
+
+def test_a_number_too_large_for_a_float_is_no_column(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text('{"t": [0, 1, 2], "x": [1, 2, 3], "y": [1, 2, 1' + "0" * 400 + "]}")
+    assert list(ss.read_record(tmp_path / "run.json")) == ["x"]

@@ -161,3 +161,15 @@ def test_the_short_stroke_of_the_rack(dataset):
     fit = np.polyfit(both["x"], position, 1)
     assert fit[0] == pytest.approx(1.0, abs=0.01)
     assert np.std(position - np.polyval(fit, both["x"])) < 2e-4  # m, over a stroke of 0.15 m
+
+
+def test_the_shared_motion_is_found_by_its_names():
+    a, b = pair(0.05, 0.0, 1, velocity=True)
+    assert clock_offset(a, b) == clock_offset(a, b, on=("x", "v"))
+    assert clock_offset(b, a) == clock_offset(b, a, on=("v", "x"))
+    step = synchronise(a, b).history[-1]
+    assert step.arguments["on"] == ("x", "v")
+    assert "found on x and v" in step.outcome
+    plate = Record.of({"plate": a["x"]}, fs=a.fs)
+    with pytest.raises(RecordError, match=r"have plate and v;.*on=\("):
+        synchronise(plate, b)

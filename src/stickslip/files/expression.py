@@ -15,6 +15,7 @@ from stickslip.errors import RecordError
 from stickslip.record.channels import VOCABULARY
 from stickslip.units import Unit, parse_unit
 
+ACCELERATION = re.compile(r"(^|_)acc(\d|_|[xyz]|$)|accel|beschl", re.IGNORECASE)  # names whose "g" is gravity
 LONGEST = 500  # characters; a linear combination needs fewer, and the parser's recursion stays shallow
 
 
@@ -121,8 +122,12 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> RecordError:
 
 
 def channel_unit(text: str, channel: str) -> Unit:
-    """Read a unit for a channel: the vocabulary settles symbols with two meanings, and must be met."""
-    accepted = VOCABULARY[channel].units if channel in VOCABULARY else (None,)
+    """Read a unit for a channel: the vocabulary settles symbols with two meanings, and must be met.
+
+    Outside of it the name of an acceleration settles "g", and need not be met.
+    """
+    accepted: tuple[str | None, ...] = ("m/s^2", None) if ACCELERATION.search(channel) else (None,)
+    accepted = VOCABULARY[channel].units if channel in VOCABULARY else accepted
     refusals = []
     for expected in accepted:
         try:

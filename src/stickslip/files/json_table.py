@@ -90,7 +90,10 @@ def _numbers(value: Any) -> Array | None:
         return None
     if not all(item is None or type(item) in (int, float) for item in value):
         return None
-    return np.array([np.nan if item is None else float(item) for item in value])
+    try:
+        return np.array([np.nan if item is None else float(item) for item in value])
+    except OverflowError:  # whole numbers of JSON know no largest
+        return None
 
 
 def _rate(about: Mapping[str, Any]) -> float | None:
@@ -121,9 +124,11 @@ def _sep005(contents: Any) -> Table:
     columns, arrays = [], {}
     for name, channel in zip(names, channels, strict=True):
         values = _numbers(channel["data"])
-        if values is None or type(channel["fs"]) not in (int, float):
+        if values is None or type(channel["fs"]) not in (int, float) or not 0 < channel["fs"] < 1e15:
             raise FormatError(
-                f"channel {name} holds no numbers", "SEP 005 gives data and fs as numbers", "write the file again"
+                f"channel {name} holds no numbers or no rate",
+                "SEP 005 gives data and a positive fs as numbers",
+                "write the file again",
             )
         arrays[name] = values
         columns.append(Column(name, str(channel["unit_str"]) or None, len(values), float(channel["fs"])))

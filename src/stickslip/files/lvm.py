@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from stickslip.errors import FormatError
-from stickslip.files.table import Column, Options, Table, optional, slices, unique
+from stickslip.files.table import Column, Options, Table, optional, reading, slices, unique
 
 NAME = "LabVIEW measurement"
 SUFFIXES = (".lvm",)
@@ -21,8 +23,13 @@ def recognise(path: Path, head: bytes) -> bool:
 def read(path: Path, options: Options) -> Table:
     """The columns of a file with one segment."""
     lvm_read = optional("lvm_read")
-    # not lvm_read.read: even with read_from_pickle=False it loads FILE.lvm.pkl where there is one
-    contents = lvm_read.read_str(path.read_text(encoding="utf-8-sig", errors="replace"))
+    with reading(path, NAME):
+        # not lvm_read.read: even with read_from_pickle=False it loads FILE.lvm.pkl where there is one
+        contents = lvm_read.read_str(path.read_text(encoding="utf-8-sig", errors="replace"))
+        return _table(path, contents)
+
+
+def _table(path: Path, contents: Mapping[Any, Any]) -> Table:
     if contents["Segments"] != 1:
         raise FormatError(
             f"'{path.name}' has {contents['Segments']} segments",

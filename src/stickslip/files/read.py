@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, RecordError
 from stickslip.files.select import Columns, Source, TimeColumn, Wanted
-from stickslip.files.table import Block, Options, reading
+from stickslip.files.table import Block, Options, supplied
 from stickslip.files.titles import titled
 from stickslip.record.clock import Clock, fit_clock, resolution
 from stickslip.record.metadata import (
@@ -369,6 +369,7 @@ def _open(
     else:
         wanted, more = columns.every(units or {}, times)
         notes += more
+    notes += columns.notes
     columns.check_units(units or {}, [one.channel.name for one in wanted])
     if not wanted:
         raise RecordError(
@@ -398,7 +399,7 @@ def _source(path: Path, options: Options) -> Source:
     for name in FORMATS:
         room = importlib.import_module(f"stickslip.files.{name}")
         if room.recognise(path, head):
-            with _quietly(path, room.NAME):
+            with _quietly(path):
                 return Source(path, room.NAME, titled(room.read(path, options)), digest, size)
     raise FormatError(
         f"'{path.name}' is of no known format",
@@ -412,19 +413,19 @@ def _room(name: str) -> ModuleType:
 
 
 @contextmanager
-def _quietly(source: Path, kind: str) -> Iterator[None]:
-    """Damage as one sentence, without the parser's warnings: what they warn of either fails or shows in the numbers."""
-    with warnings.catch_warnings(), reading(source, kind):
+def _quietly(path: Path) -> Iterator[None]:
+    """Without the parsers' warnings: what they warn of either fails or shows in the numbers."""
+    with warnings.catch_warnings(), supplied(path):
         warnings.simplefilter("ignore")
         yield
 
 
 def _blocks(source: Source, names: Sequence[str], size: int) -> Iterator[Block]:
     """The table's blocks, its failures as FormatError."""
-    with _quietly(source.path, source.format):
+    with _quietly(source.path):
         blocks = source.table.blocks(names, size)
     while True:
-        with _quietly(source.path, source.format):
+        with _quietly(source.path):
             try:
                 block = next(blocks)
             except StopIteration:

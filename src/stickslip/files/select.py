@@ -66,6 +66,7 @@ class Columns:
         self.columns: dict[Key, Column] = {
             (number, column.name): column for number, source in enumerate(sources) for column in source.table.columns
         }
+        self.notes: list[str] = []
         self._by_name: dict[str, Key] = {}
         exact = [(name, (number, name)) for number, name in self.columns]
         self._admit(exact)
@@ -178,6 +179,9 @@ class Columns:
         else:
             unit = self._unit(name, stated)
             source += f" [{stated}]" if spec.unit is None else ""
+        weighed = re.search(r"(?:^|[ /(])(m?g)\)?$", spec.sensitivity or stated or "")
+        if weighed and unit.si == "kg":
+            self.notes.append(f"{name}: {weighed[1]} read as a mass; call the channel a or acc if it is gravity")
         return Channel(name, unit.si, described(name, unit.si), source, spec.sensitivity), unit.scale
 
     def _unit(self, name: str, stated: str) -> Unit:

@@ -104,18 +104,29 @@ def unique(names: Sequence[str]) -> list[str]:
 
 
 @contextmanager
-def reading(path: Path, kind: str) -> Iterator[None]:
-    """Around a call into a format's library: whatever it raises on a damaged file becomes one sentence."""
+def supplied(path: Path) -> Iterator[None]:
+    """Around all reading of a file: memory or disk that fail become one sentence; an error of the program stays one."""
     try:
         yield
-    except StickslipError:
-        raise
     except MemoryError as error:
         raise FormatError(
             f"'{path.name}' asks for more memory than there is",
             "columns are held whole unless they are read in blocks; a damaged file may state absurd sizes",
             "name fewer channels=, or go through the file with read_blocks()",
         ) from error
+    except OSError as error:
+        raise FormatError(
+            f"'{path.name}' can not be read ({error})", "the file stays there while it is read", "check disk and rights"
+        ) from error
+
+
+@contextmanager
+def reading(path: Path, kind: str) -> Iterator[None]:
+    """Around a call into a format's library: whatever it raises on a damaged file becomes one sentence."""
+    try:
+        yield
+    except (StickslipError, MemoryError):
+        raise
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
         raise FormatError(

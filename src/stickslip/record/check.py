@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SHORTEST = 32  # samples below which no question about friction can be answered
+NAMED = 8  # constant channels named in one sentence
 DRIFT = 0.3  # rise of the trend, in amplitudes of the oscillation, from which it is told
 SHARP_UNITS = ("m/s", "rad/s", "N", "N m")  # what may have plateaus with corners by nature: sticking, saturation
 
@@ -32,7 +33,7 @@ class Fault:
         "short", "clock", "rate", "backwards", "repeated stamps", "jitter", "gap", "missing", "constant", "clipped",
         "frozen", "spike", "drift" or "coarse".
     channel : str or None
-        The channel it is in; None for the clock.
+        The channel it is in; None for the clock, and for three or more channels that are all constant.
     rows : tuple of (first, last)
         All runs of rows concerned, both ends included, counted from 0.
     message : str
@@ -57,6 +58,10 @@ class Fault:
 
     def __str__(self) -> str:
         return self.message
+
+    def __repr__(self) -> str:
+        where = f" in {self.channel}" if self.channel else ""
+        return f"Fault({self.severity}: {self.kind}{where}, {in_words(self.rows)})"
 
 
 def find_faults(record: Record) -> list[Fault]:
@@ -88,7 +93,21 @@ def find_faults(record: Record) -> list[Fault]:
     with np.errstate(over="ignore", invalid="ignore"):  # a damaged file holds 1e300: its square is no news
         for name in record:
             faults += _channel_faults(name, record.channels[name].unit, record[name])
-    return sorted(faults, key=lambda fault: fault.severity != "error")
+    return sorted(_folded(record, faults), key=lambda fault: fault.severity != "error")
+
+
+def _folded(record: Record, faults: list[Fault]) -> list[Fault]:
+    """The faults, with three or more constant channels as one."""
+    names = [fault.channel for fault in faults if fault.kind == "constant" and fault.channel]
+    if len(names) < 3:
+        return faults
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    message = (
+        f"{len(names)} of {len(record.channels)} channels are constant throughout ({', '.join(names[:NAMED])}{more}); "
+        "look at their cables, ranges and columns."
+    )
+    folded = Fault("constant", None, ((0, len(record) - 1),), message)
+    return [*(fault for fault in faults if fault.kind != "constant"), folded]
 
 
 def in_words(runs: Runs, most: int = 5) -> str:
@@ -206,7 +225,8 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
         values = flaws.held_over(values, lost)
     if np.ptp(values) <= 1e-12 * float(np.max(np.abs(values))):
         message = (
-            f"channel {name} is constant at {values[0]:.6g} {unit} throughout; look at its cable, range and column."
+            f"channel {name} is constant at {_number(values[0], '.6g', unit)} throughout; "
+            "look at its cable, range and column."
         )
         return [*faults, Fault("constant", name, ((0, len(values) - 1),), message)]
     return faults + [fault for fault in _shape_faults(name, unit, values) if not _inside(fault.rows, lost)]
@@ -244,7 +264,7 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
     measured = name != "friction"  # what is computed as friction has no sensor that could clip or freeze
     cut = flaws.clipped(values, plateaus=unit in SHARP_UNITS) if measured else ()
     if cut:
-        what = _several(_count(cut), "sample", "samples") + f" clipped near {values[cut[0][0]]:.4g} {unit}"
+        what = _several(_count(cut), "sample", "samples") + f" clipped near {_number(values[cut[0][0]], '.4g', unit)}"
         faults.append(
             _fault("clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")')
         )
@@ -259,6 +279,11 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
         what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"
         faults.append(_fault("drift", name, everywhere, what, f'take it off with remove_drift(record, "{name}")'))
     return faults
+
+
+def _number(value: float, digits: str, unit: str) -> str:
+    """A number with its unit, where it has one."""
+    return f"{value:{digits}} {'' if unit == '1' else unit}".rstrip()
 
 
 def _several(count: int, one: str, many: str) -> str:

@@ -225,8 +225,13 @@ class Record:
         for name in names:
             bad = np.flatnonzero(~np.isfinite(self.samples[name]))
             if len(bad):
+                many = (
+                    f"{len(bad)} values that are not numbers, the first"
+                    if len(bad) > 1
+                    else "a value that is no number"
+                )
                 raise RecordError(
-                    f"channel {name} has {len(bad)} values that are not numbers, the first at row {bad[0]}",
+                    f"channel {name} has {many} at row {bad[0]}",
                     f"{question} needs numbers throughout",
                     "see record.check() and fill them with fill_missing(record)",
                 )

@@ -23,7 +23,7 @@ ALIKE = 0.9  # correlation from which two channels are taken to have seen one mo
 DERIVATIVE = {"m": ("m/s", 0), "m/s": ("m/s", 1), "rad": ("rad/s", 0), "rad/s": ("rad/s", 1)}
 
 
-def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] = "x") -> Estimate:
+def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] | None = None) -> Estimate:
     """How many seconds must be added to b's clock for it to agree with a's?
 
     Both channels are smoothed by one Gaussian kernel, wide enough that neither rate matters any more, and a
@@ -36,8 +36,9 @@ def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] = "x") -> Es
     ----------
     a, b : Record
         Two records of one run, each with its own rate and start.
-    on : str or (str, str)
-        The channel both have, or a's and b's names for it: a displacement, a velocity, or one of each.
+    on : str or (str, str), optional
+        The channel both have, or a's and b's names for it: a displacement, a velocity, or one of each. Where left
+        out, x or v: of both, or one of each.
 
     Returns
     -------
@@ -61,7 +62,7 @@ def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] = "x") -> Es
     return _match(a, b, on).offset
 
 
-def clock_rate(a: Record, b: Record, *, on: str | tuple[str, str] = "x") -> Estimate:
+def clock_rate(a: Record, b: Record, *, on: str | tuple[str, str] | None = None) -> Estimate:
     """How many seconds of a's clock pass in one second of b's?
 
     The stretch between the two smoothed motions by least squares, about the middle of b's record.
@@ -69,7 +70,7 @@ def clock_rate(a: Record, b: Record, *, on: str | tuple[str, str] = "x") -> Esti
     Parameters
     ----------
     a, b : Record
-    on : str or (str, str)
+    on : str or (str, str), optional
         As for :func:`clock_offset`, which tells where the rates differ.
 
     Returns
@@ -96,7 +97,7 @@ def synchronise(
     a: Record,
     b: Record,
     *,
-    on: str | tuple[str, str] = "x",
+    on: str | tuple[str, str] | None = None,
     offset: float | Estimate | None = None,
     rate: float | Estimate = 1.0,
 ) -> Record:
@@ -106,8 +107,8 @@ def synchronise(
     ----------
     a, b : Record
         Two records of one run; a's clock is kept.
-    on : str or (str, str)
-        The channel both have, see :func:`clock_offset`.
+    on : str or (str, str), optional
+        The channels that saw the same motion, see :func:`clock_offset`.
     offset : float or Estimate, optional
         Seconds to add to b's clock; found with :func:`clock_offset` where left out.
     rate : float or Estimate
@@ -130,12 +131,13 @@ def synchronise(
     >>> t = np.arange(4000) / 1000
     >>> a = Record.of({"x": np.sin(9 * t) + np.sin(23 * t)}, fs=1000.0)
     >>> b = Record.of({"v": 9 * np.cos(9 * t + 0.9) + 23 * np.cos(23 * t + 2.3)}, fs=1000.0)
-    >>> sorted(synchronise(a, b, on=("x", "v")))
+    >>> sorted(synchronise(a, b))
     ['v', 'x']
     """
     a.require_clean(*a, question="synchronise")
     b.require_clean(*b, question="synchronise")
-    found = clock_offset(a, b, on=on) if offset is None else offset
+    names = _shared_motion(a, b, on) if offset is None or on is not None else None
+    found = clock_offset(a, b, on=names) if offset is None else offset
     seconds = found.value if isinstance(found, Estimate) else float(found)
     ratio = rate.value if isinstance(rate, Estimate) else float(rate)
     middle = float(b.time[0]) + 0.5 * b.duration
@@ -155,14 +157,14 @@ def synchronise(
         samples[mine] = band_limited(b[name], rows[shared], cutoff=cutoff)
         channels[mine] = replace(b.channels[name], name=mine, noise=None)  # the filter took part of it
     interval = list(found.interval) if isinstance(found, Estimate) else [seconds, seconds]
-    known = "found" if offset is None else "given"
+    known = f"found on {' and '.join(dict.fromkeys(names))}" if names and offset is None else "given"
     outcome = (
         f"b's clock moved by {seconds:.6g} s ({known}; 95 %: {interval[0]:.6g} to {interval[1]:.6g}), "
         f"{len(b)} samples at {b.fs:g} Hz interpolated onto {len(shared)} at {a.fs:g} Hz"
     )
     if isinstance(found, Estimate) and found.status != "ok":
         outcome += f"; {found.status}"
-    step = Step("synchronise", {"on": on, "offset": seconds, "offset_interval": interval, "rate": ratio}, outcome)
+    step = Step("synchronise", {"on": names, "offset": seconds, "offset_interval": interval, "rate": ratio}, outcome)
     theirs = tuple(Step(s.action, {**s.arguments, "record": "b"}, s.outcome) for s in b.history)
     return Record(samples, channels, a.fs, part.start, (*part.history, *theirs, step), None, {**b.truth, **a.truth})
 
@@ -173,8 +175,22 @@ class _Match:
     rate: Estimate
 
 
-def _match(a: Record, b: Record, on: str | tuple[str, str]) -> _Match:
-    names = (on, on) if isinstance(on, str) else tuple(on)
+def _shared_motion(a: Record, b: Record, on: str | tuple[str, str] | None) -> tuple[str, str]:
+    """The names of the motion that both saw, a's and b's."""
+    if on is not None:
+        return (on, on) if isinstance(on, str) else on
+    for names in (("x", "x"), ("v", "v"), ("x", "v"), ("v", "x")):
+        if names[0] in a and names[1] in b:
+            return names
+    raise RecordError(
+        f"the records have {', '.join(a)} and {', '.join(b)}",
+        "clocks are compared by a motion x or v that both recorded",
+        'name the channels that saw the same motion, a\'s and b\'s: on=("x", "plate")',
+    )
+
+
+def _match(a: Record, b: Record, on: str | tuple[str, str] | None) -> _Match:
+    names = _shared_motion(a, b, on)
     a.require_clean(names[0], question="clock_offset", samples=64)
     b.require_clean(names[1], question="clock_offset", samples=64)
     orders = _orders(a.channels[names[0]].unit, b.channels[names[1]].unit)
