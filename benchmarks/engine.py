@@ -1,25 +1,36 @@
-"""The engine beside general solvers, in one run: interleaved rounds, medians, accuracy printed with every figure.
+"""The engine beside general solvers and a floor in C, in one run: interleaved rounds, medians, accuracy printed too.
 
-Run with ``python benchmarks/engine.py``. heyoka is compared where it is installed.
+Run with ``python benchmarks/engine.py``. heyoka is compared where it is installed; the floor, one
+contact written out by hand, is compiled here. Then come the long random tests: ``--cases`` of energy, ``--replays`` in
+40 digits.
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
 import functools
 import importlib.util
 import math
+import shutil
 import statistics
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 import stickslip as ss
+from stickslip.solve.energy import energy
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-ffp-contract=fast", "-shared", "-fPIC")
 MASS, SPRING = 2.42, 2310.0
 RIGID = ss.Oscillator(
     mass=MASS, stiffness=SPRING, damping=2 * 0.0008 * math.sqrt(MASS * SPRING), law=ss.Coulomb(1.1),
@@ -167,6 +178,36 @@ def heyoka(system: ss.Oscillator, cycles: int, tolerance: float = 1e-10) -> Run:
         modes.append({0: "microstuck" if stiff else "stuck", 1: "forward", -1: "back"}[side])
 
 
+@functools.cache
+def library() -> ctypes.CDLL:
+    """The floor, compiled for this processor."""
+    built = Path(tempfile.mkdtemp()) / "floor.so"
+    source = Path(__file__).with_name("floor.c")
+    subprocess.run(["cc", *FLAGS, "-o", str(built), str(source), "-lm"], check=True)
+    loaded = ctypes.CDLL(str(built))
+    loaded.run.restype = ctypes.c_long
+    loaded.run.argtypes = [ctypes.c_double] * 9 + [ctypes.c_long] + [ctypes.c_void_p] * 2
+    return loaded
+
+
+def floor(system: ss.Oscillator, cycles: int) -> Run:
+    """The same motion in C, for these contacts alone; every event's time and mode are kept."""
+    law, drive, room = system.law, system.drive, 24 * cycles
+    contact, loss = getattr(law, "stiffness", 0.0), getattr(law, "damping", 0.0)
+    times, modes = np.zeros(room), np.zeros(room, np.int32)
+    begin = time.process_time()
+    count = library().run(
+        system.mass, system.stiffness, system.damping, drive.amplitude, 2 * math.pi * drive.frequency, law.kinetic,
+        contact, loss, cycles, room, times.ctypes.data, modes.ctypes.data,
+    )  # fmt: skip
+    seconds = time.process_time() - begin
+    if not 0 <= count <= room:
+        raise RuntimeError(f"the floor found {count} events")
+    names = {0: "microstuck" if contact else "stuck", 1: "forward", -1: "back"}
+    kept = min(count, 50_000)
+    return Run(list(times[:kept]), [names[int(m)] for m in modes[:kept]], seconds)
+
+
 def distance(run: Run, reference: Run, period: float) -> str:
     """Sequence first, then the largest difference of an event's time over the period."""
     count = min(len(run.times), len(reference.times))
@@ -177,34 +218,105 @@ def distance(run: Run, reference: Run, period: float) -> str:
     return f"{count} events equal, times within {gap:.0e} T"
 
 
+def progress(name: str, done: int, count: int) -> None:
+    """One line that counts."""
+    if sys.stderr.isatty() or done == count:
+        print(f"\r{name}: {done} of {count}", end="\n" if done == count else "", file=sys.stderr, flush=True)
+
+
+def random_energy(count: int) -> None:
+    """Any law under any drive, scales over decades: what the energy balance leaves, and what does not run."""
+    from test_engine import random_case
+
+    residuals, refused = np.zeros(count), []
+    begin = time.perf_counter()
+    for seed in range(count):
+        system, start, duration = random_case(seed)
+        try:
+            residuals[seed] = energy(ss.simulate(system, duration=duration, start=start)).residual
+        except ss.SolveError as error:
+            refused.append((seed, str(error)))
+        progress("random energy", seed + 1, count)
+    above = np.flatnonzero(residuals >= 1e-12)
+    print(
+        f"energy of {count} random runs in {time.perf_counter() - begin:.0f} s: residual {np.median(residuals):.0e} in "
+        f"the median, {np.max(residuals):.1e} at most, {len(above)} above 1e-12, {len(refused)} refused"
+    )
+    for seed in above[:10]:
+        print(f"    seed {seed}: {residuals[seed]:.1e}, {random_case(int(seed))[0]}")
+    for seed, reason in refused[:10]:
+        print(f"    seed {seed}: {reason}")
+
+
+def replays(count: int) -> None:
+    """Random compliant contacts against a replay of 40 digits: the order of events first, then their times."""
+    from test_engine import random_contact, replay
+
+    wrong, gaps = [], []
+    begin = time.perf_counter()
+    for seed in range(count):
+        system = random_contact(seed)
+        run = ss.simulate(system, cycles=3)
+        times, modes = replay(system, 3)
+        names = [mode.name for mode in run.table.modes]
+        if [names[m] for m in run.modes[1:]] != modes:
+            wrong.append(seed)
+        elif modes:
+            gaps.append(float(np.max(np.abs(run.starts[1:] - times))) * system.drive.frequency)
+        progress("40-digit replays", seed + 1, count)
+    print(
+        f"{count} replays of 40 digits in {time.perf_counter() - begin:.0f} s: {len(wrong)} of another sequence "
+        f"{wrong[:10]}, times within {max(gaps, default=0.0):.0e} T"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--cycles", type=int, default=200_000, help="of the engine; scipy runs 20, heyoka 400")
+    parser.add_argument("--cycles", type=int, default=200_000, help="of the engine and the floor; scipy runs 20")
+    parser.add_argument("--cases", type=int, default=10_000, help="random runs whose energy is balanced")
+    parser.add_argument("--replays", type=int, default=200, help="random compliant runs replayed in 40 digits")
     options = parser.parse_args()
-    solvers: dict[str, tuple[Callable[[ss.Oscillator, int], Run], int]] = {
-        "stickslip": (engine, options.cycles), "scipy DOP853": (dop853, 20), "heyoka": (heyoka, 400)
+    speed(options.rounds, options.cycles)
+    if options.cases:
+        random_energy(options.cases)
+    if options.replays:
+        replays(options.replays)
+
+
+def speed(rounds: int, cycles_: int) -> None:
+    """Forcing cycles a second of each solver on each case."""
+    solvers: dict[str, tuple[Callable[..., Run], int]] = {
+        "stickslip": (engine, cycles_), "C floor": (floor, cycles_), "scipy DOP853": (dop853, 20),
+        "heyoka": (heyoka, 400),
     }  # fmt: skip
+    if shutil.which("cc") is None:
+        print("no C compiler (cc): no floor")
+        del solvers["C floor"]
     if importlib.util.find_spec("heyoka") is None:
         print("heyoka is not installed: not compared")
         del solvers["heyoka"]
+    print("numbalsoda is not compared: its package is built from source with a Fortran compiler, not asked for here")
     speeds = {case: {solver: [] for solver in solvers} for case in CASES}
     for case, system in CASES.items():
         for run, _ in solvers.values():
             run(system, 10)
-        for _ in range(options.rounds):
+        for _ in range(rounds):
             for solver, (run, cycles) in solvers.items():
                 speeds[case][solver].append(cycles / run(system, cycles).seconds)
-    print(f"forcing cycles a second of CPU time, medians of {options.rounds} interleaved rounds; peers at 1e-10")
+    print(f"forcing cycles a second of CPU time, medians of {rounds} interleaved rounds; peers at 1e-10")
     for case, system in CASES.items():
         medians = {solver: statistics.median(speeds[case][solver]) for solver in solvers}
         print(f"{case:24}" + "".join(f"{solver} {speed:,.0f}   " for solver, speed in medians.items()))
         for solver in list(solvers)[1:]:
+            ratio = medians["stickslip"] / medians[solver]
+            if solver == "C floor":
+                check = distance(engine(system, 2000), floor(system, 2000), 1 / system.drive.frequency)
+                print(f"{'':24}{ratio:8.2f} of the floor; {check}")
+                continue
             tight = solvers[solver][0](system, 20, 1e-13 if solver == "heyoka" else 1e-12)
             check = distance(engine(system, 20), tight, 1 / system.drive.frequency)
-            print(
-                f"{'':24}{medians['stickslip'] / medians[solver]:8,.0f} times {solver}; against it run tight: {check}"
-            )
+            print(f"{'':24}{ratio:8,.0f} times {solver}; against it run tight: {check}")
 
 
 if __name__ == "__main__":

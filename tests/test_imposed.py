@@ -1,0 +1,113 @@
+"""Laws under imposed motion, against closed forms: hysteresis loops and friction under dither."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+
+HEAVY = 1e21  # kg: a mass that the contact can not move, so that start and counter-face impose the motion
+ORDER = 40  # Gauss points on each half of a piece
+
+
+def means(law: Any, amplitude: float, *, speed: float = 0.0) -> tuple[float, float, float]:
+    """Mean friction [N], its part along the way (f cos) and energy [J] over a cycle of dither of angular rate 1.
+
+    The counter-face moves as A cos t, the mass steadily at `speed`; the second cycle counts.
+    """
+    drive = ss.MultiTone([(amplitude, 1 / (2 * math.pi), 0.0)], on="face")
+    run = ss.simulate(ss.Oscillator(mass=HEAVY, stiffness=0, law=law, drive=drive), cycles=3, start={"v": speed})
+    nodes, weights = np.polynomial.legendre.leggauss(ORDER)
+    turn = 2 * math.pi
+    cuts = np.unique(np.concatenate([run.starts, np.arange(9, 17) * turn / 8, [turn, 2 * turn]]))
+    cuts = cuts[(cuts >= turn) & (cuts <= 2 * turn)]
+    total = np.zeros(3)
+    for low, high in itertools.pairwise(cuts):
+        times = low + (high - low) * (nodes + 1) / 2
+        (friction, slip), _ = run.sample(times, ("friction", "slip"))
+        parts = [friction, -friction * np.cos(times), friction * slip]  # the slip is -A cos t
+        total += [(high - low) / 2 * float(weights @ part) for part in parts]
+    return total[0] / turn, total[1] / math.pi, total[2]
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "energy", "stiffness", "loss"),
+    [
+        (10e-6, 1.8791666666666667e-5, 113761.96748009386, 59815.732778703997),
+        (20e-6, 6.2791666666666667e-5, 45430.674338500731, 49968.020674892973),
+        (485e-6, 0.0021087916666666667, 416.99379733432271, 2853.6475094143603),
+    ],
+)
+@pytest.mark.parametrize("law", [ss.ElastoSlip([192000], [1.1]), ss.CompliantContact(1.1, 192000)], ids=repr)
+def test_a_jenkins_loop(law: Any, amplitude: float, energy: float, stiffness: float, loss: float) -> None:
+    """HY-2: energy W, first-harmonic stiffness k_eq = (k/pi)(th - sin(2 th)/2) and loss W / (pi X^2)."""
+    _, along, taken = means(law, amplitude)
+    assert taken == pytest.approx(energy, rel=1e-10)
+    assert along / amplitude == pytest.approx(stiffness, rel=1e-10)
+    assert taken / (math.pi * amplitude**2) == pytest.approx(loss, rel=1e-10)
+
+
+@pytest.mark.parametrize(("amplitude", "energy"), [(20e-6, 1.7777777777777778e-4), (50e-6, 0.0018)])
+def test_iwans_loop_is_the_limit_of_many_elements(amplitude: float, energy: float) -> None:
+    """HY-3: classes of an even density miss W by a term in 1 / n^2, which two counts remove."""
+    coarse, fine = (means(ss.ElastoSlip.iwan(1e6, width=30e-6, elements=n), amplitude)[2] for n in (15, 45))
+    assert fine + (fine - coarse) / 8 == pytest.approx(energy, rel=1e-9)
+
+
+def segalman(strength: float, power: float, width: float, count: int) -> ss.ElastoSlip:
+    """Elements of the density R phi^chi of yield displacements, one at the mean of each class of squared width."""
+    edges = width * (np.arange(count + 1) / count) ** 2
+    stiffness = strength * np.diff(edges ** (power + 1)) / (power + 1)
+    force = strength * np.diff(edges ** (power + 2)) / (power + 2)
+    return ss.ElastoSlip(list(stiffness), list(force))
+
+
+def test_segalmans_loop_is_the_limit_of_many_elements() -> None:
+    """HY-4: W = 4 R X^(chi + 3) / ((chi + 2)(chi + 3)), approached at second order."""
+    known = 0.033730961708462713
+    errors = [abs(means(segalman(1e6, -0.5, 1e-3, n), 1e-3)[2] / known - 1) for n in (6, 12, 24)]
+    assert errors[2] < 2e-3
+    assert math.log2(errors[0] / errors[2]) / 2 == pytest.approx(2.0, abs=0.15)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99, 2.0])
+def test_dither_smooths_coulomb_friction(ratio: float) -> None:
+    """DI-1: <f> / f_k = (2 / pi) asin(v / a w), whole above a w."""
+    mean, *_ = means(ss.Coulomb(1.1), 0.3, speed=0.3 * ratio)
+    assert mean == pytest.approx(1.1 * (2 / math.pi * math.asin(min(ratio, 1.0))), rel=1e-11, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("speed", "known"),
+    [(0.05, 0.02426530323049094), (0.1, 0.050238758375514184), (0.2, 0.11682362175901599), (0.4, 0.2908)],
+)
+def test_dither_smooths_a_stribeck_curve(speed: float, known: float) -> None:
+    """DI-3: mu_s (2/pi) asin(v/U) - k1 v + k3 (v^3 + 1.5 v U^2) for a cubic curve with its minimum 0.25 at 0.5."""
+    fall = 1.5 * (0.4 - 0.25) / 0.5
+    law = ss.FrictionCurve(lambda v: 0.4 - fall * v + fall / (3 * 0.5**2) * v * v * v)
+    mean, *_ = means(law, 0.3, speed=speed)
+    assert mean == pytest.approx(known, rel=1e-10)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.5])
+def test_dither_of_other_shapes(ratio: float) -> None:
+    """DI-2: a triangle of velocity gives <f> / f_k = v / U, a square none, in the limit of many harmonics."""
+    level, count, period = 0.3, 40, 1.0
+    orders = np.arange(1, 2 * count, 2)
+    for gains, known in (
+        (8 / math.pi**2 / orders**2, ratio),
+        (4 / math.pi / orders * (-1.0) ** ((orders - 1) // 2), 0),
+    ):
+        speeds = level * gains
+        tones = [(u / (2 * math.pi * n), float(n), -math.pi / 2) for u, n in zip(speeds, orders, strict=True)]
+        drive = ss.MultiTone(tones, on="face")
+        system = ss.Oscillator(mass=HEAVY, stiffness=0, law=ss.Coulomb(1.0), drive=drive)
+        run = ss.simulate(system, duration=2 * period, start={"v": ratio * level})
+        sides = np.array([run.table.modes[m].side for m in run.modes])
+        inside = np.clip(run.starts + run.durations, period, None) - np.clip(run.starts, period, None)
+        assert float(sides @ inside) / period == pytest.approx(known, abs=9e-3)
