@@ -28,6 +28,8 @@ docs: $(VENV)/.docs
 
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/run.py
+	$(BIN)/python benchmarks/engine.py
+	$(BIN)/python benchmarks/curved.py
 
 smoke: $(VENV)/.dev
 	$(BIN)/python tests/smoke.py

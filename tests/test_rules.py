@@ -26,7 +26,15 @@ MODULES = sorted(module.name for module in pkgutil.walk_packages([str(PACKAGE)],
 HEAVY = {"scipy", "pandas", "matplotlib", "pint", "h5py", "pyarrow", "xarray", "jinja2", "pooch", "nptdms", "soundfile"}
 EMPTY_NAMES = {"utils", "util", "core", "common", "helpers", "misc", "tools"}
 
-BY_PLACE = {"fs", "path", "record", "channel", "b", "parameter", "load"}  # may follow the first argument without being named
+BY_PLACE = {
+    "fs",
+    "path",
+    "record",
+    "channel",
+    "b",
+    "parameter",
+    "load",
+}  # may follow the first argument without being named
 
 
 def public_names() -> Iterator[tuple[str, object]]:
