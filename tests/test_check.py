@@ -225,3 +225,10 @@ def test_one_value_is_told_as_one():
     values[7] = np.nan
     with pytest.raises(RecordError, match="channel x has a value that is no number at row 7;"):
         Record.of({"x": values}, fs=FS).require_clean("x", question="a loop")
+
+
+@pytest.mark.parametrize("rows", range(2, 22))
+def test_few_stamps_are_checked_too(rows: int):
+    stamps = np.cumsum(np.where(np.arange(rows) % 3 == 1, 0.0, 1.0 + np.arange(rows)))
+    record = replace(Record.of({"x": np.arange(float(rows))}, fs=FS), stamps=stamps)
+    assert record.check()[0].severity == "error"

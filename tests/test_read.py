@@ -479,3 +479,10 @@ def test_an_error_of_the_program_is_not_taken_for_a_damaged_file(
 def test_a_number_too_large_for_a_float_is_no_column(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text('{"t": [0, 1, 2], "x": [1, 2, 3], "y": [1, 2, 1' + "0" * 400 + "]}")
     assert list(ss.read_record(tmp_path / "run.json")) == ["x"]
+
+
+@pytest.mark.parametrize("unit", ["(m", "m(", 'm"""'])
+def test_a_unit_that_is_no_unit_is_a_sentence(tmp_path: Path, unit: str) -> None:
+    (tmp_path / "run.csv").write_text("t [s],x\n0,1\n1,2\n2,-1\n")
+    with pytest.raises(ss.RecordError, match="is not known"):
+        ss.read_record(tmp_path / "run.csv", units={"x": unit})

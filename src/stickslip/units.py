@@ -159,12 +159,17 @@ def parse_value(text: str | float, expect: str) -> float:
 
 @functools.cache
 def _by_pint(name: str, text: str) -> tuple[float, str]:
+    import tokenize
+
     import pint
 
     registry = _registry()
     try:
         quantity = registry.Quantity(1.0, name.replace(" ", "*")).to_base_units()
-    except (pint.errors.PintError, AttributeError, TypeError, ValueError, AssertionError, KeyError) as error:
+    except (
+        pint.errors.PintError, tokenize.TokenError, SyntaxError,
+        AttributeError, TypeError, ValueError, AssertionError, KeyError,
+    ) as error:  # fmt: skip
         raise RecordError(
             f"unit '{text}' is not known",
             "a unit is written like mm, m/s^2, g, N, lbf or deg",

@@ -215,7 +215,7 @@ def inspect(stamps: Array) -> Stamps:
     share = float(np.mean(repeated))
     held = share > 0.5 or (share > 0.05 and float(np.median(steps)) < 0.6 * mean)
     # One stamp gone wrong disturbs the interval after it too.
-    readable = (np.convolve(repeated | backward, np.ones(5), "same") == 0) & (not held)
+    readable = (_around(repeated | backward, 5) == 0) & (not held)
     gaps = (steps > (GAP + spanned - 1) * step) & readable
     uneven = np.abs(steps - spanned * step) > max(1.5 * quantum, TOLERANCE * step)
     uneven &= readable & ~gaps
@@ -224,7 +224,7 @@ def inspect(stamps: Array) -> Stamps:
         if not (held or (repeated | backward | gaps).any() or len(missing) or is_uniform(stamps)):
             uneven[_worst(steps, step, quantum)] = True
     # gaps row after row are another rate
-    rate = np.convolve(gaps, np.ones(2 * STEADY - 1), "same") >= STEADY
+    rate = _around(gaps, 2 * STEADY - 1) >= STEADY
     slower, gaps = gaps & rate, gaps & ~rate
     return Stamps(
         step, quantum, held, first[repeated], first[backward], first[gaps], first[slower], first[uneven], missing
@@ -293,3 +293,8 @@ def _usual(steps: Array, quantum: float) -> float:
     if len(near) < 0.9 * len(steps):
         near = steps[np.abs(steps - middle) <= max(1.01 * quantum, TOLERANCE * middle)]
     return float(np.mean(near))
+
+
+def _around(mask: NDArray[np.bool_], width: int) -> Array:
+    """How many hold among the odd number of `width` rows about each; of short masks too."""
+    return np.convolve(mask, np.ones(width))[width // 2 : width // 2 + len(mask)]
