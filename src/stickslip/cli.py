@@ -463,8 +463,10 @@ def _progress(steps: int) -> Iterator[Callable[[str, float], None]]:
     patience = threading.Timer(PATIENCE, progress.start)
     patience.daemon = True
     patience.start()
+    if PATIENCE <= 0:
+        patience.join()
     try:
-        yield lambda words, done: progress.update(task, completed=done, description=words)
+        yield lambda words, done: progress.update(task, completed=done, description=words, refresh=True)
     finally:
         patience.cancel()
         progress.stop()
