@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from stickslip.solve.phasors import HISTORY, glide
-from stickslip.solve.roots import NOISE, NONE, OPTIONS, first_rise, opening_order
+from stickslip.solve.compiled import OPTIONS, compiled
+from stickslip.solve.phasors import glide
+from stickslip.solve.roots import NOISE, NONE, first_rise, opening_order
 
 DONE, FULL, CHATTER, LOST = 0, 1, 2, 3
 CHAIN = 64  # transitions without time in between before a run is given up
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def set_tones(tones, state, time):
     """Keep the turning signals of the drive true.
 
@@ -34,7 +33,7 @@ def set_tones(tones, state, time):
             state[s] *= length
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def multiply(matrix, state, out):
     """out = matrix state."""
     n = state.shape[0]
@@ -45,7 +44,7 @@ def multiply(matrix, state, out):
         out[i] = total
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def advance(flow, state, time, work):
     """state = exp(flow time) state by the Taylor series, for a time within one cell; `work` is (2, N)."""
     n = state.shape[0]
@@ -68,7 +67,7 @@ def advance(flow, state, time, work):
             break
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def expand(series, state, scale, cell, c, noise):
     """Coefficients of an exit in the cell ahead, with the rounding noise of each.
 
@@ -85,7 +84,7 @@ def expand(series, state, scale, cell, c, noise):
         power *= cell / (k + 1)
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def settle(tables, mode, state, scale, cell, work, c, noise):
     """Take every exit that is due at once; returns the mode in which time passes, or -1 if the chain does not end."""
     _, _, _, series, target, crossing, reset, first, _ = tables
@@ -108,7 +107,7 @@ def settle(tables, mode, state, scale, cell, work, c, noise):
     return -1
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def next_exit(tables, mode, state, scale, opened, armed, span, c, noise):
     """The first exit within `span` [s] of the cell ahead: (time, exit, armed), or (-1, -1, armed).
 
@@ -144,7 +143,7 @@ def next_exit(tables, mode, state, scale, opened, armed, span, c, noise):
     return (best * cell, which, armed) if which >= 0 else (-1.0, -1, armed)
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def march(tables, fast, clock, state, mode, limit, period, past, out, work):
     """March until `limit` or until the buffers are full.
 
@@ -237,8 +236,8 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
         count += 1
         slot = ring[0]
         past_mode[slot], past_exit[slot], past_time[slot], past_parts[slot] = mode, leaving, gone, 1
-        ring[0] = (slot + 1) & (HISTORY - 1)
-        ring[1] = (ring[1] + 1) & (HISTORY - 1)
+        ring[0] = (slot + 1) & (past_mode.shape[0] - 1)
+        ring[1] = (ring[1] + 1) & (past_mode.shape[0] - 1)
         # compensated clock, wrapped at the period
         step = gone - clock[2]
         now = clock[1] + step
@@ -269,7 +268,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
             return LOST, count, mode
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def follow(tables, mode, state, time, work):
     """state = exp(A time) state, however long the time."""
     flow, cells, hop, _, _, _, _, _, _ = tables
@@ -283,7 +282,7 @@ def follow(tables, mode, state, time, work):
     advance(flow[mode], state, time, work)
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def sample(tables, begin, modes, states, times, rows, piece, out, work):
     """Values of linear forms at increasing `times` [s].
 

@@ -16,13 +16,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from stickslip.solve.automaton import Array, Automaton
-from stickslip.solve.roots import NOISE, OPTIONS
+from stickslip.solve.compiled import FAST, compiled
+from stickslip.solve.roots import NOISE
 
-FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
 KEEPS, STOPS, CARRIES = 0.0, 1.0, 2.0  # what an exit does to velocity and memory
 HALF_STEP = 0.09  # rad between a node and the edge of its polynomial; degree 9 leaves 1e-17
 LONGEST = 8192  # nodes of one table
@@ -163,7 +162,7 @@ def _times(rate: float, count: int) -> Array:
     return np.arange(count, dtype=np.float64) * (2 * HALF_STEP / rate)
 
 
-@njit(**FAST, forceinline=True)
+@compiled(**FAST, forceinline=True)
 def _turn(nodes, first, count, density, decay, turn, t):
     """e^{(decay + i turn) t} from the nearest node."""
     j = min(count - 1, int(t * density + 0.5))
@@ -184,7 +183,7 @@ def _turn(nodes, first, count, density, decay, turn, t):
     return a * c - b * s, a * s + b * c
 
 
-@njit(**FAST, forceinline=True)
+@compiled(**FAST, forceinline=True)
 def _below(g, d, h, j, fourth, length):
     """Whether g + d t + h t^2/2 + j t^3/6 + fourth t^4/24 stays below zero on (0, length]: Bernstein coefficients."""
     a, b, c = d * length, h * length * length, j * length * length * length
@@ -198,7 +197,7 @@ def _below(g, d, h, j, fourth, length):
     )
 
 
-@njit(**FAST, forceinline=True)
+@compiled(**FAST, forceinline=True)
 def _certified(grid, piece, exits, leaving, w, lr, li, t, end, parts, nodes):
     """Whether every exit stays below zero on (0, t): quartic bounds from both ends of `parts` intervals.
 
@@ -239,7 +238,7 @@ def _certified(grid, piece, exits, leaving, w, lr, li, t, end, parts, nodes):
     return True
 
 
-@njit(**FAST)
+@compiled(**FAST)
 def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, work):
     """March by phasors as far as every piece is certified.
 
@@ -400,8 +399,8 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
         count += 1
         slot = ring[0]
         past_mode[slot], past_exit[slot], past_time[slot], past_parts[slot] = mode, leaving, t, parts
-        ring[0] = (slot + 1) & (HISTORY - 1)
-        ring[1] = (ring[1] + 1) & (HISTORY - 1)
+        ring[0] = (slot + 1) & (past_mode.shape[0] - 1)
+        ring[1] = (ring[1] + 1) & (past_mode.shape[0] - 1)
         ec, es = ec * cr - es * ci, ec * ci + es * cr
         gap = t - clock[2]
         now = clock[1] + gap
@@ -433,7 +432,7 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
     return count, mode
 
 
-@njit(**FAST)
+@compiled(**FAST)
 def _carry(matrix, state, fresh, size):
     """Take the velocity and the memory over an exit; displacement and drive go on."""
     for i in range(1, size - 3):

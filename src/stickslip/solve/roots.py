@@ -19,14 +19,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from stickslip.solve.compiled import OPTIONS, compiled
 
-OPTIONS = {"cache": True, "error_model": "numpy", "_nrt": False}
 NONE = 2.0  # no root in the cell
 NOISE = 64 * 2.220446049250313e-16
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def opening_order(c, noise, count):
     """Number of leading coefficients that are zeros within their noise (`count` if all are)."""
     order = 0
@@ -35,7 +34,7 @@ def opening_order(c, noise, count):
     return order
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def _curve(c, low, count, u):
     """Value, slope and curvature at u of the polynomial whose coefficients start at `low`."""
     g, d, h = 0.0, 0.0, 0.0
@@ -46,7 +45,7 @@ def _curve(c, low, count, u):
     return g, d, 2.0 * h
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def first_rise(c, noise, count, low, sign, start, limit):
     """First u in (start, limit] at which sign * polynomial rises through zero; `NONE` where there is none.
 

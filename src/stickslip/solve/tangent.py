@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from stickslip.solve.compiled import OPTIONS, compiled
 from stickslip.solve.kernel import follow, multiply
-from stickslip.solve.roots import OPTIONS
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def carry_tangents(tables, leap, modes, states, durations, exits, after, tangents, work):
     """Carry small differences of the state through pieces and the events between them.
 

@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from stickslip.solve.compiled import compiled
 from stickslip.solve.roots import NOISE, NONE, first_rise
 
-OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}}
-EXACT = {"cache": True, "error_model": "numpy"}
+OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}
+EXACT = {"error_model": "numpy"}
 
 LINEAR, PRODUCT, SQUARE, QUOTIENT, POWER, EXP, TANH, SLOPE, LOG, ASINH = range(10)
 DONE, FULL, CHATTER, STALL = range(4)
@@ -26,7 +25,7 @@ CHAIN = 16  # most transitions without time between them
 STILL = 1e-10  # a power's base below this is zero: there the power is not analytic
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def _value(kind, at, power):
     """A function's value, the coefficient of order 0."""
     if kind == EXP:
@@ -43,7 +42,7 @@ def _value(kind, at, power):
     return at**power if at > STILL else (0.0 if power > 0.0 else math.nan)
 
 
-@njit(**OPTIONS)
+@compiled(**OPTIONS)
 def expand(tape, mode, state, h, order, width, s):
     """Coefficients 0 .. order of every node in a mode; the state's rows are complete, the others lack the last.
 
@@ -116,7 +115,7 @@ def expand(tape, mode, state, h, order, width, s):
                 s[out + k] = (k * s[a + k] - total) / (k * s[b])
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def _entry_rounding(tape, mode, i, k, size, h, width, big, s):
     """Noise of coefficient k of a state entry: what rounds the sum that is its rate."""
     kinds, _, _, _, low, weight, index, constant, first, rate, factor = tape
@@ -134,7 +133,7 @@ def _entry_rounding(tape, mode, i, k, size, h, width, big, s):
     return NOISE * total * abs(factor[mode, i]) * h / k
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def _rounding(tape, mode, node, k, size, h, width, big, s):
     """Noise of coefficient k of a state entry or of a linear node."""
     if node < size:
@@ -151,7 +150,7 @@ def _rounding(tape, mode, node, k, size, h, width, big, s):
     return total
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def _surely_below(s, start, top, sign, level, u):
     """Whether sign * polynomial stays below a level up to u <= GROWTH, by its coefficients alone."""
     total, power = sign * s[start] - level, 1.0
@@ -163,7 +162,7 @@ def _surely_below(s, start, top, sign, level, u):
     return total < 0.0
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def _length(s, width, order, size, tolerance, big):
     """Step in units of h at which the last two terms of every entry are its tolerance."""
     last, before = 0.0, 0.0
@@ -185,7 +184,7 @@ def _length(s, width, order, size, tolerance, big):
     return u
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def _guarded(tape, guards, mode, u, asleep, order, width, s, c, noise):
     """The step, shortened to where a saturated exponential wakes: until then its series does not know of it."""
     kinds, left = tape[0], tape[1]
@@ -213,7 +212,7 @@ def _guarded(tape, guards, mode, u, asleep, order, width, s, c, noise):
     return u
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def advance(s, width, size, order, u, state):
     """The state at u by Horner's rule."""
     for i in range(size):
@@ -224,7 +223,7 @@ def advance(s, width, size, order, u, state):
         state[i] = total
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def _first_exit(tape, exits, mode, size, h, u, order, width, big, s, c, noise):
     """The exit that ends the mode first within u, and when; -1 where none does."""
     node, _, crossing, _, bound, _, scale = exits
@@ -259,7 +258,7 @@ def _first_exit(tape, exits, mode, size, h, u, order, width, big, s, c, noise):
     return found, best
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def _set_tones(tones, time, state):
     """The drive's tones by the clock: they gather no error of the steps."""
     for j in range(len(tones)):
@@ -267,7 +266,7 @@ def _set_tones(tones, time, state):
         state[int(tones[j, 0])], state[int(tones[j, 1])] = math.cos(angle), math.sin(angle)
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def _polish(tape, node, tones, mode, h, time, state, s):
     """Newton's step onto the zero of an exit that holds the drive: the delay [s], and the state at it.
 
@@ -286,7 +285,7 @@ def _polish(tape, node, tones, mode, h, time, state, s):
     return total
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def march(tape, exits, guards, tones, clock, state, mode, until, period, tolerance, order, big, steps, work):
     """Steps from `clock` to `until` (laps, offset): the outcome, the steps written, and the mode.
 
@@ -351,7 +350,7 @@ def march(tape, exits, guards, tones, clock, state, mode, until, period, toleran
             mode = target[leaving]
 
 
-@njit(**EXACT)
+@compiled(**EXACT)
 def sample(tape, order, starts, lengths, modes, states, times, nodes, out, step, work):
     """Values of nodes (by mode) at increasing times, from the series of the step each one falls in."""
     s, state, values = work

@@ -1,0 +1,69 @@
+"""How the kernels are compiled: one source for the CPU and the GPU, kept on disk.
+
+numba keeps a compiled function as long as its own file stands as it was, and does not see that a function it calls in
+another file has changed. So the folder is named after the content of every file that holds kernels.
+
+A CUDA kernel calls the same functions: numba compiles them anew for the device.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba import config, njit
+
+OPTIONS = {"error_model": "numpy", "_nrt": False}
+FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
+
+
+def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """numba's `njit` with these options, kept in :func:`folder`."""
+
+    def compile_(function: Callable[..., Any]) -> Any:
+        kept, place = config.CACHE_DIR, folder()
+        if place is None or config.DISABLE_JIT:
+            return njit(**options)(function)
+        config.CACHE_DIR = str(place)
+        try:
+            return njit(cache=True, **options)(function)
+        finally:
+            config.CACHE_DIR = kept
+
+    return compile_
+
+
+@cache
+def folder() -> Path | None:
+    """Where compiled kernels are kept: the first place that may be written, named after their sources."""
+    name = "kernels-" + digest(Path(__file__).parent)
+    chosen = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []
+    for parent in (*chosen, Path(__file__).parent / "__pycache__", _own_cache(), Path(tempfile.gettempdir())):
+        try:
+            (parent / name).mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=parent / name).close()
+        except OSError:
+            continue
+        return parent / name
+    return None
+
+
+def digest(sources: Path) -> str:
+    """What the files that hold kernels say, in 16 digits."""
+    texts = [(file.name.encode(), file.read_bytes()) for file in sorted(sources.glob("*.py"))]
+    held = [name + text for name, text in texts if b"@compiled(" in text]
+    return hashlib.sha256(b"\0".join(held)).hexdigest()[:16]
+
+
+def _own_cache() -> Path:
+    """The user's folder for what can be made again."""
+    home = Path(os.path.expanduser("~"))
+    places = {"win32": home / "AppData" / "Local", "darwin": home / "Library" / "Caches"}
+    chosen = os.environ.get("LOCALAPPDATA" if sys.platform == "win32" else "XDG_CACHE_HOME")
+    return (Path(chosen) if chosen else places.get(sys.platform, home / ".cache")) / "stickslip"

@@ -1,0 +1,63 @@
+"""Compiled kernels are kept on disk, and made anew when any file that holds one changes."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import stickslip
+
+PACKAGE = Path(stickslip.__file__).parent
+ASK = (
+    "import stickslip.solve.kernel as k, stickslip.solve.compiled as c; import numpy as np;"
+    "order = k.opening_order(np.zeros(3), np.zeros(3), 3);"
+    "stats = k.opening_order.stats; print(order, sum(stats.cache_hits.values()), c.folder())"
+)
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """The package in a folder of its own, without what was compiled."""
+    shutil.copytree(PACKAGE, tmp_path / "site" / "stickslip", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path / "site"
+
+
+def ask(site: Path, **variables: str) -> tuple[int, int, Path]:
+    """What a fresh process computes, how often it found it on disk, and where."""
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"PYTHONPATH": str(site), "PYTHONDONTWRITEBYTECODE": "1", **variables}
+    run = subprocess.run([sys.executable, "-c", ASK], capture_output=True, text=True, env=environment, timeout=120)
+    assert run.returncode == 0, run.stderr
+    order, hits, folder = run.stdout.split(maxsplit=2)
+    return int(order), int(hits), Path(folder.strip())
+
+
+def test_a_second_process_finds_what_the_first_compiled(copy: Path) -> None:
+    assert ask(copy)[:2] == (3, 0)
+    order, hits, folder = ask(copy)
+    assert (order, hits) == (3, 1)
+    assert folder.is_relative_to(copy)
+
+
+def test_a_change_in_one_file_is_seen_by_its_callers_in_others(copy: Path) -> None:
+    first = ask(copy)[2]
+    constant = copy / "stickslip" / "solve" / "roots.py"
+    constant.write_text(constant.read_text("utf-8").replace("NOISE = 64 *", "NOISE = 65 *"), "utf-8")
+    assert ask(copy)[2] != first
+
+
+def test_an_install_that_may_not_be_written_keeps_them_with_the_user(copy: Path, tmp_path: Path) -> None:
+    (copy / "stickslip" / "solve" / "__pycache__").write_text("a file where the folder would be", "utf-8")
+    user = {"XDG_CACHE_HOME": str(tmp_path / "user"), "LOCALAPPDATA": str(tmp_path / "user")}
+    first, second = ask(copy, **user), ask(copy, **user)
+    assert (first[1], second[1]) == (0, 1)
+    assert not second[2].is_relative_to(copy)
+
+
+def test_a_folder_named_by_the_user_goes_first(copy: Path, tmp_path: Path) -> None:
+    assert ask(copy, NUMBA_CACHE_DIR=str(tmp_path / "named"))[2].is_relative_to(tmp_path / "named")
