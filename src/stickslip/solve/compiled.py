@@ -44,7 +44,8 @@ def folder() -> Path | None:
     """Where compiled kernels are kept: the first place that may be written, named after their sources."""
     name = "kernels-" + digest(Path(__file__).parent)
     chosen = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []
-    for parent in (*chosen, Path(__file__).parent / "__pycache__", _own_cache(), Path(tempfile.gettempdir())):
+    # Not the common temporary folder: what numba finds there it would run, whoever put it there.
+    for parent in (*chosen, Path(__file__).parent / "__pycache__", _own_cache()):
         try:
             (parent / name).mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=parent / name).close()
