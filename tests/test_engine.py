@@ -300,21 +300,6 @@ def test_chatter_ends_in_an_error_that_names_the_state() -> None:
         ss.simulate(RIGID, cycles=2000, budget=1)
 
 
-def test_an_interrupted_run_keeps_what_was_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    march, calls = simulate_module.kernel.march, itertools.count()
-
-    def stopped(*arguments):  # type: ignore[no-untyped-def]
-        if next(calls) == 2:
-            raise KeyboardInterrupt
-        return march(*arguments)
-
-    monkeypatch.setattr(simulate_module.kernel, "march", stopped)
-    run = ss.simulate(RIGID, cycles=50_000)
-    assert run.status == "interrupted"
-    assert 0 < run.duration < 20_000
-    assert run.starts[-1] + run.durations[-1] == pytest.approx(run.duration)
-
-
 def test_chaos_has_a_positive_exponent() -> None:
     """FM-1: 0.596 +- 0.004 a forcing period."""
     scenario = scenarios.get("FM-1")

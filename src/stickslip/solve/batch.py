@@ -18,6 +18,7 @@ from stickslip.solve.kernel import CHATTER, march, settle
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.simulate import opening
 
+TIRELESS = 2**62  # cells: a batch is not interrupted
 LAP = 64  # pieces remembered of each oscillator, a power of two; a lap of the drive with more has no fast path
 
 
@@ -169,7 +170,8 @@ def march_one(i, given, out, scratch):
     mode = settle(tables, modes[i], state, work[3, :n], cell, work[:2, :n], work[4, :degree], work[5, :degree])
     status, count = CHATTER, 0
     if mode >= 0:
-        status, count, mode = march(tables, quick, clocks[i], state, mode, limit, periods[j], past, room, work)
+        clock, period = clocks[i], periods[j]
+        status, count, mode = march(tables, quick, clock, state, mode, limit, period, past, room, work, TIRELESS)
     statuses[i], counts[i] = status, count
 
 

@@ -12,7 +12,7 @@ the run ends with an error that says so instead of crawling.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -416,7 +416,15 @@ class CurvedTrajectory(Trajectory):
 
 
 def run_curved(
-    table: Tape, state: Array, mode: int, *, span: tuple[float, float], stops: Stops, budget: int, rtol: float
+    table: Tape,
+    state: Array,
+    mode: int,
+    *,
+    span: tuple[float, float],
+    stops: Stops,
+    budget: int,
+    rtol: float,
+    tell: Callable[[float], None],
 ) -> CurvedTrajectory:
     """March from a state at time 0 to the end of the time (laps, offset), in chunks."""
     if not 1e-15 <= rtol <= 1e-2:
@@ -442,7 +450,8 @@ def run_curved(
                     table.nodes, table.exits, table.guards, table.tones, clock, state, mode, at, period,
                     0.1 * rtol, order, big, room, work,
                 )  # fmt: skip
-                kept.append(tuple(column[:written] for column in room))
+                if written:
+                    kept.append(tuple(column[:written] for column in room))
                 passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
                 ahead = total - clock[1] - (clock[0] * period if clock[0] else 0.0)
                 _refuse(outcome, table, state, clock, passed, ahead, CHUNK * len(kept))
@@ -453,13 +462,16 @@ def run_curved(
                         f"a period of {scale:g} s has at most {budget} events",
                         "check the law there (chatter), or raise budget=",
                     )
+                tell(1.0 - ahead / total)
     except KeyboardInterrupt:
-        status = "interrupted"
         if not kept:
             raise
-        total = clock[1] + (clock[0] * period if math.isfinite(period) else 0.0)
-    if status == "complete" and _at_rest(table, state, mode, work[0]):
-        status = "at rest"
+        status = "interrupted"
+        lap, offset, length = (float(column[-1]) for column in kept[-1][:3])
+        total = offset + length + (lap * period if math.isfinite(period) else 0.0)
+    if status == "complete":
+        tell(1.0)
+        status = "at rest" if _at_rest(table, state, mode, work[0]) else status
     return _assembled(table, kept, total, status, order)
 
 

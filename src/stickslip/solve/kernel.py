@@ -144,8 +144,8 @@ def next_exit(tables, mode, state, scale, opened, armed, span, c, noise):
 
 
 @compiled(**OPTIONS)
-def march(tables, fast, clock, state, mode, limit, period, past, out, work):
-    """March until `limit` or until the buffers are full.
+def march(tables, fast, clock, state, mode, limit, period, past, out, work, patience):
+    """March until `limit`, until the buffers are full, or until a piece is longer than `patience` cells.
 
     Parameters
     ----------
@@ -169,6 +169,9 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
         Laps, times, modes, durations, states, exits of the pieces; of the state as many entries as there is room.
     work : ndarray (15, N or more)
         Scratch.
+    patience : int
+        Cells after which a march ends FULL: at the next event, or by cutting a piece that is longer itself (exit -1),
+        so that the caller hears of a long run while it lasts.
 
     Returns
     -------
@@ -181,7 +184,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
     c, noise = work[4], work[5]
     scratch = work[:2, :n]
     held, scale = work[2, :n], work[3, :n]
-    count, capacity = 0, laps.shape[0]
+    count, capacity, spent = 0, laps.shape[0], 0
     quick = fast[5].shape[0] > 0
     past_mode, past_exit, past_time, past_parts, ring = past
     while True:
@@ -190,7 +193,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
             mode = settle(tables, came, state, scale, cells[came], scratch, c, noise)
             if mode < 0:
                 return CHATTER, count, came
-        if count == capacity:
+        if count == capacity or spent >= patience:
             return FULL, count, mode
         left = (limit[0] - clock[0]) * period if limit[0] != clock[0] else 0.0
         left += limit[1] - clock[1]
@@ -203,7 +206,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
         for i in range(n):
             held[i] = state[i]
         gone, leaving, armed = 0.0, -1, 0
-        opened = True
+        opened, cut = True, spent + patience
         while True:
             span = left - gone
             cell = cells[mode]
@@ -231,6 +234,9 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
                 scale[i] = max(scale[i], abs(held[i]))
             gone += cell
             set_tones(tones, held, clock[1] + gone)
+            spent += 1
+            if spent == cut:
+                break
         durations[count] = gone
         exits[count] = leaving
         count += 1
@@ -251,6 +257,8 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work):
         clock[1] = now
         for i in range(n):
             state[i] = held[i]
+        if leaving < 0 and gone < left:
+            return FULL, count, mode
         if leaving < 0:
             clock[0], clock[1], clock[2] = limit[0], limit[1], 0.0
             set_tones(tones, state, clock[1])

@@ -80,7 +80,7 @@ def lyapunov(
     weights[table.degrees : 2 * table.degrees] = scale
     growth = []
     for lap in range(transient + cycles):
-        orbit = run(system, table, state, mode, laps=1.0, offset=0.0, budget=10_000)
+        orbit = run(system, table, state, mode, span=(1.0, 0.0))
         state, mode = end_of(orbit)
         carry_tangents(table.tables, table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, mode,
                        difference, work)  # fmt: skip

@@ -248,7 +248,7 @@ def _same(one: SteadyState, other: SteadyState) -> bool:
 
 def lap(system: System, table: Automaton, state: Array, mode: int, laps: int) -> Trajectory:
     """The motion over whole periods of the drive from a state at phase zero."""
-    return run(system, table, state, mode, laps=float(laps), offset=0.0, budget=10_000)
+    return run(system, table, state, mode, span=(float(laps), 0.0))
 
 
 def end_of(orbit: Trajectory) -> tuple[Array, int]:
@@ -354,7 +354,7 @@ def _self_excited(system: System, table: Automaton, start: Mapping[str, float | 
     # the way of the belt moves on, so the relative coordinate is compared, not the signals
     duration = transient * scale
     for _ in range(8):
-        motion = run(system, table, state, mode, laps=0.0, offset=duration, budget=10_000)
+        motion = run(system, table, state, mode, span=(0.0, duration))
         ends = [
             j
             for j in range(1, len(motion.modes))

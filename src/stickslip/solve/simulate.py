@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from stickslip.solve.phasors import blank_past, fast_tables
 from stickslip.solve.trajectory import Trajectory
 
 CHUNK = 16384  # pieces between two looks at the clock and the keyboard
+CELLS = 65536  # Taylor cells between two looks
+PACE = 0.1  # s between two calls of progress
 
 
 def simulate(
@@ -28,6 +31,7 @@ def simulate(
     start: Mapping[str, float | str] | None = None,
     budget: int = 10_000,
     rtol: float = 1e-12,
+    progress: Callable[[float], object] | None = None,
 ) -> Trajectory:
     """How does the system move?
 
@@ -49,10 +53,13 @@ def simulate(
         Most events in one period; more is taken for chatter.
     rtol : float
         For curved laws: error of a step relative to the largest value each entry of the state has had.
+    progress : callable, optional
+        Called some ten times a second with the share of the time that is simulated, 0 to 1.
 
     Returns
     -------
     Trajectory
+        Where the user interrupts (Ctrl-C), what was simulated until then, with the status "interrupted".
 
     Raises
     ------
@@ -73,27 +80,31 @@ def simulate(
     ('at rest', 0.25)
     """
     if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
-        return _simulate_curved(system, duration, cycles, start or {}, budget, rtol)
+        from stickslip.solve.curved import run_curved, tape
+
+        curved: Any = tape(system)
+        span = _end(system, curved, duration, cycles)
+        state, mode = opening(curved, start or {})
+        return run_curved(
+            curved, state, mode, span=span, stops=_stops(curved, *span), budget=budget, rtol=rtol, tell=paced(progress)
+        )
     table = automaton(system)
-    laps, offset = _end(system, table, duration, cycles)
-    state, mode = opening(table, start or {})
-    return run(system, table, state, mode, laps=laps, offset=offset, budget=budget)
-
-
-def _simulate_curved(
-    system: Oscillator,
-    duration: float | None,
-    cycles: float | None,
-    start: Mapping[str, float | str],
-    budget: int,
-    rtol: float,
-) -> Trajectory:
-    from stickslip.solve.curved import run_curved, tape
-
-    table: Any = tape(system)
     span = _end(system, table, duration, cycles)
-    state, mode = opening(table, start)
-    return run_curved(table, state, mode, span=span, stops=_stops(table, *span), budget=budget, rtol=rtol)
+    state, mode = opening(table, start or {})
+    return run(system, table, state, mode, span=span, budget=budget, tell=paced(progress))
+
+
+def paced(progress: Callable[[float], object] | None) -> Callable[[float], None]:
+    """The same call, passed on once in a while and at the end."""
+    due = time.monotonic() + PACE
+
+    def tell(share: float) -> None:
+        nonlocal due
+        if progress is not None and (share >= 1.0 or time.monotonic() >= due):
+            progress(min(share, 1.0))
+            due = time.monotonic() + PACE
+
+    return tell
 
 
 def _end(system: System, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
@@ -143,9 +154,21 @@ def opening(table: Automaton, start: Mapping[str, float | str]) -> tuple[Array, 
 
 
 def run(
-    system: System, table: Automaton, state: Array, mode: int, *, laps: float, offset: float, budget: int
+    system: System,
+    table: Automaton,
+    state: Array,
+    mode: int,
+    *,
+    span: tuple[float, float],
+    budget: int = 10_000,
+    tell: Callable[[float], None] | None = None,
 ) -> Trajectory:
-    """March from a state at time 0 to the end of the time, in chunks."""
+    """March from a state at time 0 to the end of the time (laps, offset), in chunks.
+
+    With somebody to tell how far it is, an interrupted run is returned as far as it came; without, it is a part of
+    a greater question, which then ends as well.
+    """
+    laps, offset = span
     size = len(table.names)
     work = np.zeros((15, max(size, DEGREE + 1)))
     fast, past = fast_tables(table), blank_past()
@@ -168,7 +191,7 @@ def run(
             while outcome == kernel.FULL:
                 before = clock.copy()
                 outcome, count, mode = kernel.march(
-                    table.tables, fast, clock, state, mode, at, period, past, pieces.room(), work
+                    table.tables, fast, clock, state, mode, at, period, past, pieces.room(), work, CELLS
                 )
                 passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
                 pieces.keep(count, passed, total)
@@ -179,14 +202,20 @@ def run(
                         f"a period of {scale:g} s has at most {budget} events",
                         "check the law there (chatter), or raise budget=",
                     )
+                if tell:
+                    tell(pieces.passed / total)
     except KeyboardInterrupt:
-        status = "interrupted"
-        total = clock[1] + (clock[0] * period if math.isfinite(period) else 0.0)
-        if not pieces.count:
+        if tell is None or not pieces.count:
             raise
+        status = "interrupted"
     laps_, offsets, modes, durations, states, exits = pieces.done()
-    if status == "complete" and _at_rest(table, state, mode):
-        status = "at rest"
+    if status == "interrupted":
+        # what the march wrote since is lost: the signal comes before Python learns of it
+        total = float(offsets[-1] + durations[-1] + (laps_[-1] * period if math.isfinite(period) else 0.0))
+    if status == "complete":
+        if tell:
+            tell(1.0)
+        status = "at rest" if _at_rest(table, state, mode) else status
     return Trajectory(system, table, laps_, offsets, modes, durations, states, exits, total, status)
 
 
