@@ -8,7 +8,8 @@ from typing import Any
 
 from stickslip.drives import Drive, Release
 from stickslip.errors import ModelError
-from stickslip.laws.base import Law, finite
+from stickslip.laws.base import Law, changed, finite, parameters
+from stickslip.laws.curved import CurvedLaw
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Oscillator:
         m [kg].
     stiffness : float
         k [N/m]; zero: no spring.
-    law : Law
+    law : Law or CurvedLaw
         Friction law of the contact.
     drive : Drive
         What moves; nothing (free decay) where left out.
@@ -45,7 +46,7 @@ class Oscillator:
 
     mass: float
     stiffness: float
-    law: Law
+    law: Law | CurvedLaw
     drive: Drive = field(default_factory=Release)
     damping: float = 0.0
     damper: str = "ground"
@@ -67,6 +68,8 @@ class Oscillator:
     def having(self, **changes: Any) -> Oscillator:
         """The same oscillator with other values; a name is looked for in the oscillator, its law, then its drive.
 
+        Of a law around another law (:class:`InSeries`), the inner one's parameters come last.
+
         Parameters
         ----------
         **changes
@@ -76,13 +79,12 @@ class Oscillator:
         -------
         Oscillator
         """
-        parts: dict[str, dict[str, Any]] = {"": {}, "law": {}, "drive": {}}
-        owners = {"drive": self.drive, "law": self.law, "": self}
-        place = {f.name: part for part, owner in owners.items() for f in fields(owner)}  # type: ignore[arg-type]
-        for name, value in changes.items():
-            if name not in place:
-                raise ModelError(f"no parameter is called '{name}'", f"it is one of {', '.join(place)}", "correct it")
-            parts[place[name]][name] = value
-        law, drive = parts[""].get("law", self.law), parts[""].get("drive", self.drive)
-        inner = {"law": replace(law, **parts["law"]), "drive": replace(drive, **parts["drive"])}
-        return replace(self, **{**parts[""], **inner})
+        own = {f.name: changes.pop(f.name) for f in fields(self) if f.name in changes}
+        law, drive = own.pop("law", self.law), own.pop("drive", self.drive)
+        of_law, of_drive = parameters(law), parameters(drive)
+        for name in changes:
+            if name not in of_law | of_drive:
+                known = [*(f.name for f in fields(self)), *of_law, *of_drive]
+                raise ModelError(f"no parameter is called '{name}'", f"it is one of {', '.join(known)}", "correct it")
+        moved = {name: changes.pop(name) for name in of_drive.keys() & changes.keys() if name not in of_law}
+        return replace(self, **own, law=changed(law, changes), drive=changed(drive, moved))

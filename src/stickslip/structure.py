@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.drives import Drive, Release
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Law, Mode, finite
+from stickslip.laws.base import Exit, Law, Mode, changed, finite, parameters
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.curved import CurvedLaw
@@ -260,19 +260,18 @@ class Structure:
         -------
         Structure
         """
-        own = {name: changes.pop(name) for name in _names(self) & changes.keys()}
+        own = {f.name: changes.pop(f.name) for f in fields(self) if f.name in changes}
         drive, contacts = own.pop("drive", self.drive), own.pop("contacts", self.contacts)
-        inner = {name: changes.pop(name) for name in _names(drive) & changes.keys()}
-        unknown = changes.keys() - {name for contact in contacts for name in _names(contact) | _names(contact.law)}
+        of_drive = {name: changes.pop(name) for name in parameters(drive).keys() & changes.keys()}
+        unknown = changes.keys() - {name for contact in contacts for name in parameters(contact)}
         if unknown:
             raise ModelError(
                 f"no parameter is called '{min(unknown)}'",
                 "it belongs to the structure, its drive, its contacts or their laws",
                 "correct it",
             )
-        return replace(
-            self, **own, drive=replace(drive, **inner), contacts=[_contact_having(c, changes) for c in contacts]
-        )
+        moved = [changed(c, {name: changes[name] for name in parameters(c).keys() & changes.keys()}) for c in contacts]
+        return replace(self, **own, drive=changed(drive, of_drive), contacts=moved)
 
 
 def _positive(mass: Array) -> bool:
@@ -281,17 +280,6 @@ def _positive(mass: Array) -> bool:
     if not np.all(units > 0):
         return False
     return bool(np.min(np.linalg.eigvalsh(mass / np.outer(units, units))) > 1e-14 * len(mass))
-
-
-def _contact_having(contact: Contact, changes: Mapping[str, Any]) -> Contact:
-    own = {name: value for name, value in changes.items() if name in _names(contact)}
-    law = own.pop("law", contact.law)
-    inner = {name: value for name, value in changes.items() if name in _names(law) and name not in _names(contact)}
-    return replace(contact, **own, law=replace(law, **inner))
-
-
-def _names(part: Any) -> set[str]:
-    return {f.name for f in fields(part)}
 
 
 def _numbers(name: str, values: ArrayLike) -> Array:

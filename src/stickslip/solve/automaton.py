@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from stickslip.drives import Motion
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Mode
+from stickslip.laws.base import Exit, Law, Mode
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
 from stickslip.structure import Structure
@@ -120,15 +120,15 @@ def automaton(system: System) -> Automaton:
             "this question needs a law of linear modes",
             "ask simulate(), or make a polygon of the curve with Tabulated.of()",
         )
-    return _Builder(system).build()
+    return _Builder(system, system.law).build()
 
 
 class _Builder:
     """Turns rows over names into rows over the state; lives for one call of :func:`automaton`."""
 
-    def __init__(self, system: Oscillator) -> None:
-        self.system, self.motion, self.modes = system, system.drive.motion(), system.law.modes()
-        self.memory, self.places = tuple(system.law.memory), system.law.places
+    def __init__(self, system: Oscillator, law: Law) -> None:
+        self.system, self.law, self.motion, self.modes = system, law, system.drive.motion(), law.modes()
+        self.memory, self.places = tuple(law.memory), law.places
         self.names = ("x", "v", *self.memory, "1", *self.motion.rates)
         self.size = len(self.names)
         motion = self.motion
@@ -213,10 +213,10 @@ class _Builder:
                 stopped = set(exit_.quantity) == {"v"}
                 resets.append(self.carry(exit_, friction, stopped or self.modes[target].friction is None))
             first.append(len(rows))
-        entry = system.law.entry
+        entry = self.law.entry
         none = np.zeros(self.size)
         opening = [none, self.face[1]]
-        opening += [self.relative(form, none) + self.moved(name, 0) for name, form in system.law.memory.items()]
+        opening += [self.relative(form, none) + self.moved(name, 0) for name, form in self.law.memory.items()]
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
         return Automaton(
             names=self.names,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from stickslip.errors import ModelError
+from stickslip.laws.base import parameters
 from stickslip.solve.automaton import Array, System, automaton
 from stickslip.solve.periodic import CLOSED, SteadyState, derivative, end_of, judged, lap
 from stickslip.solve.simulate import opening
@@ -178,9 +179,8 @@ def continue_orbit(orbit: SteadyState, parameter: str, *, to: float, step: float
 
 def _value(system: System, parameter: str) -> float:
     """The parameter's value now, found where `having` would put it."""
-    laws = [contact.law for contact in system.contacts] if isinstance(system, Structure) else [system.law]
-    for owner in (system, *laws, system.drive):
-        value = getattr(owner, parameter, None) if parameter in {f.name for f in fields(owner)} else None  # type: ignore[arg-type]
+    for owner in (system, *(system.contacts if isinstance(system, Structure) else ()), system.drive):
+        value = getattr(parameters(owner).get(parameter), parameter, None)
         if isinstance(value, int | float):
             return float(value)
     raise ModelError(f"'{parameter}' has no single value", "a branch follows one number", "choose another parameter")
