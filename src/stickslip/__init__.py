@@ -79,11 +79,19 @@ if TYPE_CHECKING:
     from stickslip.laws.inertial import InertialContact as InertialContact
     from stickslip.laws.linear_slope import LinearSlope as LinearSlope
     from stickslip.laws.position_load import PositionLoad as PositionLoad
+    from stickslip.laws.rough import RoughSurface as RoughSurface
     from stickslip.laws.series import InSeries as InSeries
     from stickslip.laws.state_variable import StateVariable as StateVariable
     from stickslip.laws.tabulated import Tabulated as Tabulated
     from stickslip.oscillator import Oscillator as Oscillator
     from stickslip.plot.animation import animate as animate
+    from stickslip.rig import (
+        Digitiser as Digitiser,
+        Mount as Mount,
+        Noise as Noise,
+        Rig as Rig,
+        Sensor as Sensor,
+    )
     from stickslip.reports.simulation import Outcome as Outcome, outcome as outcome, publish_run as publish_run
     from stickslip import scenarios as scenarios
     from stickslip.solve.continuation import Branch as Branch, continue_orbit as continue_orbit
@@ -123,7 +131,8 @@ _ROOMS = {
     "analyze": "analysis", "compare": "analysis", "mend": "analysis", "Findings": "analysis", "Comparison": "analysis",
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",
     "Tabulated": "laws.tabulated", "StateVariable": "laws.state_variable", "InertialContact": "laws.inertial",
-    "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load", "InSeries": "laws.series",
+    "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load", "RoughSurface": "laws.rough",
+    "InSeries": "laws.series",
     "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
     "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",
@@ -134,6 +143,7 @@ _ROOMS = {
     "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
     "energy": "solve.energy", "attractors": "solve.periodic",
     "continue_orbit": "solve.continuation", "Branch": "solve.continuation",
+    "Rig": "rig", "Sensor": "rig", "Mount": "rig", "Noise": "rig", "Digitiser": "rig",
     "scenarios": "scenarios", "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
     "outcome": "reports.simulation", "Outcome": "reports.simulation", "publish_run": "reports.simulation",
     "animate": "plot.animation",

@@ -1,0 +1,170 @@
+"""A surface that is not everywhere the same: friction that fluctuates along the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import ModelError
+from stickslip.laws.base import Exit, Mode, Row, finite
+from stickslip.laws.compliant import CompliantContact
+from stickslip.laws.coulomb import Coulomb
+
+CELLS = 60  # from the middle to either end: a run that starts far out crosses them without time between
+
+
+@dataclass(frozen=True)
+class _Over(Mode):
+    """A mode over one cell of the surface: to cross into the next cell is no event."""
+
+    def changes(self, before: Mode, leaving: int) -> Iterator[tuple[int, Mode, Mode]]:
+        if (before.kind, before.side) != (self.kind, self.side):
+            yield 0, before, self
+
+
+@dataclass(frozen=True)
+class RoughSurface:
+    r"""A contact whose friction forces are multiplied by a random profile along the counter-face, :math:`1 + r(x)`.
+
+    The profile is a polygon through independent Gaussian values, one in each `length`; beyond `span` it stays as it
+    is there. Friction is piecewise linear in x, so that the motion stays a closed form between events.
+
+    Attributes
+    ----------
+    contact : Coulomb or CompliantContact
+        The contact on the even surface.
+    share : float
+        Standard deviation of r along the surface: 0.03 is 3 % of the friction.
+    length : float
+        Distance [m] within which the friction changes.
+    span : float
+        Half the length [m] of the surface, around x = 0.
+    seed : int
+        Which surface: one of the same seed is the same.
+
+    Raises
+    ------
+    ModelError
+        A value has no meaning, more than 60 lengths in the span, or a contact of another kind.
+
+    Examples
+    --------
+    >>> surface = RoughSurface(Coulomb(1.1), share=0.03, length=1e-4, span=1e-3, seed=1)
+    >>> len(surface.modes()), bool(0.9 < surface.profile(0.0) < 1.1)
+    (66, True)
+    """
+
+    contact: Coulomb | CompliantContact
+    share: float
+    length: float
+    span: float
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        finite("share", self.share, unit="(ratio)")
+        finite("length", self.length, unit="m", positive=True)
+        finite("span", self.span, unit="m", positive=True)
+        if (
+            not isinstance(self.contact, Coulomb | CompliantContact)
+            or getattr(self.contact, "rule", "") == "consistent"
+        ):
+            raise ModelError(
+                f"a rough surface under {self.contact!r}",
+                "it is laid under Coulomb or the CompliantContact of the literal rule",
+                "use one of the two",
+            )
+        if self.share > 0.3 or self.span / self.length > CELLS:
+            raise ModelError(
+                f"share = {self.share}, span = {self.span} m of {self.length} m each",
+                f"the fluctuation is 0.3 at most, and the span has at most {CELLS} lengths",
+                "make the surface smoother, shorter, or of longer waves",
+            )
+
+    @cached_property
+    def knots(self) -> NDArray[np.float64]:
+        """Places [m] and values of the profile (n, 2)."""
+        cells = 2 * math.ceil(self.span / self.length)
+        places = self.length * (np.arange(cells + 1) - cells / 2)
+        chance = np.random.default_rng(self.seed).standard_normal(cells + 1)
+        # between two knots a polygon has 2/3 of their variance
+        return np.column_stack([places, np.maximum(0.0, 1 + math.sqrt(1.5) * self.share * chance)])
+
+    def profile(self, x: float) -> float:
+        """The friction at a place [m] over that of the even surface.
+
+        Parameters
+        ----------
+        x : float
+            Place on the counter-face [m].
+
+        Returns
+        -------
+        float
+        """
+        return float(np.interp(x, *self.knots.T))
+
+    @property
+    def kinetic(self) -> float:
+        """Mean sliding friction [N]."""
+        return self.contact.kinetic
+
+    @property
+    def memory(self) -> Mapping[str, Row]:
+        """The contact's."""
+        return self.contact.memory
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """The contact's."""
+        return self.contact.places
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, at x = 0; elsewhere the cells are crossed before time passes."""
+        middle = (len(self.knots) + 1) // 2
+        back, still, forward = (f"{name} {middle}" for name in self.contact.entry)
+        return back, still, forward
+
+    def modes(self) -> tuple[Mode, ...]:
+        """The contact's modes over each cell of the surface, and over the even ends."""
+        places, values = self.knots.T
+        slopes = np.concatenate([[0.0], np.diff(values) / np.diff(places), [0.0]])
+        starts = np.concatenate([values[:1], values])
+        origins = np.concatenate([places[:1], places])
+        edges = np.concatenate([[-np.inf], places, [np.inf]])
+        return tuple(
+            self._over(mode, cell, float(starts[cell] - slopes[cell] * origins[cell]), float(slopes[cell]), edges)
+            for cell in range(len(slopes))
+            for mode in self.contact.modes()
+        )
+
+    def _over(self, mode: Mode, cell: int, level: float, slope: float, edges: NDArray[np.float64]) -> Mode:
+        """A mode over one cell, in which every force of the contact is multiplied by level + slope x."""
+
+        def put(form: Row) -> dict[str, float]:
+            other = {name: value for name, value in form.items() if name != "1"}
+            force = form.get("1", 0.0)
+            put_ = {**other, "1": force * level, "x": other.get("x", 0.0) + force * slope}
+            return {name: value for name, value in put_.items() if value}
+
+        exits = [
+            Exit(
+                put(exit_.quantity),
+                f"{exit_.to} {cell}",
+                {name: put(form) for name, form in exit_.reset.items()},
+                exit_.crossing,
+            )
+            for exit_ in mode.exits
+        ]
+        if mode.kind != "stick":
+            if np.isfinite(edges[cell + 1]):
+                exits.append(Exit({"x": 1.0, "1": -float(edges[cell + 1])}, f"{mode.name} {cell + 1}"))
+            if np.isfinite(edges[cell]):
+                exits.append(Exit({"x": -1.0, "1": float(edges[cell])}, f"{mode.name} {cell - 1}"))
+        friction = None if mode.friction is None else put(mode.friction)
+        return _Over(f"{mode.name} {cell}", mode.kind, mode.side, friction, tuple(exits))

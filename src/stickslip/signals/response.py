@@ -1,0 +1,148 @@
+"""What a linear sensor makes of a motion that is known at every instant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TURN = 1.0  # radians that no pole turns further in a stretch of the quadrature
+NODES, WEIGHTS = (np.polynomial.legendre.leggauss(6)[0] + 1) / 2, np.polynomial.legendre.leggauss(6)[1] / 2
+BLOCK = 1 << 16  # samples at a time
+CRITICAL = 1e-7  # a damping ratio as near to 1 is moved away from it: a double pole has no partial fractions
+
+
+@dataclass(frozen=True)
+class Response:
+    r"""A linear filter in partial fractions, :math:`H(s) = d + \sum_i r_i/(s - p_i)`.
+
+    Attributes
+    ----------
+    poles, residues : tuple of complex
+        p_i [rad/s] and r_i, conjugates included.
+    direct : float
+        d.
+    leak : float
+        Rate [1/s] at which a constant leaks away; zero where none does.
+    """
+
+    poles: tuple[complex, ...] = ()
+    residues: tuple[complex, ...] = ()
+    direct: float = 1.0
+    leak: float = 0.0
+
+    def at(self, frequency: Array | float) -> NDArray[np.complex128]:
+        """H at frequencies [Hz]."""
+        s = 2j * np.pi * np.asarray(frequency, dtype=float)
+        total = np.full(s.shape, self.direct, dtype=complex)
+        for pole, residue in zip(self.poles, self.residues, strict=True):
+            total += residue / (s - pole)
+        return total
+
+    def then(self, other: Response) -> Response:
+        """This filter, and the other behind it; they share no pole."""
+
+        def value(filter_: Response, s: complex) -> complex:
+            parts = zip(filter_.poles, filter_.residues, strict=True)
+            return filter_.direct + sum(residue / (s - pole) for pole, residue in parts)
+
+        own = [r * value(other, p) for p, r in zip(self.poles, self.residues, strict=True)]
+        others = [r * value(self, p) for p, r in zip(other.poles, other.residues, strict=True)]
+        return Response(
+            (*self.poles, *other.poles), (*own, *others), self.direct * other.direct, self.leak + other.leak
+        )
+
+
+def resonance(frequency: float, damping: float) -> Response:
+    r"""A mount that rings: :math:`H = w^2/(s^2 + 2\zeta w s + w^2)`, w = 2 pi `frequency` [Hz]."""
+    if abs(damping - 1) < CRITICAL:
+        damping = 1 + CRITICAL
+    w = 2 * math.pi * frequency
+    root = np.emath.sqrt(damping**2 - 1.0)
+    first, second = complex(w * (-damping + root)), complex(w * (-damping - root))
+    residue = w * w / (first - second)
+    return Response((first, second), (residue, -residue), 0.0)
+
+
+def leak(time_constant: float) -> Response:
+    r"""A charge that leaks away: :math:`H = s/(s + 1/T)`, T the time constant [s]."""
+    rate = 1 / time_constant
+    return Response((complex(-rate),), (complex(-rate),), 1.0, rate)
+
+
+def respond(values: Callable[[Array], Array], *, breaks: Array, times: Array, response: Response) -> Array:
+    """What does a linear sensor read at equally spaced instants?
+
+    Before time 0 its input was what it is at time 0, and nothing had leaked away. The convolution with each pole is
+    taken by Gauss's quadrature between the samples and the breaks, so that a jump of the input rings as it should.
+
+    Parameters
+    ----------
+    values : callable
+        The input at increasing instants [s], none below 0.
+    breaks : ndarray
+        Instants at which the input may jump, increasing.
+    times : ndarray (n,)
+        Equally spaced instants [s]; the input before 0 is what it is at 0.
+    response : Response
+
+    Returns
+    -------
+    ndarray (n,)
+    """
+    after = np.maximum(times, 0.0)
+    if not response.poles or len(times) < 2:
+        return response.direct * values(after)
+    began = float(values(np.zeros(1))[0])
+    out = response.direct * (values(after) - began) + began * np.exp(-response.leak * after)
+    step = float(times[-1] - times[0]) / (len(times) - 1)
+    ahead = max(0, math.ceil(times[0] / step))
+    grid = times[0] + step * np.arange(-ahead - 1, len(times))
+    kept = [np.zeros(1, dtype=complex) for _ in response.poles]
+    for first in range(0, len(grid) - 1, BLOCK):
+        part = grid[first : first + BLOCK + 1]
+        written = _convolved(values, began, breaks, part, response, kept)
+        low, high = max(first, ahead), first + len(written)
+        if low < high:
+            out[low - ahead : high - ahead] += written[low - first :]
+    return out
+
+
+def _convolved(
+    values: Callable[[Array], Array],
+    began: float,
+    breaks: Array,
+    grid: Array,
+    response: Response,
+    kept: list[NDArray[np.complex128]],
+) -> Array:
+    """The poles' part of the response at ``grid[1:]``; `kept` holds their states, and is updated."""
+    from scipy.signal import lfilter
+
+    step = grid[1] - grid[0]
+    pieces = max(1, math.ceil(max(abs(pole) for pole in response.poles) * step / TURN))
+    inside = breaks[(breaks > grid[0]) & (breaks < grid[-1])]
+    fine = (grid[:-1, None] + step * np.arange(pieces) / pieces).ravel()
+    edges = np.unique(np.concatenate([fine, grid[-1:], inside, np.zeros(1)]))
+    edges = edges[(edges >= max(grid[0], 0.0)) & (edges <= grid[-1])]
+    total = np.zeros(len(grid) - 1)
+    length = np.diff(edges)
+    nodes = edges[:-1, None] + length[:, None] * NODES
+    changed = (
+        (values(nodes.ravel()).reshape(nodes.shape) - began) * WEIGHTS * length[:, None]
+        if len(length)
+        else np.zeros((0, len(NODES)))
+    )
+    into = np.clip(np.searchsorted(grid, edges[:-1] + length / 2) - 1, 0, len(grid) - 2)
+    for j, (pole, residue) in enumerate(zip(response.poles, response.residues, strict=True)):
+        carried = (changed * np.exp(pole * (grid[into + 1][:, None] - nodes))).sum(axis=1)
+        driven = np.bincount(into, carried.real, len(total)) + 1j * np.bincount(into, carried.imag, len(total))
+        turned = np.exp(pole * step)
+        state, kept[j] = lfilter([1.0], [1.0, -turned], driven, zi=kept[j])
+        total += (residue * state).real
+    return total
