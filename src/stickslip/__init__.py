@@ -64,6 +64,16 @@ if TYPE_CHECKING:
         clock_rate as clock_rate,
         synchronise as synchronise,
     )
+    from stickslip.signals.wavelet import (
+        cone_of_influence as cone_of_influence,
+        dyadic_map as dyadic_map,
+        inverse_wavelet as inverse_wavelet,
+        stft_map as stft_map,
+        wavelet_blocks as wavelet_blocks,
+        wavelet_map as wavelet_map,
+        wavelet_overview as wavelet_overview,
+    )
+    from stickslip.plot.wavelet import plot_wavelet as plot_wavelet
     from stickslip.drives import (
         Belt as Belt,
         HarmonicBase as HarmonicBase,
@@ -125,6 +135,9 @@ _ROOMS = {
     "remove_spikes": "signals.repair", "without_delays": "signals.delay",
     "synchronise": "signals.synchronise", "clock_offset": "signals.synchronise", "clock_rate": "signals.synchronise",
     "differentiate": "signals.differentiate", "smooth": "signals.differentiate",
+    "wavelet_map": "signals.wavelet", "wavelet_blocks": "signals.wavelet", "wavelet_overview": "signals.wavelet",
+    "dyadic_map": "signals.wavelet", "stft_map": "signals.wavelet", "cone_of_influence": "signals.wavelet",
+    "inverse_wavelet": "signals.wavelet", "plot_wavelet": "plot.wavelet",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",

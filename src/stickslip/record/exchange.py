@@ -146,7 +146,7 @@ def to_xarray(record: Record) -> xr.Dataset:
     >>> dataset["x"].attrs["units"], from_xarray(dataset).equals(record)
     ('m', True)
     """
-    xarray = _xarray()
+    xarray = labelled_arrays()
     axis = time_column(record)
     variables = {
         name: (axis, values.copy(), {"units": record.channels[name].unit, "long_name": record.channels[name].quantity})
@@ -189,7 +189,7 @@ def from_xarray(
     >>> from_xarray(data)
     Record(x [m]; 3 samples, 1000 Hz, from 0 s)
     """
-    xarray = _xarray()
+    xarray = labelled_arrays()
     if isinstance(dataset, xarray.DataArray):
         dataset = dataset.to_dataset(name=str(dataset.name or "value"), promote_attrs=False)
     if not isinstance(dataset, xarray.Dataset):
@@ -471,13 +471,14 @@ def _given(**arguments: Any) -> dict[str, Any]:
     }
 
 
-def _xarray() -> Any:
+def labelled_arrays(asker: str = "to_xarray and from_xarray") -> Any:
+    """The package xarray, or a refusal that says how to get it."""
     try:
         import xarray
     except ImportError as error:
         raise FormatError(
             "the package xarray is not installed",
-            "to_xarray and from_xarray need it",
+            f"{asker} need it",
             'install it with: pip install "stickslip[io]"',
         ) from error
     return xarray
