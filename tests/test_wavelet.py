@@ -90,8 +90,8 @@ def test_a_decaying_sine_is_its_closed_form() -> None:
         """a^(-1/2) pi^(-1/4) integral from 0 of exp(rate u - i w (u - b) / a - (u - b)^2 / (2 a^2)) du."""
         slope = rate * a - 1j * CENTRE
         z = (-b / a - slope) / math.sqrt(2)
-        far = np.exp(b / a * slope + slope**2 / 2)  # exp(z^2) times the Gaussian
-        near = np.exp(-((b / a) ** 2) / 2) * wofz(1j * np.where(z.real < 0, -z, z))
+        far = np.exp(rate * b + slope**2 / 2)
+        near = np.exp(-((b / a) ** 2) / 2 + 1j * CENTRE * b / a) * wofz(1j * np.where(z.real < 0, -z, z))
         value = np.where(z.real < 0, 2 * far - near, near)
         return np.asarray(a**0.5 * np.pi**-0.25 * math.sqrt(np.pi / 2) * value)
 
@@ -106,7 +106,7 @@ def test_a_decaying_sine_is_its_closed_form() -> None:
     reach = float(scales.max())
     assert apart(16000.0, 7 * reach, 0.7) < 1e-9  # away from the onset, whose kink samples do not tell exactly
     near = {fs: apart(fs, -reach, reach) for fs in (8000.0, 16000.0)}
-    assert near[16000.0] < 1e-5
+    assert near[16000.0] < 3e-5
     assert near[8000.0] / near[16000.0] == pytest.approx(4, rel=0.02)  # the error of summing over a kink
 
 
