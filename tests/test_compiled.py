@@ -14,7 +14,7 @@ import stickslip
 
 PACKAGE = Path(stickslip.__file__).parent
 ASK = (
-    "import stickslip.solve.kernel as k, stickslip.solve.compiled as c; import numpy as np;"
+    "import stickslip.solve.kernel as k, stickslip.compiled as c; import numpy as np;"
     "order = k.opening_order(np.zeros(3), np.zeros(3), 3);"
     "stats = k.opening_order.stats; print(order, sum(stats.cache_hits.values()), c.folder())"
 )
@@ -52,7 +52,7 @@ def test_a_change_in_one_file_is_seen_by_its_callers_in_others(copy: Path) -> No
 
 
 def test_an_install_that_may_not_be_written_keeps_them_with_the_user(copy: Path, tmp_path: Path) -> None:
-    (copy / "stickslip" / "solve" / "__pycache__").write_text("a file where the folder would be", "utf-8")
+    (copy / "stickslip" / "__pycache__").write_text("a file where the folder would be", "utf-8")
     user = {"XDG_CACHE_HOME": str(tmp_path / "user"), "LOCALAPPDATA": str(tmp_path / "user")}
     first, second = ask(copy, **user), ask(copy, **user)
     assert (first[1], second[1]) == (0, 1)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import DEGREE, Array, automaton
-from stickslip.solve.compiled import OPTIONS, compiled
 from stickslip.solve.kernel import CHATTER, march, settle
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.simulate import opening

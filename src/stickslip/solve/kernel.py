@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from stickslip.solve.compiled import OPTIONS, compiled
+from stickslip.compiled import OPTIONS, compiled
 from stickslip.solve.phasors import glide
 from stickslip.solve.roots import NOISE, NONE, first_rise, opening_order
 

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.compiled import FAST, compiled
 from stickslip.solve.automaton import Array, Automaton
-from stickslip.solve.compiled import FAST, compiled
 from stickslip.solve.roots import NOISE
 
 KEEPS, STOPS, CARRIES = 0.0, 1.0, 2.0  # what an exit does to velocity and memory

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 
-from stickslip.solve.compiled import OPTIONS, compiled
+from stickslip.compiled import OPTIONS, compiled
 
 NONE = 2.0  # no root in the cell
 NOISE = 64 * 2.220446049250313e-16

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stickslip.solve.compiled import OPTIONS, compiled
+from stickslip.compiled import OPTIONS, compiled
 from stickslip.solve.kernel import follow, multiply
 
 

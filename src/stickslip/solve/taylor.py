@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from stickslip.solve.compiled import compiled
+from stickslip.compiled import compiled
 from stickslip.solve.roots import NOISE, NONE, first_rise
 
 OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}

@@ -57,7 +57,8 @@ def folder() -> Path | None:
 
 def digest(sources: Path) -> str:
     """What the files that hold kernels say, in 16 digits."""
-    texts = [(file.name.encode(), file.read_bytes()) for file in sorted(sources.glob("*.py"))]
+    files = sorted(sources.rglob("*.py"))
+    texts = [(file.relative_to(sources).as_posix().encode(), file.read_bytes()) for file in files]
     held = [name + text for name, text in texts if b"@compiled(" in text]
     return hashlib.sha256(b"\0".join(held)).hexdigest()[:16]
 
