@@ -73,6 +73,54 @@ def test_energy_balances_in_random_runs(block: int) -> None:
         assert run.durations.sum() == pytest.approx(duration, rel=1e-12), (seed, system)
 
 
+@pytest.mark.parametrize("seed", [595, 758, 4004, 4747, 4803, 6220, 9639])
+def test_energy_balances_over_thousands_of_cells(seed: int) -> None:
+    """A stiff contact under a slow ramp: pieces of up to 42,000 turns of the contact, far along the way."""
+    system, start, duration = random_case(seed)
+    run = ss.simulate(system, duration=duration, start=start)
+    assert np.max(run.durations / run.table.cell[run.modes]) > 2500
+    assert energy(run).residual < 1e-12
+
+
+def test_a_piece_of_a_hundred_thousand_cells_keeps_its_digits() -> None:
+    """A free vibration on a belt that never lets it stick, against the closed form in 40 digits."""
+    rate, damping, speed, level, mass = 1e4, 0.003, 10.0, 1.0, 1.5
+    law, drive = ss.Coulomb(level), ss.Belt(speed)
+    system = ss.Oscillator(mass=mass, stiffness=mass * rate**2, damping=damping, law=law, drive=drive)
+    run = ss.simulate(system, duration=10.0, start={"x": 1e-5, "v": 0.0})
+    assert len(run.modes) == 2  # cut once, for the ear of the caller
+    with mpmath.workdps(40):
+        k, c, m = (mpmath.mpf(value) for value in (system.stiffness, damping, mass))
+        decay, rest, t = c / (2 * m), level / k, mpmath.mpf(10.0)
+        turn = mpmath.sqrt(k / m - decay**2)
+        away = mpmath.mpf(1e-5) - rest
+        wave = away * (mpmath.cos(turn * t) + decay / turn * mpmath.sin(turn * t))
+        x = rest + mpmath.exp(-decay * t) * wave
+    assert run.state(10.0)["x"] == pytest.approx(float(x), rel=0, abs=1e-13 * 1e-5)
+
+
+def test_friction_at_rest_follows_a_force_that_starts_at_zero() -> None:
+    """A cosine that starts at zero carries the rounding of a cosine: it must not set off the state variable."""
+    law, drive = ss.StateVariable(0.5, rate=20), ss.HarmonicForce(1.2, frequency=0.13, phase=-math.pi / 2)
+    run = ss.simulate(ss.Oscillator(mass=1, stiffness=1, law=law, drive=drive), cycles=20)
+    # held while the rate that friction needs, f' + f_k gamma f, stays below f_k^2 gamma
+    omega = 2 * math.pi * 0.13
+    limit, lead = 5 / math.hypot(12, 1.2 * omega), math.atan2(1.2 * omega, 12)
+    assert run.events[0].time == pytest.approx((math.asin(limit) - lead) / omega, rel=1e-14)
+    assert len(run.modes) == 42
+    assert energy(run).residual < 1e-12
+
+
+def test_a_run_that_ends_on_an_event_ends_there() -> None:
+    """The energy at the end is that of the last instant, not of the last piece's start."""
+    system = ss.Oscillator(mass=1, stiffness=4, law=ss.Coulomb(1.0))
+    whole = ss.simulate(system, duration=10, start={"x": 3.0})
+    for event in whole.events[:3]:
+        run = ss.simulate(system, duration=event.time, start={"x": 3.0})
+        assert energy(run).residual < 1e-14
+        assert run.state(event.time)["v"] == pytest.approx(0, abs=1e-15)
+
+
 @pytest.mark.parametrize("system", [RIGID, COMPLIANT, RIGID.having(frequency=8.7, amplitude=1.1e-3)])
 def test_both_paths_agree(system: ss.Oscillator, monkeypatch: pytest.MonkeyPatch) -> None:
     """The fast path by phasors against the general march: sequence first, then values."""

@@ -538,7 +538,7 @@ def test_hard_structures_never_hang(seed: int) -> None:
         mass, -0.2 * damping if seed % 7 == 0 else damping, stiffness, contacts=contacts, drive=DRIVES[seed % 6]
     )
     run = simulate(system, duration=5.0, budget=2000)
-    assert energy(run).residual < 1e-11
+    assert energy(run).residual < 1e-12
     assert np.all(run.durations[:-1] > 0)
 
 

@@ -31,7 +31,7 @@ class InertialContact:
     Examples
     --------
     >>> sorted(InertialContact(1.1, stiffness=192000, mass=0.01).memory)
-    ['u', 'y']
+    ['stretch', 'u']
     """
 
     kinetic: float
@@ -49,13 +49,16 @@ class InertialContact:
 
     @property
     def memory(self) -> Mapping[str, Row]:
-        """Displacement y [m] and velocity u [m/s] of the contact; at the start relaxed and at rest."""
-        return {"y": {"x": 1.0}, "u": {}}
+        """Stretch x - y [m] and velocity u [m/s] of the contact, at the start relaxed and at rest.
+
+        Not y itself: far along the way a stiff contact's force would lose its digits in x - y.
+        """
+        return {"stretch": {}, "u": {}}
 
     @property
     def places(self) -> tuple[str, ...]:
-        """The contact's displacement."""
-        return ("y",)
+        """None."""
+        return ()
 
     @property
     def entry(self) -> tuple[str, str, str]:
@@ -64,19 +67,19 @@ class InertialContact:
 
     def modes(self) -> tuple[Mode, ...]:
         """The contact slides to either side, or holds."""
-        force = {"x": self.stiffness, "y": -self.stiffness, "v": self.damping, "u": -self.damping}
+        force = {"stretch": self.stiffness, "v": self.damping, "u": -self.damping}
         level = static_level(self.static, self.kinetic)
         held = (
-            Exit({"x": self.stiffness, "y": -self.stiffness, "v": self.damping, "1": -level}, "forward"),
-            Exit({"x": -self.stiffness, "y": self.stiffness, "v": -self.damping, "1": -level}, "back"),
+            Exit({"stretch": self.stiffness, "v": self.damping, "1": -level}, "forward"),
+            Exit({"stretch": -self.stiffness, "v": -self.damping, "1": -level}, "back"),
         )
         return (
             self._slip("back", -1, force),
-            Mode("stuck", "microstick", 0, force, held),
+            Mode("stuck", "microstick", 0, force, held, {"stretch": {"v": 1.0}}),
             self._slip("forward", 1, force),
         )
 
     def _slip(self, name: str, side: int, force: Row) -> Mode:
         push = {key: value / self.mass for key, value in force.items()} | {"1": -side * self.kinetic / self.mass}
         stop = Exit({"u": float(-side)}, "stuck", {"u": {}})
-        return Mode(name, "slip", side, force, (stop,), {"y": {"u": 1.0}, "u": push})
+        return Mode(name, "slip", side, force, (stop,), {"stretch": {"v": 1.0, "u": -1.0}, "u": push})

@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 System = Oscillator | Structure
 
 DEGREE = 20  # of the Taylor polynomial in a cell; with rate * cell <= 1 the remainder is 1/21! = 2e-20 of its scale
+SPLITTER = 134217729.0  # 2^27 + 1: halves a number into 26 bits and the rest
+CANCELLED = 8 * 2.220446049250313e-16  # of the terms: what rounding leaves of a difference of equals
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +44,8 @@ class Automaton:
         A of each mode.
     cell : ndarray (M,)
         Length [s] of a Taylor cell: the reciprocal of the mode's fastest rate; infinite where nothing turns.
-    hop : ndarray (M, N, N)
-        exp(A cell).
+    hop : ndarray (M, 3, N, N)
+        exp(A cell), in the three parts of :func:`halved`.
     series : ndarray (E, DEGREE + 1, N)
         q A^k of each exit: its derivatives as linear forms of the state.
     target, crossing : ndarray (E,)
@@ -204,10 +206,7 @@ class _Builder:
         for mode, flow, friction in zip(self.modes, flows, frictions, strict=True):
             for exit_ in mode.exits:
                 target = order[exit_.to]
-                series = [self.relative(exit_.quantity, friction, friction @ flow)]
-                for _ in range(DEGREE):
-                    series.append(series[-1] @ flow)
-                rows.append(series)
+                rows.append(derivatives(self.relative(exit_.quantity, friction, friction @ flow), flow))
                 targets.append(target)
                 # an exit at zero velocity leaves exactly none: rounding must not decide what follows
                 stopped = set(exit_.quantity) == {"v"}
@@ -223,7 +222,7 @@ class _Builder:
             modes=self.modes,
             flow=np.array(flows),
             cell=cells,
-            hop=np.array([exponential(flow, cell) for flow, cell in zip(flows, cells, strict=True)]),
+            hop=np.array([halved(exponential(flow, cell)) for flow, cell in zip(flows, cells, strict=True)]),
             series=np.array(rows).reshape(len(rows), DEGREE + 1, self.size),
             target=np.array(targets, dtype=np.int64),
             crossing=np.array([e.crossing for mode in self.modes for e in mode.exits], dtype=np.bool_),
@@ -243,6 +242,15 @@ class _Builder:
             opening=np.array(opening),
             tones=np.array(tones).reshape(len(tones), 4),
         )
+
+
+def derivatives(quantity: Any, flow: Any) -> list[Any]:
+    """q A^k of an exit; where terms cancel but for their rounding, nothing is left."""
+    rows = [quantity]
+    for _ in range(DEGREE):
+        row, size = rows[-1] @ flow, np.abs(rows[-1]) @ np.abs(flow)
+        rows.append(np.where(np.abs(row) > CANCELLED * size, row, 0.0))
+    return rows
 
 
 def _leaps(count: int, first: NDArray[np.int64], targets: NDArray[np.int64], resets: Array, size: int) -> Array:
@@ -286,13 +294,21 @@ def _eigenvalues(flow: Array) -> Any:
     return np.concatenate([np.linalg.eigvals(flow[np.ix_(part, part)]) for part in sorted(parts)])
 
 
-def exponential(flow: Array, time: float) -> Array:
-    """exp(A t) by its Taylor series in extended precision, halved until no entry of the flow dominates.
+def halved(matrix: Any) -> Array:
+    """A matrix as a sum of three: its first 26 bits, the rest of a double, and what a double has no room for."""
+    whole = np.asarray(matrix, dtype=np.float64)
+    spread = SPLITTER * whole
+    upper = spread - (spread - whole)
+    return np.array([upper, whole - upper, np.asarray(matrix - whole, dtype=np.float64)])
+
+
+def exponential(flow: Array, time: float) -> Any:
+    """exp(A t) in extended precision by its Taylor series, halved until no entry of the flow dominates.
 
     Each entry is summed on its own, so entries of very different units keep their digits.
     """
     if not np.isfinite(time):
-        return np.eye(len(flow))
+        return np.eye(len(flow), dtype=np.longdouble)
     rate = float(np.max(np.abs(_eigenvalues(flow)), initial=0.0)) * time
     halvings = max(0, int(np.ceil(np.log2(rate))) + 1) if rate > 0.5 else 0
     step = np.asarray(flow, dtype=np.longdouble) * (np.longdouble(time) / 2**halvings)
@@ -302,4 +318,4 @@ def exponential(flow: Array, time: float) -> Array:
         total = total + term
     for _ in range(halvings):
         total = total @ total
-    return np.asarray(total, dtype=np.float64)
+    return total

@@ -14,7 +14,7 @@ from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import DEGREE, Array, automaton
-from stickslip.solve.kernel import CHATTER, march, settle
+from stickslip.solve.kernel import CHATTER, march, measure, settle
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.simulate import opening
 
@@ -129,7 +129,7 @@ def simulate_batch(
         np.empty((count, room)), np.empty((count, room), np.int16), np.empty((count, room)),
         np.empty((count, room, size)), np.empty((count, room), np.int16), np.empty((count, size)),
     )  # fmt: skip
-    scratch = (np.zeros((count, 15, max(size, DEGREE + 1, 16))), np.full((2, count, LAP), -1), np.zeros((count, LAP)),
+    scratch = (np.zeros((count, 16, max(size, DEGREE + 1, 16))), np.full((2, count, LAP), -1), np.zeros((count, LAP)),
                np.ones((count, LAP), np.int64), np.zeros((count, 3), np.int64), np.zeros((count, 3)))  # fmt: skip
     (_on_gpu if gpu else _on_cpu)(given, out.arrays, scratch)
     return out
@@ -165,7 +165,7 @@ def march_one(i, given, out, scratch):
     total = limit[1] + (limit[0] * periods[j] if limit[0] > 0.0 else 0.0)
     for k in range(n):
         state[k] = opened[i, k]
-        work[3, k] = abs(state[k])
+    measure(tables[8], state, work[3], 0.0)
     cell = min(tables[1][modes[i]], total)
     mode = settle(tables, modes[i], state, work[3, :n], cell, work[:2, :n], work[4, :degree], work[5, :degree])
     status, count = CHATTER, 0

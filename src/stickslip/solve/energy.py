@@ -76,9 +76,7 @@ def energy(run: Trajectory) -> Energy:
     taken = np.sum(tangents.T @ friction * v, axis=0)
     given = np.sum(mass @ a * v, axis=0) + taken
     first = run.states[0, len(mass) : 2 * len(mass)]
-    last = (
-        run.sample([run.duration], ("v",))[0][:, 0] if run.exits[-1] < 0 else run.states[-1, len(mass) : 2 * len(mass)]
-    )
+    last = run.sample([run.duration], ("v",))[0][:, 0]
     kinetic = float(last @ mass @ last - first @ mass @ first) / 2
     return Energy(
         kinetic,

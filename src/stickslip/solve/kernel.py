@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from stickslip.compiled import OPTIONS, compiled
+from stickslip.solve.automaton import SPLITTER
 from stickslip.solve.phasors import glide
 from stickslip.solve.roots import NOISE, NONE, first_rise, opening_order
 
@@ -34,6 +35,19 @@ def set_tones(tones, state, time):
 
 
 @compiled(**OPTIONS)
+def measure(tones, state, scale, faded):
+    """What the rounding of each entry is measured by: its size now, or a part of what it was; turning signals have 1.
+
+    A cosine that starts at zero carries the rounding of a cosine.
+    """
+    for i in range(state.shape[0]):
+        scale[i] = max(abs(state[i]), faded * scale[i])
+    for j in range(tones.shape[0]):
+        scale[int(tones[j, 0])] = 1.0
+        scale[int(tones[j, 1])] = 1.0
+
+
+@compiled(**OPTIONS)
 def multiply(matrix, state, out):
     """out = matrix state."""
     n = state.shape[0]
@@ -42,6 +56,35 @@ def multiply(matrix, state, out):
         for j in range(n):
             total += matrix[i, j] * state[j]
         out[i] = total
+
+
+@compiled(**OPTIONS)
+def leap(hop, state, tail, work):
+    """state + tail = exp(A cell) (state + tail), in twice the digits: a long piece has thousands of cells.
+
+    `hop` is (3, N, N), see :func:`stickslip.solve.automaton.halved`; `tail` is what rounding took from the state.
+    """
+    n = state.shape[0]
+    for i in range(n):
+        total, rest = 0.0, 0.0
+        for j in range(n):
+            a, b = hop[0, i, j], hop[1, i, j]
+            if a == 0.0:
+                continue
+            # upper halves have 26 bits: their product is exact
+            x = SPLITTER * state[j]
+            x -= x - state[j]
+            y = state[j] - x
+            term = a * x
+            step = total + term
+            seen = step - total
+            rest += (total - (step - seen)) + (term - seen)
+            rest += a * y + (b * state[j] + (a * tail[j] + hop[2, i, j] * state[j]))
+            total = step
+        work[0, i] = total + rest
+        work[1, i] = rest - (work[0, i] - total)
+    for i in range(n):
+        state[i], tail[i] = work[0, i], work[1, i]
 
 
 @compiled(**OPTIONS)
@@ -167,7 +210,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
         Ring of pieces gone by, see :func:`stickslip.solve.phasors.glide`.
     out : tuple of arrays
         Laps, times, modes, durations, states, exits of the pieces; of the state as many entries as there is room.
-    work : ndarray (15, N or more)
+    work : ndarray (16, N or more)
         Scratch.
     patience : int
         Cells after which a march ends FULL: at the next event, or by cutting a piece that is longer itself (exit -1),
@@ -183,7 +226,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
     n = state.shape[0]
     c, noise = work[4], work[5]
     scratch = work[:2, :n]
-    held, scale = work[2, :n], work[3, :n]
+    held, scale, tail = work[2, :n], work[3, :n], work[15, :n]
     count, capacity, spent = 0, laps.shape[0], 0
     quick = fast[5].shape[0] > 0
     past_mode, past_exit, past_time, past_parts, ring = past
@@ -204,9 +247,9 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
         for i in range(states.shape[1]):
             states[count, i] = state[i]
         for i in range(n):
-            held[i] = state[i]
-        gone, leaving, armed = 0.0, -1, 0
-        opened, cut = True, spent + patience
+            held[i], tail[i] = state[i], 0.0
+        gone, leaving, armed, begun = 0.0, -1, 0, spent
+        opened = True
         while True:
             span = left - gone
             cell = cells[mode]
@@ -228,14 +271,15 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
                 advance(flow[mode], held, span, scratch)
                 gone = left
                 break
-            multiply(hop[mode], held, scratch[0])
+            leap(hop[mode], held, tail, scratch)
             for i in range(n):
-                held[i] = scratch[0, i]
                 scale[i] = max(scale[i], abs(held[i]))
-            gone += cell
-            set_tones(tones, held, clock[1] + gone)
             spent += 1
-            if spent == cut:
+            gone = (spent - begun) * cell
+            if tones.shape[0] == 1:
+                set_tones(tones, held, clock[1] + gone)
+                tail[int(tones[0, 0])], tail[int(tones[0, 1])] = 0.0, 0.0
+            if spent - begun == patience:
                 break
         durations[count] = gone
         exits[count] = leaving
@@ -267,7 +311,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
         multiply(reset[leaving], state, held)
         for i in range(n):
             state[i] = held[i]
-            scale[i] = max(abs(state[i]), 0.5 * scale[i])
+        measure(tones, state, scale, 0.5)
         cell = cells[target[leaving]]
         mode = settle(tables, target[leaving], state, scale, min(cell, left), scratch, c, noise)
         if mode < 0:
@@ -278,16 +322,15 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
 
 @compiled(**OPTIONS)
 def follow(tables, mode, state, time, work):
-    """state = exp(A time) state, however long the time."""
+    """state = exp(A time) state, however long the time; `work` is (3, N)."""
     flow, cells, hop, _, _, _, _, _, _ = tables
-    n = state.shape[0]
-    cell = cells[mode]
-    while time > cell:
-        multiply(hop[mode], state, work[0])
-        for i in range(n):
-            state[i] = work[0, i]
-        time -= cell
-    advance(flow[mode], state, time, work)
+    cell, tail, count = cells[mode], work[2], 0
+    for i in range(state.shape[0]):
+        tail[i] = 0.0
+    while time - count * cell > cell:
+        leap(hop[mode], state, tail, work)
+        count += 1
+    advance(flow[mode], state, time - count * cell if count else time, work)
 
 
 @compiled(**OPTIONS)
@@ -308,31 +351,31 @@ def sample(tables, begin, modes, states, times, rows, piece, out, work):
         Set to the piece each time falls in.
     out : ndarray (R, T)
         Set to the values.
-    work : ndarray (4, N)
+    work : ndarray (5, N)
         Scratch.
     """
     flow, cells, hop, _, _, _, _, _, _ = tables
     n, last = states.shape[1], begin.shape[0] - 1
-    scratch, held, state = work[:2], work[2], work[3]
-    j, at = 0, begin[0]
+    scratch, held, tail, state = work[:2], work[2], work[3], work[4]
+    j, count = 0, 0
     for i in range(n):
-        held[i] = states[0, i]
+        held[i], tail[i] = states[0, i], 0.0
     for t in range(times.shape[0]):
         if j < last and begin[j + 1] <= times[t]:
             while j < last and begin[j + 1] <= times[t]:
                 j += 1
-            at = begin[j]
+            count = 0
             for i in range(n):
-                held[i] = states[j, i]
+                held[i], tail[i] = states[j, i], 0.0
         mode = modes[j]
-        while times[t] - at > cells[mode]:
-            multiply(hop[mode], held, scratch[0])
-            for i in range(n):
-                held[i] = scratch[0, i]
-            at += cells[mode]
+        cell = cells[mode]
+        time = times[t] - begin[j]
+        while time - count * cell > cell:
+            leap(hop[mode], held, tail, scratch)
+            count += 1
         for i in range(n):
             state[i] = held[i]
-        advance(flow[mode], state, times[t] - at, scratch)
+        advance(flow[mode], state, time - count * cell if count else time, scratch)
         piece[t] = j
         for r in range(rows.shape[1]):
             total = 0.0

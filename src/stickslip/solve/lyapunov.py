@@ -74,7 +74,7 @@ def lyapunov(
     size = len(table.names)
     difference = np.zeros((1, size))
     difference[0, : table.physical] = np.linspace(1.0, 0.5, table.physical)
-    work = np.empty((8, size))
+    work = np.empty((9, size))
     scale = 1 / system.frequency / (2 * math.pi) if system.frequency else period
     weights = np.ones(table.physical)
     weights[table.degrees : 2 * table.degrees] = scale

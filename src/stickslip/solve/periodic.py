@@ -257,7 +257,7 @@ def end_of(orbit: Trajectory) -> tuple[Array, int]:
 
     last = orbit.states[-1].copy()
     mode, size = int(orbit.modes[-1]), len(last)
-    follow(orbit.table.tables, mode, last, float(orbit.durations[-1]), np.empty((2, size)))
+    follow(orbit.table.tables, mode, last, float(orbit.durations[-1]), np.empty((3, size)))
     if orbit.exits[-1] >= 0:
         leaving = int(orbit.exits[-1])
         last, mode = orbit.table.reset[leaving] @ last, int(orbit.table.target[leaving])
@@ -321,7 +321,7 @@ def derivative(orbit: Trajectory, after: int) -> tuple[Array, float]:
     tangents = np.eye(size)[: table.physical].copy()
     slowest = carry_tangents(
         table.tables, table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
-        np.empty((8, size)),
+        np.empty((9, size)),
     )  # fmt: skip
     return tangents[:, : table.physical].T, slowest
 

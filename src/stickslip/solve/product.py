@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
-from stickslip.solve.automaton import DEGREE, Automaton, exponential, fastest
+from stickslip.solve.automaton import DEGREE, Automaton, derivatives, exponential, fastest, halved
 from stickslip.structure import Contact, Structure
 
 Rows = NDArray[np.floating[Any]]
@@ -239,10 +239,7 @@ class _Builder:
         rows, resets, first = [], [], [0]
         for mode, flow, friction, follow in zip(modes, flows, frictions, targets, strict=True):
             for e, (exit_, owner) in enumerate(zip(mode.exits, mode.owners, strict=True)):
-                series = [self.relative(owner, exit_.quantity, friction[owner], flow)]
-                for _ in range(DEGREE):
-                    series.append(series[-1] @ flow)
-                rows.append(series)
+                rows.append(derivatives(self.relative(owner, exit_.quantity, friction[owner], flow), flow))
                 resets.append(self.carry(mode, e, modes[follow[e]], friction))
             first.append(len(rows))
         smooth = np.array(flows, dtype=np.float64)
@@ -266,7 +263,7 @@ class _Builder:
             modes=modes,
             flow=smooth,
             cell=cells,
-            hop=np.array([exponential(flow, cell) for flow, cell in zip(smooth, cells, strict=True)]),
+            hop=np.array([halved(exponential(flow, cell)) for flow, cell in zip(smooth, cells, strict=True)]),
             series=np.array(rows, dtype=np.float64).reshape(len(rows), DEGREE + 1, self.size),
             target=np.array([t for follow in targets for t in follow], dtype=np.int64),
             crossing=np.array([e.crossing for mode in modes for e in mode.exits], dtype=np.bool_),

@@ -170,7 +170,7 @@ def run(
     """
     laps, offset = span
     size = len(table.names)
-    work = np.zeros((15, max(size, DEGREE + 1)))
+    work = np.zeros((16, max(size, DEGREE + 1)))
     fast, past = fast_tables(table), blank_past()
     clock, state = np.zeros(3), state.copy()
     period = table.motion.period
@@ -181,7 +181,7 @@ def run(
     try:
         for at, (signals, values) in _stops(table, laps, offset):
             state[signals] = values
-            work[3, :size] = np.maximum(np.abs(state), work[3, :size])  # what rounding is measured by
+            kernel.measure(table.tones, state, work[3], 1.0)
             cell = min(table.cell[mode], total)
             mode = kernel.settle(
                 table.tables, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]

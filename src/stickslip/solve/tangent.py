@@ -23,7 +23,7 @@ def carry_tangents(tables, leap, modes, states, durations, exits, after, tangent
         Mode that follows the last piece.
     tangents : ndarray (K, N)
         Differences of the state, updated.
-    work : ndarray (8, N)
+    work : ndarray (9, N)
         Scratch.
 
     Returns
@@ -35,7 +35,7 @@ def carry_tangents(tables, leap, modes, states, durations, exits, after, tangent
     flow, _, _, series, target, _, reset, _, _ = tables
     n = states.shape[1]
     least = 1.0
-    scratch, end, begin, before, carried, fresh = work[:2], work[2], work[3], work[4], work[5], work[6]
+    scratch, end, begin, before, carried, fresh = work[:3], work[3], work[4], work[5], work[6], work[7]
     for j in range(modes.shape[0]):
         mode, e = modes[j], exits[j]
         for k in range(tangents.shape[0]):
