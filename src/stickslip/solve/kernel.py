@@ -88,8 +88,8 @@ def leap(hop, state, tail, work):
 
 
 @compiled(**OPTIONS)
-def advance(flow, state, time, work):
-    """state = exp(flow time) state by the Taylor series, for a time within one cell; `work` is (2, N)."""
+def advance(flow, state, tail, time, work):
+    """state + tail = exp(A time) (state + tail) by the Taylor series, for a time within one cell; `work` is (2, N)."""
     n = state.shape[0]
     for i in range(n):
         work[0, i] = state[i]
@@ -103,11 +103,16 @@ def advance(flow, state, time, work):
         small = True
         for i in range(n):
             work[0, i] = work[1, i]
-            before = state[i]
-            state[i] = before + work[1, i]
-            small = small and state[i] == before
+            before = state[i] + tail[i]
+            tail[i] += work[1, i]
+            small = small and before + work[1, i] == before
         if small and k > 4:
             break
+    for i in range(n):
+        whole = state[i] + tail[i]
+        seen = whole - state[i]
+        tail[i] = (state[i] - (whole - seen)) + (tail[i] - seen)
+        state[i] = whole
 
 
 @compiled(**OPTIONS)
@@ -256,7 +261,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
             dt, leaving, armed = next_exit(tables, mode, held, scale, opened, armed, span, c, noise)
             opened = False
             if leaving >= 0:
-                advance(flow[mode], held, dt, scratch)
+                advance(flow[mode], held, tail, dt, scratch)
                 gone += dt
                 # the last digits: where the state itself, not the polynomial, has the exit at zero
                 g, d = 0.0, 0.0
@@ -264,11 +269,11 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
                     g += series[leaving, 0, j] * held[j]
                     d += series[leaving, 1, j] * held[j]
                 if d > 0.0 and abs(g) < 1e-9 * d * min(cell, dt):
-                    advance(flow[mode], held, -g / d, scratch)
+                    advance(flow[mode], held, tail, -g / d, scratch)
                     gone -= g / d
                 break
             if span <= cell:
-                advance(flow[mode], held, span, scratch)
+                advance(flow[mode], held, tail, span, scratch)
                 gone = left
                 break
             leap(hop[mode], held, tail, scratch)
@@ -330,7 +335,7 @@ def follow(tables, mode, state, time, work):
     while time - count * cell > cell:
         leap(hop[mode], state, tail, work)
         count += 1
-    advance(flow[mode], state, time - count * cell if count else time, work)
+    advance(flow[mode], state, tail, time - count * cell if count else time, work)
 
 
 @compiled(**OPTIONS)
@@ -351,12 +356,12 @@ def sample(tables, begin, modes, states, times, rows, piece, out, work):
         Set to the piece each time falls in.
     out : ndarray (R, T)
         Set to the values.
-    work : ndarray (5, N)
+    work : ndarray (6, N)
         Scratch.
     """
     flow, cells, hop, _, _, _, _, _, _ = tables
     n, last = states.shape[1], begin.shape[0] - 1
-    scratch, held, tail, state = work[:2], work[2], work[3], work[4]
+    scratch, held, tail, state, rest = work[:2], work[2], work[3], work[4], work[5]
     j, count = 0, 0
     for i in range(n):
         held[i], tail[i] = states[0, i], 0.0
@@ -374,8 +379,8 @@ def sample(tables, begin, modes, states, times, rows, piece, out, work):
             leap(hop[mode], held, tail, scratch)
             count += 1
         for i in range(n):
-            state[i] = held[i]
-        advance(flow[mode], state, time - count * cell if count else time, scratch)
+            state[i], rest[i] = held[i], tail[i]
+        advance(flow[mode], state, rest, time - count * cell if count else time, scratch)
         piece[t] = j
         for r in range(rows.shape[1]):
             total = 0.0

@@ -168,7 +168,7 @@ class Trajectory:
             )
         rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
         out, piece = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
-        work = np.empty((5, self.states.shape[1]))
+        work = np.empty((6, self.states.shape[1]))
         sample(self.table.tables, self.starts, self.modes, self.states, times, rows, piece, out, work)
         return out, piece
 
