@@ -1,7 +1,8 @@
 """The engine beside general solvers and a floor in C, in one run: interleaved rounds, medians, accuracy printed too.
 
-Run with ``python benchmarks/engine.py``. heyoka is compared where it is installed; the floor, one
-contact written out by hand, is compiled here. Then come the long random tests: ``--cases`` of energy, ``--replays`` in
+Run with ``python benchmarks/engine.py``. heyoka and numbalsoda are compared where they are installed (the latter is built
+from source: ``pip install scikit-build cmake ninja``, then ``pip install numbalsoda --no-build-isolation``, with gfortran);
+the floor, one contact written out by hand, is compiled here. Then come the long random tests: ``--cases`` of energy, ``--replays`` in
 40 digits.
 """
 
@@ -179,6 +180,77 @@ def heyoka(system: ss.Oscillator, cycles: int, tolerance: float = 1e-10) -> Run:
 
 
 @functools.cache
+def soda_march() -> Callable[..., int]:
+    """numbalsoda's DOP853 with events, restarted at every event, all of it compiled by numba."""
+    import numba
+    from numbalsoda import lsoda_sig, solve_ivp
+
+    void = numba.types.void
+    doubles = numba.types.CPointer(numba.types.double)
+
+    # p: m, k, c, w, Z, level, K_y (0: rigid), its damping, side, anchor
+    @numba.cfunc(lsoda_sig)
+    def rate(t, u, du, p):
+        force = p[8] * p[5] if p[8] != 0.0 else p[6] * (u[0] - p[9]) + p[7] * u[1]
+        held = p[8] == 0.0 and p[6] == 0.0
+        du[0] = 0.0 if held else u[1]
+        du[1] = 0.0 if held else (p[1] * (p[4] * math.cos(p[3] * t) - u[0]) - p[2] * u[1] - force) / p[0]
+
+    @numba.cfunc(void(numba.types.double, doubles, doubles, doubles))
+    def exits(t, u, g, p):
+        pull = p[1] * (p[4] * math.cos(p[3] * t) - u[0])
+        force = p[6] * (u[0] - p[9]) + p[7] * u[1] if p[6] != 0.0 else pull
+        g[0] = u[1] if p[8] != 0.0 else force - p[5]
+        g[1] = 1.0 if p[8] != 0.0 else force + p[5]
+
+    field, events = rate.address, exits.address
+
+    @numba.njit
+    def march(p, end, longest, tolerance, times, modes):
+        state, t, count = np.zeros(2), 0.0, 0
+        p[8] = 1.0 if p[6] == 0.0 and p[1] * p[4] > p[5] else 0.0
+        while True:
+            step = longest if p[8] == 0.0 and p[6] == 0.0 else longest * (p[10] == 1.0)
+            found = solve_ivp(
+                field, np.array([t, end]), state, np.empty(0), "DOP853", 2, events, p.ctypes.data, 0.0, step,
+                tolerance, tolerance * 1e-4,
+            )  # fmt: skip
+            if not found.event_found:
+                return count
+            t = found.t_event
+            state[0], state[1] = found.y_event[0], found.y_event[1]
+            if p[8] != 0.0:
+                if p[6] != 0.0:
+                    # a hair below the level: its event finder takes a crossing downwards as well
+                    p[9] = state[0] - p[8] * p[5] / p[6] * (1.0 - 1e-12)
+                pull = p[1] * (p[4] * math.cos(p[3] * t) - state[0])
+                p[8] = 0.0 if p[6] != 0.0 or abs(pull) <= p[5] else math.copysign(1.0, pull)
+                state[1] = 0.0
+            else:
+                p[8] = 1.0 if found.ind_event == 0 else -1.0
+            times[count], modes[count] = t, p[8]
+            count += 1
+
+    return march
+
+
+def soda(system: ss.Oscillator, cycles: int, tolerance: float = 1e-10) -> Run:
+    """The same march through numbalsoda; compilation is not counted. Steps are held where :func:`dop853` holds them."""
+    law, drive = system.law, system.drive
+    stiff, loss = getattr(law, "stiffness", 0.0), getattr(law, "damping", 0.0)
+    jumps = not stiff and drive.frequency == 5.61
+    p = np.array([system.mass, system.stiffness, system.damping, 2 * math.pi * drive.frequency, drive.amplitude,
+                  law.kinetic, stiff, loss, 0.0, 0.0, float(jumps)])  # fmt: skip
+    times, modes = np.zeros(24 * cycles), np.zeros(24 * cycles)
+    march, end = soda_march(), cycles / drive.frequency
+    begin = time.process_time()
+    count = march(p, end, 0.05 / drive.frequency, tolerance, times, modes)
+    seconds = time.process_time() - begin
+    names = {0: "microstuck" if stiff else "stuck", 1: "forward", -1: "back"}
+    return Run(list(times[:count]), [names[int(m)] for m in modes[:count]], seconds)
+
+
+@functools.cache
 def library() -> ctypes.CDLL:
     """The floor, compiled for this processor."""
     built = Path(tempfile.mkdtemp()) / "floor.so"
@@ -288,15 +360,15 @@ def speed(rounds: int, cycles_: int) -> None:
     """Forcing cycles a second of each solver on each case."""
     solvers: dict[str, tuple[Callable[..., Run], int]] = {
         "stickslip": (engine, cycles_), "C floor": (floor, cycles_), "scipy DOP853": (dop853, 20),
-        "heyoka": (heyoka, 400),
+        "heyoka": (heyoka, 400), "numbalsoda": (soda, 400),
     }  # fmt: skip
     if shutil.which("cc") is None:
         print("no C compiler (cc): no floor")
         del solvers["C floor"]
-    if importlib.util.find_spec("heyoka") is None:
-        print("heyoka is not installed: not compared")
-        del solvers["heyoka"]
-    print("numbalsoda is not compared: its package is built from source with a Fortran compiler, not asked for here")
+    for peer in ("heyoka", "numbalsoda"):
+        if importlib.util.find_spec(peer) is None:
+            print(f"{peer} is not installed: not compared")
+            del solvers[peer]
     speeds = {case: {solver: [] for solver in solvers} for case in CASES}
     for case, system in CASES.items():
         for run, _ in solvers.values():
@@ -314,7 +386,7 @@ def speed(rounds: int, cycles_: int) -> None:
                 check = distance(engine(system, 2000), floor(system, 2000), 1 / system.drive.frequency)
                 print(f"{'':24}{ratio:8.2f} of the floor; {check}")
                 continue
-            tight = solvers[solver][0](system, 20, 1e-13 if solver == "heyoka" else 1e-12)
+            tight = solvers[solver][0](system, 20, 1e-12 if solver == "scipy DOP853" else 1e-13)
             check = distance(engine(system, 20), tight, 1 / system.drive.frequency)
             print(f"{'':24}{ratio:8,.0f} times {solver}; against it run tight: {check}")
 
