@@ -1,9 +1,9 @@
 """The engine beside general solvers and a floor in C, in one run: interleaved rounds, medians, accuracy printed too.
 
-Run with ``python benchmarks/engine.py``. heyoka and numbalsoda are compared where they are installed (the latter is built
-from source: ``pip install scikit-build cmake ninja``, then ``pip install numbalsoda --no-build-isolation``, with gfortran);
-the floor, one contact written out by hand, is compiled here. Then come the long random tests: ``--cases`` of energy, ``--replays`` in
-40 digits.
+Run with ``python benchmarks/engine.py``. heyoka and numbalsoda are compared where they are installed (numbalsoda is
+built from source, with gfortran: ``pip install scikit-build cmake ninja``, then ``pip install numbalsoda
+--no-build-isolation``); the floor, one contact written out by hand, is compiled here. Then come the long random tests:
+``--cases`` of energy, ``--replays`` in 40 digits.
 """
 
 from __future__ import annotations

@@ -24,10 +24,12 @@ LONG = {
     "curved law": RIGID.having(law=ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=2e5, damping=20.0)),
 }
 SCRIPT = """
-import json, sys
+import json, signal, sys
 sys.path.insert(0, sys.argv[1])
 import stickslip as ss
 from test_interrupt import LONG
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are born deaf to it
 
 def tell(share):
     print(share, flush=True)
