@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from stickslip.laws.base import Exit, Mode, Rigid, finite, static_level
 from stickslip.laws.coulomb import held_until
+from stickslip.laws.curved import Expression
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,19 @@ class LinearSlope(Rigid):
         finite("slope", self.slope, unit="N s/m", signed=True)
         static_level(self.static, self.kinetic)
 
+    @property
+    def breakaway(self) -> float:
+        """Largest friction force while stuck [N]."""
+        return static_level(self.static, self.kinetic)
+
+    def branches(self) -> tuple[tuple[float, Callable[[Expression], Expression]], ...]:
+        """One straight line from rest on."""
+        return ((0.0, lambda speed: self.kinetic + self.slope * speed),)
+
     def modes(self) -> tuple[Mode, ...]:
         """Slip on either side, and stick."""
-        level = static_level(self.static, self.kinetic)
         return (
             Mode("back", "slip", -1, {"1": -self.kinetic, "v": self.slope}, (Exit({"v": 1.0}, "stuck"),)),
-            Mode("stuck", "stick", 0, None, held_until(level)),
+            Mode("stuck", "stick", 0, None, held_until(self.breakaway)),
             Mode("forward", "slip", 1, {"1": self.kinetic, "v": self.slope}, (Exit({"v": -1.0}, "stuck"),)),
         )

@@ -92,9 +92,18 @@ class Stribeck(Rigid):
         """
         return self._curve(symbol("v")).at(v=speed)
 
+    @property
+    def breakaway(self) -> float:
+        """Largest friction force while stuck [N]."""
+        return self.static
+
+    def branches(self) -> tuple[tuple[float, Curve], ...]:
+        """One smooth curve from rest on."""
+        return ((0.0, self._curve),)
+
     def rates(self) -> tuple[CurvedMode, ...]:
         """Slip on either side, and stick."""
-        return slips_and_stick(self._curve, self.static)
+        return slips_and_stick(self._curve, self.breakaway)
 
 
 @dataclass(frozen=True)
@@ -149,6 +158,15 @@ class FrictionCurve(Rigid):
             raise ModelError(f"speed = {speed} m/s", "a speed is finite", "correct it")
         return self.curve(symbol("v")).at(v=speed)
 
+    @property
+    def breakaway(self) -> float:
+        """Largest friction force while stuck [N]."""
+        return self.friction(0.0) if self.static is None else self.static
+
+    def branches(self) -> tuple[tuple[float, Curve], ...]:
+        """One smooth curve from rest on."""
+        return ((0.0, self.curve),)
+
     def rates(self) -> tuple[CurvedMode, ...]:
         """Slip on either side, and stick."""
-        return slips_and_stick(self.curve, self.friction(0.0) if self.static is None else self.static)
+        return slips_and_stick(self.curve, self.breakaway)

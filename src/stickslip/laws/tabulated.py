@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode, Rigid, finite, static_level
 from stickslip.laws.coulomb import held_until
+from stickslip.laws.curved import Expression
 
 
 @dataclass(frozen=True)
@@ -89,18 +90,36 @@ class Tabulated(Rigid):
         """Modes in which motion starts, by the sign of the velocity."""
         return "back 0", "stuck", "forward 0"
 
+    @property
+    def breakaway(self) -> float:
+        """Largest friction force while stuck [N]."""
+        return static_level(self.static, self.forces[0])
+
+    def branches(self) -> tuple[tuple[float, Callable[[Expression], Expression]], ...]:
+        """A straight line between two points, the last one level."""
+
+        def line(speed: float, force: float, slope: float) -> Callable[[Expression], Expression]:
+            return lambda at: force + slope * (at - speed)
+
+        ends = zip(self.speeds, self.forces, (*self._slopes(), 0.0), strict=True)
+        return tuple((speed, line(speed, force, slope)) for speed, force, slope in ends)
+
+    def _slopes(self) -> tuple[float, ...]:
+        """Slope of each straight piece [N s/m]."""
+        points = zip(self.speeds, self.forces, strict=True)
+        return tuple((g - f) / (w - v) for (v, f), (w, g) in pairwise(points))
+
     def modes(self) -> tuple[Mode, ...]:
         """A mode for each straight piece on either side, and stick."""
-        stuck = Mode("stuck", "stick", 0, None, held_until(static_level(self.static, self.forces[0]), back="back 0",
+        stuck = Mode("stuck", "stick", 0, None, held_until(self.breakaway, back="back 0",
                                                            forward="forward 0"))  # fmt: skip
         return (*self._side(-1, "back"), stuck, *self._side(1, "forward"))
 
     def _side(self, side: int, name: str) -> list[Mode]:
         found = []
-        last = len(self.speeds) - 1
+        last, slopes = len(self.speeds) - 1, (*self._slopes(), 0.0)
         for j in range(last + 1):
-            low, high = self.speeds[j], self.speeds[min(j + 1, last)]
-            slope = (self.forces[j + 1] - self.forces[j]) / (high - low) if j < last else 0.0
+            low, high, slope = self.speeds[j], self.speeds[min(j + 1, last)], slopes[j]
             friction = {"1": side * (self.forces[j] - slope * low), "v": slope}
             slower = Exit({"v": -side, "1": low}, f"{name} {j - 1}") if j else Exit({"v": float(-side)}, "stuck")
             faster = (Exit({"v": float(side), "1": -high}, f"{name} {j + 1}"),) if j < last else ()

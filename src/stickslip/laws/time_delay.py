@@ -1,0 +1,113 @@
+"""Frictional memory as a time lag: friction answers a change of the sliding speed some time later."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from stickslip.errors import ModelError
+from stickslip.laws.base import Exit, Rigid, finite
+from stickslip.laws.coulomb import held_until
+from stickslip.laws.curved import CurvedMode, symbol
+from stickslip.laws.stribeck import Curve
+
+DELAYED = "delayed_speed"
+
+
+@runtime_checkable
+class SpeedCurve(Protocol):
+    """A law whose friction in slip is a function of the sliding speed alone."""
+
+    @property
+    def breakaway(self) -> float:
+        """Largest friction force while stuck [N]."""
+
+    def branches(self) -> tuple[tuple[float, Curve], ...]:
+        """The curve's smooth branches: the speed [m/s] from which each one holds, and its formula."""
+
+
+@dataclass(frozen=True)
+class DelayedMode(CurvedMode):
+    """A regime of a delayed law: to go from one branch of the curve to the next is no event."""
+
+    def changes(self, before: CurvedMode, leaving: int) -> Iterator[tuple[int, CurvedMode, CurvedMode]]:
+        """Contact, its mode before and its mode now."""
+        if (before.kind, before.side) != (self.kind, self.side):
+            yield 0, before, self
+
+
+@dataclass(frozen=True)
+class TimeDelay(Rigid):
+    r"""Rigid contact with friction of the speed a while ago: :math:`f(t) = F(|v(t-\tau)|)\,\mathrm{sgn}\,v(t)` in slip.
+
+    The time-lag model of Hess and Soom (Journal of Tribology 112, 1990), one of the two frictional memories of the
+    thesis (1.4). The friction-velocity curve F gives the level by the delayed speed; direction and sticking are those
+    of the present: a mass that has stopped is held while :math:`|f| \le f_s`, and friction always opposes the slip.
+    All velocities are those relative to the counter-face. Before time 0 the mass is taken to have slid as at time 0.
+
+    Attributes
+    ----------
+    curve : Stribeck, FrictionCurve, LinearSlope or Tabulated
+        F, with its own break-away force f_s.
+    lag : float
+        tau [s], the time between a change of speed and the answer of the friction.
+
+    Raises
+    ------
+    ModelError
+        The lag is not finite and positive, or friction of `curve` does not follow the speed alone.
+
+    Examples
+    --------
+    >>> from stickslip.laws.linear_slope import LinearSlope
+    >>> law = TimeDelay(LinearSlope(1.0, slope=2.0), lag=1e-3)
+    >>> law.rates()[2].friction.at(delayed_speed=0.1)
+    1.2
+    """
+
+    curve: SpeedCurve
+    lag: float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.curve, SpeedCurve):
+            raise ModelError(
+                f"curve = {type(self.curve).__name__}",
+                "a time lag is that of a law whose friction follows the speed alone",
+                "give a Stribeck, FrictionCurve, LinearSlope or Tabulated",
+            )
+        if finite("lag", self.lag, unit="s") == 0:
+            raise ModelError("lag = 0 s", "a lag is positive", "take the curve itself as the law")
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        """Modes in which motion starts, by the sign of the velocity; the solver knows the branch."""
+        back, stuck, forward = self.rates()[:3]
+        return back.name, stuck.name, forward.name
+
+    def rates(self) -> tuple[CurvedMode, ...]:
+        """Slip back, stick and slip forward, on each branch of the curve over the delayed speed in turn."""
+        branches = self.curve.branches()
+        highs = [low for low, _ in branches[1:]] + [math.inf]
+        return tuple(
+            mode
+            for j, ((low, curve), high) in enumerate(zip(branches, highs, strict=True))
+            for mode in self._branch(j, low, high, curve, single=len(branches) == 1)
+        )
+
+    def _branch(self, number: int, low: float, high: float, curve: Curve, *, single: bool) -> Iterator[CurvedMode]:
+        def named(name: str, j: int = number) -> str:
+            return name if single else f"{name} {j}"
+
+        friction = curve(symbol(DELAYED))
+        held = held_until(self.curve.breakaway, back=named("back"), forward=named("forward"))
+        stopped = {side: (Exit({"v": -float(side)}, named("stuck")),) for side in (-1, 1)}
+        for name, kind, side, force, exits in (
+            ("back", "slip", -1, -friction, stopped[-1]),
+            ("stuck", "stick", 0, None, held),
+            ("forward", "slip", 1, friction, stopped[1]),
+        ):
+            slower = (Exit({DELAYED: -1.0, "1": low}, named(name, number - 1)),) * (number > 0)
+            faster = (Exit({DELAYED: 1.0, "1": -high}, named(name, number + 1)),) * (high < math.inf)
+            yield DelayedMode(named(name), kind, side, force, (*exits, *slower, *faster))
