@@ -93,6 +93,7 @@ if TYPE_CHECKING:
     from stickslip.laws.series import InSeries as InSeries
     from stickslip.laws.state_variable import StateVariable as StateVariable
     from stickslip.laws.tabulated import Tabulated as Tabulated
+    from stickslip.laws.time_delay import TimeDelay as TimeDelay
     from stickslip.oscillator import Oscillator as Oscillator
     from stickslip.plot.animation import animate as animate
     from stickslip.rig import (
@@ -145,7 +146,7 @@ _ROOMS = {
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",
     "Tabulated": "laws.tabulated", "StateVariable": "laws.state_variable", "InertialContact": "laws.inertial",
     "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load", "RoughSurface": "laws.rough",
-    "InSeries": "laws.series",
+    "InSeries": "laws.series", "TimeDelay": "laws.time_delay",
     "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
     "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",

@@ -49,7 +49,7 @@ class TimeDelay(Rigid):
 
     Attributes
     ----------
-    curve : Stribeck, FrictionCurve, LinearSlope or Tabulated
+    law : Stribeck, FrictionCurve, LinearSlope or Tabulated
         F, with its own break-away force f_s.
     lag : float
         tau [s], the time between a change of speed and the answer of the friction.
@@ -57,7 +57,7 @@ class TimeDelay(Rigid):
     Raises
     ------
     ModelError
-        The lag is not finite and positive, or friction of `curve` does not follow the speed alone.
+        The lag is not finite and positive, or friction of `law` does not follow the speed alone.
 
     Examples
     --------
@@ -67,18 +67,18 @@ class TimeDelay(Rigid):
     1.2
     """
 
-    curve: SpeedCurve
+    law: SpeedCurve
     lag: float
 
     def __post_init__(self) -> None:
-        if not isinstance(self.curve, SpeedCurve):
+        if not isinstance(self.law, SpeedCurve):
             raise ModelError(
-                f"curve = {type(self.curve).__name__}",
+                f"law = {type(self.law).__name__}",
                 "a time lag is that of a law whose friction follows the speed alone",
                 "give a Stribeck, FrictionCurve, LinearSlope or Tabulated",
             )
         if finite("lag", self.lag, unit="s") == 0:
-            raise ModelError("lag = 0 s", "a lag is positive", "take the curve itself as the law")
+            raise ModelError("lag = 0 s", "a lag is positive", "take the law itself, without TimeDelay")
 
     @property
     def entry(self) -> tuple[str, str, str]:
@@ -88,7 +88,7 @@ class TimeDelay(Rigid):
 
     def rates(self) -> tuple[CurvedMode, ...]:
         """Slip back, stick and slip forward, on each branch of the curve over the delayed speed in turn."""
-        branches = self.curve.branches()
+        branches = self.law.branches()
         highs = [low for low, _ in branches[1:]] + [math.inf]
         return tuple(
             mode
@@ -101,7 +101,7 @@ class TimeDelay(Rigid):
             return name if single else f"{name} {j}"
 
         friction = curve(symbol(DELAYED))
-        held = held_until(self.curve.breakaway, back=named("back"), forward=named("forward"))
+        held = held_until(self.law.breakaway, back=named("back"), forward=named("forward"))
         stopped = {side: (Exit({"v": -float(side)}, named("stuck")),) for side in (-1, 1)}
         for name, kind, side, force, exits in (
             ("back", "slip", -1, -friction, stopped[-1]),

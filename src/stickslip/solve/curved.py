@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Form = tuple[dict[int, float], float]  # weights of nodes, and a constant
 
 Scaled = tuple[int, float]  # a node and a factor
+March = Callable[..., tuple[int, int, int]]  # of clock, state, mode, until, and what follows in `taylor.march`
 Stops = Iterable[tuple[tuple[float, float], tuple[Any, Any]]]
 
 DTYPES = (np.int64, np.float64)
@@ -388,6 +389,11 @@ class CurvedTrajectory(Trajectory):
     step_states: Array
     order: int
 
+    @property
+    def cells(self) -> tuple[Array, Array]:
+        """Start and length [s] of the steps."""
+        return self.step_starts, self.step_lengths
+
     def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, NDArray[np.int64]]:
         """Values at increasing instants; parameters and returns as of :meth:`Trajectory.sample`."""
         times = np.ascontiguousarray(times, dtype=np.float64)
@@ -415,25 +421,39 @@ class CurvedTrajectory(Trajectory):
         return (name,)
 
 
+def degree(rtol: float) -> int:
+    """Degree of the polynomials for a tolerance."""
+    if not 1e-15 <= rtol <= 1e-2:
+        raise ModelError(f"rtol = {rtol}", "the tolerance lies between 1e-15 and 1e-2", "give rtol=1e-12, or 1e-8")
+    return int(np.clip(round(3 - 0.55 * math.log(rtol)), 8, 24))
+
+
+def _march(table: Tape) -> March:
+    def march(clock: Array, state: Array, mode: int, at: tuple[float, float], *rest: Any) -> tuple[int, int, int]:
+        return taylor.march(  # type: ignore[no-any-return]
+            table.nodes, table.exits, table.guards, table.tones, clock, state, mode, at, table.motion.period, *rest
+        )  # fmt: skip
+
+    return march
+
+
 def run_curved(
     table: Tape,
     state: Array,
     mode: int,
     *,
-    span: tuple[float, float],
-    stops: Stops,
+    course: tuple[tuple[float, float], Stops],
     budget: int,
     rtol: float,
     tell: Callable[[float], None],
+    march: March | None = None,
 ) -> CurvedTrajectory:
-    """March from a state at time 0 to the end of the time (laps, offset), in chunks."""
-    if not 1e-15 <= rtol <= 1e-2:
-        raise ModelError(f"rtol = {rtol}", "the tolerance lies between 1e-15 and 1e-2", "give rtol=1e-12, or 1e-8")
-    order = int(np.clip(round(3 - 0.55 * math.log(rtol)), 8, 24))
+    """March from a state at time 0 to the end of the course's time (laps, offset), in chunks."""
+    (laps, offset), stops = course
+    order, march = degree(rtol), march or _march(table)
     system, size, period = table.system, len(table.names), table.motion.period
     count = int(np.max(np.diff(table.nodes[8])))
     work = (np.zeros(count * (order + 1)), np.zeros(order + 1), np.zeros(order + 1))
-    laps, offset = span
     total = offset + (laps * period if math.isfinite(period) else 0.0)
     scale = min(period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total, total)
     clock, state, big = np.array([0.0, 0.0, 1e-6 * scale]), state.copy(), np.abs(state)
@@ -442,14 +462,12 @@ def run_curved(
     try:
         for at, (signals, values) in stops:
             state[signals] = values
+            clock[2] = min(clock[2], scale)  # at rest steps would grow for ever
             outcome = taylor.FULL
             while outcome == taylor.FULL:
-                room = _room(CHUNK, size)
+                room = room_for(CHUNK, size)
                 before = clock.copy()
-                outcome, written, mode = taylor.march(
-                    table.nodes, table.exits, table.guards, table.tones, clock, state, mode, at, period,
-                    0.1 * rtol, order, big, room, work,
-                )  # fmt: skip
+                outcome, written, mode = march(clock, state, mode, at, 0.1 * rtol, order, big, room, work)
                 if written:
                     kept.append(tuple(column[:written] for column in room))
                 passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
@@ -475,7 +493,7 @@ def run_curved(
     return _assembled(table, kept, total, status, order)
 
 
-def _room(count: int, size: int) -> tuple[NDArray[Any], ...]:
+def room_for(count: int, size: int) -> tuple[NDArray[Any], ...]:
     return (np.empty(count), np.empty(count), np.empty(count), np.empty(count, np.int64), np.empty((count, size)),
             np.empty(count, np.int16))  # fmt: skip
 

@@ -43,7 +43,7 @@ def energy(run: Trajectory) -> Energy:
     """Where does the energy go?
 
     :math:`m v^2/2` changes by the work of the drive less the work against friction. The works are integrated by
-    Gauss's rule on the cells of the closed form.
+    Gauss's rule on the cells of the closed form, or on the Taylor steps of a curved law.
 
     Parameters
     ----------
@@ -61,13 +61,9 @@ def energy(run: Trajectory) -> Energy:
     >>> round(energy(decay).friction, 12)  # 1 N along 2 m and 1 m
     3.0
     """
-    table, mass = run.table, np.atleast_2d(run.system.mass)
+    mass = np.atleast_2d(run.system.mass)
     tangents = run.system.tangents if isinstance(run.system, Structure) else np.ones((1, 1))
-    cells = np.minimum(table.cell[run.modes], run.durations)
-    counts = np.maximum(1, np.ceil(run.durations / cells - 1e-9)).astype(np.int64)
-    widths = np.repeat(run.durations / counts, counts)
-    index = np.arange(len(widths)) - np.repeat(np.cumsum(counts) - counts, counts)
-    begins = np.repeat(run.starts, counts) + index * widths
+    begins, widths = run.cells
     nodes, weights = np.polynomial.legendre.leggauss(ORDER)
     times = begins[:, None] + widths[:, None] * (nodes + 1) / 2
     values, _ = run.sample(np.minimum(times.ravel(), run.duration), ("v", "a", "friction"))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
 from stickslip.solve.automaton import DEGREE, Array, Automaton, System, automaton
@@ -80,18 +81,30 @@ def simulate(
     ('at rest', 0.25)
     """
     if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
-        from stickslip.solve.curved import run_curved, tape
-
-        curved: Any = tape(system)
-        span = _end(system, curved, duration, cycles)
-        state, mode = opening(curved, start or {})
-        return run_curved(
-            curved, state, mode, span=span, stops=_stops(curved, *span), budget=budget, rtol=rtol, tell=paced(progress)
-        )
+        return _simulate_curved(system, (duration, cycles), start or {}, budget, rtol, progress)
     table = automaton(system)
     span = _end(system, table, duration, cycles)
     state, mode = opening(table, start or {})
     return run(system, table, state, mode, span=span, budget=budget, tell=paced(progress))
+
+
+def _simulate_curved(
+    system: Oscillator,
+    time_: tuple[float | None, float | None],
+    start: Mapping[str, float | str],
+    budget: int,
+    rtol: float,
+    progress: Callable[[float], object] | None,
+) -> Trajectory:
+    from stickslip.solve.curved import degree, run_curved, tape
+    from stickslip.solve.delayed import delayed_tape, run_delayed
+
+    lags = isinstance(system.law, TimeDelay)
+    table: Any = delayed_tape(system, degree(rtol)) if lags else tape(system)
+    span = _end(system, table, *time_)
+    state, mode = opening(table, start)
+    follow, course = run_delayed if lags else run_curved, (span, _stops(table, *span))
+    return follow(table, state, mode, course=course, budget=budget, rtol=rtol, tell=paced(progress))
 
 
 def paced(progress: Callable[[float], object] | None) -> Callable[[float], None]:

@@ -172,6 +172,15 @@ class Trajectory:
         sample(self.table.tables, self.starts, self.modes, self.states, times, rows, piece, out, work)
         return out, piece
 
+    @property
+    def cells(self) -> tuple[Array, Array]:
+        """Start and length [s] of the stretches in turn on which the motion is one short polynomial."""
+        cells = np.minimum(self.table.cell[self.modes], self.durations)
+        counts = np.maximum(1, np.ceil(self.durations / cells - 1e-9)).astype(np.int64)
+        widths = np.repeat(self.durations / counts, counts)
+        index = np.arange(len(widths)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return np.repeat(self.starts, counts) + index * widths, widths
+
     def section(self, *, phase: float = 0.0) -> Array:
         """The Poincare section: the physical state once in each period of the drive.
 
