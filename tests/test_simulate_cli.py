@@ -31,6 +31,26 @@ frequency = 2.5
 cycles = 30
 fs = 1000
 """
+SQUEAL = """
+about = "a mass pressed on a belt, sprung along it and across it"
+[system]
+mass = [["1 kg", 0], [0, 1]]
+stiffness = [[23.25, 3.9], [3.9, 7.75]]
+[[contacts]]
+tangent = [1, 0]
+normal = [0, 1]
+stiffness = 11.0
+preload = 5.0
+law = { name = "Coulomb", kinetic = 0.6 }
+[drive]
+name = "Belt"
+speed = 0.8
+[start]
+x1 = 0.3
+v1 = 0
+[run]
+duration = 25
+"""
 FIGURES = {"whole-run", "motion", "friction-displacement", "friction-velocity", "phase-portrait"}
 
 
@@ -75,7 +95,8 @@ def test_a_file_gives_a_folder_that_holds_the_motion() -> None:
     motion = ss.simulate(ss.read_system("slider.toml").system, cycles=30)
     assert record.equals(motion.record(fs=1000))
     events = np.genfromtxt(folder / "events.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
-    assert [tuple(event) for event in events] == [tuple(event) for event in motion.events], "to the last bit"
+    known = [(*event[:4], event.contact + 1) for event in motion.events]
+    assert [tuple(event) for event in events] == known, "to the last bit; contacts are counted from 1"
     assert run("slider.toml").exit_code == 0, "its own results are replaced"
 
 
@@ -112,6 +133,27 @@ def test_work_and_shares_are_those_of_the_exact_motion() -> None:
     assert found["energy unaccounted for, relative"] < 1e-12
     decay = quantities(told("FD-4"))
     assert decay["work against friction"] == pytest.approx(3.0, rel=1e-12), "1 N along 2 m and 1 m"
+
+
+def test_several_masses_are_told_shown_and_written() -> None:
+    Path("squeal.toml").write_text(SQUEAL)
+    result = run("squeal.toml")
+    assert result.exit_code == 0, result.output
+    for words in ("x1 between", "and x2 between", "13 × flight", "share of time in flight", "normal load, to"):
+        assert words in result.stdout.replace("\n", " ")
+    shown = {path.stem for path in Path("squeal-stickslip/figures").iterdir()}
+    assert shown == FIGURES - {"phase-portrait"} | {"friction-load", "phase-portrait-x1", "phase-portrait-x2"}
+    found = told("squeal.toml")
+    assert found["contacts"][0]["law"] == {"name": "Coulomb", "kinetic": 0.6, "static": None}
+    assert (found["system"]["mass"], found["drive"]["speed"]) == ([[1.0, 0.0], [0.0, 1.0]], 0.8)
+    numbers = quantities(found)
+    assert numbers["normal load, from"] == 0
+    motion = ss.simulate(ss.read_system("squeal.toml").system, duration=25, start={"x1": 0.3, "v1": 0.0})
+    flown = sum(piece.duration for piece in motion.pieces if piece.mode == "lifted") / 25
+    assert numbers["share of time in flight"] == pytest.approx(flown, rel=1e-12)
+    assert numbers["energy unaccounted for, relative"] < 1e-12
+    other = told("squeal.toml", "--set", "contacts.1.law.kinetic=0.1", "--set", "preload=6 N")
+    assert (other["contacts"][0]["law"]["kinetic"], other["contacts"][0]["preload"]) == (0.1, 6.0)
 
 
 def test_options_change_the_run() -> None:

@@ -156,6 +156,117 @@ def test_a_scenario_is_a_case_with_its_known_answers() -> None:
         scenario_case("FD")
 
 
+TWO = """[system]
+mass = [[1.3, 0], [0, "700 g"]]
+damping = [[0.05, 0], [0, 0.05]]
+stiffness = [[3.0, -1.3], [-1.3, 2.9]]
+acts_on = [1, 0]
+[[contacts]]
+tangent = [1, 0]
+[contacts.law]
+name = "CompliantContact"
+kinetic = "0.5 N"
+stiffness = 50
+[[contacts]]
+tangent = [-1, 1]
+normal = [0, 1]
+stiffness = "2 N/m"
+preload = 5
+law = { name = "Coulomb", kinetic = 0.2, static = 0.3 }
+[drive]
+name = "HarmonicForce"
+amplitude = 1.2
+frequency = 0.13
+[start]
+x2 = 0.1
+anchor1 = 0.0
+"""
+
+
+def test_a_structure_is_read_as_python_makes_it(tmp_path: Path) -> None:
+    case = read_system(written(tmp_path, TWO))
+    pads = [
+        ss.Contact(ss.CompliantContact(0.5, stiffness=50.0), [1, 0]),
+        ss.Contact(ss.Coulomb(0.2, static=0.3), [-1, 1], normal=[0, 1], stiffness=2.0, preload=5.0),
+    ]
+    system = ss.Structure(
+        np.diag([1.3, 700 * 1e-3]), np.diag([0.05, 0.05]), [[3.0, -1.3], [-1.3, 2.9]], contacts=pads, acts_on=[1, 0],
+        drive=ss.HarmonicForce(1.2, frequency=0.13),
+    )  # fmt: skip
+    assert isinstance(case.system, ss.Structure)
+    assert (case.start, case.run) == ({"x2": 0.1, "anchor1": 0.0}, {"cycles": 20.0})
+    run = ss.simulate(case.system, start=case.start, **case.run)
+    known = ss.simulate(system, start={"x2": 0.1, "anchor1": 0.0}, cycles=20)
+    assert len(known.events) > 50
+    assert run.events == known.events
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('"700 g"', '"700 N"', ["line 2", "system.mass", "measured in kg"]),
+        ('"700 g"', "-1", ["line 2", "positive definite"]),
+        ('[0, "700 g"]', "[0]", ["line 2", "rows of equal length"]),
+        ("[[3.0, -1.3], [-1.3, 2.9]]", "3", ["line 4", "system.stiffness", "it should be a list"]),
+        ("tangent = [-1, 1]", "tangent = [-1, 1, 0]", ["tangent of 3 numbers"]),
+        ("tangent = [-1, 1]", "tangents = [-1, 1]", ["line 13", "contacts.2.tangents", "perhaps tangent is meant"]),
+        ("stiffness = 50", "stiffness = 50\nstatik = 3", ["line 12", "contacts.1.law.statik", "perhaps static"]),
+        ("kinetic = 0.2", "kinetic = -0.2", ["line 17", "kinetic = -0.2 N"]),
+        ("preload = 5", "preload = nan", ["line 16", "contacts.2.preload", "not a finite number"]),
+        ('"Coulomb"', '"Stribeck", speed = 1', ["line 12", "Stribeck in a structure"]),
+        ("[drive]", "[law]\nname = 'Coulomb'\n[drive]", ["line 18", "each contact of a structure has its own"]),
+        ("x2 = 0.1", "x3 = 0.1", ["line 23", "known are x1, x2, v1, v2, anchor1, mode"]),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_structure_is_told_alike(tmp_path: Path, old: str, new: str, told: list[str]) -> None:
+    assert old in TWO
+    with pytest.raises(ModelError) as caught:
+        read_system(written(tmp_path, TWO.replace(old, new, 1)))
+    assert "\n" not in str(caught.value)
+    assert all(part in str(caught.value) for part in told), str(caught.value)
+
+
+def test_one_contact_of_several_is_changed_by_its_place(tmp_path: Path) -> None:
+    case = read_system(written(tmp_path, TWO))
+    other = case.having(**{"contacts.2.law.kinetic": "0.1 N", "damper": "base"}).system
+    assert isinstance(other, ss.Structure)
+    assert [contact.law.kinetic for contact in other.contacts] == [0.5, 0.1]  # type: ignore[attr-defined]
+    assert [c.law.kinetic for c in case.having(kinetic=0.3).system.contacts] == [0.3, 0.3]  # type: ignore[attr-defined, union-attr]
+    for change in ({"stiffness": 3}, {"contacts.3.preload": 2}, {"kinetic": "1 m"}, {"acts_on": 2}, {"contacts": 1}):
+        with pytest.raises(ModelError, match=r"stiffness|contacts|kinetic|acts_on"):
+            case.having(**change)
+
+
+LAW = '[law]\nname = "CompliantContact"\nkinetic = 1.1\nstiffness = 192000\ndamping = 23.9\n'
+
+
+def test_a_law_behind_a_compliant_contact_is_a_table_within(tmp_path: Path) -> None:
+    inner = 'name = "LinearSlope"\nkinetic = 1.1\nslope = -5\n'
+    outer = '[law]\nname = "InSeries"\nstiffness = 192000\ndamping = 24\n[law.law]\n'
+    text = WHOLE.replace(LAW, outer + inner)
+    law = ss.InSeries(ss.LinearSlope(1.1, slope=-5.0), stiffness=192000.0, damping=24.0)
+    case = read_system(written(tmp_path, text))
+    assert case.system.law == law  # type: ignore[union-attr]
+    changed = case.having(**{"law.stiffness": "1 N/um", "slope": -4}).system
+    assert changed.law == ss.InSeries(ss.LinearSlope(1.1, slope=-4.0), stiffness=1e6, damping=24.0)  # type: ignore[union-attr]
+    for old, new, told in (("slope = -5", "slop = -5", "law.law.slop"), ("slope = -5", "slope = -50", "raise damping"),
+                           ('name = "LinearSlope"', 'name = "Linear"', "line 11,")):  # fmt: skip
+        with pytest.raises(ModelError, match=told):
+            read_system(written(tmp_path, text.replace(old, new)))
+
+
+def test_a_curve_is_a_formula_of_the_speed(tmp_path: Path) -> None:
+    text = WHOLE.replace(LAW, '[law]\nname = "FrictionCurve"\ncurve = "3 / (1 + 1.42 * v) + 1 + 0.1 * v**2"\n')
+    law = read_system(written(tmp_path, text)).system.law  # type: ignore[union-attr]
+    assert isinstance(law, ss.FrictionCurve)
+    assert law.friction(0.7) == pytest.approx(3 / (1 + 1.42 * 0.7) + 1 + 0.1 * 0.49, rel=1e-15)
+    for curve, told in (("1 / v", "no value at rest"), ("v^2", r"has 'v \^ 2'"), ("w", "has 'w'"), ("1 +", "read"),
+                        ("__import__('os')", "has"), ("v ** v", "has"), ("9**9**9**9", "rest"),
+                        ("1" * 400, "400")):  # fmt: skip
+        with pytest.raises(ModelError, match=f"(?s)line 8.*{told}"):
+            read_system(written(tmp_path, text.replace("3 / (1 + 1.42 * v) + 1 + 0.1 * v**2", curve)))
+
+
 def one_sentence(make: Callable[[], Case]) -> str | None:
     """None for a case, the sentence for a refusal; anything else fails the test."""
     try:

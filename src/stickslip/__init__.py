@@ -103,7 +103,12 @@ if TYPE_CHECKING:
         Rig as Rig,
         Sensor as Sensor,
     )
-    from stickslip.reports.simulation import Outcome as Outcome, outcome as outcome, publish_run as publish_run
+    from stickslip.reports.simulation import (
+        Outcome as Outcome,
+        outcome as outcome,
+        publish_run as publish_run,
+        require_output as require_output,
+    )
     from stickslip import scenarios as scenarios
     from stickslip.solve.continuation import Branch as Branch, continue_orbit as continue_orbit
     from stickslip.solve.energy import energy as energy
@@ -160,6 +165,7 @@ _ROOMS = {
     "Rig": "rig", "Sensor": "rig", "Mount": "rig", "Noise": "rig", "Digitiser": "rig",
     "scenarios": "scenarios", "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
     "outcome": "reports.simulation", "Outcome": "reports.simulation", "publish_run": "reports.simulation",
+    "require_output": "reports.simulation",
     "animate": "plot.animation",
     "figures": "plot.figures", "report": "reports.page", "publish": "reports.folder",
     "summary": "reports.summary", "datasets": "datasets",

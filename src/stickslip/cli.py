@@ -7,6 +7,7 @@ import dataclasses
 import fnmatch
 import glob
 import hashlib
+import itertools
 import json
 import re
 import sys
@@ -256,9 +257,11 @@ def simulate(case: str | None, output: Path | None, as_json: bool, **options: An
         return
     wanted = _case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
     folder = output or (None if as_json else Path(f"{_fit_for_a_file(wanted.name)}-stickslip"))
+    if folder:
+        ss.require_output(wanted, folder=folder, **options)
     with _progress(4 if options["animation"] else 3) as tell:
         tell("simulating", 0)
-        result = ss.outcome(wanted)
+        result = ss.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", share))
         written = ss.publish_run(result, folder=folder, tell=tell, **options) if folder else None
     _show_run(result, written, as_json=as_json)
     if result.run.status == "interrupted":
@@ -519,14 +522,18 @@ def _show_run(result: Outcome, written: Path | None, *, as_json: bool) -> None:
         answers = [(name, str(pair["known"]), str(pair["found"])) for name, pair in result.known.items()]
         console.print("\nKnown of this scenario, and what the engine finds:")
         console.print(_table(("answer", "known", "found"), answers))
-    events = result.run.events
+    count, events = result.run.event_counts().total(), list(itertools.islice(result.run.each_event(), SHOWN_EVENTS))
     if events:
-        rows = [(f"{event.time:.9g}", event.kind, event.mode) for event in events[:SHOWN_EVENTS]]
+        several = any(event.contact for event in events)
+        rows = [
+            (f"{event.time:.9g}", event.kind, *([str(event.contact + 1)] if several else []), event.mode)
+            for event in events
+        ]
+        headings = ("time [s]", "event", *(["contact"] if several else []), "mode that begins")
         console.print("")
-        console.print(_table(("time [s]", "event", "mode that begins"), rows))
-        rest = len(events) - len(rows)
-        if rest:
-            click.echo(f"... and {rest} more{', in events.csv' if written is not None else ''}")
+        console.print(_table(headings, rows))
+        if count > len(rows):
+            click.echo(f"... and {count - len(rows)} more{', in events.csv' if written is not None else ''}")
     if written is not None:
         click.echo(f"Results: {written}")
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from stickslip.drives import Drive, Release
 from stickslip.errors import ModelError
-from stickslip.laws.base import Law, changed, finite, parameters
+from stickslip.laws.base import Law, finite
 from stickslip.laws.curved import CurvedLaw
+from stickslip.parameters import changed
 
 
 @dataclass(frozen=True)
@@ -68,23 +69,14 @@ class Oscillator:
     def having(self, **changes: Any) -> Oscillator:
         """The same oscillator with other values; a name is looked for in the oscillator, its law, then its drive.
 
-        Of a law around another law (:class:`InSeries`), the inner one's parameters come last.
-
         Parameters
         ----------
         **changes
-            New values by name (``mass=3.0, kinetic=1.28, frequency=5.61``).
+            New values by name (``mass=3.0, kinetic=1.28, frequency=5.61``), or by name and place
+            (``**{"law.stiffness": 1e5}``).
 
         Returns
         -------
         Oscillator
         """
-        own = {f.name: changes.pop(f.name) for f in fields(self) if f.name in changes}
-        law, drive = own.pop("law", self.law), own.pop("drive", self.drive)
-        of_law, of_drive = parameters(law), parameters(drive)
-        for name in changes:
-            if name not in of_law | of_drive:
-                known = [*(f.name for f in fields(self)), *of_law, *of_drive]
-                raise ModelError(f"no parameter is called '{name}'", f"it is one of {', '.join(known)}", "correct it")
-        moved = {name: changes.pop(name) for name in of_drive.keys() & changes.keys() if name not in of_law}
-        return replace(self, **own, law=changed(law, changes), drive=changed(drive, moved))
+        return changed(self, changes)

@@ -18,25 +18,29 @@ from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.dahl import Dahl
 from stickslip.laws.elastoslip import ElastoSlip
+from stickslip.laws.formula import Formula
 from stickslip.laws.inertial import InertialContact
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.lugre import LuGre
 from stickslip.laws.position_load import PositionLoad
 from stickslip.laws.rate_state import RateState
+from stickslip.laws.series import InSeries
 from stickslip.laws.smooth_state import SmoothStateVariable
 from stickslip.laws.state_variable import StateVariable
-from stickslip.laws.stribeck import Stribeck
+from stickslip.laws.stribeck import FrictionCurve, Stribeck
 from stickslip.laws.tabulated import Tabulated
 from stickslip.oscillator import Oscillator
+from stickslip.solve.automaton import System
 from stickslip.solve.periodic import SteadyState, steady_state
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
+from stickslip.structure import Contact, Structure
 
 LAWS: dict[str, Callable[..., Any]] = {
     "Coulomb": Coulomb, "CompliantContact": CompliantContact, "LinearSlope": LinearSlope, "Tabulated": Tabulated,
     "StateVariable": StateVariable, "InertialContact": InertialContact, "ElastoSlip": ElastoSlip,
     "PositionLoad": PositionLoad, "Stribeck": Stribeck, "Dahl": Dahl, "LuGre": LuGre, "RateState": RateState,
-    "SmoothStateVariable": SmoothStateVariable,
+    "SmoothStateVariable": SmoothStateVariable, "FrictionCurve": FrictionCurve, "InSeries": InSeries,
 }  # fmt: skip
 DRIVES: dict[str, Callable[..., Any]] = {
     "Release": Release, "HarmonicBase": HarmonicBase, "HarmonicForce": HarmonicForce, "MultiTone": MultiTone,
@@ -54,7 +58,7 @@ class Scenario:
         Its name.
     about : str
         What it is and where it comes from.
-    system : Oscillator
+    system : Oscillator or Structure
         What moves.
     start : mapping
         State at time 0, as ``simulate`` takes it.
@@ -68,7 +72,7 @@ class Scenario:
 
     name: str
     about: str
-    system: Oscillator
+    system: System
     start: Mapping[str, float]
     run: Mapping[str, float]
     known: Mapping[str, Any]
@@ -115,19 +119,19 @@ def get(name: str) -> Scenario:
     if name not in names():
         raise ModelError(f"no scenario is called '{name}'", f"there are {', '.join(names())}", "choose one")
     entry = _table()[name]
-    law, drive = dict(entry["law"]), dict(entry.get("drive", {"name": "Release"}))
-    system = Oscillator(**entry["system"], law=LAWS[law.pop("name")](**law), drive=DRIVES[drive.pop("name")](**drive))
-    return Scenario(name, entry["about"], system, entry.get("start", {}), entry.get("run", {}), entry["known"],
+    return Scenario(name, entry["about"], _system(entry), entry.get("start", {}), entry.get("run", {}), entry["known"],
                     entry.get("tolerance", 1e-10))  # fmt: skip
 
 
-def answers(scenario: Scenario) -> dict[str, Any]:
+def answers(scenario: Scenario, *, run: Trajectory | None = None) -> dict[str, Any]:
     """What does the engine say to the questions whose answers are known?
 
     Parameters
     ----------
     scenario : Scenario
         One of them.
+    run : Trajectory, optional
+        The scenario's own run, where it is at hand.
 
     Returns
     -------
@@ -140,7 +144,7 @@ def answers(scenario: Scenario) -> dict[str, Any]:
     2
     """
     if scenario.run:
-        motion = simulate(scenario.system, start=scenario.start, **scenario.run)  # type: ignore[arg-type]
+        motion = run or simulate(scenario.system, start=scenario.start, **scenario.run)  # type: ignore[arg-type]
         return {question: OF_RUNS[question](motion) for question in scenario.known}
     orbit = steady_state(scenario.system, start=scenario.start)
     return {question: OF_ORBITS[question](orbit) for question in scenario.known}
@@ -196,6 +200,26 @@ def forced(ratio: float, load: float, *, damping_ratio: float = 0.0, static_rati
     law = Coulomb(load, None if static_ratio == 1 else static_ratio * load)
     drive = HarmonicForce(1.0, ratio / (2 * math.pi))
     return Oscillator(mass=1, stiffness=1, law=law, drive=drive, damping=2 * damping_ratio)
+
+
+def _system(entry: Mapping[str, Any]) -> System:
+    """The oscillator or structure of plain data in SI."""
+    drive = _named(DRIVES, entry.get("drive", {"name": "Release"}))
+    if "contacts" not in entry:
+        return Oscillator(**entry["system"], law=_named(LAWS, entry["law"]), drive=drive)
+    contacts = [Contact(**{**contact, "law": _named(LAWS, contact["law"])}) for contact in entry["contacts"]]
+    return Structure(**entry["system"], contacts=contacts, drive=drive)
+
+
+def _named(register: Mapping[str, Callable[..., Any]], values: Mapping[str, Any]) -> Any:
+    """The law or drive that plain data name, with what it holds."""
+    given = dict(values)
+    make = register[given.pop("name")]
+    if isinstance(given.get("law"), Mapping):
+        given["law"] = _named(LAWS, given["law"])
+    if "curve" in given:
+        given["curve"] = Formula(given["curve"])
+    return make(**given)
 
 
 @functools.cache

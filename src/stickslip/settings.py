@@ -60,7 +60,7 @@ def checked(
     lines : sequence of str
         The text it was read from, so that the message can name the line.
     table : str
-        The table of the file that holds the values; "" for the top.
+        The table of the file that holds the values, as "law" or "contacts.2.law"; "" for the top.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def checked(
         faults = error.errors(include_url=False, include_context=False)
         first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")  # a typo explains what is missing
         path = [str(part) for part in first["loc"] if not str(part).startswith("function-")]
-        within = [table, *path] if table else path
+        within = [*table.split("."), *path] if table else path
         where = f"{source}{line_of(within, lines)}"
         inner = path[:2] if isinstance(values.get(path[0]), Mapping) else path[:1]
         key = ".".join([table, *inner] if table else inner)
@@ -94,29 +94,45 @@ def checked(
             raise ModelError(
                 f"{where} has the key '{key}'", f"the keys known are {', '.join(known)}", nearest(path[0], known)
             ) from error
+        kind = model.model_fields[path[0]].annotation if path[0] in model.model_fields else None
         if first["type"] == "missing":
-            raise ModelError(f"{where} has no {key}", f"{key} is needed", f"add {path[0]} = VALUE") from error
+            value = "{ name = ... }" if table else "{ ... }"
+            step = f"add {path[0]} = {value if 'dict' in str(kind) else 'VALUE'}"
+            raise ModelError(f"{where} has no {key}", f"{key} is needed", step) from error
         raise ModelError(
             f"{where} sets {key} = {first['input']!r}",
-            first["msg"].removeprefix("Value error, ").replace("Input should", "it should"),
+            _said(first["msg"]),
             f"correct {key}",
         ) from error
 
 
+def _said(message: str) -> str:
+    """What a model says of a value, in the words of a settings file."""
+    said = message.removeprefix("Value error, ").replace("Input should", "it should")
+    return said.replace("a valid dictionary", "a table").replace("a valid ", "a ")
+
+
 def line_of(path: Sequence[str], lines: Sequence[str]) -> str:
-    """ ", line N," of the innermost key of `path` that the text shows."""
+    """ ", line N," of the innermost key of `path` that the text shows; a number after a key counts its headings."""
     found, first, last = None, 0, len(lines)
     for depth, key in enumerate(path):
-        dotted = r"\s*\.\s*".join(rf"""["']?{re.escape(part)}["']?""" for part in path[: depth + 1])
-        alone = rf"""["']?{re.escape(key)}["']?"""
-        pattern = re.compile(rf"^\s*(\[\s*)?(?:{dotted}|{alone})\s*[\]=.]")
-        number = next((n for n in range(first, last) if pattern.match(lines[n])), None)
-        if number is None:
+        if key.isdigit():
             continue
-        found = number
-        if lines[number].lstrip().startswith("["):  # the keys of a table stand between its heading and the next one
-            first = number + 1
-            last = next((n for n in range(first, len(lines)) if lines[n].lstrip().startswith("[")), len(lines))
+        words = [part for part in path[: depth + 1] if not part.isdigit()]
+        dotted = r"\s*\.\s*".join(rf"""["']?{re.escape(part)}["']?""" for part in words)
+        alone = rf"""["']?{re.escape(key)}["']?"""
+        pattern = re.compile(rf"^\s*(\[\[?\s*)?(?:{dotted}|{alone})\s*[\]=.]")
+        places = [n for n in range(first, last) if pattern.match(lines[n])]
+        if not places:
+            continue
+        number = int(path[depth + 1]) if path[depth + 1 : depth + 2] and path[depth + 1].isdigit() else 1
+        headings = [n for n in places if re.match(rf"\s*\[\[?\s*(?:{dotted})\s*\]", lines[n])]
+        found = headings[number - 1] if 0 < number <= len(headings) else places[0]
+        heading = re.match(r"\s*\[\[?\s*([^\]]*?)\s*\]", lines[found])
+        if heading:  # the keys of a table stand between its heading and the next one that is not a part of it
+            part = re.compile(rf"\s*\[\[?\s*{re.escape(heading[1])}\s*\.")
+            ends = (n for n in range(found + 1, last) if lines[n].lstrip().startswith("[") and not part.match(lines[n]))
+            first, last = found + 1, next(ends, last)
     return "" if found is None else f", line {found + 1},"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.drives import Drive, Release
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Law, Mode, changed, finite, parameters
+from stickslip.laws.base import Exit, Law, Mode, finite
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.elastoslip import ElastoSlip
 from stickslip.laws.inertial import InertialContact
+from stickslip.parameters import changed
 
 Array = NDArray[np.float64]
 
@@ -254,24 +255,14 @@ class Structure:
         Parameters
         ----------
         **changes
-            New values by name; one that belongs to contacts or their laws is changed in every one that has it.
+            New values by name; one that belongs to contacts or their laws is changed in every one that has it. With
+            its place it is changed there alone (``**{"contacts.2.law.kinetic": 0.4}``).
 
         Returns
         -------
         Structure
         """
-        own = {f.name: changes.pop(f.name) for f in fields(self) if f.name in changes}
-        drive, contacts = own.pop("drive", self.drive), own.pop("contacts", self.contacts)
-        of_drive = {name: changes.pop(name) for name in parameters(drive).keys() & changes.keys()}
-        unknown = changes.keys() - {name for contact in contacts for name in parameters(contact)}
-        if unknown:
-            raise ModelError(
-                f"no parameter is called '{min(unknown)}'",
-                "it belongs to the structure, its drive, its contacts or their laws",
-                "correct it",
-            )
-        moved = [changed(c, {name: changes[name] for name in parameters(c).keys() & changes.keys()}) for c in contacts]
-        return replace(self, **own, drive=changed(drive, of_drive), contacts=moved)
+        return changed(self, changes)
 
 
 def _positive(mass: Array) -> bool:

@@ -1,4 +1,4 @@
-"""A system written down: oscillator, law, drive, start and length of run, in a TOML file or as a named scenario."""
+"""A system written down: masses, laws, drive, start and length of run, in a TOML file or as a named scenario."""
 
 from __future__ import annotations
 
@@ -12,15 +12,23 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, Field, create_model
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, BeforeValidator, Field, create_model
 
 from stickslip import scenarios
 from stickslip.drives import RecordedBase
 from stickslip.errors import ModelError
+from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.formula import Formula
+from stickslip.laws.stribeck import Curve
 from stickslip.oscillator import Oscillator
+from stickslip.parameters import PARTS, changed, find, places
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
+from stickslip.solve.automaton import System
+from stickslip.solve.product import numbered
+from stickslip.structure import Contact, Structure
 
 # The unit of each parameter of a law or drive; a test holds them to the docstrings.
 UNITS = {
@@ -28,6 +36,7 @@ UNITS = {
     "damping": "N s/m", "slope": "N s/m", "gradient": "N/m", "rate": "1/(N s)", "steepness": "s/m", "speeds": "m/s",
     "speed": "m/s", "amplitude": "m", "frequency": "Hz", "phase": "rad", "fs": "Hz", "samples": "m",
     "HarmonicForce.amplitude": "N", "viscous": "N s/m", "normal": "N", "distance": "m", "reference": "m/s",
+    "preload": "N",
 }  # fmt: skip
 STATE_UNITS = {"x": "m", "v": "m/s", "y": "m", "u": "m/s", "theta": "N"}
 CYCLES = 20.0  # of a run where nothing is said
@@ -41,7 +50,7 @@ class Case:
     ----------
     name, about : str
         What it is called, and what it is.
-    system : Oscillator
+    system : Oscillator or Structure
         What moves.
     start : mapping
         State at time 0, as :func:`simulate` takes it.
@@ -55,11 +64,18 @@ class Case:
 
     name: str
     about: str
-    system: Oscillator
+    system: System
     start: Mapping[str, float | str]
     run: Mapping[str, float]
     fs: float | None = None
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    @property
+    def duration(self) -> float:
+        """Time that is run [s]."""
+        period = self.system.drive.motion().period
+        cycle = period if np.isfinite(period) else 1 / self.system.frequency if self.system.frequency else np.nan
+        return self.run["duration"] if "duration" in self.run else self.run["cycles"] * cycle
 
     def having(self, **changes: Any) -> Case:
         """The same case with other values of its system, as text with units or SI numbers; nothing is known of it then.
@@ -67,7 +83,7 @@ class Case:
         Parameters
         ----------
         **changes
-            New values by name, as in :meth:`Oscillator.having`.
+            New values by name, as in :meth:`Oscillator.having`: "kinetic", or with its place "contacts.2.law.kinetic".
 
         Returns
         -------
@@ -75,19 +91,18 @@ class Case:
         """
         if not changes:
             return self
-        owners = (self.system, self.system.law, self.system.drive)
-        known = [f.name for owner in owners for f in dataclasses.fields(owner)]  # type: ignore[arg-type]
-        for name in changes:
-            if name not in known or name in ("law", "drive"):
-                choices = [n for n in dict.fromkeys(known) if n not in ("law", "drive")]
-                raise ModelError(f"no parameter is called '{name}'", f"there are {', '.join(choices)}",
-                                 nearest(name, choices))  # fmt: skip
+        known = places(self.system)
         values: dict[str, Any] = {}
         for name, value in changes.items():
-            owner = next(o for o in owners if name in {f.name for f in dataclasses.fields(o)})  # type: ignore[arg-type]
-            models = create_model("Changes", __config__=STRICT, **{name: (_kind(type(owner), name), ...)})  # type: ignore[call-overload]
-            values[name] = getattr(checked(models, {name: value}, source="the change"), name)
-        return dataclasses.replace(self, system=self.system.having(**values), known={})
+            path = find(self.system, name)[0]
+            kind = _kind(type(known[path]), path[-1])
+            if path[-1] in PARTS or kind in (ArrayLike, ArrayLike | None):
+                others = [".".join(other) for other in known if other[-1] == path[-1] and other != path]
+                step = f"or name {', '.join(others)}" if others and path[-1] not in PARTS else "there"
+                raise ModelError(f"'{name}' is no single number", "a part or a matrix is changed in the file", step)
+            models = create_model("Changes", __config__=STRICT, **{"value": (kind, ...)})  # type: ignore[call-overload]
+            values[name] = _checked_change(models, name, value)
+        return dataclasses.replace(self, system=changed(self.system, values), known={})
 
     def lasting(
         self, *, duration: str | float | None = None, cycles: float | None = None, fs: str | float | None = None
@@ -115,13 +130,39 @@ class Case:
         return case
 
 
+Kilograms = Annotated[float, quantity("kg")]
+Stiffness = Annotated[float, quantity("N/m")]
+Damping = Annotated[float, quantity("N s/m")]
+
+
 class _Oscillator(BaseModel):
     model_config = STRICT
 
-    mass: Annotated[float, quantity("kg"), Field(gt=0)]
-    stiffness: Annotated[float, quantity("N/m"), Field(ge=0)]
-    damping: Annotated[float, quantity("N s/m")] = 0.0
+    mass: Annotated[Kilograms, Field(gt=0)]
+    stiffness: Annotated[Stiffness, Field(ge=0)]
+    damping: Damping = 0.0
     damper: Literal["ground", "base"] = "ground"
+
+
+class _Structure(BaseModel):
+    model_config = STRICT
+
+    mass: list[list[Kilograms]]
+    stiffness: list[list[Stiffness]]
+    damping: list[list[Damping]] | None = None
+    acts_on: list[float] | None = None
+    damper: Literal["ground", "base"] = "ground"
+
+
+class _Contact(BaseModel):
+    model_config = STRICT
+
+    tangent: list[float]
+    law: dict[str, Any]
+    normal: list[float] | None = None
+    stiffness: Stiffness | None = None
+    preload: Annotated[float, quantity("N")] | None = None
+    carried: float | None = None
 
 
 class _Run(BaseModel):
@@ -137,7 +178,8 @@ class _File(BaseModel):
 
     about: str = ""
     system: dict[str, Any]
-    law: dict[str, Any]
+    law: dict[str, Any] | None = None
+    contacts: list[dict[str, Any]] | None = None
     drive: dict[str, Any] = Field(default_factory=lambda: {"name": "Release"})
     start: dict[str, Any] = Field(default_factory=dict)
     run: dict[str, Any] = Field(default_factory=dict)
@@ -232,12 +274,10 @@ def read_system(path: str | Path) -> Case:
     values, lines = read_toml(path, what="a system is")
     source = _Source(path.name, lines, path.parent)
     whole = checked(_File, values, source=source.name, lines=lines)
-    oscillator = _part(_Oscillator, "system", whole.system, source)
-    law = _built("law", LAWS, whole.law, source)
     drive = _built("drive", DRIVES, whole.drive, source)
-    with _placed("system", source):
-        system = Oscillator(**oscillator, law=law, drive=drive)
-    start = _part(_start_of(law), "start", whole.start, source)
+    several = whole.contacts is not None or isinstance(whole.system.get("mass"), list)
+    system = _structure(whole, drive, source) if several else _oscillator(whole, drive, source)
+    start = _part(_start_of(system), "start", whole.start, source)
     run = _part(_Run, "run", whole.run, source)
     fs = run.pop("fs", None)
     case = Case(path.stem, whole.about, system, start, run or _whole_run(system), fs)
@@ -246,7 +286,37 @@ def read_system(path: str | Path) -> Case:
     return case
 
 
-def _whole_run(system: Oscillator) -> dict[str, float]:
+def _oscillator(whole: _File, drive: Any, source: _Source) -> Oscillator:
+    if whole.law is None:
+        raise ModelError(
+            f"{source.name} has no law", "a mass rubs under one, a structure under one at each contact",
+            "add a table [law], or tables [[contacts]]",
+        )  # fmt: skip
+    values = _part(_Oscillator, "system", whole.system, source)
+    law = _built("law", LAWS, whole.law, source)
+    with _placed("system", source):
+        return Oscillator(**values, law=law, drive=drive)
+
+
+def _structure(whole: _File, drive: Any, source: _Source) -> Structure:
+    if whole.law is not None:
+        where = f"{source.name}{line_of(['law'], source.lines)}"
+        raise ModelError(f"{where} has a law beside a structure's matrices", "each contact of a structure has its own",
+                         "write it into [[contacts]], as law = {name = ...}")  # fmt: skip
+    values = _part(_Structure, "system", whole.system, source)
+    contacts = []
+    for number, entry in enumerate(whole.contacts or [], start=1):
+        table = f"contacts.{number}"
+        given = _part(_Contact, table, entry, source)
+        given["law"] = _built(f"{table}.law", LAWS, given["law"], source)
+        with _placed(table, source):
+            contacts.append(Contact(**given))
+    damping = values.pop("damping", [[0.0] * len(values["mass"])] * len(values["mass"]))
+    with _placed("system", source):
+        return Structure(**values, damping=damping, contacts=contacts, drive=drive)
+
+
+def _whole_run(system: System) -> dict[str, float]:
     """What is run where nothing is said: the whole recorded motion, else some cycles."""
     drive = system.drive
     return {"duration": _length(drive)} if isinstance(drive, RecordedBase) else {"cycles": CYCLES}
@@ -260,31 +330,47 @@ def _check_run(case: Case) -> None:
     if len(case.run) > 1:
         raise ModelError("duration and cycles are given", "a run has one of the two", "leave one out")
     drive = case.system.drive
+    if not np.isfinite(case.duration):
+        raise ModelError(
+            "a system without spring or periodic drive has no cycles", "it is run for a time", "give a duration"
+        )
     if not isinstance(drive, RecordedBase):
         return
-    natural = 1 / case.system.frequency if case.system.stiffness else 1.0
-    asked = case.run.get("duration", case.run.get("cycles", 0.0) * natural)
-    if asked > _length(drive) * (1 + 1e-9):
+    if case.duration > _length(drive) * (1 + 1e-9):
         raise ModelError(
-            f"duration = {asked:g} s", f"the recorded base motion ends at {_length(drive):g} s", "run it no longer"
+            f"duration = {case.duration:g} s",
+            f"the recorded base motion ends at {_length(drive):g} s",
+            "run it no longer",
         )
 
 
 def _part(model: type[BaseModel], table: str, values: Mapping[str, Any], source: _Source) -> dict[str, Any]:
     part = checked(model, values, source=source.name, lines=source.lines, table=table)
-    return {name: value for name, value in part.model_dump(exclude_unset=True).items() if value is not None}
+    given = {name: getattr(part, name) for name in part.model_fields_set}
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def _checked_change(model: type[BaseModel], name: str, value: Any) -> Any:
+    """One value, as a file would give it; a refusal calls it by its name."""
+    try:
+        return checked(model, {"value": value}, source="the change").value  # type: ignore[attr-defined]
+    except ModelError as error:
+        told = (text.replace(" value", f" {name}", 1) for text in (error.value, error.rule, error.next_step))
+        raise ModelError(*told) from error
 
 
 def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mapping[str, Any], source: _Source) -> Any:
     """The law or drive named in a table, with its parameters."""
     name = values.get("name")
     if not isinstance(name, str) or name not in register:
-        where = f"{source.name}{line_of([table, 'name'], source.lines)}"
+        where = f"{source.name}{line_of([*table.split('.'), 'name'], source.lines)}"
         told = f"sets {table}.name = {name!r}" if "name" in values else f"has no {table}.name"
         next_step = nearest(str(name), register) if "name" in values else "add name = NAME"
-        raise ModelError(f"{where} {told}", f"a {table} is one of {', '.join(register)}", next_step)
+        raise ModelError(f"{where} {told}", f"a {table.rpartition('.')[2]} is one of {', '.join(register)}", next_step)
     factory = register[name]
     parameters = {key: value for key, value in values.items() if key != "name"}
+    if isinstance(parameters.get("law"), Mapping):
+        parameters["law"] = _built(f"{table}.law", LAWS, parameters["law"], source)
     if name == "RecordedBase" and "record" in parameters:
         parameters |= _recorded(parameters, source)
         parameters = {key: value for key, value in parameters.items() if key not in ("record", "channel")}
@@ -316,7 +402,7 @@ def _placed(table: str, source: _Source) -> Iterator[None]:
         yield
     except ModelError as error:
         named = re.match(r"(\w+) = ", error.value)
-        where = line_of([table, named[1]] if named else [table], source.lines)
+        where = line_of([*table.split("."), *([named[1]] if named else [])], source.lines)
         raise ModelError(f"{source.name}{where} [{table}]: {error.value}", error.rule, error.next_step) from error
 
 
@@ -336,6 +422,10 @@ def _kind(factory: type, name: str, on: str = "") -> Any:
     if name == "tones":
         amplitude = Annotated[float, quantity("N" if on == "force" else "m")]
         return list[tuple[amplitude, Annotated[float, quantity("Hz")], Annotated[float, quantity("rad")]]]
+    if hint == Curve:
+        return Annotated[Any, BeforeValidator(_formula)]
+    if hint == Law:
+        return Annotated[Any, BeforeValidator(_law)]
     unit = UNITS.get(f"{factory.__name__}.{name}", UNITS.get(name, "1"))
     number = Annotated[float, quantity(unit)]
     if name == "samples" or hint == Sequence[float]:
@@ -343,14 +433,38 @@ def _kind(factory: type, name: str, on: str = "") -> Any:
     return {float: number, float | None: number | None}.get(hint, hint)
 
 
-def _start_of(law: Any) -> type[BaseModel]:
-    """The state that a start may set: displacement, velocity, the law's memory, and the mode."""
-    names = {
-        "x": "m",
-        "v": "m/s",
-        **{name: "m" if name in law.places else STATE_UNITS.get(name, "1") for name in law.memory},
-    }
+def _formula(value: object) -> Formula:
+    if not isinstance(value, str):
+        raise ValueError("a curve is text, as in '1.0 + 0.5 * exp(-v / 0.1)', with the speed v in m/s")
+    try:
+        return Formula(value)
+    except ModelError as error:
+        raise ValueError(str(error).rstrip(".")) from error
+
+
+def _law(value: object) -> object:
+    if isinstance(value, str | int | float | list):
+        raise ValueError("a law within a law is a table, as in law = {name = 'Coulomb', kinetic = 1}")
+    return value
+
+
+def _start_of(system: System) -> type[BaseModel]:
+    """The state that a start may set: displacements, velocities, the laws' memory, and the mode."""
+    names = {name: unit for letter, unit in (("x", "m"), ("v", "m/s")) for name in numbered(letter, _size(system))}
+    laws = [contact.law for contact in system.contacts] if isinstance(system, Structure) else [system.law]
+    for number, law in enumerate(laws, start=1):
+        for name in law.memory:
+            unit = "m" if name in law.places else STATE_UNITS.get(name, "1")
+            names[f"{name}{number}" if len(laws) > 1 else name] = unit
     known: dict[str, Any] = {name: (Annotated[float, quantity(unit)] | None, None) for name, unit in names.items()}
-    modes = law.rates() if isinstance(law, CurvedLaw) else law.modes()
-    known["mode"] = (Literal[tuple(mode.name for mode in modes)] | None, None)
+    known["mode"] = (str | None if isinstance(system, Structure) else Literal[_modes(system)] | None, None)
     return create_model("Start", __config__=STRICT, **known)
+
+
+def _size(system: System) -> int:
+    return system.size if isinstance(system, Structure) else 1
+
+
+def _modes(system: Oscillator) -> tuple[str, ...]:
+    law = system.law
+    return tuple(mode.name for mode in (law.rates() if isinstance(law, CurvedLaw) else law.modes()))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from typing import Protocol
 
 from stickslip.errors import ModelError
 
@@ -105,21 +105,6 @@ class Rigid:
     def entry(self) -> tuple[str, str, str]:
         """Modes in which motion starts, by the sign of the velocity."""
         return "back", "stuck", "forward"
-
-
-def parameters(part: Any) -> dict[str, Any]:
-    """The parameters of a law, a drive or a contact by name, each with the part it belongs to; of a law around another
-    law the inner one's too."""
-    inner = getattr(part, "law", None)
-    return {**(parameters(inner) if is_dataclass(inner) else {}), **{f.name: part for f in fields(part)}}
-
-
-def changed(part: Any, changes: Mapping[str, Any]) -> Any:
-    """A law, a drive or a contact with other values; a name is looked for in the part, then in the law inside it."""
-    own = {f.name: changes[f.name] for f in fields(part) if f.name in changes}
-    inner = own.get("law", getattr(part, "law", None))
-    rest = {name: value for name, value in changes.items() if name not in own}
-    return replace(part, **own, **({"law": changed(inner, rest)} if is_dataclass(inner) and rest else {}))
 
 
 def finite(name: str, value: float, *, unit: str, positive: bool = False, signed: bool = False) -> float:

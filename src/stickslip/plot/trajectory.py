@@ -1,9 +1,10 @@
-"""A simulated motion: traces, loops and phase portrait, drawn from the exact solution, with sticks marked."""
+"""A simulated motion: traces, loops and phase portraits, drawn from the exact solution, with sticks marked."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ from stickslip.plot.style import (
     prefixed,
     styled,
 )
+from stickslip.solve.product import JointMode
+from stickslip.structure import Structure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,11 +40,41 @@ CLOSE_CYCLES = 3
 POINTS = 2400  # of a curve; the instants of events come on top
 A_CYCLE, MOST_POINTS = 60, 200_000  # instants looked at in each cycle of a long run before its envelope is drawn
 A_PIECE, MOST_PIECES = 24, 400  # instants in each piece, so that a stiff contact's ringing is drawn as it is
+MOST_EDGES = 6000  # pieces whose both ends are drawn, so that jumps stay upright
 MOST_SHADES = 150
-_UNITS = {"x": "m", "z": "m", "v": "m/s", "slip": "m/s", "friction": "N", "force": "N"}
-_WORDS = {"x": "displacement", "v": "velocity", "slip": "sliding velocity", "friction": "friction", "force": "force"}
-_COLOURS = {"x": BLUE, "z": SKY, "v": GREEN, "friction": ORANGE, "force": PURPLE}
-_KINDS = {"stick": ("sticks", 0.8), "microstick": ("microsticks", 0.4)}  # legend, opacity of the shade
+MOST_DRAWN = 4  # masses with a phase portrait, contacts with a loop
+_UNITS = {"x": "m", "z": "m", "way": "m", "v": "m/s", "slip": "m/s", "friction": "N", "load": "N", "force": "N"}
+_WORDS = {
+    "x": "displacement", "way": "displacement along the contact", "v": "velocity", "slip": "sliding velocity",
+    "friction": "friction", "load": "normal load", "force": "force",
+}  # fmt: skip
+_COLOURS = {"x": BLUE, "z": SKY, "v": GREEN, "friction": ORANGE, "load": INK, "force": PURPLE}
+_MASSES = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK)
+_KINDS = {
+    "stick": ("sticks", SHADE, 0.8),
+    "microstick": ("microsticks", SHADE, 0.4),
+    "flight": ("lifts off", SKY, 0.25),
+}
+
+Quantity = tuple[str, int]
+"""An output of a run and which of its rows: that of a mass, or of a contact."""
+
+
+def contacts_of(run: Trajectory) -> int:
+    """How many contacts there are."""
+    return len(run.system.contacts) if isinstance(run.system, Structure) else 1
+
+
+def numbered_words(run: Trajectory, words: str, name: str, row: int) -> str:
+    """What a row of an output is called: "velocity" of one mass, "velocity v2", "friction, contact 2" of several."""
+    if name in ("z", "force") or len(run.labels("x" if name in ("x", "v") else "friction")) == 1:
+        return words
+    return f"{words} {name}{row + 1}" if name in ("x", "v") else f"{words}, contact {row + 1}"
+
+
+def kinds_of(run: Trajectory, contact: int) -> list[str]:
+    """What each mode of the table is called at one contact: "slip", "stick", "microstick", "flight"."""
+    return [mode.parts[contact].kind if isinstance(mode, JointMode) else mode.kind for mode in run.table.modes]
 
 
 def cycle_of(run: Trajectory) -> float:
@@ -50,11 +83,12 @@ def cycle_of(run: Trajectory) -> float:
     motion = run.table.motion
     if math.isfinite(motion.period):
         return min(motion.period, run.duration)
-    natural = 1 / run.system.frequency if run.system.stiffness else run.duration
+    natural = 1 / run.system.frequency if run.system.frequency else run.duration
     if motion.tones:
         return min(max(natural, *(2 * math.pi / tone[2] for tone in motion.tones)), run.duration)
     same = np.flatnonzero(run.modes == run.modes[-1])
-    found = float(run.starts[same[-1]] - run.starts[same[-2]]) if len(same) > 1 and motion.face else natural
+    pulled = motion.rates and motion.knots is None  # by a belt or a ramp
+    found = float(run.starts[same[-1]] - run.starts[same[-2]]) if len(same) > 1 and pulled else natural
     return min(found, run.duration)
 
 
@@ -66,36 +100,55 @@ def last_cycles(run: Trajectory, cycles: float) -> tuple[float, float]:
     return max(0.0, run.duration - cycles * cycle_of(run)), run.duration
 
 
-def curve(run: Trajectory, outputs: tuple[str, ...], *, first: float, last: float) -> tuple[Array, list[Array]]:
+def sampled(run: Trajectory, wanted: Sequence[str | Quantity], times: Array) -> Array:
+    """Exact values of some quantities at increasing instants, a row for each."""
+    pairs = [(each, 0) if isinstance(each, str) else each for each in wanted]
+    names = list(dict.fromkeys("x" if name == "way" else name for name, _ in pairs))
+    values, _ = run.sample(times, tuple(names))
+    counts = [len(run.labels(name)) for name in names]
+    rows = dict(zip(names, np.split(values, np.cumsum(counts)[:-1]), strict=True))
+    return np.array([
+        run.system.tangents[row] @ rows["x"] if name == "way" and isinstance(run.system, Structure)
+        else rows["x" if name == "way" else name][row]
+        for name, row in pairs
+    ])  # fmt: skip
+
+
+def curve(run: Trajectory, wanted: Sequence[str | Quantity], *, first: float, last: float) -> tuple[Array, list[Array]]:
     """Instants and exact values between two of them: both sides of every event, so that jumps stay upright; of very
     many cycles the envelope."""
     count = int(np.clip(A_CYCLE * (last - first) / cycle_of(run), POINTS, MOST_POINTS))
     times = np.linspace(first, last, count)
     if count > POINTS:
-        values, _ = run.sample(times, outputs)
-        drawn = [envelope(times, row, columns=POINTS // 2) for row in values]
+        drawn = [envelope(times, row, columns=POINTS // 2) for row in sampled(run, wanted, times)]
         return drawn[0][0], [row for _, row in drawn]
     ends = run.starts + run.durations
     shown = (ends > first) & (run.starts < last)
     begin, end = np.clip(run.starts[shown], first, last), np.clip(ends[shown], first, last)
+    if len(begin) <= MOST_EDGES:
+        times = np.concatenate([times, begin, np.maximum(np.nextafter(begin, -np.inf), first)])
     if len(begin) <= MOST_PIECES:
-        inner = begin[:, None] + np.linspace(0, 1, A_PIECE) * (end - begin)[:, None]
-        times = np.unique(np.concatenate([times, begin, np.maximum(np.nextafter(begin, -np.inf), first), *inner]))
-    values, _ = run.sample(np.clip(times, first, last), outputs)
-    return times, list(values)
+        times = np.concatenate([times, *(begin[:, None] + np.linspace(0, 1, A_PIECE) * (end - begin)[:, None])])
+    times = np.clip(np.unique(times), first, last)
+    return times, list(sampled(run, wanted, times))
 
 
-def stretches(run: Trajectory, kind: str, *, first: float, last: float) -> list[tuple[float, float]]:
-    """Start and length of each stretch of one kind of mode ("slip", "stick", "microstick"), within two instants."""
-    chosen = np.array([mode.kind == kind for mode in run.table.modes])[run.modes]
-    begin = np.clip(run.starts[chosen], first, last)
-    length = np.clip(run.starts[chosen] + run.durations[chosen], first, last) - begin
-    return [(float(b), float(n)) for b, n in zip(begin, length, strict=True) if n > 0]
+def stretches(run: Trajectory, kind: str, *, first: float, last: float, contact: int = 0) -> Array:
+    """Start and length of each stretch of one kind of mode at a contact ("slip", "stick", "microstick", "flight"),
+    within two instants (n, 2)."""
+    chosen = np.array([found == kind for found in kinds_of(run, contact)])[run.modes]
+    chosen &= (run.starts < last) & (run.starts + run.durations > first)
+    begin, end = (np.clip(ends[chosen], first, last) for ends in (run.starts, run.starts + run.durations))
+    spans: Array = np.column_stack([begin, end - begin])[end > begin]
+    return spans
 
 
 @styled
 def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = None) -> Figure:
     """Displacement, velocity, friction and force over time, one under the other, with sticks shaded.
+
+    Of a structure every mass is drawn, and each contact's friction has a panel of its own, shaded by what that contact
+    does; a load that follows the motion is drawn too.
 
     Parameters
     ----------
@@ -109,40 +162,78 @@ def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = Non
     Figure
     """
     last = run.duration if last is None else last
-    motion = run.table.motion
-    panels = [("x", *(["z"] if motion.base else [])), ("v",), ("friction",), *([("force",)] if motion.force else [])]
+    panels = _panels(run)
     figure, axes = new_figure(len(panels), height=1.0 + 1.3 * len(panels))
-    for ax, names in zip(axes, panels, strict=True):
-        times, values = curve(run, names, first=first, last=last)
-        factor, unit = prefixed(np.concatenate(values), _UNITS[names[0]])
-        for name, row in zip(names, values, strict=True):
-            words = {"x": "mass", "z": "spring's end"}.get(name)
-            ax.plot(times, factor * row, color=_COLOURS[name], label=words, linestyle="--" if name == "z" else "-")
-        ax.set_ylabel(axis_label(_WORDS[names[0]], unit, between="\n"))
+    for ax, wanted in zip(axes, panels, strict=True):
+        times, values = curve(run, wanted, first=first, last=last)
+        factor, unit = prefixed(np.concatenate(values), _UNITS[wanted[0][0]])
+        for quantity, row in zip(wanted, values, strict=True):
+            ax.plot(times, factor * row, **_line(run, quantity, wanted))
+        ax.set_ylabel(axis_label(_panel_words(run, wanted), unit, between="\n"))
         if np.min(values) < 0 < np.max(values):
             ax.axhline(0, color=FAINT, linewidth=0.8, zorder=0.5)
-        _shade(ax, run, first, last)
-    handles = [
-        h for h in axes[0].get_legend_handles_labels()[0] if motion.base or h.get_label() in ("sticks", "microsticks")
-    ]
-    if handles:
-        axes[0].legend(handles=handles, ncols=4, loc="lower left", bbox_to_anchor=(0, 1.0))
+        own = [row for name, row in wanted if name in ("friction", "load")]
+        if contacts_of(run) == 1 or own:
+            _shade(ax, run, first, last, own[0] if own else 0)
+    for ax in axes:
+        handles = [
+            handle for handle in ax.get_legend_handles_labels()[0] if ax is axes[0] or _shades_alone(run, handle)
+        ]
+        if handles and (ax is axes[0] or contacts_of(run) > 1):
+            ax.legend(handles=handles, ncols=6, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(first, last)
     figure.align_ylabels(axes)
     return figure
 
 
+def _panels(run: Trajectory) -> list[list[Quantity]]:
+    motion, every = run.table.motion, range(len(run.labels("x")))
+    panels = [[*(("x", j) for j in every), *([("z", 0)] if motion.base else [])], [("v", j) for j in every]]
+    for c in range(contacts_of(run)):
+        panels.append([("friction", c)])
+        if pressed(run, c):
+            panels.append([("load", c)])
+    return [*panels, *([[("force", 0)]] if motion.force else [])]
+
+
+def pressed(run: Trajectory, contact: int) -> bool:
+    """Whether a contact's load follows the motion."""
+    return isinstance(run.system, Structure) and run.system.contacts[contact].normal is not None
+
+
+def _panel_words(run: Trajectory, wanted: list[Quantity]) -> str:
+    name, row = wanted[0]
+    words = _WORDS[name] if name in ("x", "v") else numbered_words(run, _WORDS[name], name, row)
+    return words.replace(", ", "\n").replace("normal load", "load")
+
+
+def _line(run: Trajectory, quantity: Quantity, wanted: list[Quantity]) -> dict[str, Any]:
+    """Colour, line and legend of one row of a panel."""
+    name, row = quantity
+    several = len(run.labels("x")) > 1
+    words = {"x": f"x{row + 1}" if several else "mass", "z": "base" if several else "spring's end"}.get(name)
+    colour = _MASSES[row % len(_MASSES)] if several and name in ("x", "v") else _COLOURS[name]
+    alone = name == "x" and not several and len(wanted) == 1
+    return {"color": colour, "linestyle": "--" if name == "z" else "-", "label": None if alone else words}
+
+
+def _shades_alone(run: Trajectory, handle: Any) -> bool:
+    return handle.get_label() in {words for words, *_ in _KINDS.values()}
+
+
 @styled
-def plot_loop(run: Trajectory, *, against: str = "x", ax: Axes | None = None) -> Axes:
-    """Friction against displacement or velocity: the last cycle, over those before it.
+def plot_loop(run: Trajectory, *, against: str = "x", contact: int = 0, ax: Axes | None = None) -> Axes:
+    """Friction against displacement, velocity or load: the last cycle, over those before it.
 
     Parameters
     ----------
     run : Trajectory
         What to draw.
-    against : {"x", "slip"}
-        Displacement of the mass, or its velocity on the counter-face.
+    against : {"x", "slip", "load"}
+        Displacement along the contact (of one mass: its own), velocity on the counter-face, or normal load.
+    contact : int
+        Which contact of a structure, from 0.
     ax : Axes, optional
         Where to draw.
 
@@ -150,17 +241,20 @@ def plot_loop(run: Trajectory, *, against: str = "x", ax: Axes | None = None) ->
     -------
     Axes
     """
-    return _portrait(run, against, "friction", axes_of(ax))
+    across = "way" if against == "x" and isinstance(run.system, Structure) else against
+    return _portrait(run, (across, contact), ("friction", contact), axes_of(ax), contact)
 
 
 @styled
-def plot_phase(run: Trajectory, *, ax: Axes | None = None) -> Axes:
-    """Velocity against displacement: the last cycle, over those before it, with sticks marked.
+def plot_phase(run: Trajectory, *, mass: int = 0, ax: Axes | None = None) -> Axes:
+    """Velocity against displacement: the last cycle, over those before it, with sticks of a single contact marked.
 
     Parameters
     ----------
     run : Trajectory
         What to draw.
+    mass : int
+        Which degree of freedom of a structure, from 0.
     ax : Axes, optional
         Where to draw.
 
@@ -168,14 +262,17 @@ def plot_phase(run: Trajectory, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
     """
-    return _portrait(run, "x", "v", axes_of(ax, height=4.2))
+    marked = 0 if contacts_of(run) == 1 else None
+    return _portrait(run, ("x", mass), ("v", mass), axes_of(ax, height=4.2), marked)
 
 
 @styled
 def plates_of(run: Trajectory) -> tuple[Plate, ...]:
     """The figures that show a run, in reading order."""
-    kinds = {mode.kind for mode in np.array(run.table.modes, dtype=object)[np.unique(run.modes)]}
-    marks = {"stick": "dark grey: it sticks", "microstick": "light grey: the contact holds and yields a little"}
+    seen = np.unique(run.modes)
+    kinds = {kinds_of(run, c)[mode] for c in range(contacts_of(run)) for mode in seen}
+    marks = {"stick": "dark grey: it sticks", "microstick": "light grey: the contact holds and yields a little",
+             "flight": "blue: the contact has lifted off"}  # fmt: skip
     shaded = "; ".join(words for kind, words in marks.items() if kind in kinds)
     shaded = f" {shaded[0].upper()}{shaded[1:]}." if shaded else ""
     first, last = last_cycles(run, CLOSE_CYCLES)
@@ -185,63 +282,91 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
             plate("whole-run", plot_motion(run), "The whole run", f"From the start, over all of the time.{shaded}")
         )
     words = "As long as it moves" if run.status == "at rest" else "The last cycles"
-    plates += [
+    plates.append(
         plate("motion", plot_motion(run, first=first, last=last), words,
-              f"Exact between events; friction jumps where a slip begins, ends or turns.{shaded}"),
-        plate("friction-displacement", plot_loop(run), "Friction against displacement",
-              "The area of a loop is the work that friction takes in a cycle. Flat top and bottom: sliding. Sides: the "
-              "contact holds, upright where it is rigid, sloping where it gives way."),
-        plate("friction-velocity", plot_loop(run, against="slip"), "Friction against sliding velocity",
-              "The law as the motion passes through it. A contact that holds bears whatever the other forces ask for: "
-              "the upright at zero."),
-        plate("phase-portrait", plot_phase(run), "Phase portrait",
-              "Velocity against displacement, run through clockwise. Marked: where the contact holds."),
-    ]  # fmt: skip
+              f"Exact between events; friction jumps where a slip begins, ends or turns.{shaded}")
+    )  # fmt: skip
+    several = contacts_of(run) > 1
+    for c in range(min(contacts_of(run), MOST_DRAWN)):
+        plates += _of_contact(run, c, f"-{c + 1}" if several else "", f", contact {c + 1}" if several else "")
+    masses = len(run.labels("x"))
+    for j in range(min(masses, MOST_DRAWN)):
+        name, which = (f"-x{j + 1}", f" of x{j + 1}") if masses > 1 else ("", "")
+        holds = "" if several or not contacts_of(run) else " Marked: where the contact holds."
+        plates.append(
+            plate(f"phase-portrait{name}", plot_phase(run, mass=j), f"Phase portrait{which}",
+                  f"Velocity against displacement, run through clockwise.{holds}")
+        )  # fmt: skip
     return tuple(plates)
 
 
-def _shade(ax: Axes, run: Trajectory, first: float, last: float) -> None:
+def _of_contact(run: Trajectory, contact: int, name: str, which: str) -> list[Plate]:
+    """Loops of one contact; `name` and `which` tell it from others."""
+    plates = [
+        plate(f"friction-displacement{name}", plot_loop(run, contact=contact), f"Friction against displacement{which}",
+              "The area of a loop is the work that friction takes in a cycle. Flat top and bottom: sliding. Sides: the "
+              "contact holds, upright where it is rigid, sloping where it gives way."),
+        plate(f"friction-velocity{name}", plot_loop(run, against="slip", contact=contact),
+              f"Friction against sliding velocity{which}",
+              "The law as the motion passes through it. A contact that holds bears whatever the other forces ask for: "
+              "the upright at zero."),
+    ]  # fmt: skip
+    if pressed(run, contact):
+        plates.append(
+            plate(f"friction-load{name}", plot_loop(run, against="load", contact=contact),
+                  f"Friction against normal load{which}",
+                  "Sliding lies on the two edges of a wedge, whose slope is the coefficient of friction; holding lies "
+                  "between them; at its tip the contact lifts off.")
+        )  # fmt: skip
+    return plates
+
+
+def _shade(ax: Axes, run: Trajectory, first: float, last: float, contact: int) -> None:
     low, high = ax.get_ylim()
-    for kind, (words, opacity) in _KINDS.items():
-        spans = stretches(run, kind, first=first, last=last)
+    for kind, (words, colour, opacity) in _KINDS.items():
+        spans = stretches(run, kind, first=first, last=last, contact=contact)
         if 0 < len(spans) <= MOST_SHADES:
-            ax.broken_barh(spans, (low, high - low), color=SHADE, alpha=opacity, linewidth=0, zorder=0, label=words)
+            ax.broken_barh(
+                spans.tolist(), (low, high - low), color=colour, alpha=opacity, linewidth=0, zorder=0, label=words
+            )
     ax.set_ylim(low, high)
 
 
-def _portrait(run: Trajectory, across: str, up: str, ax: Axes) -> Axes:
-    """One output against another: the cycles before thin, the last one strong, what holds marked along it."""
+def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact: int | None) -> Axes:
+    """One quantity against another: the cycles before thin, the last one strong, what holds marked along it."""
     first, last = last_cycles(run, 20)
     split = 0.0 if run.status == "at rest" else max(first, last - cycle_of(run))
     _, before = curve(run, (across, up), first=first, last=last)
     times, values = curve(run, (across, up), first=split, last=last)
-    (x_factor, x_unit), (y_factor, y_unit) = prefixed(before[0], _UNITS[across]), prefixed(before[1], _UNITS[up])
+    (x_factor, x_unit), (y_factor, y_unit) = (
+        prefixed(row, _UNITS[name]) for row, (name, _) in zip(before, (across, up), strict=True)
+    )
     if split > first:
         ax.plot(
             x_factor * before[0], y_factor * before[1], color=FAINT, linewidth=0.6, alpha=0.7, label="cycles before"
         )
     label = "last cycle" if split > 0 else "the motion"
-    ax.plot(x_factor * values[0], y_factor * values[1], color=ORANGE if up == "friction" else GREEN, label=label)
-    for kind, colour, words in (("microstick", SKY, "microstick"), ("stick", BLUE, "stick")):
-        spans = stretches(run, kind, first=split, last=last)
+    ax.plot(x_factor * values[0], y_factor * values[1], color=ORANGE if up[0] == "friction" else GREEN, label=label)
+    marks = (("microstick", SKY, "microstick"), ("stick", BLUE, "stick"), ("flight", PURPLE, "lifted off"))
+    for kind, colour, words in marks if contact is not None and contacts_of(run) else ():
         held = np.zeros(len(times), dtype=bool)
-        for begin, length in spans:
+        for begin, length in stretches(run, kind, first=split, last=last, contact=contact or 0):
             held |= (times >= begin) & (times < begin + length)
         if not held.any():
             continue
         x, y = (np.where(held, factor * row, np.nan) for factor, row in zip((x_factor, y_factor), values, strict=True))
-        point = (
-            up == "v" and kind == "stick" and not run.table.motion.face
-        )  # at rest, a stick is a point of the portrait
+        # at rest, a stick is a point of the portrait
+        point = up[0] == "v" and kind == "stick" and not run.table.motion.face and len(run.labels("x")) == 1
         dot = "o" if point else ""
         ax.plot(x, y, marker=dot, markevery=_middles(held), color=colour, linewidth=3, markersize=6, label=words)
     for line, row in ((ax.axvline, before[0]), (ax.axhline, before[1])):
         if row.min() < 0 < row.max():  # an axis far from the motion would only squeeze it
             line(0, color=FAINT, linewidth=0.8, zorder=0.5)
-    if up == "v" and "way" in run.table.motion.face:
+    if up[0] == "v" and "way" in run.table.motion.face and not isinstance(run.system, Structure):
         belt = y_factor * run.table.motion.face["way"]
         ax.axhline(belt, color=INK, linewidth=0.9, linestyle=":", zorder=1, label="belt")
-    ax.set(xlabel=axis_label(_WORDS[across], x_unit), ylabel=axis_label(_WORDS[up], y_unit))
+    named = (numbered_words(run, _WORDS[name], name, row) for name, row in (across, up))
+    ax.set(xlabel=axis_label(next(named), x_unit), ylabel=axis_label(next(named), y_unit))
     ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(0, 1.0))
     return ax
 

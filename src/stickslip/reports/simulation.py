@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,12 @@ import numpy as np
 from stickslip import scenarios
 from stickslip.errors import ModelError
 from stickslip.files.write import WRITERS, write_record
+from stickslip.laws.formula import Formula
+from stickslip.parameters import PARTS
 from stickslip.plot.figures import figures
 from stickslip.plot.style import prefixed
-from stickslip.plot.trajectory import cycle_of, last_cycles
-from stickslip.reports.folder import results_folder, write_figures
+from stickslip.plot.trajectory import contacts_of, cycle_of, kinds_of, last_cycles, numbered_words, pressed, sampled
+from stickslip.reports.folder import check_folder, results_folder, write_figures
 from stickslip.solve.automaton import Automaton
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.energy import energy
@@ -30,6 +32,8 @@ MOST_ROWS = 200_000  # of a record whose rate was not asked for
 REFUSED_ROWS = 100_000_000
 MOST_PIECES = 200_000  # of a run whose energy is integrated: beyond, it takes longer than the run
 MOST_TOLD = 10_000  # events in JSON; events.csv has them all
+MOST_NAMED = 4  # masses in a sentence
+KINDS = ("slip", "microstick", "stick", "flight")
 PEAKS = 4001  # instants looked at for the largest values of the last cycle
 
 
@@ -65,31 +69,33 @@ class Outcome:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: SI numbers, None where a number does not exist."""
         system = self.case.system
-        events = self.run.events
-        parts = {"system": system, "law": system.law, "drive": system.drive}
+        counts = self.run.event_counts()
         return {
             "name": self.case.name,
             "about": self.case.about,
             "status": self.run.status,
-            **{part: {"name": type(thing).__name__, **_fields(thing)} for part, thing in parts.items()},
+            "system": {"name": type(system).__name__, **_fields(system, without=PARTS)},
+            **{part: _described(getattr(system, part)) for part in PARTS if hasattr(system, part)},
             "start": dict(self.case.start),
             "run": dict(self.case.run),
             "quantities": [
                 {"name": name, "value": _plain(value), "unit": unit} for name, (value, unit) in self.values.items()
             ],
             "known_answers": _plain(self.known),
-            "event_count": len(events),
-            "events": [event._asdict() for event in events[:MOST_TOLD]],
+            "event_count": counts.total(),
+            "events": [_told(event) for event in itertools.islice(self.run.each_event(), MOST_TOLD)],
         }
 
 
-def outcome(case: Case) -> Outcome:
+def outcome(case: Case, *, progress: Callable[[float], object] | None = None) -> Outcome:
     """Run a case, and say what happened.
 
     Parameters
     ----------
     case : Case
         As :func:`read_system` or :func:`scenario_case` gives it.
+    progress : callable, optional
+        Called now and then with the share of the time that is simulated, as in :func:`simulate`.
 
     Returns
     -------
@@ -108,8 +114,11 @@ def outcome(case: Case) -> Outcome:
     >>> outcome(scenario_case("FD-4")).sentences[0]
     'The mass comes to rest after 3.142 s, at a displacement of 250 mm.'
     """
-    run = simulate(case.system, start=case.start, **case.run)  # type: ignore[arg-type]
-    found = scenarios.answers(scenarios.get(case.name)) if case.known else {}
+    run = simulate(case.system, start=case.start, progress=progress, **case.run)  # type: ignore[arg-type]
+    found: Mapping[str, Any] = {}
+    if case.known and run.status != "interrupted":
+        scenario = scenarios.get(case.name)
+        found = scenarios.answers(scenario, run=run if case.run == scenario.run else None)
     known = {question: {"known": case.known[question], "found": found[question]} for question in found}
     values = _values(run)
     return Outcome(case, run, tuple(_sentences(run, values)), values, known)
@@ -175,11 +184,12 @@ def publish_run(
     ['events.csv', 'figures', 'record.csv', 'results.json']
     """
     run = result.run
-    rate = check_output(run, fs=fs or result.case.fs, form=form, animation=animation)
+    require_output(result.case, folder=folder, fs=fs, form=form, animation=animation)
+    rate = fs or result.case.fs or default_rate(run)
     with results_folder(Path(folder), {**result.to_dict(), "fs": rate}) as draft:
         tell("writing the record", 1)
         write_record(run.record(fs=rate), draft / f"record.{form}")
-        (draft / "events.csv").write_text(_events_text(run), encoding="utf-8")
+        _write_events(run, draft / "events.csv")
         tell("drawing the figures", 2)
         (draft / "figures").mkdir()
         write_figures(draft / "figures", "", figures(run))
@@ -190,43 +200,76 @@ def publish_run(
     return Path(folder)
 
 
-def _events_text(run: Trajectory) -> str:
-    headings = ",".join(["time [s]", *Event._fields[1:]])
-    return "\n".join([headings, *(",".join(map(str, event)) for event in run.events)]) + "\n"
+def _write_events(run: Trajectory, path: Path) -> None:
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(["time [s]", *Event._fields[1:]]) + "\n")
+        file.writelines(",".join(map(str, _told(event).values())) + "\n" for event in run.each_event())
 
 
-def check_output(run: Trajectory, *, fs: float | None, form: str, animation: str | None) -> float:
-    """The sampling rate, once everything asked for can be written."""
+def _told(event: Event) -> dict[str, Any]:
+    """An event for readers: contacts are counted from 1, as in a system's file."""
+    return {**event._asdict(), "contact": event.contact + 1}
+
+
+def require_output(
+    case: Case, *, folder: str | Path, fs: float | None = None, form: str = "csv", animation: str | None = None
+) -> None:
+    """Refuse, before a case is run, what :func:`publish_run` could not write after it.
+
+    Parameters
+    ----------
+    case : Case
+        What is to be run.
+    folder, fs, form, animation
+        As in :func:`publish_run`.
+
+    Raises
+    ------
+    ModelError
+        A format is not known, the record would be too long, or the folder holds something that is not ours.
+
+    Examples
+    --------
+    >>> from stickslip.system_file import scenario_case
+    >>> require_output(scenario_case("FD-4"), folder="decay", form="h5")
+    """
     if f".{form}" not in WRITERS:
         raise ModelError(f"a record as '{form}'", f"it is written as {', '.join(w[1:] for w in WRITERS)}", "choose one")
     if animation is not None:
         from stickslip.plot.animation import require_writer
 
         require_writer(f".{animation}")
-    rate = default_rate(run) if fs is None else fs
-    if not (math.isfinite(rate) and rate > 0 and rate * run.duration <= REFUSED_ROWS):
+    rate = fs or case.fs
+    if rate is not None and not (math.isfinite(rate) and rate > 0 and rate * case.duration <= REFUSED_ROWS):
         raise ModelError(
-            f"fs = {rate:g} Hz over {run.duration:g} s",
+            f"fs = {rate:g} Hz over {case.duration:g} s",
             f"a record has at most {REFUSED_ROWS:g} rows, at a positive rate",
             "give a lower --fs or a shorter run",
         )
-    return rate
+    check_folder(Path(folder))
 
 
 def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
     cycle = cycle_of(run)
     first, last = last_cycles(run, 1)
     times = np.linspace(first, last, PEAKS)
-    (x, v), _ = run.sample(times, ("x", "v"))
     values = {
         "simulated time": (run.duration, "s"),
         "cycles": (run.duration / cycle, "1"),
         "events": (float(np.count_nonzero(run.exits[:-1] >= 0)), "1"),
-        **{f"share of time in {kind}": (share, "1") for kind, share in _shares(run).items()},
-        "displacement, from": (float(x.min()), "m"),
-        "displacement, to": (float(x.max()), "m"),
-        "largest speed": (float(np.abs(v).max()), "m/s"),
+        **_shares(run),
     }
+    for j in range(len(run.labels("x"))):
+        x, v = sampled(run, (("x", j), ("v", j)), times)
+        words, speed = (numbered_words(run, text, name, j) for text, name in (("displacement", "x"), ("speed", "v")))
+        values[f"{words}, from"] = (float(x.min()), "m")
+        values[f"{words}, to"] = (float(x.max()), "m")
+        values[f"largest {speed}"] = (float(np.abs(v).max()), "m/s")
+    for c in range(contacts_of(run)):
+        if pressed(run, c):
+            (load,) = sampled(run, (("load", c),), times)
+            words = numbered_words(run, "normal load", "load", c)
+            values[f"{words}, from"], values[f"{words}, to"] = (float(load.min()), "N"), (float(load.max()), "N")
     if len(run.modes) <= MOST_PIECES and isinstance(run.table, Automaton):  # a closed form to integrate
         work = energy(run)
         values["work against friction"] = (work.friction, "J")
@@ -234,32 +277,50 @@ def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
     return values
 
 
-def _shares(run: Trajectory) -> dict[str, float]:
-    kinds = [mode.kind for mode in run.table.modes]
-    spent = np.bincount(run.modes, weights=run.durations, minlength=len(kinds)) / run.duration
-    shares = {
-        kind: float(sum(s for s, k in zip(spent, kinds, strict=True) if k == kind)) for kind in dict.fromkeys(kinds)
-    }
-    return {kind: shares[kind] for kind in ("slip", "microstick", "stick") if kind in shares}
+def _shares(run: Trajectory) -> dict[str, tuple[float, str]]:
+    """How the time is shared by what each contact does."""
+    found: dict[str, tuple[float, str]] = {}
+    spent = np.bincount(run.modes, weights=run.durations, minlength=len(run.table.modes)) / run.duration
+    for contact in range(contacts_of(run)):
+        kinds = kinds_of(run, contact)
+        for kind in [kind for kind in KINDS if kind in kinds]:
+            share = float(sum(s for s, k in zip(spent, kinds, strict=True) if k == kind))
+            found[numbered_words(run, f"share of time in {kind}", "friction", contact)] = (share, "1")
+    return found
 
 
 def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list[str]:
     found = []
+    masses = run.labels("x")
     if run.status == "interrupted":
         found.append(f"Interrupted: the run holds the {_text(run.duration, 's')} simulated until then.")
     if run.status == "at rest":
-        place = _text(float(run.state(run.duration)["x"]), "m")
-        found.append(f"The mass comes to rest after {_text(float(run.starts[-1]), 's')}, at a displacement of {place}.")
+        state, after = run.state(run.duration), _text(float(run.starts[-1]), "s")
+        places = [f"{_text(float(state[name]), 'm')}{f' of {name}' if len(masses) > 1 else ''}" for name in masses]
+        subject = "The mass comes" if len(masses) == 1 else "All masses come"
+        found.append(f"{subject} to rest after {after}, at a displacement of {_listed(places)}.")
     else:
-        low, high, speed = (_text(*values[n]) for n in ("displacement, from", "displacement, to", "largest speed"))
-        found.append(f"In the last cycle the mass moves between {low} and {high}, at up to {speed}.")
-    counts = Counter(event.kind for event in run.events)
+        ways = []
+        for j, name in enumerate(masses):
+            words = numbered_words(run, "displacement", "x", j)
+            low, high = (_text(*values[f"{words}, {end}"]) for end in ("from", "to"))
+            ways.append(f"{'the mass moves' if len(masses) == 1 else name} between {low} and {high}")
+        speeds = [values[f"largest {numbered_words(run, 'speed', 'v', j)}"][0] for j in range(len(masses))]
+        verb = "" if len(masses) == 1 else "the masses move: "
+        found.append(f"In the last cycle {verb}{_listed(ways)}, at up to {_text(max(speeds), 'm/s')}.")
+    counts = run.event_counts()
     if counts:
         told = ", ".join(f"{count} × {kind}" for kind, count in counts.most_common())
-        found.append(f"On the way the contact changes {sum(counts.values())} times: {told}.")
-    elif len(run.modes) == 1:
-        found.append("The contact never changes its mode.")
+        subject = "the contact changes" if contacts_of(run) == 1 else "the contacts change"
+        found.append(f"On the way {subject} {counts.total()} times: {told}.")
+    elif len(run.modes) == 1 and contacts_of(run):
+        found.append("The contact never changes its mode." if contacts_of(run) == 1 else "No contact changes its mode.")
     return found
+
+
+def _listed(parts: Sequence[str]) -> str:
+    shown = [*parts[:MOST_NAMED], *([f"{len(parts) - MOST_NAMED} more"] if len(parts) > MOST_NAMED else [])]
+    return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
 
 
 def _fastest_contact(run: Trajectory) -> float:
@@ -269,20 +330,33 @@ def _fastest_contact(run: Trajectory) -> float:
     return max(float(np.abs(np.linalg.eigvals(flow).imag).max()) for flow in run.table.flow) / (2 * math.pi)
 
 
-def _fields(thing: Any) -> dict[str, Any]:
-    values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.name not in ("law", "drive")}
+def _described(thing: Any) -> Any:
+    """A part of a system by its name and values; several parts, each."""
+    if isinstance(thing, Sequence):
+        return [_described(part) for part in thing]
+    return {"name": type(thing).__name__, **_fields(thing)}
+
+
+def _fields(thing: Any, *, without: Sequence[str] = ()) -> dict[str, Any]:
+    values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.name not in without}
     return {name: _plain(np.size(value) if name == "samples" else value) for name, value in values.items()}
 
 
 def _plain(value: Any) -> Any:
     """A value as JSON has it."""
+    if isinstance(value, Formula):
+        return value.text
+    if dataclasses.is_dataclass(value):
+        return _described(value)
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
     if isinstance(value, Mapping):
         return {key: _plain(inner) for key, inner in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [_plain(inner) for inner in value]
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
-    return value
+    return value if isinstance(value, str | int | None) else repr(value)
 
 
 def _text(value: float, unit: str) -> str:

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import parameters
+from stickslip.parameters import find, places
 from stickslip.solve.automaton import Array, System, automaton
 from stickslip.solve.periodic import CLOSED, SteadyState, derivative, end_of, judged, lap
 from stickslip.solve.simulate import opening
-from stickslip.structure import Structure
 
 NUDGE = 1e-6  # of the parameter, relative to the way ahead: the map is differenced across twice this
 FLOOR = 1e-11  # a step shorter than this, relative to the way ahead, has met a jump of the map
@@ -179,10 +178,10 @@ def continue_orbit(orbit: SteadyState, parameter: str, *, to: float, step: float
 
 def _value(system: System, parameter: str) -> float:
     """The parameter's value now, found where `having` would put it."""
-    for owner in (system, *(system.contacts if isinstance(system, Structure) else ()), system.drive):
-        value = getattr(parameters(owner).get(parameter), parameter, None)
-        if isinstance(value, int | float):
-            return float(value)
+    known = places(system)
+    value, *others = [getattr(known[path], path[-1]) for path in find(system, parameter)]
+    if isinstance(value, int | float) and all(other == value for other in others):
+        return float(value)
     raise ModelError(f"'{parameter}' has no single value", "a branch follows one number", "choose another parameter")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -102,20 +103,52 @@ class Trajectory:
     def events(self) -> tuple[Event, ...]:
         """The changes of mode, in order of time.
 
-        Kinds: the kind of the mode that begins ("stick", "slip", "microstick"), or "reversal" where a slip goes
-        straight over into a slip to the other side.
+        Kinds: the kind of the mode that begins ("stick", "slip", "microstick", "flight"), or "reversal" where a slip
+        goes straight over into a slip to the other side.
         """
-        return tuple(self._events())
+        return tuple(self.each_event())
 
-    def _events(self) -> Iterator[Event]:
-        modes = self.table.modes
-        for j in range(1, len(self.modes)):
-            if self.exits[j - 1] < 0:
-                continue
-            before, after = modes[self.modes[j - 1]], modes[self.modes[j]]
-            for contact, old, new in after.changes(before, self.exits[j - 1] - self.table.first[self.modes[j - 1]]):
-                turned = old.side * new.side < 0
-                yield Event(float(self.starts[j]), "reversal" if turned else new.kind, new.name, new.side, contact)
+    def each_event(self) -> Iterator[Event]:
+        """The events one by one, of a run too long for a tuple of them.
+
+        Yields
+        ------
+        Event
+        """
+        ends, codes = self._changes
+        words = {code: self._words(code) for code in np.unique(codes).tolist()}
+        for j, code in zip(ends.tolist(), codes.tolist(), strict=True):
+            for word in words[code]:
+                yield Event(float(self.starts[j]), *word)
+
+    def event_counts(self) -> Counter[str]:
+        """How many events there are of each kind.
+
+        Returns
+        -------
+        Counter
+        """
+        counts: Counter[str] = Counter()
+        for code, count in zip(*np.unique(self._changes[1], return_counts=True), strict=True):
+            for kind, *_ in self._words(int(code)):
+                counts[kind] += int(count)
+        return counts
+
+    @cached_property
+    def _changes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Pieces that begin with an event, and a number for what happens there: by which exit, into which mode."""
+        begun = np.flatnonzero(self.exits[:-1] >= 0) + 1
+        return begun, self.exits[begun - 1].astype(np.int64) * len(self.table.modes) + self.modes[begun]
+
+    def _words(self, code: int) -> list[tuple[str, str, int, int]]:
+        """Kind, mode, side and contact of the events that an exit into a mode stands for."""
+        leaving, entered = divmod(code, len(self.table.modes))
+        left = int(np.searchsorted(self.table.first, leaving, side="right")) - 1
+        before, after = self.table.modes[left], self.table.modes[entered]
+        return [
+            ("reversal" if old.side * new.side < 0 else new.kind, new.name, new.side, contact)
+            for contact, old, new in after.changes(before, leaving - int(self.table.first[left]))
+        ]
 
     def state(self, time: float) -> dict[str, float]:
         """The exact state at one instant: x [m], v [m/s], the law's memory, a [m/s^2], friction [N], and the mode.

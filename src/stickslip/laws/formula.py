@@ -1,0 +1,95 @@
+"""A friction curve written as text: ``"3 / (1 + 1.42 * v) + 1"`` is a function of the sliding speed v."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+
+from stickslip.errors import ModelError
+from stickslip.laws import curved
+from stickslip.laws.curved import FUNCTIONS, Expression, lifted
+
+LONGEST = 300  # characters; the parser's recursion stays shallow
+_GRAMMAR = f"a curve is made of numbers, the speed v [m/s], + - * / **, brackets and {', '.join(FUNCTIONS)}"
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A curve over the sliding speed, as a :class:`FrictionCurve` takes it, from its text.
+
+    Attributes
+    ----------
+    text : str
+        Numbers, the speed ``v`` [m/s], ``+ - * / **``, brackets, and the functions exp, log, tanh, asinh, sqrt.
+
+    Raises
+    ------
+    ModelError
+        The text is no such formula.
+
+    Examples
+    --------
+    >>> popp = Formula("3 / (1 + 1.42 * v) + 1 + 0.1 * v**2")
+    >>> round(popp(lifted(1.0)).at(), 6)
+    2.339669
+    """
+
+    text: str
+
+    def __post_init__(self) -> None:
+        if len(self.text) > LONGEST:
+            raise self._refused(f"of {len(self.text)} characters")
+        try:
+            self(lifted(0.0)).at()
+        except (ArithmeticError, TypeError, ValueError) as error:
+            raise self._refused(f"has no value at rest ({error})") from error
+
+    def __call__(self, speed: Expression) -> Expression:
+        """The curve at a speed."""
+        try:
+            tree = ast.parse(self.text, mode="eval")
+        except (SyntaxError, ValueError) as error:
+            raise self._refused("can not be read") from error
+        return lifted(self._value(tree.body, speed))
+
+    def _value(self, node: ast.expr, speed: Expression) -> Expression | float:
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
+            return float(node.value)
+        if isinstance(node, ast.Name) and node.id == "v":
+            return speed
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+            inner = self._value(node.operand, speed)
+            return -inner if isinstance(node.op, ast.USub) else inner
+        if isinstance(node, ast.BinOp):
+            return self._joined(node, speed)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
+            arguments = [self._value(part, speed) for part in node.args]
+            if len(arguments) == 1 and not node.keywords:
+                return lifted(getattr(curved, node.func.id)(*arguments))
+        raise self._refused(f"has '{ast.unparse(node)}'")
+
+    def _joined(self, node: ast.BinOp, speed: Expression) -> Expression | float:
+        left, right = lifted(self._value(node.left, speed)), self._value(node.right, speed)
+        match node.op:
+            case ast.Add():
+                return left + right
+            case ast.Sub():
+                return left - right
+            case ast.Mult():
+                return left * right
+            case ast.Div():
+                return left / right
+            case ast.Pow() if isinstance(right, float):
+                return left**right
+            case ast.Pow() if not _has_speed(node.right):
+                return left ** lifted(right).at()
+        raise self._refused(f"has '{ast.unparse(node)}'")
+
+    def _refused(self, what: str) -> ModelError:
+        return ModelError(
+            f"the curve '{self.text[:60]}' {what}", _GRAMMAR, "correct it, as in 1.0 + 0.5 * exp(-v / 0.1)"
+        )
+
+
+def _has_speed(node: ast.expr) -> bool:
+    return any(isinstance(part, ast.Name) and part.id == "v" for part in ast.walk(node))
