@@ -22,7 +22,7 @@ def places(part: Any, within: Path = ()) -> dict[Path, Any]:
     >>> from stickslip import CompliantContact, Oscillator
     >>> slider = Oscillator(mass=1, stiffness=4, law=CompliantContact(kinetic=1, stiffness=1e5))
     >>> [".".join(path) for path in places(slider)][-4:]
-    ['law.damping', 'law.static', 'law.rule', 'drive.contact']
+    ['law.stiffness', 'law.damping', 'law.static', 'law.rule']
     """
     found = {(*within, field.name): part for field in fields(part)}
     for name in PARTS:
