@@ -70,3 +70,44 @@ def stick_slip(
         out["f"][here] = sign * friction
         now, x = float(stop), float(motion(stop, 0))
     return {"t": t, **out, "z": amplitude * np.sin(w * t)}
+
+
+def free_decay(
+    *,
+    damping_ratio: float = 0.0316,
+    dry: float = 0.02,
+    static: float | None = None,
+    amplitude: float = 1.0,
+    per_cycle: float = 100.0,
+    hold: float = 0.25,
+    tail: float = 1.0,
+    order: int = 0,
+) -> tuple[Array, float, Array]:
+    """Exact displacement (or its derivative), sampling rate and extremes of a mass released over dry friction.
+
+    Of ``x'' + 2 zeta w x' + w^2 x = -w^2 dry sign(x')`` from `amplitude`, of 1 Hz were it undamped; `hold` and `tail`
+    are in cycles. It stops at the first extreme within `static` (`dry` unless given), or below 1e-4 of the first.
+    """
+    w, z = 2 * np.pi, damping_ratio
+    wd, beta = w * np.sqrt(1 - z**2), z / np.sqrt(1 - z**2)
+    fade = np.exp(-np.pi * beta)
+    extremes = [amplitude]
+    while abs(extremes[-1]) > max(dry if static is None else static, 1e-4 * abs(amplitude)):
+        extremes.append(-fade * extremes[-1] + np.sign(extremes[-1]) * (1 + fade) * dry)
+    turns = np.array(extremes)
+    cycle = 2 * np.pi / wd
+    fs = per_cycle / cycle
+    halves = len(turns) - 1
+    t = np.arange(-round(hold * per_cycle), round((halves / 2 + tail) * per_cycle)) / fs
+    number = np.clip(np.floor(2 * t / cycle), 0, halves - 1).astype(int)
+    since = t - number * cycle / 2
+    side, reach = np.sign(turns[number]), np.abs(turns[number]) - dry
+    shape = np.exp(-z * w * since)
+    if order == 0:
+        moving = side * (dry + reach * shape * (np.cos(wd * since) + beta * np.sin(wd * since)))
+        return np.where(t <= 0, amplitude, np.where(t >= halves * cycle / 2, turns[-1], moving)), fs, turns
+    if order == 1:
+        moving = -side * reach * shape * np.sin(wd * since) * w**2 / wd
+    else:
+        moving = -side * reach * shape * w**2 * (np.cos(wd * since) - beta * np.sin(wd * since))
+    return np.where((t <= 0) | (t >= halves * cycle / 2), 0.0, moving), fs, turns

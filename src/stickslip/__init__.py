@@ -35,6 +35,11 @@ if TYPE_CHECKING:
     from stickslip.identify.force import friction_force as friction_force
     from stickslip.identify.loops import friction_loops as friction_loops
     from stickslip.identify.regression import regress_friction as regress_friction
+    from stickslip.identify.release import (
+        Releases as Releases,
+        RingDown as RingDown,
+        find_releases as find_releases,
+    )
     from stickslip.identify.sticks import find_sticks as find_sticks
     from stickslip.plot.figures import figures as figures
     from stickslip.record.channels import Channel as Channel
@@ -146,6 +151,7 @@ _ROOMS = {
     "inverse_wavelet": "signals.wavelet", "plot_wavelet": "plot.wavelet",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",
+    "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
     "analyze": "analysis", "compare": "analysis", "mend": "analysis", "Findings": "analysis", "Comparison": "analysis",
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",

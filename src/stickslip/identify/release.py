@@ -1,0 +1,527 @@
+"""Where in a record is something released, and how does it swing until it comes to rest?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError, RecordError
+from stickslip.record.flaws import clipped
+from stickslip.record.record import Record
+from stickslip.signals.delay import without_delays
+from stickslip.signals.noise import noise_level, quantisation_step
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+QUESTION = "free decay"
+ORDERS = {"x": 0, "theta": 0, "v": 1, "a": 2}  # derivative of the displacement that a channel is, in order of choice
+DRIVEN = ("z", "force")  # channels that must not move in a free decay
+LEAST = 24  # samples from which a noise level can be told
+COARSE, FINE = 8192, 12  # points of the record, and per half cycle, in which turning points are sought
+SEEN = 5.0  # standard deviations that a swing must rise above the noise
+LARGE = 0.3  # of the record's range: swings from which the period is first read
+RISE = 3.0  # half periods in the time that a cosine takes from a quarter to three quarters of its swing
+PACE = (0.7, 1.4)  # a half cycle over the one before; a pendulum from near the top shortens by a third
+GROWN = 1.05  # a swing over the one before from which it is not the same decay
+STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
+
+
+@dataclass(frozen=True, eq=False)
+class RingDown:
+    """One release and what follows it: hold, motion, tail.
+
+    Attributes
+    ----------
+    channel : str
+        What was measured: ``x``, ``theta``, ``v`` or ``a``.
+    order : int
+        Derivative of the displacement that it is: 0, 1 or 2.
+    unit : str
+        Its SI unit.
+    fs : float
+        Sampling rate [Hz].
+    first : float
+        Time in the record [s] of the first of `samples`.
+    samples : ndarray, shape (n,)
+        Hold, motion and tail as recorded, stated delays taken out.
+    release, stop : float
+        Times in the record [s], to a few samples, at which the motion begins and ends; the ends of `samples` where
+        these are not in the record.
+    held, stopped : bool
+        Whether the release, and the coming to rest, are in the record.
+    frequency : float
+        Of the oscillation, roughly [Hz].
+    rest : float
+        Where the extremes are centred: the spring's zero, roughly.
+    amplitude : float
+        First extreme from `rest`, with its sign.
+    noise, step : float
+        Standard deviation of the broadband noise; step of the digitiser, 0 where none is seen.
+    turns : ndarray of int, shape (k,)
+        Rows of the alternating extremes; the release is the first where `held`, the rest the last where `stopped`.
+    sound : ndarray of bool, shape (k,)
+        Which extremes can be trusted: not cut off by the instrument.
+    notes : tuple of str
+        What to beware of.
+    """
+
+    channel: str
+    order: int
+    unit: str
+    fs: float
+    first: float
+    samples: Array
+    release: float
+    stop: float
+    held: bool
+    stopped: bool
+    frequency: float
+    rest: float
+    amplitude: float
+    noise: float
+    step: float
+    turns: Rows
+    sound: NDArray[np.bool_]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> str:
+        """ "ok", or what to beware of."""
+        return "; ".join(self.notes) or "ok"
+
+    @property
+    def time(self) -> Array:
+        """Times in the record [s] of the samples."""
+        return self.first + np.arange(len(self.samples)) / self.fs
+
+    @property
+    def hold(self) -> slice:
+        """Rows before the motion."""
+        return slice(0, self._row(self.release))
+
+    @property
+    def motion(self) -> slice:
+        """Rows of the motion."""
+        return slice(self._row(self.release), self._row(self.stop) + 1)
+
+    @property
+    def tail(self) -> slice:
+        """Rows after the motion."""
+        return slice(self._row(self.stop) + 1, len(self.samples))
+
+    def _row(self, time: float) -> int:
+        return min(max(0, round((time - self.first) * self.fs)), len(self.samples) - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Releases:
+    """The free decays of a record.
+
+    Attributes
+    ----------
+    ring_downs : tuple of RingDown
+        In order of time, one at least.
+    notes : tuple of str
+        What to beware of, of the record as a whole.
+    """
+
+    ring_downs: tuple[RingDown, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> str:
+        """ "ok", or what to beware of."""
+        return "; ".join(self.notes) or "ok"
+
+    def __repr__(self) -> str:
+        told = [
+            f"{each.release:.4g} to {each.stop:.4g} s: {len(each.turns)} extremes at {each.frequency:.4g} Hz"
+            f" from {each.amplitude:.3g} {each.unit}" + ("" if each.stopped else ", still moving at the end")
+            for each in self.ring_downs
+        ]
+        return "\n  ".join([f"{len(told)} release{'s' * (len(told) > 1)}:", *told])
+
+
+def find_releases(record: Record, *, channel: str | None = None) -> Releases:
+    """Where is something let go, and where does it come to rest?
+
+    Turning points are sought in block means of twelve to the half cycle, where the channel turns back by five standard
+    deviations of their noise (one and a half steps of a digitiser). A free decay is a chain of swings from one turning
+    point to the next that keep pace (each half cycle takes 0.7 to 1.4 times as long as the one before) and do not grow.
+    Motion begins a quarter of a cycle before the first swing's middle and ends a quarter after the last one's; before
+    lies the hold, after it the tail. A hand's slow pull keeps no pace and belongs to neither.
+
+    Parameters
+    ----------
+    record : Record
+        With ``x`` [m] or ``theta`` [rad], ``v`` [m/s] or ``a`` [m/s^2]. Stated delays are taken out first.
+    channel : str, optional
+        Which of them; the first of these that the record has when left out.
+
+    Returns
+    -------
+    Releases
+
+    Raises
+    ------
+    RecordError
+        No such channel, a value that is no number, a broken clock, or fewer than 24 samples.
+    EstimateError
+        No free decay: nothing moves, nothing swings back (overdamped), the oscillation grows, stays or beats, or
+        something drives it.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) / 400
+    >>> swing = np.exp(-0.5 * t) * (np.cos(15 * t) + 0.5 / 15 * np.sin(15 * t))
+    >>> record = Record.of({"x": np.concatenate([np.ones(200), swing])}, fs=400.0)
+    >>> releases = find_releases(record)
+    >>> round(releases.ring_downs[0].release, 2), round(releases.ring_downs[0].frequency, 1)
+    (0.5, 2.4)
+    """
+    record, name = _prepared(record, channel)
+    values = record[name]
+    noise, step = _noise(record, name), quantisation_step(values)
+    swings = _Swings.of(values, noise, step, record.fs)
+    runs = _runs(swings, values)
+    unsound = np.zeros(len(values), dtype=bool)
+    for first, last in clipped(values, plateaus=name != "x"):
+        unsound[first : last + 1] = True
+    found = tuple(
+        _ring_down(record, name, swings, run, (noise, step), unsound, _bounds(swings, runs, number, len(values)))
+        for number, run in enumerate(runs)
+    )
+    many = (f"{len(found)} releases in one record, each on its own",) if len(found) > 1 else ()
+    return Releases(found, (*many, *dict.fromkeys(note for each in found for note in each.notes)))
+
+
+def _prepared(record: Record, channel: str | None) -> tuple[Record, str]:
+    present = [name for name in ORDERS if name in record]
+    if channel is None and not present:
+        raise RecordError(
+            f"the record has {', '.join(record)}",
+            "a free decay is read from x, theta, v or a",
+            'name the column when reading: channels={"x": "COLUMN [unit]"}',
+        )
+    name = present[0] if channel is None else channel
+    if name not in ORDERS:
+        raise RecordError(
+            f"channel {name} is not a motion", f"a free decay is read from {', '.join(ORDERS)}", "choose one of them"
+        )
+    record.require_clean(name, question=QUESTION, samples=LEAST)
+    record = without_delays(record, name, question=QUESTION, samples=LEAST)
+    for driven in DRIVEN:
+        if driven in record and np.isfinite(record[driven]).all():
+            span, noise = float(np.ptp(record[driven])), _noise(record, driven)
+            if span > 12 * noise and span > (0.02 * float(np.ptp(record[name])) if driven == "z" else 0.0):
+                raise EstimateError(
+                    f"channel {driven} moves by {span:.3g} {record.channels[driven].unit}",
+                    "a free decay has nothing that drives it",
+                    "give a record with the drive at rest, or ask friction_loops(record)",
+                )
+    return record, name
+
+
+def _noise(record: Record, name: str) -> float:
+    known = record.channels[name].noise
+    return known if known is not None else noise_level(record[name], record.fs)
+
+
+@dataclass(frozen=True, eq=False)
+class _Swings:
+    """Motions from one turning point to the next: rows (fractions allowed) and sizes."""
+
+    edges: Array  # (k + 1,) turning points
+    levels: Array  # (k + 1,) values there
+    middles: Array  # (k,) where each swing passes its middle
+    halves: Array  # (k,) half period that each swing's own steepness tells
+    seen: float  # least swing that is told from noise
+
+    @property
+    def sizes(self) -> Array:
+        return np.abs(np.diff(self.levels))
+
+    @classmethod
+    def of(cls, values: Array, noise: float, step: float, fs: float) -> _Swings:
+        span = float(np.ptp(values))
+        if span <= max(2 * SEEN * noise, 3 * step):
+            raise EstimateError(
+                f"the channel moves by {span:.3g}, its noise is {noise:.3g}",
+                "a free decay rises above its noise",
+                "check the sensor and its column, or release from farther",
+            )
+        rough = cls._within(values, max(1, len(values) // COARSE), LARGE * span)
+        half = _weighted_median(rough.halves, rough.sizes)
+        if half < 2:
+            raise EstimateError(
+                f"the oscillation has {2 * half:.2g} samples a cycle",
+                "its extremes are seen from four samples a cycle on",
+                f"sample faster than {fs:g} Hz",
+            )
+        block = max(1, math.floor(half / FINE))
+        seen = max(2 * SEEN * noise / math.sqrt(block), 1.5 * step, 1e-3 * span)
+        return cls._within(values, block, min(seen, LARGE * span))
+
+    @classmethod
+    def _within(cls, values: Array, block: int, seen: float) -> _Swings:
+        count = len(values) // block
+        means = values[: count * block].reshape(count, block).mean(axis=1)
+        turns = turning_points(means, seen)
+        levels = means[turns]
+        crossings = [_crossings(means, first, last) for first, last in pairwise(turns)]
+        quarter, middle, three = np.array(crossings).T if crossings else np.zeros((3, 0))
+
+        def rows(at: Array) -> Array:
+            return (at + 0.5) * block - 0.5
+
+        return cls(rows(turns.astype(float)), levels, rows(middle), RISE * block * (three - quarter), seen)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Swings of one free decay."""
+
+    first: int
+    end: int
+    inside: bool  # it follows on swings that keep pace with it: no release begins it
+    parted: bool = False  # an extreme was lost before or after it
+
+
+def turning_points(values: Array, least: float) -> Rows:
+    """Rows where `values` turn back by `least` or more, alternately up and down, with the first and last extreme.
+
+    Examples
+    --------
+    >>> turning_points(np.array([0.0, 1.0, 0.9, 2.0, -1.0, 0.5]), 0.5).tolist()
+    [0, 3, 4, 5]
+    """
+    turns: list[int] = []
+    low = high = 0
+    direction = 0
+    listed = values.tolist()
+    for row, value in enumerate(listed):
+        if direction >= 0:
+            if value >= listed[high]:
+                high = row
+            elif listed[high] - value >= least:
+                turns.append(high)
+                direction, low = -1, row
+                continue
+        if direction <= 0:
+            if value <= listed[low]:
+                low = row
+            elif value - listed[low] >= least:
+                turns.append(low)
+                direction, high = 1, row
+    if turns:
+        turns.append(high if direction > 0 else low)
+    return np.array(turns, dtype=np.intp)
+
+
+def _crossings(values: Array, first: int, last: int) -> list[float]:
+    """Where a swing passes a quarter, half and three quarters of its way; the last time before it is through."""
+    way = (values[first : last + 1] - values[first]) / (values[last] - values[first])
+    through = int(np.argmax(way >= 0.75))
+    places = []
+    for share in (0.25, 0.5, 0.75):
+        before = np.flatnonzero(way[: through + 1] < share)
+        row = int(before[-1]) if len(before) else 0
+        after = min(row + 1, len(way) - 1)
+        rise = way[after] - way[row]
+        places.append(first + row + (float((share - way[row]) / rise) if rise > 0 else 0.0))
+    return places
+
+
+def _weighted_median(values: Array, weights: Array) -> float:
+    if not len(values):
+        return math.inf
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, total[-1] / 2)])
+
+
+def _runs(swings: _Swings, values: Array) -> list[_Run]:
+    """First swing, and the one after the last, of each free decay."""
+    if len(swings.middles) < 2:
+        raise EstimateError(
+            f"the motion turns {max(0, len(swings.levels) - 2)} times",
+            "a free decay swings past its rest and back; an overdamped one creeps there and tells no decrement",
+            "lessen the damping, or release from farther",
+        )
+    runs: list[_Run] = []
+    for first, last in _paced(swings):
+        sizes = swings.sizes[first:last]
+        grown = sizes[1:] > GROWN * sizes[:-1] + swings.seen
+        _refuse_growth(sizes, grown, swings)
+        starts = [0, *(int(i) + 1 for i in np.flatnonzero(grown)), len(sizes)]
+        runs += [_Run(first + a, first + b, a > 0) for a, b in pairwise(starts) if b - a >= 2]
+    if not runs:
+        raise EstimateError(
+            "no two swings keep pace and shrink",
+            "a free decay is a chain of swings that each take as long as the one before",
+            "give the record of a release, or cut it out with record.between(first, last)",
+        )
+    least = max(0.05 * max(float(swings.sizes[run.first]) for run in runs), 3 * swings.seen)
+    return _mended([run for run in runs if swings.sizes[run.first] > least] or runs, swings)
+
+
+def _mended(runs: list[_Run], swings: _Swings) -> list[_Run]:
+    """Of pieces of one decay, parted by an extreme that was lost, the longest; releases of their own, all."""
+    kept = [runs[0]]
+    for run in runs[1:]:
+        last = kept[-1]
+        gap = swings.middles[run.first] - swings.middles[last.end - 1]
+        near = gap < 3.2 * float(np.median(np.diff(swings.middles[last.first : last.end])))
+        if near and swings.sizes[run.first] < swings.sizes[last.first]:
+            kept[-1] = replace(max(last, run, key=lambda piece: piece.end - piece.first), parted=True)
+        else:
+            kept.append(run)
+    return kept
+
+
+def _paced(swings: _Swings) -> list[tuple[int, int]]:
+    """Chains of swings that keep pace."""
+    gaps, chains, first = np.diff(swings.middles), [], 0
+    for i, gap in enumerate(gaps):
+        before = gaps[i - 1 : i] if i > first else swings.halves[i : i + 2]
+        slack = 1.0 if i > first else 1.5  # its own steepness tells a swing's length less well
+        if not np.all((gap > PACE[0] / slack * before) & (gap < PACE[1] * slack * before)):
+            chains.append((first, i + 1))
+            first = i + 1
+    return [*chains, (first, len(swings.middles))]
+
+
+def _refuse_growth(sizes: Array, grown: NDArray[np.bool_], swings: _Swings) -> None:
+    """Refuse a chain of swings that grows, beats or stays."""
+    slowly = sizes[1:] > sizes[:-1] + swings.seen / 2
+    rising = max((len(part) for part in "".join("r" if up else " " for up in slowly).split()), default=0)
+    if len(sizes) >= 4 and (rising >= 3 or grown.sum() > len(sizes) / 3):
+        top = int(np.argmax(sizes))
+        again = int(np.sum(np.diff(np.concatenate([[False], slowly]).astype(int)) == 1))
+        if top > 0.8 * (len(sizes) - 1) and sizes[0] < 0.9 * sizes[top]:
+            raise EstimateError(
+                f"the swings grow from {sizes[0]:.3g} to {sizes[top]:.3g}",
+                "a free decay dies away",
+                "look for what drives the motion: a feedback, a base, friction that falls with speed",
+            )
+        if again > 1:
+            raise EstimateError(
+                f"the swings fall and rise again {again} times: two modes beat, or something drives the motion",
+                "a free decay has one mode and swings that shrink",
+                "hold the other mode still, or filter it out before reading",
+            )
+    if len(sizes) >= 10:
+        third = len(sizes) // 3
+        fall = 1 - float(np.median(sizes[-third:]) / np.median(sizes[:third]))
+        if fall < STEADY and float(np.median(sizes)) > 20 * swings.seen:
+            raise EstimateError(
+                f"{len(sizes)} swings shrink by {100 * max(0.0, fall):.2g} %",
+                "a free decay dies away",
+                "give a record of a release, or ask friction_loops(record) of a forced one",
+            )
+
+
+def _bounds(swings: _Swings, runs: Sequence[_Run], number: int, size: int) -> tuple[int, int]:
+    """Rows that belong to no other release."""
+    before = 0 if number == 0 else round(swings.edges[runs[number - 1].end])
+    after = size if number == len(runs) - 1 else round(swings.edges[runs[number + 1].first])
+    return before, after
+
+
+def _ring_down(
+    record: Record,
+    name: str,
+    swings: _Swings,
+    run: _Run,
+    noise_step: tuple[float, float],
+    unsound: NDArray[np.bool_],
+    bounds: tuple[int, int],
+) -> RingDown:
+    values, (noise, step) = record[name], noise_step
+    middles, levels = swings.middles[run.first : run.end], swings.levels[run.first : run.end + 1]
+    gaps = np.diff(middles)
+    half = float(np.median(gaps))
+    release, stop = middles[0] - gaps[0] / 2, middles[-1] + gaps[-1] / 2
+    rest = _centre(levels)
+    near = max(SEEN * noise, 1.5 * step, 0.02 * abs(levels[0] - rest))
+    held = not run.inside and (release >= 0 or (release > -0.25 * half and _flat_start(values, half, noise)))
+    stopped = stop + half <= bounds[1] - 1
+    start = max(0, round(release))
+    end = min(round(stop), len(values) - 1)
+    hold = _reach(values[bounds[0] : start + 1][::-1], near) if held else 1
+    tail = _reach(values[end : bounds[1]], near) if stopped else len(values) - end
+    first, last = max(0, start + 1 - hold), end + tail
+    inner = [
+        _extreme(values, a, b, level > rest) for a, b, level in zip(middles, middles[1:], levels[1:], strict=False)
+    ]
+    turns = [*([start] if held or run.inside else []), *inner, *([end] if stop <= len(values) - 1 - half / 8 else [])]
+    rows = np.array(turns, dtype=np.intp)
+    sound = ~unsound[rows]
+    notes = _notes(values[rows], sound, swings, run, stopped, noise)
+    return RingDown(
+        name, ORDERS[name], record.channels[name].unit, record.fs, record.start + first / record.fs,
+        values[first:last], record.start + start / record.fs, record.start + end / record.fs, bool(held),
+        bool(stopped), record.fs / (2 * half), rest, float(values[rows[0]] - rest), noise, step, rows - first,
+        sound, notes,
+    )  # fmt: skip
+
+
+def _centre(levels: Array) -> float:
+    """What alternating extremes are centred on: the mean of their running means, which cancel a steady decrement."""
+    if len(levels) < 3:
+        return float(levels.mean())
+    return float(np.mean((levels[:-2] + 2 * levels[1:-1] + levels[2:]) / 4))
+
+
+def _reach(values: Array, near: float) -> int:
+    """For how many rows `values` stay near the first few."""
+    level = float(np.median(values[: max(1, min(8, len(values)))]))
+    away = np.flatnonzero(np.abs(values - level) > near)
+    return int(away[0]) if len(away) else len(values)
+
+
+def _flat_start(values: Array, half: float, noise: float) -> bool:
+    """Whether a record begins at an extreme: the parabola through its first samples has its top there, not before."""
+    count = min(max(5, round(half / 6)), len(values))
+    along = np.arange(count, dtype=float)
+    bend, slope, _ = np.polyfit(along, values[:count], 2)
+    if bend == 0:
+        return False
+    doubt = 2 * noise * 14 / (2 * abs(bend) * count**1.5)  # standard deviations of the slope at a parabola's end
+    return bool(-slope / (2 * bend) > -1 - min(doubt, 0.05 * half))
+
+
+def _extreme(values: Array, first: float, last: float, top: bool) -> int:
+    """Row of the extreme between two middles, of running means over a sixth of the half cycle."""
+    part = values[round(first) : round(last) + 1]
+    width = max(1, len(part) // 6) | 1
+    smooth = np.convolve(np.pad(part, width // 2, mode="edge"), np.full(width, 1 / width), mode="valid")
+    return round(first) + int(np.argmax(smooth) if top else np.argmin(smooth))
+
+
+def _notes(
+    levels: Array, sound: NDArray[np.bool_], swings: _Swings, run: _Run, stopped: bool, noise: float
+) -> tuple[str, ...]:
+    notes = []
+    if not sound.all():
+        notes.append(f"{int(np.sum(~sound))} extremes are clipped and left out")
+    if not stopped:
+        notes.append("the record ends before the motion")
+    elif swings.sizes[run.end - 1] < 2 * swings.seen:
+        notes.append("the last swings sink into the noise")
+    between = (levels[:-2] + 2 * levels[1:-1] + levels[2:]) / 4
+    if len(between) >= 6:
+        pairs = (between[:-1] + between[1:]) / 2
+        along = np.linspace(-0.5, 0.5, len(pairs))
+        rise = float(along @ pairs / (along @ along))
+        if abs(rise) > max(0.03 * abs(levels[0] - levels[1]), 4 * noise):
+            notes.append(f"the rest position drifts by {rise:.2g}: see remove_drift(record)")
+    if run.parted:
+        notes.append("an extreme was lost, and what lies beyond it is left out")
+    return tuple(notes)
