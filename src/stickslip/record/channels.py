@@ -57,6 +57,12 @@ class Channel:
         Time [s] by which the samples lag what they measure; not yet applied.
     noise : float or None
         Standard deviation [unit] of the channel's noise where known; otherwise estimated when needed.
+    mount : tuple of (float, float), or None
+        Resonance [Hz] and damping ratio of what the sensor stands on, where it matters.
+    inertia : float
+        Mass [kg] between the contact and a load cell, whose inertia the cell feels too.
+    discharge : float or None
+        Time constant [s] with which a piezoelectric sensor forgets; None: it does not.
     """
 
     name: str
@@ -66,6 +72,9 @@ class Channel:
     sensitivity: str = ""
     delay: float = 0.0
     noise: float | None = None
+    mount: tuple[float, float] | None = None
+    inertia: float = 0.0
+    discharge: float | None = None
 
     def __post_init__(self) -> None:
         described(checked_name(self.name), self.unit)
@@ -84,6 +93,31 @@ class Channel:
                 f"noise = {self.noise!r} of channel {self.name}",
                 f"noise is a standard deviation in {self.unit}, zero or more",
                 "pass a number, or None where it is not known",
+            )
+        self._check_dynamics()
+
+    def _check_dynamics(self) -> None:
+        if self.mount is not None and not (
+            isinstance(self.mount, tuple)
+            and len(self.mount) == 2
+            and all(map(_is_finite, self.mount))
+            and self.mount[0] > 0
+            and self.mount[1] >= 0
+        ):
+            raise RecordError(
+                f"mount = {self.mount!r} of channel {self.name}",
+                "a mount is a resonance in Hz and a damping ratio",
+                "pass two numbers: (125.0, 0.1)",
+            )
+        if not _is_finite(self.inertia):
+            raise RecordError(
+                f"inertia = {self.inertia!r} of channel {self.name}", "an inertia is a mass in kg", "pass a number"
+            )
+        if self.discharge is not None and not (_is_finite(self.discharge) and self.discharge > 0):
+            raise RecordError(
+                f"discharge = {self.discharge!r} of channel {self.name}",
+                "a discharge is a positive time constant in seconds",
+                "pass a number, or None",
             )
 
 

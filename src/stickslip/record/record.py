@@ -23,7 +23,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-DETAILS = ("delay", "noise", "sensitivity", "quantity")  # of a channel, that a user may know better than the file
+DETAILS = (
+    "delay",
+    "noise",
+    "sensitivity",
+    "quantity",
+    "mount",
+    "inertia",
+    "discharge",
+)  # of a channel, that a user may know better than the file
 
 
 @dataclass(frozen=True)
@@ -259,7 +267,7 @@ class Record:
         )
 
     def with_details(self, name: str, /, **details: Any) -> Record:
-        """This record with details of a channel stated: ``delay``, ``noise``, ``sensitivity``, ``quantity``."""
+        """This record with details of a channel stated: ``delay``, ``noise``, ``mount`` ...; see :class:`Channel`."""
         self.require(name)
         if unknown := set(details) - set(DETAILS):
             raise RecordError(

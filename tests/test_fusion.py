@@ -1,0 +1,134 @@
+"""Friction by all sensors together, on a rig whose mounts ring, whose cell forgets and whose LVDTs come late."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import stickslip as ss
+from stickslip.errors import EstimateError, RecordError
+from stickslip.signals.kalman import Motion, smooth_motion
+
+CASES = {5.61: (0.6e-3, 1.05), 8.7: (1.1e-3, 1.1), 11.1: (2e-3, 1.1), 2.5: (0.65e-3, 1.1)}
+RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
+LAG = 0.0389 / 30.91
+SETTLED = 8.0  # s
+
+
+@cache
+def measured(frequency: float, rough: float = 0.0, seconds: float = 1.0) -> tuple[ss.Record, NDArray[np.float64]]:
+    """A record of the thesis's rig, and the true friction."""
+    amplitude, kinetic = CASES[frequency]
+    law: Any = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9)
+    if rough:
+        law = ss.RoughSurface(law, share=rough, length=2e-4, span=2e-3, seed=4)
+    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
+    run = ss.simulate(slider, duration=SETTLED + seconds)
+    record = ss.Rig().measure(run, fs=4000, rng=7, start=SETTLED)
+    return record, run.sample(np.minimum(SETTLED + record.time, run.duration), ("friction",))[0][0]
+
+
+def told(record: ss.Record, wrong: bool = False) -> ss.Record:
+    """The record with what its user knows of the sensors: rightly, or 2 %, 30 % and 20 us off."""
+    for name in ("x", "z"):
+        record = record.with_details(name, delay=LAG + 20e-6 * wrong)
+    record = record.with_details("a", mount=(127.5, 0.13) if wrong else (125.0, 0.1))
+    cell = {"mount": (255.0, 0.065), "inertia": 0.055} if wrong else {"mount": (250.0, 0.05), "inertia": 0.05}
+    return record.with_details("load", discharge=50.0, **cell)
+
+
+def error(record: ss.Record, truth: NDArray[np.float64], method: str) -> tuple[float, float]:
+    """Root mean square of the error [N], and the share of samples within two deviations; without the ends."""
+    found = ss.friction_force(record, method=method, **RIG)
+    inside = slice(200, -200)
+    true = truth[round(found.start * 4000) :][: len(found)][inside]
+    off = np.abs(found["friction"][inside] - true)
+    return float(np.sqrt(np.mean(off**2))), float(np.mean(off < 2 * found["friction_sd"][inside]))
+
+
+@pytest.mark.parametrize("rough", [0.0, 0.03])
+@pytest.mark.parametrize("frequency", list(CASES))
+def test_all_sensors_together_find_the_friction_and_its_band(frequency: float, rough: float) -> None:
+    rms, share = error(told(measured(frequency, rough)[0]), measured(frequency, rough)[1], "fusion")
+    assert rms < 0.012
+    assert share > 0.93
+
+
+@pytest.mark.parametrize("frequency", list(CASES))
+def test_motion_sensors_alone_come_near(frequency: float) -> None:
+    rms, share = error(told(measured(frequency)[0]), measured(frequency)[1], "motion")
+    assert rms < 0.026
+    assert share > 0.92
+
+
+@pytest.mark.parametrize("frequency", list(CASES))
+def test_sensors_a_little_wrong_do_little_harm(frequency: float) -> None:
+    assert error(told(measured(frequency)[0], wrong=True), measured(frequency)[1], "fusion")[0] < 0.02
+
+
+def test_the_cell_alone_is_deconvolved() -> None:
+    record, truth = measured(2.5)
+    assert error(told(record), truth, "load")[0] < 0.012
+
+
+def test_the_five_point_average_leaves_the_mount_ringing() -> None:
+    record, truth = measured(8.7)
+    assert error(told(record), truth, "five-point")[0] > 0.1
+
+
+def test_blocks_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
+    record = told(measured(2.5)[0])
+    whole = ss.friction_force(record, method="fusion", **RIG)
+    monkeypatch.setattr("stickslip.identify.fusion.BLOCK", 1500)
+    parts = ss.friction_force(record, method="fusion", **RIG)
+    assert np.sqrt(np.mean((whole["friction"] - parts["friction"]) ** 2)) < 2e-3
+    assert np.abs(whole["friction"] - parts["friction"]).max() < 0.1
+
+
+def test_what_it_lacks_is_said() -> None:
+    record = measured(2.5)[0]
+    few = ss.Record.of({"x": record["x"], "z": record["z"]}, fs=4000)
+    with pytest.raises(RecordError, match="load"):
+        ss.friction_force(few, method="load", **RIG)
+    with pytest.raises(EstimateError, match="fusion"):
+        ss.friction_force(few, method="magic", **RIG)
+    assert "no mounts stated" in ss.friction_force(few, method="motion", **RIG).history[-1].outcome
+
+
+def test_the_smoother_is_the_least_squares_of_all_readings() -> None:
+    """Against the dense normal equations of a small case, states and unknowns solved for at once."""
+    rng = np.random.default_rng(1)
+    size, count = 3, 12
+    transition = np.eye(size) + 0.1 * rng.standard_normal((size, size))
+    motion = Motion(
+        transition, rng.standard_normal(size), rng.standard_normal((2, size)), np.array([0.3, 0.5]),
+        rng.standard_normal(size), np.array([1.0, 2.0, 3.0]),
+    )  # fmt: skip
+    readings, inputs = rng.standard_normal((count, 2)), rng.standard_normal((count, size))
+    readings[4, 1] = np.nan
+    unknown = rng.uniform(0.1, 2.0, count)
+    # everything is linear in (s_0, w_0 ... w_{n-2})
+    free = size + count - 1
+    effect, known = np.zeros((count, size, free)), np.zeros((count, size))
+    effect[0, :, :size] = np.eye(size)
+    for t in range(count - 1):
+        effect[t + 1] = transition @ effect[t]
+        effect[t + 1][:, size + t] += motion.spread
+        known[t + 1] = transition @ known[t] + inputs[t]
+    prior = np.diag(1 / np.concatenate([motion.doubt, unknown[:-1]]))
+    mean = np.concatenate([motion.start, np.zeros(count - 1)])
+    seen = [(t, k) for t in range(count) for k in range(2) if np.isfinite(readings[t, k])]
+    rows = np.array([motion.readings[k] @ effect[t] for t, k in seen])
+    target = np.array([readings[t, k] - motion.readings[k] @ known[t] for t, k in seen])
+    weight = np.diag([1 / motion.noise[k] for _, k in seen])
+    covariance = np.linalg.inv(prior + rows.T @ weight @ rows)
+    best = covariance @ (prior @ mean + rows.T @ weight @ target)
+    smoothed = smooth_motion(motion, readings=readings, inputs=inputs, unknown=unknown, forms=np.eye(size))
+    for t in range(count):
+        assert np.allclose(smoothed.values[:, t], effect[t] @ best + known[t], atol=1e-9)
+        assert np.allclose(smoothed.variance[:, t], np.diag(effect[t] @ covariance @ effect[t].T), atol=1e-9)
+    assert np.allclose(unknown[:-1] * smoothed.score[:-1], best[size:], atol=1e-9)
