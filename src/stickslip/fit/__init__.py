@@ -1,0 +1,1 @@
+"""Questions that need the motion itself: the whole waveform against a record."""

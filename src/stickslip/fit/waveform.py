@@ -1,0 +1,296 @@
+r"""A free decay under viscous and dry friction: the exact motion, its Jacobian, and its normal equations.
+
+The equation of motion is ``x'' + 2 zeta w x' + w^2 (x - b) + w^2 x_k sgn(x') = 0`` (thesis, chapter 6). Held at
+amplitude A until its release at t_0, the mass turns every ``T = pi / (w sqrt(1 - zeta^2))``, whatever the friction
+and the amplitude. In half cycle i, with ``tau = t - t_0 - i T`` and ``s_i = (-1)^i sgn A``,
+
+    x = b + s_i (x_k + d_i E(tau)),   E = Re((1 - i beta) exp(lam tau)),   lam = w (-zeta + i sqrt(1 - zeta^2)),
+
+    d_0 = |A| - x_k,   d_{i+1} = exp(-pi beta) d_i - 2 x_k,   beta = zeta / sqrt(1 - zeta^2),
+
+and after n half cycles it rests at ``b + s_n (d_n + x_k)``. Velocity and acceleration multiply E by lam once and twice.
+
+The data are means over blocks of equally many samples. A block's mean of exp(lam tau) is the value at its centre times
+``sinh(m lam dt / 2) / (m sinh(lam dt / 2))``, so the means of the model are exact at any sampling rate; a block across
+a turning point is split there. Within a half cycle the Jacobian is spanned by five functions, 1, Re z, Im z, tau Re z
+and tau Im z of ``z = exp(lam tau)``: their products are summed over the blocks, and turned into normal equations once.
+
+Parameters of the motion, in this order: angular frequency w [rad/s], damping ratio zeta, dry-friction displacement x_k,
+rest position b, amplitude A (signed, from b), release time t_0 [s] from the first sample.
+"""
+
+from __future__ import annotations
+
+import math
+
+from stickslip.compiled import FAST, compiled
+
+RATE, DAMPING, DRY, REST, AMPLITUDE, RELEASE = range(6)
+NAMES = ("angular_frequency", "damping_ratio", "dry_displacement", "rest", "amplitude", "release")
+VALUE = 6  # the row of the value itself, after those of its derivatives
+
+
+@compiled(**FAST)
+def fall(p, state, advance):
+    """Set (`advance` False) or carry on by a half cycle d_i and its derivatives to damping, dry friction and |A|."""
+    if advance:
+        root = 1.0 - p[DAMPING] * p[DAMPING]
+        ratio = math.exp(-math.pi * p[DAMPING] / math.sqrt(root))
+        slope = -math.pi * ratio / (root * math.sqrt(root))
+        state[1] = slope * state[0] + ratio * state[1]
+        state[0] = ratio * state[0] - 2.0 * p[DRY]
+        state[2] = ratio * state[2] - 2.0
+        state[3] = ratio * state[3]
+    else:
+        state[0] = abs(p[AMPLITUDE]) - p[DRY]
+        state[1], state[2], state[3] = 0.0, -1.0, 1.0
+
+
+@compiled(**FAST)
+def describe(p, n, order, piece, count, dt, state, rows):
+    """Rows of the five functions that make the mean over `count` samples, and its derivatives, in a piece.
+
+    Piece -1 is the hold, 0 to n - 1 are the half cycles, n is the rest.
+    """
+    for k in range(7):
+        for j in range(5):
+            rows[k, j] = 0.0
+    rows[REST, 0] = 1.0
+    rows[VALUE, 0] = p[REST]
+    side = 1.0 if p[AMPLITUDE] >= 0.0 else -1.0
+    if piece < 0:
+        if order == 0:
+            rows[AMPLITUDE, 0] = 1.0
+            rows[VALUE, 0] += p[AMPLITUDE]
+        return
+    sign = side if piece % 2 == 0 else -side
+    if piece >= n:
+        if order == 0:
+            rows[DAMPING, 0] = sign * state[1]
+            rows[DRY, 0] = sign * (state[2] + 1.0)
+            rows[AMPLITUDE, 0] = sign * side * state[3]
+            rows[VALUE, 0] += sign * (state[0] + p[DRY])
+        return
+    w, zeta = p[RATE], p[DAMPING]
+    square = 1.0 - zeta * zeta
+    root = math.sqrt(square)
+    lam = complex(-zeta * w, root * w)
+    lam_zeta = complex(-w, -zeta * w / root)
+    half = math.pi / (w * root)
+    late_zeta, late_w = piece * half * zeta / square, -piece * half / w
+    c, c_zeta = complex(1.0, -zeta / root), complex(0.0, -1.0 / (square * root))
+    q = lam * dt
+    first, second = (count * count - 1.0) / 24.0, (count * count - 1.0) * (3.0 * count * count - 7.0) / 5760.0
+    mean = 1.0 + q * q * (first + q * q * second)
+    mean_lam = dt * q * (2.0 * first + 4.0 * q * q * second)
+    if order == 0:
+        power, power_lam = complex(1.0, 0.0), complex(0.0, 0.0)
+    elif order == 1:
+        power, power_lam = lam, complex(1.0, 0.0)
+    else:
+        power, power_lam = lam * lam, 2.0 * lam
+    a = c * power * mean
+    a_lam = c * (power_lam * mean + power * mean_lam)
+    d = sign * state[0]
+    _row(rows, DAMPING, d * (c_zeta * power * mean + a_lam * lam_zeta - a * lam * late_zeta) + sign * state[1] * a)
+    _turned(rows, DAMPING, d * a * lam_zeta)
+    _row(rows, RATE, d * (a_lam * lam / w - a * lam * late_w))
+    _turned(rows, RATE, d * a * lam / w)
+    _row(rows, DRY, sign * state[2] * a)
+    _row(rows, AMPLITUDE, sign * side * state[3] * a)
+    _row(rows, RELEASE, -d * a * lam)
+    _row(rows, VALUE, d * a)
+    if order == 0:
+        rows[DRY, 0] = sign
+        rows[VALUE, 0] += sign * p[DRY]
+
+
+@compiled(**FAST)
+def _row(rows, k, factor):
+    """Re(factor z) by its parts."""
+    rows[k, 1], rows[k, 2] = factor.real, -factor.imag
+
+
+@compiled(**FAST)
+def _turned(rows, k, factor):
+    """tau Re(factor z) by its parts."""
+    rows[k, 3], rows[k, 4] = factor.real, -factor.imag
+
+
+@compiled(**FAST)
+def _exponential(lam, tau):
+    size = math.exp(lam.real * tau)
+    return complex(size * math.cos(lam.imag * tau), size * math.sin(lam.imag * tau))
+
+
+@compiled(**FAST)
+def first_sample(time, dt, total):
+    """Number of the first sample at or after `time`."""
+    return int(min(max(math.ceil(time / dt - 1e-9), 0.0), float(total)))
+
+
+@compiled(**FAST)
+def normal_equations(p, n, means, size, total, dt, order, hessian, gradient, work):
+    """Sum of squares of data minus model over the blocks, J'J in `hessian` (6, 6) and J'r in `gradient` (6).
+
+    Parameters
+    ----------
+    p : ndarray (6,)
+        Parameters of the motion.
+    n : int
+        Half cycles until rest.
+    means : ndarray
+        Mean of each block of `size` samples; of `total` samples the last block has what is left, and counts less.
+    dt : float
+        Step of the samples [s].
+    order : int
+        0, 1, 2: displacement, velocity, acceleration.
+    work : ndarray (3, 7, 6)
+        Scratch.
+    """
+    rows, state, pending, mixed = work[0], work[1, 0], work[1, 1], work[2]
+    for j in range(6):
+        gradient[j] = 0.0
+        for k in range(6):
+            hessian[j, k] = 0.0
+    zeta, w = p[DAMPING], p[RATE]
+    root = math.sqrt(1.0 - zeta * zeta)
+    lam, half = complex(-zeta * w, root * w), math.pi / (w * root)
+    turn = _exponential(lam, size * dt)
+    squares, held, pending_value = 0.0, 0, 0.0
+    for k in range(6):
+        pending[k] = 0.0
+    fall(p, state, False)
+    i = 0
+    for piece in range(-1, n + 1):
+        if piece > 0:
+            fall(p, state, True)
+        stop = total if piece == n else first_sample(p[RELEASE] + (piece + 1) * half, dt, total)
+        begin = p[RELEASE] + piece * half
+        described = 0
+        while i < stop:
+            offset = i % size
+            count = min(stop - i, size - offset)
+            if count != described:
+                describe(p, n, order, piece, count, dt, state, rows)
+                described = count
+            tau = (i + 0.5 * (count - 1)) * dt - begin
+            z = complex(1.0, 0.0) if piece < 0 or piece >= n else _exponential(lam, tau)
+            if count == size:
+                blocks = (stop - i) // size
+                squares += _add_blocks(
+                    rows, means, i // size, blocks, z, turn, tau, size * dt, hessian, gradient, mixed
+                )
+                i += blocks * size
+                continue
+            share = count / size
+            basis = (1.0, z.real, z.imag, tau * z.real, tau * z.imag)
+            for j in range(5):
+                pending_value += share * rows[VALUE, j] * basis[j]
+                for k in range(6):
+                    pending[k] += share * rows[k, j] * basis[j]
+            held += count
+            i += count
+            if i % size == 0 or i == total:
+                filled = held / size
+                left = means[(i - 1) // size] - pending_value / filled
+                squares += filled * left * left
+                for j in range(6):
+                    gradient[j] += pending[j] * left
+                    for k in range(j + 1):
+                        hessian[j, k] += pending[j] * pending[k] / filled
+                for k in range(6):
+                    pending[k] = 0.0
+                pending_value, held = 0.0, 0
+    for j in range(6):
+        for k in range(j):
+            hessian[k, j] = hessian[j, k]
+    return squares
+
+
+@compiled(**FAST)
+def _add_blocks(rows, means, first, blocks, z, turn, tau, step, hessian, gradient, mixed):
+    """Add the whole blocks of one piece, by the products of the five functions."""
+    v0, v1, v2 = rows[6, 0], rows[6, 1], rows[6, 2]
+    squares, r0, r1, r2, r3, r4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    g01, g02, g03, g04, g11, g12, g13, g14 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    g22, g23, g24, g33, g34, g44 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(first, first + blocks):
+        c, s = z.real, z.imag
+        tc, ts = tau * c, tau * s
+        left = means[j] - (v0 + v1 * c + v2 * s)
+        squares += left * left
+        r0 += left
+        r1 += left * c
+        r2 += left * s
+        r3 += left * tc
+        r4 += left * ts
+        g01 += c
+        g02 += s
+        g03 += tc
+        g04 += ts
+        g11 += c * c
+        g12 += c * s
+        g13 += c * tc
+        g14 += c * ts
+        g22 += s * s
+        g23 += s * tc
+        g24 += s * ts
+        g33 += tc * tc
+        g34 += tc * ts
+        g44 += ts * ts
+        z *= turn
+        tau += step
+    gram = (
+        (float(blocks), g01, g02, g03, g04), (g01, g11, g12, g13, g14), (g02, g12, g22, g23, g24),
+        (g03, g13, g23, g33, g34), (g04, g14, g24, g34, g44),
+    )  # fmt: skip
+    for k in range(6):
+        gradient[k] += rows[k, 0] * r0 + rows[k, 1] * r1 + rows[k, 2] * r2 + rows[k, 3] * r3 + rows[k, 4] * r4
+        for j in range(5):
+            line = gram[j]
+            mixed[k, j] = (
+                rows[k, 0] * line[0] + rows[k, 1] * line[1] + rows[k, 2] * line[2] + rows[k, 3] * line[3]
+                + rows[k, 4] * line[4]
+            )  # fmt: skip
+    for k in range(6):
+        for m in range(k + 1):
+            for j in range(5):
+                hessian[k, m] += mixed[k, j] * rows[m, j]
+    return squares
+
+
+@compiled(**FAST)
+def sample_motion(p, n, size, total, dt, order, values, jacobian, work):
+    """The model's block means, `values` (blocks,), and their derivatives, `jacobian` (6, blocks)."""
+    rows, state = work[0], work[1, 0]
+    for j in range(values.shape[0]):
+        values[j] = 0.0
+        for k in range(6):
+            jacobian[k, j] = 0.0
+    zeta, w = p[DAMPING], p[RATE]
+    root = math.sqrt(1.0 - zeta * zeta)
+    lam, half = complex(-zeta * w, root * w), math.pi / (w * root)
+    fall(p, state, False)
+    i = 0
+    for piece in range(-1, n + 1):
+        if piece > 0:
+            fall(p, state, True)
+        stop = total if piece == n else first_sample(p[RELEASE] + (piece + 1) * half, dt, total)
+        begin = p[RELEASE] + piece * half
+        described = 0
+        while i < stop:
+            count = min(stop - i, size - i % size)
+            if count != described:
+                describe(p, n, order, piece, count, dt, state, rows)
+                described = count
+            tau = (i + 0.5 * (count - 1)) * dt - begin
+            z = complex(1.0, 0.0) if piece < 0 or piece >= n else _exponential(lam, tau)
+            block = i // size
+            share = count / min(size, total - block * size)
+            basis = (1.0, z.real, z.imag, tau * z.real, tau * z.imag)
+            for j in range(5):
+                values[block] += share * rows[VALUE, j] * basis[j]
+                for k in range(6):
+                    jacobian[k, block] += share * rows[k, j] * basis[j]
+            i += count
