@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 
-from stickslip.fit.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, normal_equations
 from stickslip.compiled import FAST, compiled
+from stickslip.fit.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, normal_equations
 
 STEPS = 60
 CLOSE = 1e-5  # of the variance: what the sum of squares may still fall
@@ -219,11 +219,12 @@ def intervals(fits, kept, level, means, size, total, dt, order, ends, work):
                 for k in range(6):
                     p[k] = fits[row, 3 + k]
                 n = int(fits[row, 0])
-                found = extreme(
+                # which blocks an acceleration leaves out changes with the parameters: the quadratic serves there
+                found = order < 2 and extreme(
                     p, n, which, side, level, fits[row, 1], means, size, total, dt, order, hessian, gradient, work[:8]
                 )
                 if not found:
-                    missed += 1
+                    missed += order < 2
                     for k in range(6):
                         p[k] = fits[row, 3 + k]
                     normal_equations(p, n, means, size, total, dt, order, hessian, gradient, work[:3])

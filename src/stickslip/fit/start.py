@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from stickslip.compiled import FAST, compiled
 from stickslip.fit.profile import solve
 from stickslip.fit.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, REST, normal_equations
-from stickslip.compiled import FAST, compiled
 
 BLOCKS = 40  # a period; the variance of the answer rises by 0.3 % of itself
 FIRST_SWINGS = 0.25  # of the range: what counts as a swing before the noise is averaged

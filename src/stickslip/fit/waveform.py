@@ -130,8 +130,16 @@ def first_sample(time, dt, total):
 
 
 @compiled(**FAST)
+def block_of(time, dt, size):
+    """Number of the block that a time falls into."""
+    return math.floor((time / dt + 0.5) / size)
+
+
+@compiled(**FAST)
 def normal_equations(p, n, means, size, total, dt, order, hessian, gradient, work):
     """Sum of squares of data minus model over the blocks, J'J in `hessian` (6, 6) and J'r in `gradient` (6).
+
+    An acceleration jumps at every turning point. The blocks that hold one are left out, and the others count for them.
 
     Parameters
     ----------
@@ -157,7 +165,7 @@ def normal_equations(p, n, means, size, total, dt, order, hessian, gradient, wor
     root = math.sqrt(1.0 - zeta * zeta)
     lam, half = complex(-zeta * w, root * w), math.pi / (w * root)
     turn = _exponential(lam, size * dt)
-    squares, held, pending_value = 0.0, 0, 0.0
+    squares, held, pending_value, used = 0.0, 0, 0.0, 0
     for k in range(6):
         pending[k] = 0.0
     fall(p, state, False)
@@ -167,6 +175,10 @@ def normal_equations(p, n, means, size, total, dt, order, hessian, gradient, wor
             fall(p, state, True)
         stop = total if piece == n else first_sample(p[RELEASE] + (piece + 1) * half, dt, total)
         begin = p[RELEASE] + piece * half
+        if order == 2:
+            i = min(total, max(i, (block_of(begin, dt, size) + 1) * size)) if piece >= 0 else 0
+            stop = stop if piece == n else min(total, block_of(begin + half, dt, size) * size)
+            used += max(stop - i, 0)
         described = 0
         while i < stop:
             offset = i % size
@@ -202,10 +214,13 @@ def normal_equations(p, n, means, size, total, dt, order, hessian, gradient, wor
                 for k in range(6):
                     pending[k] = 0.0
                 pending_value, held = 0.0, 0
+    share = total / used if order == 2 and used > 0 else 1.0
     for j in range(6):
-        for k in range(j):
+        gradient[j] *= share
+        for k in range(j + 1):
+            hessian[j, k] *= share
             hessian[k, j] = hessian[j, k]
-    return squares
+    return share * squares
 
 
 @compiled(**FAST)
