@@ -1,0 +1,318 @@
+"""A candidate motion's least squares on one free decay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.fit.motions import MOTIONS, PARAMETERS, Motion, Restoring, free_decay
+
+Array = NDArray[np.float64]
+Whiten = Callable[[Array], Array]
+
+TRIES = 12  # numbers of half cycles
+FIRST = 4.0  # periods fitted first; then twice as many, till the end: the phase can not slip
+LEAST = 24  # blocks of a fit
+HOPELESS = 4.0  # times what viscous damping with dry friction leaves
+EVALUATIONS = 60  # of one search
+CONVERGED = 1e-8  # relative change of the sum of squares, and of the parameters
+LOWEST = {"damping_ratio": 0.0, "dry_displacement": 0.0, "quadratic": 0.0, "rise": 0.0, "micro_slip": 0.0}
+SHAPES = {
+    "stribeck_speed": (0.02, 1.0),
+    "exponent": (0.1, 1.0),
+}  # lowest and highest; speeds in units of the first speed
+SHAPED = {"stribeck_speed": "rise", "exponent": "micro_slip"}  # the term that each shapes
+ADDED = ("quadratic", "rise", "micro_slip")
+FAINT, CLEAR = 0.01, 10.0  # effect over noise below which a term is at zero, above which its shape is known
+HIGHEST = {"damping_ratio": 0.95, "rise": 1.0}
+STRIBECK_SPEEDS = (0.05, 0.3)  # of the first speed, at which a slope is looked for
+EXPONENT = 0.5  # of the micro-slip that is looked for
+NUMBERS = {name: number for number, name in enumerate(PARAMETERS)}
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """A free decay as the fits see it: means over blocks of samples.
+
+    Attributes
+    ----------
+    times, values : ndarray, shape (n,)
+        Centres of the blocks [s], rising, and the displacement's means.
+    counts : ndarray, shape (n,)
+        Samples in each block.
+    fs : float
+        Sampling rate [Hz].
+    restoring : {"linear", "pendulum"}
+        The spring's law.
+    whiten : callable or None
+        Takes a vector or matrix of n rows to one whose noise is white; None for noise that is white in the samples.
+    """
+
+    times: Array
+    values: Array
+    counts: Array
+    fs: float
+    restoring: Restoring = "linear"
+    whiten: Whiten | None = None
+
+    @cached_property
+    def spread(self) -> Array:
+        """Standard deviation in time of each block's samples [s]."""
+        return np.asarray(np.sqrt((self.counts**2 - 1) / 12) / self.fs)
+
+    def whitened(self, matrix: Array) -> Array:
+        """`matrix` (n,) or (n, m) scaled so that the noise of its rows is white and of one variance."""
+        if self.whiten is not None:
+            return self.whiten(matrix)
+        weights = np.sqrt(self.counts)
+        return np.asarray(matrix * (weights if matrix.ndim == 1 else weights[:, None]))
+
+    def motion(
+        self, parameters: Array, *, free: tuple[str, ...] = (), half_cycles: int | None = None
+    ) -> tuple[Array, Array, int]:
+        """:func:`free_decay` at these blocks."""
+        return free_decay(
+            self.times, parameters, free=free, restoring=self.restoring, half_cycles=half_cycles, spread=self.spread
+        )
+
+    def until(self, time: float) -> Blocks:
+        """The blocks up to an instant, their noise taken as white."""
+        rows = slice(0, max(int(np.searchsorted(self.times, time)), min(LEAST, len(self.times))))
+        return Blocks(self.times[rows], self.values[rows], self.counts[rows], self.fs, self.restoring)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A candidate at its least squares.
+
+    Attributes
+    ----------
+    motion : Motion
+        The candidate.
+    parameters : ndarray, shape (12,)
+        In the order of ``PARAMETERS``.
+    half_cycles : int
+        That it makes within the record.
+    forced : bool
+        Whether it stays where its kinetic friction would let it go on.
+    residual : ndarray, shape (n,)
+        Whitened data minus motion.
+    jacobian : ndarray, shape (n, p)
+        Whitened sensitivities to the free parameters.
+    blocks : Blocks
+        What was fitted.
+    """
+
+    motion: Motion
+    parameters: Array
+    half_cycles: int
+    forced: bool
+    residual: Array
+    jacobian: Array
+    blocks: Blocks
+
+    @cached_property
+    def cost(self) -> float:
+        """Sum of squares left."""
+        return float(self.residual @ self.residual)
+
+    def value(self, name: str) -> float:
+        """One parameter."""
+        return float(self.parameters[NUMBERS[name]])
+
+    @property
+    def settled(self) -> tuple[int, ...]:
+        """Columns whose uncertainty counts: no added term that is at zero, no shape of a faint one."""
+        noise = math.sqrt(self.cost / len(self.residual))
+        found = []
+        for column, name in enumerate(self.motion.free):
+            term = SHAPED.get(name, name)
+            if term in ADDED:
+                effect = self.value(term) * np.linalg.norm(self.jacobian[:, self.motion.free.index(term)])
+                if effect < (CLEAR if name in SHAPES else FAINT) * noise:
+                    continue
+            found.append(column)
+        return tuple(found)
+
+
+def fit_candidates(names: tuple[str, ...], blocks: Blocks, start: Array) -> dict[str, Fitted]:
+    """Every candidate's least squares; none leaves more than one that it contains.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of ``MOTIONS``; those of viscous damping with dry friction are always fitted.
+    blocks : Blocks
+        The data.
+    start : ndarray, shape (6,)
+        The first six of ``PARAMETERS``, near the fit of viscous damping with dry friction.
+
+    Returns
+    -------
+    dict of str to Fitted
+        The fewest terms first.
+    """
+    first = np.zeros(len(PARAMETERS))
+    first[:6], first[NUMBERS["exponent"]] = start[:6], EXPONENT
+    period = 2 * math.pi / start[0]
+    reach, end = FIRST * period, float(blocks.times[-1] - start[5])
+    while reach < end:
+        first = fit_motion(MOTIONS["static"], blocks.until(float(start[5]) + reach), first).parameters
+        reach *= 2
+    found = {name: fit_motion(MOTIONS[name], blocks, first) for name in ("both", "static")}
+    base = min(found.values(), key=lambda each: each.cost)
+    hopeless = HOPELESS * base.cost
+    wanted = sorted({*names, *found}, key=lambda name: MOTIONS[name].size)
+    for name in wanted:
+        motion = MOTIONS[name]
+        tries = [found[name]] if name in found else []
+        if not tries:
+            tries = [fit_motion(motion, blocks, s, hopeless=hopeless) for s in _starts(motion, base)]
+        for other in found.values():
+            within = set(other.motion.terms) < set(motion.terms) and other.motion.sticks_early <= motion.sticks_early
+            if within and other.cost < min(each.cost for each in tries):
+                tries += [
+                    fit_motion(motion, blocks, s, hopeless=hopeless) for s in _shaped(motion, other.parameters.copy())
+                ]
+        found[name] = min(tries, key=lambda each: each.cost)
+    return {name: found[name] for name in wanted}
+
+
+def fit_motion(
+    motion: Motion, blocks: Blocks, start: Array, *, half_cycles: int | None = None, hopeless: float = math.inf
+) -> Fitted:
+    """A candidate's least squares.
+
+    The number of half cycles before it sticks is whole: within one the residual is smooth, from one to the next it has
+    a kink. So each fit is made with one number, and the best of those that its own friction allows is taken.
+
+    Parameters
+    ----------
+    motion : Motion
+        The candidate; what it does not free stays as in `start`.
+    blocks : Blocks
+        The data.
+    start : ndarray, shape (12,)
+        Where the search begins.
+    half_cycles : int, optional
+        It stays after so many, whatever drives it on.
+    hopeless : float
+        Sum of squares beyond which the number of half cycles is not refined.
+
+    Returns
+    -------
+    Fitted
+    """
+    if half_cycles is not None or "dry_displacement" not in motion.terms:
+        return _search(motion, blocks, start, half_cycles)
+    number = blocks.motion(start)[2]
+    tried = {number: _search(motion, blocks, start, number)}
+    best = number
+    for _ in range(TRIES):
+        best = min(tried, key=lambda each: tried[each].cost)
+        if tried[best].cost > hopeless:
+            return tried[best]
+        allowed = blocks.motion(tried[best].parameters)[2]
+        new = [
+            each
+            for each in dict.fromkeys((allowed, best - 1, best + 1, best - 2, best + 2))
+            if each > 0 and each not in tried
+        ]
+        if not new:
+            break
+        for each in new:
+            tried[each] = _search(motion, blocks, tried[best].parameters, each)
+    if motion.sticks_early:
+        return tried[best]
+    own = [each for number, each in tried.items() if blocks.motion(each.parameters)[2] == number]
+    if own:
+        return replace(min(own, key=lambda each: each.cost), forced=False)
+    return _search(motion, blocks, tried[best].parameters, None)  # on the kink itself
+
+
+def _search(motion: Motion, blocks: Blocks, start: Array, half_cycles: int | None) -> Fitted:
+    """Least squares by a trust region with exact sensitivities."""
+    from scipy.optimize import least_squares
+
+    parameters = start.copy()
+    columns = [NUMBERS[name] for name in motion.free]
+    low, high = _bounds(motion, first_speed(start))
+    last: dict[bytes, tuple[Array, Array, int]] = {}
+
+    def at(free: Array) -> tuple[Array, Array, int]:
+        key = free.tobytes()
+        if key not in last:
+            trial = parameters.copy()
+            trial[columns] = free
+            x, jacobian, begun = blocks.motion(trial, free=motion.free, half_cycles=half_cycles)
+            if len(last) > 1:
+                last.pop(next(iter(last)))
+            last[key] = blocks.whitened(blocks.values - x), blocks.whitened(jacobian), begun
+        return last[key]
+
+    def residual_at(free: Array) -> Array:
+        return at(free)[0]
+
+    def slope_at(free: Array) -> Array:
+        return -at(free)[1]
+
+    found = least_squares(
+        residual_at, np.clip(parameters[columns], low, high), jac=slope_at,
+        bounds=(low, high), x_scale="jac", xtol=CONVERGED, ftol=CONVERGED, gtol=None, max_nfev=EVALUATIONS,
+    )  # fmt: skip
+    parameters[columns] = found.x
+    residual, jacobian, begun = at(found.x)
+    return Fitted(motion, parameters, begun, half_cycles is not None, residual, jacobian, blocks)
+
+
+def _bounds(motion: Motion, speed: float) -> tuple[Array, Array]:
+    """Lowest and highest value of each free parameter."""
+    low, high = [], []
+    for name in motion.free:
+        unit = speed if name == "stribeck_speed" else 1.0
+        ends = SHAPES.get(name, (LOWEST.get(name, -math.inf), HIGHEST.get(name, math.inf)))
+        low.append(unit * ends[0])
+        high.append(unit * ends[1])
+    return np.array(low), np.array(high)
+
+
+def first_speed(parameters: Array) -> float:
+    """About the greatest speed: natural frequency times first amplitude."""
+    return float(parameters[NUMBERS["angular_frequency"]] * abs(parameters[NUMBERS["amplitude"]]))
+
+
+def _starts(motion: Motion, both: Fitted) -> list[Array]:
+    """Where to search for a candidate, from the fit of viscous damping with dry friction."""
+    start = both.parameters.copy()
+    amplitude = abs(both.value("amplitude"))
+    damping, dry = both.value("damping_ratio"), both.value("dry_displacement")
+    if "dry_displacement" not in motion.terms:  # the same energy from half the first amplitude
+        start[NUMBERS["damping_ratio"]] = min(damping + (4 / math.pi) * dry / amplitude, 0.5)
+        start[NUMBERS["dry_displacement"]] = 0.0
+    if "damping_ratio" not in motion.terms:
+        start[NUMBERS["dry_displacement"]] = dry + (math.pi / 4) * damping * amplitude
+        start[NUMBERS["damping_ratio"]] = 0.0
+    return _shaped(motion, start)
+
+
+def _shaped(motion: Motion, start: Array) -> list[Array]:
+    """A start with a little of each term that it has none of yet, one for each shape that is tried."""
+    amplitude, speed = abs(start[NUMBERS["amplitude"]]), first_speed(start)
+    little = {
+        "dry_displacement": 1e-4 * amplitude, "damping_ratio": 1e-4, "quadratic": 1e-3 / amplitude,
+        "micro_slip": 0.01 * amplitude**-EXPONENT, "rise": 0.05,
+    }  # fmt: skip
+    for name, value in little.items():
+        if name in motion.terms and start[NUMBERS[name]] == 0:
+            start[NUMBERS[name]] = value
+    if "stribeck_speed" not in motion.terms or start[NUMBERS["stribeck_speed"]] > 0:
+        return [start]
+    starts = [start.copy() for _ in STRIBECK_SPEEDS]
+    for each, share in zip(starts, STRIBECK_SPEEDS, strict=True):
+        each[NUMBERS["stribeck_speed"]] = share * speed
+    return starts
