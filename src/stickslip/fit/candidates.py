@@ -36,7 +36,7 @@ NUMBERS = {name: number for number, name in enumerate(PARAMETERS)}
 
 
 @dataclass(frozen=True, eq=False)
-class Blocks:
+class BlockMeans:
     """A free decay as the fits see it: means over blocks of samples.
 
     Attributes
@@ -80,10 +80,10 @@ class Blocks:
             self.times, parameters, free=free, restoring=self.restoring, half_cycles=half_cycles, spread=self.spread
         )
 
-    def until(self, time: float) -> Blocks:
+    def until(self, time: float) -> BlockMeans:
         """The blocks up to an instant, their noise taken as white."""
         rows = slice(0, max(int(np.searchsorted(self.times, time)), min(LEAST, len(self.times))))
-        return Blocks(self.times[rows], self.values[rows], self.counts[rows], self.fs, self.restoring)
+        return BlockMeans(self.times[rows], self.values[rows], self.counts[rows], self.fs, self.restoring)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ class Fitted:
         Whitened data minus motion.
     jacobian : ndarray, shape (n, p)
         Whitened sensitivities to the free parameters.
-    blocks : Blocks
+    blocks : BlockMeans
         What was fitted.
     """
 
@@ -114,7 +114,7 @@ class Fitted:
     forced: bool
     residual: Array
     jacobian: Array
-    blocks: Blocks
+    blocks: BlockMeans
 
     @cached_property
     def cost(self) -> float:
@@ -140,14 +140,14 @@ class Fitted:
         return tuple(found)
 
 
-def fit_candidates(names: tuple[str, ...], blocks: Blocks, start: Array) -> dict[str, Fitted]:
+def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> dict[str, Fitted]:
     """Every candidate's least squares; none leaves more than one that it contains.
 
     Parameters
     ----------
     names : tuple of str
         Of ``MOTIONS``; those of viscous damping with dry friction are always fitted.
-    blocks : Blocks
+    blocks : BlockMeans
         The data.
     start : ndarray, shape (6,)
         The first six of ``PARAMETERS``, near the fit of viscous damping with dry friction.
@@ -184,7 +184,7 @@ def fit_candidates(names: tuple[str, ...], blocks: Blocks, start: Array) -> dict
 
 
 def fit_motion(
-    motion: Motion, blocks: Blocks, start: Array, *, half_cycles: int | None = None, hopeless: float = math.inf
+    motion: Motion, blocks: BlockMeans, start: Array, *, half_cycles: int | None = None, hopeless: float = math.inf
 ) -> Fitted:
     """A candidate's least squares.
 
@@ -195,7 +195,7 @@ def fit_motion(
     ----------
     motion : Motion
         The candidate; what it does not free stays as in `start`.
-    blocks : Blocks
+    blocks : BlockMeans
         The data.
     start : ndarray, shape (12,)
         Where the search begins.
@@ -235,7 +235,7 @@ def fit_motion(
     return _search(motion, blocks, tried[best].parameters, None)  # on the kink itself
 
 
-def _search(motion: Motion, blocks: Blocks, start: Array, half_cycles: int | None) -> Fitted:
+def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int | None) -> Fitted:
     """Least squares by a trust region with exact sensitivities."""
     from scipy.optimize import least_squares
 

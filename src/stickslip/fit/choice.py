@@ -16,7 +16,7 @@ from stickslip.fit.candidates import (
     HOPELESS,
     NUMBERS,
     STRIBECK_SPEEDS,
-    Blocks,
+    BlockMeans,
     Fitted,
     Whiten,
     first_speed,
@@ -237,7 +237,7 @@ def choose(
         raise EstimateError(
             f"{len(instants)} samples", f"{most} parameters need three times as many", "give a longer record"
         )
-    fits = fit_candidates(candidates, Blocks(instants, data, each, fs, restoring, whiten), np.asarray(start, float))
+    fits = fit_candidates(candidates, BlockMeans(instants, data, each, fs, restoring, whiten), np.asarray(start, float))
     best = min(fits.values(), key=lambda fitted: fitted.cost)
     noise = Noise(best.residual, best.jacobian.shape[1])
     tried = tuple(_tested(fitted, noise, best) for name, fitted in fits.items() if name in candidates)
