@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
     from stickslip.files.write import write_record as write_record
     from stickslip.fit.decay import DecayFit as DecayFit, fit_decay as fit_decay
+    from stickslip.identify.decrement import Bounds as Bounds, Decrement as Decrement, decrement as decrement
     from stickslip.identify.force import friction_force as friction_force
     from stickslip.identify.loops import friction_loops as friction_loops
     from stickslip.identify.regression import regress_friction as regress_friction
@@ -152,6 +153,7 @@ _ROOMS = {
     "inverse_wavelet": "signals.wavelet", "plot_wavelet": "plot.wavelet",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",
+    "decrement": "identify.decrement", "Decrement": "identify.decrement", "Bounds": "identify.decrement",
     "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
     "fit_decay": "fit.decay", "DecayFit": "fit.decay",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",

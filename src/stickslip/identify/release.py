@@ -29,6 +29,7 @@ LARGE = 0.3  # of the record's range: swings from which the period is first read
 RISE = 3.0  # half periods in the time that a cosine takes from a quarter to three quarters of its swing
 PACE = (0.7, 1.4)  # a half cycle over the one before; a pendulum from near the top shortens by a third
 GROWN = 1.05  # a swing over the one before from which it is not the same decay
+UNEVEN = 0.015  # change of the half cycles over the decay, beyond which the spring is not linear
 STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 
 
@@ -94,6 +95,14 @@ class RingDown:
     def status(self) -> str:
         """ "ok", or what to beware of."""
         return "; ".join(self.notes) or "ok"
+
+    @property
+    def isochronous(self) -> bool:
+        """Whether the half cycles are as long at the end as at the beginning: the spring is linear."""
+        gaps = np.diff(self.turns[1:-1] if len(self.turns) > 6 else self.turns)
+        quarter = max(1, len(gaps) // 4)
+        early, late = float(gaps[:quarter].mean()), float(gaps[-quarter:].mean())
+        return len(gaps) < 4 or abs(early / late - 1) < max(UNEVEN, 4 / (quarter * early))
 
     @property
     def time(self) -> Array:
@@ -187,7 +196,7 @@ def find_releases(record: Record, *, channel: str | None = None) -> Releases:
     """
     record, name = _prepared(record, channel)
     values = record[name]
-    noise, step = _noise(record, name), quantisation_step(values)
+    noise, step = _noise(record, name), _step(values)
     swings = _Swings.of(values, noise, step, record.fs)
     runs = _runs(swings, values)
     unsound = np.zeros(len(values), dtype=bool)
@@ -231,6 +240,14 @@ def _prepared(record: Record, channel: str | None) -> tuple[Record, str]:
 def _noise(record: Record, name: str) -> float:
     known = record.channels[name].noise
     return known if known is not None else noise_level(record[name], record.fs)
+
+
+def _step(values: Array) -> float:
+    """Step of the digitiser; where its levels were rounded to be written, their median gap."""
+    step, levels = quantisation_step(values), np.unique(values)
+    if step == 0 and 2 < len(levels) < len(values) / 6:
+        return float(np.median(np.diff(levels)))
+    return step
 
 
 @dataclass(frozen=True, eq=False)
@@ -457,13 +474,12 @@ def _ring_down(
     hold = _reach(values[bounds[0] : start + 1][::-1], near) if held else 1
     tail = _reach(values[end : bounds[1]], near) if stopped else len(values) - end
     first, last = max(0, start + 1 - hold), end + tail
-    inner = [
-        _extreme(values, a, b, level > rest) for a, b, level in zip(middles, middles[1:], levels[1:], strict=False)
-    ]
+    tops = levels[1:-1] > levels[:-2]
+    inner = [_extreme(values, a, b, bool(top)) for (a, b), top in zip(pairwise(middles), tops, strict=True)]
     turns = [*([start] if held or run.inside else []), *inner, *([end] if stop <= len(values) - 1 - half / 8 else [])]
     rows = np.array(turns, dtype=np.intp)
     sound = ~unsound[rows]
-    notes = _notes(values[rows], sound, swings, run, stopped, noise)
+    notes = _notes(values[rows], sound, ORDERS[name], run, noise)
     return RingDown(
         name, ORDERS[name], record.channels[name].unit, record.fs, record.start + first / record.fs,
         values[first:last], record.start + start / record.fs, record.start + end / record.fs, bool(held),
@@ -505,18 +521,12 @@ def _extreme(values: Array, first: float, last: float, top: bool) -> int:
     return round(first) + int(np.argmax(smooth) if top else np.argmin(smooth))
 
 
-def _notes(
-    levels: Array, sound: NDArray[np.bool_], swings: _Swings, run: _Run, stopped: bool, noise: float
-) -> tuple[str, ...]:
+def _notes(levels: Array, sound: NDArray[np.bool_], order: int, run: _Run, noise: float) -> tuple[str, ...]:
     notes = []
     if not sound.all():
         notes.append(f"{int(np.sum(~sound))} extremes are clipped and left out")
-    if not stopped:
-        notes.append("the record ends before the motion")
-    elif swings.sizes[run.end - 1] < 2 * swings.seen:
-        notes.append("the last swings sink into the noise")
     between = (levels[:-2] + 2 * levels[1:-1] + levels[2:]) / 4
-    if len(between) >= 6:
+    if order == 0 and len(between) >= 6:
         pairs = (between[:-1] + between[1:]) / 2
         along = np.linspace(-0.5, 0.5, len(pairs))
         rise = float(along @ pairs / (along @ along))
