@@ -417,9 +417,9 @@ def _bounds(x: Array, errors: Array, i: int, ring_down: RingDown) -> Bounds:
         rows.append((m, beta, alpha, worst[0], pull, psi, worst[1]))
     table = np.array(rows).reshape(-1, 7)
     best = int(table[np.argmin(table[:, 3]), 0]) if len(table) else 0
-    m, *rest = (np.asarray(column) for column in table.T)
+    steps, *rest = (np.asarray(column) for column in table.T)
     names = ("rate", "rate_first_order", "rate_worst", "dry", "dry_first_order", "dry_worst")
-    return Bounds(i=i, m=m.astype(np.intp), error=error, best=best, **dict(zip(names, rest, strict=True)))
+    return Bounds(i=i, m=steps.astype(np.intp), error=error, best=best, **dict(zip(names, rest, strict=True)))
 
 
 def _model(damping_ratio: Estimate, dry_displacement: Estimate) -> str:
