@@ -166,7 +166,11 @@ def test_options_change_the_run() -> None:
 def test_without_a_name_the_scenarios_are_listed() -> None:
     result = run()
     assert result.exit_code == 0
-    assert all(name in result.stdout for name in ss.scenarios.names())
+    assert all(f'"{name}"' in result.stdout for name in ss.scenarios.names())
+    assert "thesis, figures 3.16 and 3.19" in result.stdout
+    assert "known: status, amplitude" in result.stdout
+    assert max(len(line) for line in result.stdout.splitlines()) <= 120
+    assert run("--list").stdout == result.stdout
     assert list(told()) == list(ss.scenarios.names())
 
 
@@ -201,6 +205,8 @@ def test_an_mp4_without_ffmpeg_is_refused_and_leaves_nothing(monkeypatch: pytest
     ("arguments", "words"),
     [
         (["FD"], "perhaps FD-"),
+        (["fd-4"], "perhaps FD-4 is meant"),
+        (["none like it"], "--list' names the scenarios"),
         (["absent.toml"], "can not be read"),
         (["FD-4", "--cycles", "0"], "--cycles"),
         (["FD-4", "--cycles", "1", "--duration", "1"], "one of the two"),

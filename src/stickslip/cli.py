@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 SHOWN_EVENTS = 12
+LIST_WIDTH = 100
 PATIENCE = 2.0  # seconds of silence before a progress bar is shown
 
 # What a sentence says to a Python user, and how the command line says it.
@@ -209,6 +210,7 @@ def demo(output: Path, as_json: bool) -> None:
 
 @main.command()
 @click.argument("case", required=False, metavar="[SCENARIO|FILE.toml]")
+@click.option("--list", "listed", is_flag=True, help="List the scenarios, with what is known of each.")
 @click.option("--duration", metavar="TIME", help="Time to simulate in s, or with its unit.")
 @click.option("--cycles", type=click.FloatRange(min=0, min_open=True), help="The same in periods of the drive.")
 @click.option(
@@ -216,7 +218,7 @@ def demo(output: Path, as_json: bool) -> None:
     "changes",
     multiple=True,
     metavar='"NAME=VALUE"',
-    help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm". Repeatable.',
+    help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm", "law.stiffness=2 N/um". Repeatable.',
 )
 @click.option("--fs", metavar="HZ", help="Sampling rate of the record; fine enough for the motion unless given.")
 @click.option(
@@ -240,10 +242,10 @@ def demo(output: Path, as_json: bool) -> None:
     is_flag=True,
     help="Print the results as JSON and nothing else; a folder is written only with --output.",
 )
-def simulate(case: str | None, output: Path | None, as_json: bool, **options: Any) -> None:
-    """Simulate a mass that rubs, exactly, event by event.
+def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool, **options: Any) -> None:
+    """Simulate masses that rub, exactly, event by event.
 
-    What to simulate is a named scenario, or a TOML file of an oscillator, its friction law and its drive. Without
+    What to simulate is a named scenario, or a TOML file of a system: masses, friction laws and a drive. Without
     a name the scenarios are listed.
 
     Results go into a folder: results.json, the events, the sampled record with friction, and the figures.
@@ -251,8 +253,10 @@ def simulate(case: str | None, output: Path | None, as_json: bool, **options: An
     \b
     stickslip simulate FD-4
     stickslip simulate slider.toml --cycles 100 --set "kinetic=1.3 N" --animate gif
+
+    Ctrl-C while it runs keeps what was simulated until then, marked "interrupted", with exit code 130.
     """
-    if case is None:
+    if case is None or listed:
         _list_scenarios(as_json=as_json)
         return
     wanted = _case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
@@ -328,13 +332,24 @@ def _fit_for_a_file(name: str) -> str:
 
 
 def _list_scenarios(*, as_json: bool) -> None:
-    found = {name: ss.scenarios.get(name).about for name in ss.scenarios.names()}
+    found = {name: ss.scenarios.get(name) for name in ss.scenarios.names()}
     if as_json:
-        click.echo(json.dumps(found, indent=2, ensure_ascii=False))
+        click.echo(json.dumps({name: each.about for name, each in found.items()}, indent=2, ensure_ascii=False))
         return
-    width = max(map(len, found))
-    for name, about in found.items():
-        click.echo(f"{name:{width}}  {about}")
+    cases = [(ss.scenario_case(name), ", ".join(each.known).replace("_", " ")) for name, each in found.items()]
+    for (about, parts, known), group in itertools.groupby(
+        cases, key=lambda each: (each[0].about, each[0].parts, each[1])
+    ):
+        click.echo(f"\n{about}\n  {parts}; known: {known}")
+        line = ""
+        for case, _ in group:
+            name = f'  "{case.name}"'
+            if len(line) + len(name) > LIST_WIDTH:
+                click.echo(line)
+                line = ""
+            line += name
+        click.echo(line)
+    click.echo(f'\n{len(found)} scenarios; run one with: stickslip simulate "NAME"')
 
 
 def _rig(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import tomllib
 from collections.abc import Callable, Mapping
@@ -30,9 +31,10 @@ from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import FrictionCurve, Stribeck
 from stickslip.laws.tabulated import Tabulated
 from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import System
+from stickslip.solve.automaton import System, automaton
 from stickslip.solve.periodic import SteadyState, steady_state
 from stickslip.solve.simulate import simulate
+from stickslip.solve.sliding import steady_sliding
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Contact, Structure
 
@@ -143,11 +145,25 @@ def answers(scenario: Scenario, *, run: Trajectory | None = None) -> dict[str, A
     >>> answers(get("FD-4"))["half_cycles"]
     2
     """
-    if scenario.run:
-        motion = run or simulate(scenario.system, start=scenario.start, **scenario.run)  # type: ignore[arg-type]
-        return {question: OF_RUNS[question](motion) for question in scenario.known}
-    orbit = steady_state(scenario.system, start=scenario.start)
-    return {question: OF_ORBITS[question](orbit) for question in scenario.known}
+
+    def answer(question: str) -> Any:
+        if question in OF_SLIDING:
+            return OF_SLIDING[question](sliding())
+        return OF_RUNS[question](motion()) if scenario.run else OF_ORBITS[question](orbit())
+
+    @functools.cache
+    def motion() -> Trajectory:
+        return run or simulate(scenario.system, start=scenario.start, **scenario.run)  # type: ignore[arg-type]
+
+    @functools.cache
+    def orbit() -> SteadyState:
+        return steady_state(scenario.system, start=scenario.start)
+
+    @functools.cache
+    def sliding() -> complex:
+        return _fastest_growing(scenario.system)
+
+    return {question: answer(question) for question in scenario.known}
 
 
 def grid(name: str) -> dict[str, Any]:
@@ -249,6 +265,61 @@ def _extrema(motion: Trajectory) -> list[float]:
     return [float(state[0]) for state in motion.states]
 
 
+def _fastest_growing(system: System) -> complex:
+    """Of steady sliding on a belt, the eigenvalue with the largest real part [1/s]."""
+    if isinstance(system, Oscillator):
+        return complex(steady_sliding(system).eigenvalues[0])
+    table = automaton(system)
+    sides = ["forward" if np.sign(contact.carried) < 0 else "back" for contact in system.contacts]
+    flow = table.flow[table.index(" + ".join(sides))][: table.physical, : table.physical]
+    values = np.linalg.eigvals(flow)
+    return complex(values[np.argmax(values.real)])
+
+
+def _last_of(motion: Trajectory, kind: str) -> float:
+    """Duration of the last whole stretch of a kind."""
+    return _lengths(motion, (kind,))[-1]
+
+
+def _last_turns(motion: Trajectory) -> list[float]:
+    """Instants in the last cycle at which the velocity turns."""
+    return [event.time for event in motion.events if event.time > motion.duration - motion.table.motion.period]
+
+
+def _mean(motion: Trajectory, *factors: str) -> float:
+    """Mean of a product of outputs over the last cycle, by Gauss's rule from event to event."""
+    period = motion.table.motion.period
+    begin = motion.duration - period
+    cuts = np.unique(np.concatenate([motion.starts, np.linspace(begin, motion.duration, 9)]).clip(begin))
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    total = 0.0
+    for low, high in itertools.pairwise(cuts):
+        values, _ = motion.sample(low + (high - low) * (nodes + 1) / 2, factors)
+        total += float(weights @ np.prod(values, axis=0)) * (high - low) / 2
+    return total / period
+
+
+def _rises(motion: Trajectory, level: float) -> list[float]:
+    """Instants at which the velocity rises through a level [m/s]."""
+    times = np.linspace(0, motion.duration, 20_001)
+    above = motion.sample(times, ("v",))[0][0] >= level
+    found = []
+    for j in np.flatnonzero(~above[:-1] & above[1:]):
+        low, high = times[j], times[j + 1]
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (low, middle) if motion.state(middle)["v"] >= level else (middle, high)
+        found.append(float(high))
+    return found
+
+
+def _pull(motion: Trajectory) -> float:
+    """The rate at which a ramp pulls its spring [N/s]."""
+    assert isinstance(motion.system, Oscillator)
+    assert isinstance(motion.system.drive, Ramp)
+    return motion.system.stiffness * motion.system.drive.speed
+
+
 OF_ORBITS: dict[str, Callable[[SteadyState], Any]] = {
     "status": lambda orbit: orbit.status,
     "amplitude": lambda orbit: orbit.amplitude,
@@ -267,5 +338,18 @@ OF_RUNS: dict[str, Callable[[Trajectory], Any]] = {
     "rest": lambda motion: motion.state(motion.duration)["x"],
     "stop_time": lambda motion: motion.events[-1].time,
     "extrema": _extrema,
+    "slip_time": lambda motion: _last_of(motion, "slip"),
+    "stick_time": lambda motion: _last_of(motion, "stick"),
+    "last_amplitude": lambda motion: max(abs(motion.state(time)["x"]) for time in _last_turns(motion)),
+    "turns": lambda motion: len(_last_turns(motion)),
+    "last_friction": lambda motion: motion.state(motion.duration)["friction"],
+    "mean_friction": lambda motion: _mean(motion, "friction"),
+    "loop_energy": lambda motion: _mean(motion, "friction", "slip") * motion.table.motion.period,
+    "rises": lambda motion: _rises(motion, 0.05),
+    "break_away": lambda motion: _pull(motion) * _rises(motion, 1e-3)[0],
     "stuck_positions": lambda motion: [p.state["x"] for p in motion.pieces if p.mode == "stuck"],
+}
+OF_SLIDING: dict[str, Callable[[complex], Any]] = {
+    "growth": lambda value: value.real / abs(value),
+    "flutter_frequency": lambda value: abs(value.imag) / (2 * math.pi),
 }

@@ -77,6 +77,16 @@ class Case:
         cycle = period if np.isfinite(period) else 1 / self.system.frequency if self.system.frequency else np.nan
         return self.run["duration"] if "duration" in self.run else self.run["cycles"] * cycle
 
+    @property
+    def parts(self) -> str:
+        """What it is made of, in a few words: its laws and its drive."""
+        laws = [each.law for each in self.system.contacts] if isinstance(self.system, Structure) else [self.system.law]
+        counts = {
+            name: sum(type(law).__name__ == name for law in laws) for name in (type(law).__name__ for law in laws)
+        }
+        told = [f"{count} x {name}" if count > 1 else name for name, count in counts.items()]
+        return f"{' and '.join(told)}, {type(self.system.drive).__name__}"
+
     def having(self, **changes: Any) -> Case:
         """The same case with other values of its system, as text with units or SI numbers; nothing is known of it then.
 
@@ -216,10 +226,11 @@ def scenario_case(name: str) -> Case:
     {'duration': 126.0}
     """
     if name not in scenarios.names():
+        alike = nearest(name.upper(), scenarios.names())
         raise ModelError(
             f"no scenario is called '{name}'",
-            "a scenario is named as 'stickslip simulate' lists them, a file of a system ends in .toml",
-            nearest(name, scenarios.names()),
+            "a file of a system ends in .toml",
+            alike if alike.startswith("perhaps") else "'stickslip simulate --list' names the scenarios",
         )
     found = scenarios.get(name)
     return Case(name, found.about, found.system, found.start, found.run or {"cycles": CYCLES}, None, found.known)
