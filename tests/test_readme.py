@@ -92,7 +92,7 @@ def test_the_commands_run(folder: Path, line: str) -> None:
         if command[1] == "check":
             assert "samples" in run.stdout
             assert "nothing wrong was found" in run.stdout
-        elif command[1:] == ["simulate"]:
+        elif command[1:] == ["simulate", "--list"]:
             assert "FD-4" in run.stdout
         elif command[1] == "simulate":
             assert (folder / run.stdout.split()[-1] / "results.json").is_file(), "the folder that it names is there"
