@@ -4,25 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
+from stickslip.identify.release import RingDown, find_releases
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
 from stickslip.units import parse_value
 
+if TYPE_CHECKING:
+    from stickslip.fit.joint import Release
+    from stickslip.fit.search import Blocks
+
 Array = NDArray[np.float64]
 
-CHANNELS = {"x": 0, "theta": 0, "v": 1, "a": 2}  # and the derivative of the displacement that each is
-LEAST = 40  # samples
-CANDIDATES = 16  # numbers of half cycles kept
 UNLIKE = 2.0  # times the noise that the residual may be before the model is doubted
-METHOD = "whole waveform, profile likelihood"
+DOUBTED = 0.01  # likelihood below which a number of half cycles does not widen the static friction's bracket
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,19 +41,21 @@ class DecayFit(Result):
     frequency : Estimate
         Undamped natural frequency [Hz].
     bias : Estimate
-        Rest position in the record's zero [m or rad]; for velocity and acceleration the sensor's offset.
+        Of the first release, as the two that follow: rest position in the record's zero [m or rad]; for velocity and
+        acceleration the sensor's offset.
     release_time : Estimate
         When the mass was let go [s]; in a record that begins in motion, when it last turned before.
     amplitude : Estimate
         Amplitude at the release, from the rest position [m or rad].
     static_displacement : Estimate
-        Static friction over the stiffness [m or rad]: the interval from where the mass stayed to where it last turned.
+        Static friction over the stiffness [m or rad]: the interval from where the mass stayed to where it last turned,
+        in all releases.
     dry_force : Estimate or None
         Dry friction [N or N m], where the stiffness or the mass is known.
     half_cycles : tuple of int
         Half cycles until rest of each release, the likeliest number.
-    alternatives : tuple of (int, float)
-        Numbers of half cycles of the first release, with their weights by likelihood.
+    alternatives : tuple of (tuple of int, float)
+        Every number of half cycles (of each release) that may be, with its weight by likelihood.
     model : str
         The motion fitted, in words.
     noise : str
@@ -59,10 +64,14 @@ class DecayFit(Result):
         Its standard deviation a sample, in the channel's unit.
     channel : str
         The channel fitted.
+    ring_downs : tuple of RingDown
+        The releases found: hold, motion and tail.
     time, measured, fitted : tuple of ndarray
         For each release: time [s] of each block's centre, the block means and those of the model.
     status : str
         "ok", or in words what to beware of.
+    notes : tuple of str
+        What was noticed when the releases were sought.
     history : tuple of Step
         What was done to the records, and this fit.
     """
@@ -76,15 +85,17 @@ class DecayFit(Result):
     static_displacement: Estimate
     dry_force: Estimate | None
     half_cycles: tuple[int, ...]
-    alternatives: tuple[tuple[int, float], ...]
+    alternatives: tuple[tuple[tuple[int, ...], float], ...]
     model: str
     noise: str
     noise_level: float
     channel: str
+    ring_downs: tuple[RingDown, ...]
     time: tuple[Array, ...]
     measured: tuple[Array, ...]
     fitted: tuple[Array, ...]
     status: str
+    notes: tuple[str, ...]
     history: tuple[Step, ...]
 
     @property
@@ -93,86 +104,13 @@ class DecayFit(Result):
         return tuple(m - f for m, f in zip(self.measured, self.fitted, strict=True))
 
 
-@dataclass(frozen=True, eq=False)
-class Blocks:
-    """One release as a fit sees it: means of `size` samples each, `total` samples, their step [s], their order."""
-
-    means: Array
-    size: int
-    total: int
-    dt: float
-    order: int
-
-    @property
-    def data(self) -> tuple[Array, int, int, float, int]:
-        """What the compiled functions take."""
-        return self.means, self.size, self.total, self.dt, self.order
-
-    @property
-    def freedom(self) -> float:
-        """Degrees of freedom that the six parameters leave."""
-        return max(1.0, self.total / self.size - 6.0)
-
-    @property
-    def centres(self) -> Array:
-        """Time [s] of the blocks' centres, from the first sample."""
-        edges = np.minimum(np.arange(len(self.means) + 1) * self.size, self.total)
-        return np.asarray((edges[1:] + edges[:-1] - 1) / 2 * self.dt)
-
-
-class Search:
-    """Fits of one release after another, in memory that is laid out once."""
-
-    def __init__(self, longest: int = 2000) -> None:
-        self.work = np.empty((10, 7, 6))
-        self.fits = np.empty((CANDIDATES, 9))
-        self.ends = np.empty((6, 2))
-        self.rows = np.empty(longest, dtype=np.int64)
-        self.times = np.empty(longest)
-        self.start = np.empty(6)
-
-    def blocks(self, samples: Array, dt: float, order: int = 0) -> Blocks | None:
-        """The samples' block means, or None where no period is seen."""
-        from stickslip.fit.start import block_means, block_size
-
-        size = int(block_size(samples, self.rows, self.times))
-        if size == 0:
-            return None
-        means = np.empty(-(-len(samples) // size))
-        block_means(samples, size, means)
-        return Blocks(means, size, len(samples), dt, order)
-
-    def candidates(self, blocks: Blocks) -> Array:
-        """For each number of half cycles that may be: it, the sum of squares, log det J'J, and six parameters."""
-        from stickslip.fit.profile import over_half_cycles
-        from stickslip.fit.start import guess
-
-        first = guess(*blocks.data, self.rows, self.times, self.start, self.work)
-        kept = over_half_cycles(self.start, first, *blocks.data, self.fits, self.work) if first else 0
-        return np.asarray(self.fits[:kept])
-
-    def intervals(self, blocks: Blocks, fits: Array) -> Array:
-        """Ends (6, 2) of the 95 % profile likelihood of each parameter, the noise's level unknown."""
-        from stickslip.fit.profile import intervals
-
-        level = fits[:, 1].min() * (1 + student(blocks.freedom) ** 2 / blocks.freedom)
-        intervals(fits, len(fits), level, *blocks.data, self.ends, self.work)
-        return self.ends
-
-
-def weights(fits: Array, blocks: Blocks) -> Array:
-    """Likelihood of each number of half cycles, summing to one."""
-    best = fits[:, 1].min()
-    share = np.exp(-0.5 * (fits[:, 1] / best - 1) * blocks.freedom) if best > 0 else 1.0 * (fits[:, 1] == best)
-    return np.asarray(share / share.sum())
-
-
 def fit_decay(
     record: Record | Sequence[Record],
     *,
     channel: str | None = None,
     mass: float | str | None = None,
     stiffness: float | str | None = None,
+    noise: str | None = None,
 ) -> DecayFit:
     r"""How much viscous and how much dry friction does a free decay show?
 
@@ -188,18 +126,24 @@ def fit_decay(
     likelihood. The intervals are those of the profile likelihood, the best number at each point. In white noise that
     reaches the Cramer-Rao bound, while the decrement of the extremes lies at 13 times it (median over 288 conditions).
 
+    The noise is told from the record: white; counts of a digitiser whose step is not small beside the noise, fitted by
+    the probability of each count's interval; or white and drift with a 1/f spectrum, by restricted maximum likelihood.
+    Several releases are fitted together: they share frequency and friction, and narrow the static friction's bracket.
+
     The record is reduced to means over a fortieth of a period first, which costs 0.15 % of the accuracy and makes the
     time of a fit independent of the sampling rate. The model's means are exact.
 
     Parameters
     ----------
-    record : Record
-        One release, with displacement ``x`` or angle ``theta``, velocity ``v`` or acceleration ``a``. A stated delay is
-        taken out first.
+    record : Record or sequence of Record
+        One release or several (see :func:`find_releases`), with displacement ``x`` or angle ``theta``, velocity ``v``
+        or acceleration ``a``. A stated delay is taken out first.
     channel : {"x", "theta", "v", "a"}, optional
         The channel to fit; the first of these that the record has.
     mass, stiffness : float or str, optional
         Mass [kg] or stiffness [N/m] (of an angle: kg m^2, N m/rad), for the dry friction as a force.
+    noise : {"white", "quantised", "coloured"}, optional
+        The noise's kind; told from the record when not given.
 
     Returns
     -------
@@ -210,7 +154,7 @@ def fit_decay(
     RecordError
         The channel is missing, broken or too short.
     EstimateError
-        No oscillation that decays: fewer than two swings, overdamped, growing.
+        No free decay (see :func:`find_releases`), or fewer than two swings.
 
     Examples
     --------
@@ -223,37 +167,121 @@ def fit_decay(
     >>> decay.damping_ratio.includes(2.0 / 2 / math.sqrt(1000)), decay.dry_force.includes(0.5)
     (True, True)
     """
-    question = "the fit of a decay"
+    from stickslip.fit.noise import KINDS
+
+    if noise is not None and noise not in KINDS:
+        raise EstimateError(f"noise = '{noise}'", f"it is one of {', '.join(KINDS)}", "choose one, or leave it out")
     records = [record] if isinstance(record, Record) else list(record)
-    if len(records) != 1:
-        raise EstimateError(f"{len(records)} records", "one release is fitted at a time", "pass one record")
-    name = _channel(records[0], channel, question)
-    clean = without_delays(records[0], name, question=question)
-    clean.require_clean(name, question=question, samples=LEAST)
-    known = _stiffness(mass, stiffness, name)
+    if not records:
+        raise EstimateError("no record", "a decay is fitted to one record at least", "pass a record, or several")
+    found = [find_releases(each, channel=channel) for each in records]
+    ring_downs = [
+        _whole(ring_down, each) for each, those in zip(records, found, strict=True) for ring_down in those.ring_downs
+    ]
+    names = {each.channel for each in ring_downs}
+    if len(names) > 1:
+        raise EstimateError(
+            f"channels {', '.join(sorted(names))}",
+            "releases are fitted together by one channel",
+            "choose channel=",
+        )
+    known = _constants(mass, stiffness, ring_downs[0].channel)
+    releases = [_release(each, noise) for each in ring_downs]
+    motion = _alone(releases[0]) if len(releases) == 1 and releases[0].noise.kind == "white" else _together(releases)
+    notes = tuple(dict.fromkeys(note for each in found for note in each.notes))
+    return _answer(ring_downs, releases, motion, known, notes, tuple(step for each in records for step in each.history))
+
+
+def _whole(ring_down: RingDown, record: Record) -> RingDown:
+    """A velocity or an acceleration with the swing before its first extreme: there it was let go."""
+    if ring_down.order == 0:
+        return ring_down
+    record = without_delays(record, ring_down.channel)
+    first = round((ring_down.first - record.start) * record.fs)
+    before = min(first, round(record.fs / ring_down.frequency))
+    values = record[ring_down.channel][first - before : first]
+    return replace(
+        ring_down, first=ring_down.first - before / record.fs, samples=np.concatenate([values, ring_down.samples])
+    )
+
+
+def _release(ring_down: RingDown, noise: str | None) -> Release:
+    """One release: its blocks, its fits in white noise, its noise."""
+    from stickslip.fit.joint import Release
+    from stickslip.fit.noise import find_noise
+    from stickslip.fit.search import Search
+
+    samples = np.ascontiguousarray(ring_down.samples)
     search = Search()
-    blocks = search.blocks(np.ascontiguousarray(clean[name]), 1 / clean.fs, CHANNELS[name])
+    blocks = search.blocks(samples, 1 / ring_down.fs, ring_down.order)
     fits = search.candidates(blocks) if blocks else np.empty((0, 9))
     if blocks is None or not len(fits):
         raise EstimateError(
-            f"channel {name} shows no oscillation that decays",
+            f"channel {ring_down.channel} shows no oscillation that decays",
             "at least two swings are needed, the first the largest",
             "give the record of a release that is less than critically damped",
         )
-    return _answer(clean, name, search, blocks, fits, known)
+    return Release(blocks, fits, find_noise(blocks, fits, samples, ring_down.step, noise))
 
 
-def _channel(record: Record, channel: str | None, question: str) -> str:
-    if channel is not None and channel not in CHANNELS:
-        raise EstimateError(
-            f"channel = '{channel}'", f"it is one of {', '.join(CHANNELS)}", "choose one, or leave it out"
-        )
-    name = channel or next((each for each in CHANNELS if each in record), "x")
-    record.require(name, question=question)
-    return name
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """Six parameters of the first release, their spread and their 95 % ends, and every candidate with its weight."""
+
+    values: Array
+    spread: Array
+    ends: Array
+    candidates: tuple[tuple[tuple[int, ...], float], ...]
+    motions: tuple[tuple[Array, ...], ...]  # of each candidate, the six parameters of each release
 
 
-def _stiffness(mass: float | str | None, stiffness: float | str | None, name: str) -> tuple[float | None, float | None]:
+def _alone(release: Release) -> _Motion:
+    from stickslip.fit.search import Search, weights
+    from stickslip.fit.waveform import sample_motion
+
+    blocks, fits = release.blocks, release.fits
+    share = weights(fits, blocks)
+    best = fits[np.argmax(share)]
+    ends = Search().intervals(blocks, fits)
+    values, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
+    sample_motion(best[3:], int(best[0]), *blocks.data[1:], values, jacobian, np.empty((3, 7, 6)))
+    covariance = best[1] / blocks.freedom * np.linalg.pinv(jacobian @ jacobian.T)
+    return _mean(fits[:, 3:], share, covariance, ends, [(int(n),) for n in fits[:, 0]], [(row[3:],) for row in fits])
+
+
+def _together(releases: list[Release]) -> _Motion:
+    from stickslip.fit.joint import candidates, ends
+
+    found = candidates(releases)
+    least = min(each.value for each in found)
+    freedom = sum(each.blocks.freedom for each in releases)
+    share = np.exp(-0.5 * np.array([each.value - least for each in found]))
+    best = found[int(np.argmax(share))]
+    covariance = np.asarray(np.linalg.pinv(best.curvature)[:6, :6], dtype=np.float64)
+    limits = ends(found, least + student(freedom) ** 2, 6)
+    motions = [tuple(each.motion(k) for k in range(len(releases))) for each in found]
+    rows = np.array([each.p[:6] for each in found])
+    return _mean(rows, share / share.sum(), covariance, limits, [each.half_cycles for each in found], motions)
+
+
+def _mean(
+    rows: Array,
+    share: Array,
+    covariance: Array,
+    ends: Array,
+    half_cycles: list[tuple[int, ...]],
+    motions: list[tuple[Array, ...]],
+) -> _Motion:
+    """The mean of the candidates by likelihood, the likeliest first."""
+    values = share @ rows
+    spread = np.sqrt(np.diag(covariance) + share @ (rows - values) ** 2)
+    order = np.argsort(-share)
+    return _Motion(
+        values, spread, ends, tuple((half_cycles[k], float(share[k])) for k in order), tuple(motions[k] for k in order)
+    )
+
+
+def _constants(mass: float | str | None, stiffness: float | str | None, name: str) -> tuple[float | None, float | None]:
     """Mass and stiffness as numbers, in the units of the channel."""
     units = ("kg m^2", "N m/rad") if name == "theta" else ("kg", "N/m")
     values = []
@@ -266,82 +294,113 @@ def _stiffness(mass: float | str | None, stiffness: float | str | None, name: st
 
 
 def _answer(
-    record: Record,
-    name: str,
-    search: Search,
-    blocks: Blocks,
-    fits: Array,
+    ring_downs: list[RingDown],
+    releases: list[Release],
+    motion: _Motion,
     known: tuple[float | None, float | None],
+    notes: tuple[str, ...],
+    history: tuple[Step, ...],
 ) -> DecayFit:
-    from stickslip.fit.start import roughness
-    from stickslip.fit.waveform import sample_motion
-
-    share = weights(fits, blocks)
-    best = fits[np.argmax(share)]
-    n = int(best[0])
-    values = share @ fits[:, 3:]
-    ends = search.intervals(blocks, fits)
-    fitted, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
-    sample_motion(best[3:], n, *blocks.data[1:], fitted, jacobian, search.work[:3])
-    variance = best[1] / blocks.freedom
-    covariance = variance * np.linalg.pinv(jacobian @ jacobian.T)
-    spread = np.sqrt(np.diag(covariance) + share @ (fits[:, 3:] - values) ** 2)
-    unlike = math.sqrt(variance) / max(roughness(blocks.means), 1e-300)
-    status = "ok"
-    if unlike > UNLIKE:
-        status = (
-            f"the residual is {unlike:.2g} times the noise: the motion is not quite that of viscous and dry friction"
-        )
-    checks = (f"{n} half cycles" + ("" if len(fits) == 1 else f" (likelihood {share.max():.2f})"),)
-    length, unit = ("rad", "rad") if name == "theta" else ("m", record.channels[name].unit)
+    name = ring_downs[0].channel
+    length, unit = ("rad" if name == "theta" else "m"), ring_downs[0].unit
+    half_cycles, likelihood = motion.candidates[0]
+    fitted = [_fitted(each.blocks, n, p) for each, n, p in zip(releases, half_cycles, motion.motions[0], strict=True)]
+    cut = ("extremes are clipped, and fitted as they are",) if not all(each.sound.all() for each in ring_downs) else ()
+    worries = (*cut, *_misfit(releases, fitted))
+    status = "; ".join(worries) or "ok"
+    many = ", ".join(map(str, half_cycles))
+    checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)
+    noise = releases[0].noise
+    method = f"whole waveform, noise {noise.words}, profile likelihood"
+    starts = [each.first for each in ring_downs]
 
     def estimate(index: int, words: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
-        low, high = factor * ends[index] + offset
-        return Estimate(
-            words, float(factor * values[index] + offset), (float(low), float(high)), float(factor * spread[index]),
-            unit, METHOD, status, checks,
-        )  # fmt: skip
+        low, high = (float(factor * end + offset) for end in motion.ends[index])
+        value, spread = float(factor * motion.values[index] + offset), float(factor * motion.spread[index])
+        return Estimate(words, value, (low, high), spread, unit, method, status, checks)
 
     dry = estimate(2, "dry friction displacement", length)
-    frequency = estimate(0, "natural frequency", "Hz", 1 / (2 * math.pi))
     mass, stiffness = known
-    spring = stiffness if stiffness is not None else None if mass is None else mass * float(values[0]) ** 2
-    force = None if spring is None else dry.scaled(spring, "N m" if name == "theta" else "N", "dry friction")
-    step = Step("fit_decay", {"channel": name}, f"{n} half cycles of {frequency.value:.6g} Hz")
+    spring = stiffness if stiffness is not None or mass is None else mass * float(motion.values[0]) ** 2
+    frequency = estimate(0, "natural frequency", "Hz", 1 / (2 * math.pi))
+    step = Step("fit_decay", {"channel": name}, f"{many} half cycles of {frequency.value:.6g} Hz, noise {noise.words}")
     return DecayFit(
         damping_ratio=estimate(1, "damping ratio", "1"),
         dry_displacement=dry,
         frequency=frequency,
-        bias=estimate(3, "rest position" if CHANNELS[name] == 0 else "sensor offset", unit),
-        release_time=estimate(5, "release time", "s", offset=record.start),
+        bias=estimate(3, "rest position" if ring_downs[0].order == 0 else "sensor offset", unit),
+        release_time=estimate(5, "release time", "s", offset=starts[0]),
         amplitude=estimate(4, "amplitude at release", length),
-        static_displacement=_static(best, n, blocks, length),
-        dry_force=force,
-        half_cycles=(n,),
-        alternatives=tuple((int(row[0]), float(each)) for row, each in zip(fits, share, strict=True)),
+        static_displacement=_static(releases, motion, length),
+        dry_force=None if spring is None else dry.scaled(spring, "N m" if name == "theta" else "N", "dry friction"),
+        half_cycles=half_cycles,
+        alternatives=motion.candidates,
         model="viscous and dry friction",
-        noise="white",
-        noise_level=math.sqrt(variance * blocks.size),
+        noise=noise.words,
+        noise_level=noise.level,
         channel=name,
-        time=(record.start + blocks.centres,),
-        measured=(blocks.means,),
-        fitted=(fitted,),
+        ring_downs=tuple(ring_downs),
+        time=tuple(start + each.blocks.centres for start, each in zip(starts, releases, strict=True)),
+        measured=tuple(each.blocks.means for each in releases),
+        fitted=tuple(fitted),
         status=status,
-        history=(*record.history, step),
+        notes=notes,
+        history=(*history, step),
     )
 
 
-def _static(best: Array, n: int, blocks: Blocks, unit: str) -> Estimate:
-    """Static friction lies between where the mass stayed and where it last turned."""
+def _fitted(blocks: Blocks, n: int, p: Array) -> Array:
+    from stickslip.fit.waveform import sample_motion
+
+    values, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
+    sample_motion(p, n, *blocks.data[1:], values, jacobian, np.empty((3, 7, 6)))
+    return values
+
+
+def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[str, ...]:
+    """Doubt where the residual is much more than the record's own noise from block to block."""
+    from stickslip.fit.start import roughness
+
+    worst = 0.0
+    for release, values in zip(releases, fitted, strict=True):
+        left = release.blocks.means - values
+        counted = release.noise.level if release.noise.kind == "quantised" else 0.0
+        floor = max(float(roughness(release.blocks.means)), counted, 1e-12 * float(np.ptp(values)))
+        if release.blocks.order < 2:
+            worst = max(worst, math.sqrt(float(left @ left) / release.blocks.freedom) / floor)
+    if worst <= UNLIKE:
+        return ()
+    return (f"the residual is {worst:.2g} times the noise: drift, or not quite viscous and dry friction",)
+
+
+def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:
+    """Static friction lies between where the mass stayed and where it last turned, in every release."""
     from stickslip.fit.profile import last_swing
 
-    swing, end = last_swing(best[3:], n)
-    turned = float(swing + best[5])
-    half = math.pi / (best[3] * math.sqrt(1 - best[4] ** 2))
-    rested = best[8] + n * half < (blocks.total - 1) * blocks.dt
-    low, high = (abs(float(end)) if rested else 0.0), turned
+    low, high, rested, method = 0.0, math.inf, False, "between where it stayed and where it last turned"
+    for number, release in enumerate(releases):
+        stayed, turned = [], []
+        for (half_cycles, share), motions in zip(motion.candidates, motion.motions, strict=True):
+            if share < DOUBTED:
+                continue
+            p, n = motions[number], half_cycles[number]
+            swing, end = last_swing(p, n)
+            half = math.pi / (p[0] * math.sqrt(1 - p[1] ** 2))
+            rests = p[5] + n * half < (release.blocks.total - 1) * release.blocks.dt
+            error = 3 * release.noise.level / math.sqrt(max(1.0, half / release.blocks.dt))
+            stayed.append(max(abs(float(end)) - error, 0.0) if rests else 0.0)
+            turned.append(float(swing + p[2]) + error)
+            rested |= rests
+        low, high = max(low, min(stayed)), min(high, max(turned))
+    status = "ok" if rested else "the mass does not come to rest in the record: only an upper bound"
+    if low > high:
+        low, high, status = high, low, "the releases disagree on it: it changes, or the model does not hold"
     return Estimate(
-        "static friction displacement", (low + high) / 2, (low, high), (high - low) / math.sqrt(12), unit,
-        "where it stayed and where it last turned",
-        "ok" if rested else "the mass does not come to rest in the record: only an upper bound",
-    )  # fmt: skip
+        "static friction displacement",
+        (low + high) / 2,
+        (low, high),
+        (high - low) / math.sqrt(12),
+        unit,
+        method,
+        status,
+    )

@@ -1,0 +1,231 @@
+r"""What the noise of a decay's record is, and the likelihood that goes with it.
+
+* Quantised: the digitiser's step q is not small beside the noise. A count y says that the signal plus noise lay between
+  y - q/2 and y + q/2: the likelihood of a sample is ``Phi(b) - Phi(a)``, a, b = (y -+ q/2 - x) / sigma, sigma unknown.
+* Coloured: white noise and drift with a spectrum 1/f, of power ``S(f) = s^2 (1 + f_c / f)``. The cosine transform makes
+  both nearly independent from one frequency to the next; s and f_c are those of restricted maximum likelihood (REML).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.compiled import FAST, compiled
+from stickslip.fit.likelihood import Objective, solve
+from stickslip.fit.search import Blocks
+from stickslip.fit.waveform import normal_equations, sample_motion
+
+Array = NDArray[np.float64]
+
+STEEPEST = 0.9  # damping ratio
+FINEST = 0.02  # of the step: less noise than this is not told from it
+CORNERS = 30  # trial corners of the drift's spectrum
+GAINED = 2.7  # minus twice the log likelihood that drift must gain before it is believed
+COARSE = 0.7  # of the step: noise, the counts' own included, below which counts are not a sum of white noises
+KINDS = ("white", "quantised", "coloured")
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of one release.
+
+    Attributes
+    ----------
+    kind : {"white", "quantised", "coloured"}
+        Which likelihood.
+    level : float
+        Standard deviation of the white noise of a sample.
+    words : str
+        All of it, in words.
+    objective : callable
+        The likelihood for a number of half cycles.
+    """
+
+    kind: str
+    level: float
+    words: str
+    objective: Callable[[int], Objective]
+
+    @property
+    def extra(self) -> int:
+        """Parameters beside the motion's six: the noise itself, where counts are fitted."""
+        return int(self.kind == "quantised")
+
+
+def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: str | None = None) -> Noise:
+    """What the noise of a release is, from its fits in white noise, or the likelihood of the kind that is asked for."""
+    row = fits[np.argmin(fits[:, 1])]
+    variance = max(row[1] / blocks.freedom, 1e-300)
+    level = math.sqrt(variance * blocks.size)
+    if kind == "quantised" or (kind is None and step > 0 and level < COARSE * step):
+        least = max(level, 0.3 * step)
+        return Noise(
+            "quantised", least, f"counts of {step:.3g}",
+            lambda n: quantised(samples, n, step, blocks.dt, blocks.order),
+        )  # fmt: skip
+    if kind != "white" and len(blocks.means) > 24:
+        corner, power, gain = drift(blocks, int(row[0]), row[3:])
+        if kind == "coloured" or gain > GAINED:
+            smooth = _refined(blocks, int(row[0]), row[3:], power)
+            corner, power, _ = drift(blocks, int(row[0]), smooth)
+            white = math.sqrt(float(power[-1]) / (1 + corner / frequencies(blocks)[-1]) * blocks.size)
+            words = f"white, and drift that outweighs it below {corner:.3g} Hz"
+            return Noise("coloured", white, words, lambda n: coloured(blocks, n, power))
+    return Noise("white", level, "white", lambda n: white_noise(blocks, n, variance))
+
+
+def _refined(blocks: Blocks, n: int, p: Array, power: Array) -> Array:
+    """One step from least squares to the best fit in noise of this power."""
+    _, slope, curvature = coloured(blocks, n, power)(p)
+    return np.asarray(p + solve(curvature, slope))
+
+
+def white_noise(blocks: Blocks, n: int, variance: float) -> Objective:
+    """The likelihood in white noise whose blocks have this variance."""
+    work = np.empty((3, 7, 6))
+
+    def objective(p: Array) -> tuple[float, Array, Array]:
+        slope, curvature = np.zeros(6), np.eye(6)
+        if not (abs(p[1]) < STEEPEST and p[0] > 0):
+            return math.inf, slope, curvature
+        squares = normal_equations(p, n, *blocks.data, curvature, slope, work)
+        return float(squares) / variance, slope / variance, curvature / variance
+
+    return objective
+
+
+@compiled(**FAST)
+def mills(a):
+    """Probability beyond a >= 0 over the density there, of the normal law."""
+    if a < 30.0:
+        return 0.5 * math.erfc(a / math.sqrt(2.0)) * math.exp(0.5 * a * a) * math.sqrt(2.0 * math.pi)
+    return (1.0 - 1.0 / (a * a)) / a
+
+
+@compiled(**FAST)
+def add_counts(values, jacobian, counts, step, level, slope, curvature):
+    """Minus twice the log likelihood of counts; half its slope and curvature (7), the last for the noise's logarithm.
+
+    log(Phi(b) - Phi(a)) is concave in (a, b), so the curvature is positive.
+    """
+    total = 0.0
+    for k in range(7):
+        slope[k] = 0.0
+        for j in range(7):
+            curvature[k, j] = 0.0
+    for i in range(values.shape[0]):
+        a, b = (counts[i] - 0.5 * step - values[i]) / level, (counts[i] + 0.5 * step - values[i]) / level
+        side = 1.0
+        if a + b < 0.0:
+            a, b, side = -b, -a, -1.0
+        fade = math.exp(-0.5 * (b - a) * (b + a))
+        if a >= 0.0:
+            share = mills(a) - fade * mills(b)
+        else:
+            density = math.exp(-0.5 * a * a) / math.sqrt(2.0 * math.pi)
+            share = 0.5 * (math.erf(b / math.sqrt(2.0)) - math.erf(a / math.sqrt(2.0))) / max(density, 1e-300)
+        low = 1.0 / share
+        high = fade * low
+        total += a * a + math.log(2.0 * math.pi) - 2.0 * math.log(share)
+        aa, bb, ab = low * (low - a), high * (high + b), -low * high
+        # a and b fall with the value and, in size, with the noise
+        d_value = -side / level
+        s_value, s_noise = (high - low) * d_value, -(high * b - low * a)
+        c_value = (aa + 2.0 * ab + bb) / (level * level)
+        c_mixed = -d_value * ((aa + ab) * a + (ab + bb) * b)
+        c_noise = aa * a * a + 2.0 * ab * a * b + bb * b * b
+        for k in range(6):
+            slope[k] += s_value * jacobian[k, i]
+            curvature[6, k] += c_mixed * jacobian[k, i]
+            for j in range(k + 1):
+                curvature[k, j] += c_value * jacobian[k, i] * jacobian[j, i]
+        slope[6] += s_noise
+        curvature[6, 6] += c_noise
+    for k in range(7):
+        for j in range(k):
+            curvature[j, k] = curvature[k, j]
+    return total
+
+
+def quantised(samples: Array, n: int, step: float, dt: float, order: int) -> Objective:
+    """The likelihood of counts, of six parameters of the motion and the logarithm of the noise."""
+    values, jacobian, work = np.empty(len(samples)), np.empty((6, len(samples))), np.empty((3, 7, 6))
+    least = math.log(FINEST * step)
+
+    def objective(p: Array) -> tuple[float, Array, Array]:
+        slope, curvature = np.empty(7), np.empty((7, 7))
+        if not (abs(p[1]) < STEEPEST and p[0] > 0 and p[6] < 700):
+            return math.inf, slope, curvature
+        sample_motion(p[:6], n, 1, len(samples), dt, order, values, jacobian, work)
+        total = add_counts(values, jacobian, samples, step, math.exp(max(p[6], least)), slope, curvature)
+        under = max(least - p[6], 0.0)
+        slope[6] += under
+        curvature[6, 6] += 1e-3 + (1.0 if under else 0.0)
+        return float(total) + under**2, slope, curvature
+
+    return objective
+
+
+def _transformed(blocks: Blocks, n: int, p: Array) -> tuple[Array, Array]:
+    """Cosine transforms of the residual and the Jacobian."""
+    from scipy.fft import dct
+
+    whole = blocks.total // blocks.size
+    values, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
+    sample_motion(p, n, *blocks.data[1:], values, jacobian, np.empty((3, 7, 6)))
+    left = dct((blocks.means - values)[:whole], norm="ortho")
+    return np.asarray(left), np.asarray(dct(jacobian[:, :whole], norm="ortho"))
+
+
+def frequencies(blocks: Blocks) -> Array:
+    """Of the cosines [Hz]; the constant counts as half the lowest."""
+    whole = blocks.total // blocks.size
+    steps = np.arange(whole, dtype=float)
+    steps[0] = 0.5
+    return np.asarray(steps / (2 * whole * blocks.size * blocks.dt))
+
+
+def coloured(blocks: Blocks, n: int, power: Array) -> Objective:
+    """The likelihood in noise of this power at each cosine."""
+
+    def objective(p: Array) -> tuple[float, Array, Array]:
+        if not (abs(p[1]) < STEEPEST and p[0] > 0):
+            return math.inf, np.zeros(6), np.eye(6)
+        left, jacobian = _transformed(blocks, n, p)
+        weighted = jacobian / power
+        return float(left @ (left / power)), weighted @ left, weighted @ jacobian.T
+
+    return objective
+
+
+def drift(blocks: Blocks, n: int, p: Array) -> tuple[float, Array, float]:
+    """Corner [Hz] of the drift, the power at each cosine, and what it gains over white noise, by REML."""
+    left, jacobian = _transformed(blocks, n, p)
+    tones = frequencies(blocks)
+    freedom = len(tones) - 6
+
+    def judged(corner: float) -> tuple[float, float]:
+        power = 1 + corner / tones
+        weighted = jacobian / power
+        curvature, slope = weighted @ jacobian.T, weighted @ left
+        squares = float(left @ (left / power) - slope @ solve(curvature, slope)) / freedom
+        scale = np.sqrt(np.diag(curvature))
+        determinant = np.linalg.slogdet(curvature / np.outer(scale, scale))[1] + 2 * np.log(scale).sum()
+        return freedom * math.log(squares) + float(np.log(power).sum() + determinant), squares
+
+    corners = np.geomspace(0.1 * tones[1], 2 * tones[-1], CORNERS)
+    costs = [judged(each)[0] for each in corners]
+    best = int(np.argmin(costs))
+    if 0 < best < CORNERS - 1:  # a parabola through three costs
+        below, here, above = costs[best - 1 : best + 2]
+        shift = 0.5 * (below - above) / (below - 2 * here + above)
+        corner = float(corners[best] * (corners[1] / corners[0]) ** shift)
+    else:
+        corner = float(corners[best])
+    cost, squares = judged(corner)
+    return corner, squares * (1 + corner / tones), judged(0.0)[0] - cost

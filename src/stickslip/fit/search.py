@@ -1,0 +1,83 @@
+"""The fit of one release in white noise: blocks, start, every number of half cycles, intervals; all of it compiled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.fit.profile import intervals, over_half_cycles
+from stickslip.fit.start import block_means, block_size, guess
+from stickslip.statistics import student
+
+Array = NDArray[np.float64]
+
+CANDIDATES = 16  # numbers of half cycles kept
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """One release as a fit sees it: means of `size` samples each, `total` samples, their step [s], their order."""
+
+    means: Array
+    size: int
+    total: int
+    dt: float
+    order: int
+
+    @property
+    def data(self) -> tuple[Array, int, int, float, int]:
+        """What the compiled functions take."""
+        return self.means, self.size, self.total, self.dt, self.order
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom that the six parameters leave."""
+        return max(1.0, self.total / self.size - 6.0)
+
+    @property
+    def centres(self) -> Array:
+        """Time [s] of the blocks' centres, from the first sample."""
+        edges = np.minimum(np.arange(len(self.means) + 1) * self.size, self.total)
+        return np.asarray((edges[1:] + edges[:-1] - 1) / 2 * self.dt)
+
+
+class Search:
+    """Fits of one release after another, in memory that is laid out once."""
+
+    def __init__(self, longest: int = 2000) -> None:
+        self.work = np.empty((10, 7, 6))
+        self.fits = np.empty((CANDIDATES, 9))
+        self.ends = np.empty((6, 2))
+        self.rows = np.empty(longest, dtype=np.int64)
+        self.times = np.empty(longest)
+        self.start = np.empty(6)
+
+    def blocks(self, samples: Array, dt: float, order: int = 0) -> Blocks | None:
+        """The samples' block means, or None where no period is seen."""
+        size = int(block_size(samples, self.rows, self.times))
+        if size == 0:
+            return None
+        means = np.empty(-(-len(samples) // size))
+        block_means(samples, size, means)
+        return Blocks(means, size, len(samples), dt, order)
+
+    def candidates(self, blocks: Blocks) -> Array:
+        """For each number of half cycles that may be: it, the sum of squares, log det J'J, and six parameters."""
+        first = guess(*blocks.data, self.rows, self.times, self.start, self.work)
+        kept = over_half_cycles(self.start, first, *blocks.data, self.fits, self.work) if first else 0
+        return np.array(self.fits[:kept])
+
+    def intervals(self, blocks: Blocks, fits: Array) -> Array:
+        """Ends (6, 2) of the 95 % profile likelihood of each parameter, the noise's level unknown."""
+        level = fits[:, 1].min() * (1 + student(blocks.freedom) ** 2 / blocks.freedom)
+        intervals(fits, len(fits), level, *blocks.data, self.ends, self.work)
+        return self.ends
+
+
+def weights(fits: Array, blocks: Blocks) -> Array:
+    """Likelihood of each number of half cycles, summing to one."""
+    best = fits[:, 1].min()
+    share = np.exp(-0.5 * (fits[:, 1] / best - 1) * blocks.freedom) if best > 0 else 1.0 * (fits[:, 1] == best)
+    return np.asarray(share / share.sum())
