@@ -94,20 +94,41 @@ def test_dither_smooths_a_stribeck_curve(speed: float, known: float) -> None:
     assert mean == pytest.approx(known, rel=1e-10)
 
 
-@pytest.mark.parametrize("ratio", [0.3, 0.5])
-def test_dither_of_other_shapes(ratio: float) -> None:
-    """DI-2: a triangle of velocity gives <f> / f_k = v / U, a square none, in the limit of many harmonics."""
-    level, count, period = 0.3, 40, 1.0
-    orders = np.arange(1, 2 * count, 2)
-    for gains, known in (
-        (8 / math.pi**2 / orders**2, ratio),
-        (4 / math.pi / orders * (-1.0) ** ((orders - 1) // 2), 0),
-    ):
-        speeds = level * gains
-        tones = [(u / (2 * math.pi * n), float(n), -math.pi / 2) for u, n in zip(speeds, orders, strict=True)]
-        drive = ss.MultiTone(tones, on="face")
-        system = ss.Oscillator(mass=HEAVY, stiffness=0, law=ss.Coulomb(1.0), drive=drive)
-        run = ss.simulate(system, duration=2 * period, start={"v": ratio * level})
-        sides = np.array([run.table.modes[m].side for m in run.modes])
-        inside = np.clip(run.starts + run.durations, period, None) - np.clip(run.starts, period, None)
-        assert float(sides @ inside) / period == pytest.approx(known, abs=9e-3)
+@pytest.mark.parametrize("ratio", [0.3, 0.5, 0.8])
+@pytest.mark.parametrize("slanted", [1.0, 0.6, 1e-3, 1e-12])
+def test_dither_of_other_shapes(ratio: float, slanted: float) -> None:
+    """DI-2: a triangle of velocity gives <f> / f_k = v / U, a square none; a trapezoid its slanted part of v / U."""
+    top, cycles = 0.3, 4
+    edge = slanted / 4
+    one = np.array([0.0, edge, 0.5 - edge, 0.5 + edge, 1 - edge])
+    times = (np.arange(cycles)[:, None] + one).ravel()
+    speeds = np.tile(top * np.array([0.0, 1.0, 1.0, -1.0, -1.0]), cycles)
+    if slanted == 1.0:  # the level parts have no length
+        times, first = np.unique(times, return_index=True)
+        speeds = speeds[first]
+    drive = ss.SpeedProfile([*times, cycles], [*speeds, 0.0], on="face")
+    system = ss.Oscillator(mass=HEAVY, stiffness=0, law=ss.Coulomb(1.0), drive=drive)
+    run = ss.simulate(system, duration=float(cycles), start={"v": ratio * top})
+    sides = np.array([run.table.modes[m].side for m in run.modes])
+    inside = np.clip(run.starts + run.durations, 1.0, None) - np.clip(run.starts, 1.0, None)
+    assert float(sides @ inside) / (cycles - 1) == pytest.approx(slanted * ratio, rel=1e-12, abs=2e-15)
+
+
+def test_a_trapezoid_of_the_base_moves_as_its_closed_form() -> None:
+    """A frictionless mass on a spring whose end starts, runs and stops: three ramps of speed superposed."""
+    times, speeds, omega = [0.0, 0.7, 2.0, 2.3], [0.0, 0.5, 0.5, 0.0], 3.0
+    drive = ss.SpeedProfile(times, speeds)
+    run = ss.simulate(ss.Oscillator(mass=1, stiffness=omega**2, law=ss.Coulomb(0.0), drive=drive), duration=5.0)
+    kinks = np.diff([0.0, *(np.diff(speeds) / np.diff(times)), 0.0])
+    after = np.clip(5.0 - np.array(times), 0, None)
+    known = kinks @ (after**2 / 2 - (1 - np.cos(omega * after)) / omega**2)
+    assert run.state(5.0)["x"] == pytest.approx(known, rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("times", "speeds"),
+    [([0.0, 1.0], [0.0]), ([0.1, 1.0], [0.0, 1.0]), ([0.0, 1.0, 1.0], [0, 1, 2]), ([0, 1], [0, math.nan])],
+)
+def test_a_profile_without_meaning_is_refused(times: list[float], speeds: list[float]) -> None:
+    with pytest.raises(ss.ModelError):
+        ss.SpeedProfile(times, speeds)

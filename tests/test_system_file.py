@@ -85,7 +85,7 @@ def test_the_motion_is_that_of_the_same_system_in_python(tmp_path: Path) -> None
         ('"CompliantContact"', '"CompliantContacts"', ["line 7", "perhaps CompliantContact is meant"]),
         ('"CompliantContact"', "[1]", ["line 7", "a law is one of Coulomb,"]),
         ('name = "HarmonicBase"\n', "", ["line 11", "no drive.name", "Belt"]),
-        ("frequency = 2.5", "frequency = 1e12", ["line 14", "1e+09 times a second"]),
+        ("frequency = 2.5", "frequency = 1e12", ["line 14", "1e+10 times a second"]),
         (DRIVE, 'name = "Belt"\nspeed = 0', ["line 13", "a belt runs"]),
         (DRIVE, 'name = "MultiTone"\ntones = [[1e-3, 2.5, "9 N"]]', ["line 13", "drive.tones", "measured in rad"]),
         (DRIVE, 'name = "RecordedBase"\nrecord = "z.csv"', ["line 13", "channel"]),

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import stickslip as ss
 from stickslip import scenarios
+from stickslip.solve.energy import energy
 from stickslip.solve.periodic import steady_state
 from stickslip.solve.simulate import simulate
+from stickslip.solve.trajectory import Trajectory
 
 
 def agree(found: object, known: object, tolerance: float) -> None:
@@ -117,3 +121,133 @@ def test_a_fast_belt_is_not_stuck_to_again(side: int) -> None:
     system = ss.Oscillator(mass=1, stiffness=1, damping=0.1, law=ss.Coulomb(1.0, 1.5), drive=ss.Belt(speed))
     run = simulate(system, duration=100, start={"x": 1.5 - 0.1 * speed, "v": speed})
     assert any(event.kind == "stick" for event in run.events) == (side < 0)
+
+
+THESIS = tomllib.loads(Path(__file__).with_name("thesis_events.toml").read_text("utf-8"))
+
+
+def around(orbit: Trajectory) -> list[tuple[str, float, float, float, float, float]]:
+    """Every piece of an orbit, the one that the start of the period cuts put together.
+
+    Kind, start [s], duration [s], way [m], velocity at its end [m/s], place at its start [m].
+    """
+    modes, period = orbit.table.modes, orbit.table.motion.period
+    whole = orbit.modes[0] == orbit.modes[-1] and len(orbit.modes) > 1
+    starts, lengths, states = orbit.starts[whole:], orbit.durations[whole:].copy(), orbit.states[whole:]
+    lengths[-1] += orbit.durations[0] if whole else 0.0
+    after = np.roll(states, -1, axis=0)
+    kinds = [modes[m].kind for m in orbit.modes[whole:]]
+    ways = after[:, 0] - states[:, 0]
+    return list(zip(kinds, starts % period, lengths, ways, after[:, 1], states[:, 0], strict=True))
+
+
+@pytest.mark.parametrize("name", THESIS)
+def test_every_event_of_a_thesis_case(name: str) -> None:
+    """Start, duration, way and end velocity of every stick and slip, in both halves of the cycle."""
+    steady = steady_state(scenarios.get(name).system)
+    found, period = around(steady.orbit), steady.period
+    scale = np.array([period, period, steady.amplitude, steady.largest("v")])
+    assert len(found) == 2 * len(THESIS[name])
+    for kind, start, length, way, speed in THESIS[name]:
+        for sign, half in ((1, 0.0), (-1, period / 2)):
+            known = np.array([(start + half) % period, length, sign * way, sign * speed])
+            gaps = [np.max(np.abs(np.subtract(piece[1:5], known)) / scale) for piece in found if piece[0] == kind]
+            assert min(gaps) < 1e-13, (kind, start)
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "phase"),
+    [
+        ("DH-3 b=0.5084 r=0.7326", 0.25920113385723104, 1.149229742705322),
+        ("DH-3 b=0.5 r=0.8", 0.29862263728316468, 1.3481768895364696),
+        ("DH-3 b=0.8 r=0.9", 0.50625335423584046, 2.5528771191239934),
+        ("DH-3 b=1.2 r=0.8", 0.30081303295030159, 2.3262726425890987),
+        ("DH-3 b=0.5 r=0.6", 0.24809218742629285, 1.1403078594673675),
+        ("DH-3 b=0.7 r=0.6", 0.033696025069110911, 0.67021886142259415),
+        ("DH-3 b=0.25 r=0.9", 0.6436614653800147, 2.1000166872174145),
+    ],
+)
+def test_the_share_of_stick_and_the_phase_of_break_away(name: str, share: float, phase: float) -> None:
+    """DH-3: slip breaks away downwards at cos(phase) = x0 - F_s / P."""
+    scenario = scenarios.get(name)
+    steady = steady_state(scenario.system, start=scenario.start)
+    found = around(steady.orbit)
+    assert sum(p[2] for p in found if p[0] == "stick") / steady.period == pytest.approx(share, rel=1e-12)
+    phases = [p[1] / steady.period * 2 * math.pi for p in found if p[0] == "slip" and p[3] < 0]
+    assert phases == [pytest.approx(phase, rel=1e-12)]
+
+
+@pytest.mark.parametrize(
+    ("name", "load", "given", "friction"),
+    [
+        ("FR-1 z=0.02", 0.3, 48.540035137856002, 18.54029320186995),
+        ("FR-1 z=0.05", 0.5, 11.418455648134838, 7.2627716482268195),
+        ("FR-1 z=0.1", 0.2, 11.708285431570341, 2.9803517608452448),
+    ],
+)
+def test_the_energy_of_resonance(name: str, load: float, given: float, friction: float) -> None:
+    """FR-1: the drive gives what friction, 4 r X, and the damper take over a cycle."""
+    steady = steady_state(scenarios.get(name).system)
+    balance = energy(steady.orbit)
+    assert 4 * load * steady.amplitude == pytest.approx(friction, rel=1e-12)
+    assert balance.friction == pytest.approx(friction, rel=1e-12)
+    # what the spring and the damper give is in `drive` too: the damper's loss is the rest
+    nodes, weights = np.polynomial.legendre.leggauss(30)
+    orbit, work = steady.orbit, 0.0
+    for begin, length in zip(orbit.starts, orbit.durations, strict=True):
+        (force, v), _ = orbit.sample(begin + length * (nodes + 1) / 2, ("force", "v"))
+        work += length / 2 * float(weights @ (force * v))
+    assert work == pytest.approx(given, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("BS-2", {"slip": 0.17156718657531491, "stick": 0.034632034632034632, "end": 0.00064935064935064935,
+                  "most": 0.00084326860184054256, "least": 0.00010911235054040982, "slowest": -0.011341142633122203}),
+        ("BS-3", {"slip": 2.6112592541013096, "stick": 5.0, "end": 0.75, "most": 0.75980762113533159,
+                  "least": 0.24019237886466841, "slowest": -0.36742346141747671}),
+    ],
+)  # fmt: skip
+def test_stick_slip_on_a_belt(name: str, values: dict[str, float]) -> None:
+    """BS: lengths of stick and slip, where the stick ends, and the extremes of displacement and velocity."""
+    scenario = scenarios.get(name)
+    run = simulate(scenario.system, duration=4 * values["slip"] + 4 * values["stick"])
+    slips = [p for p in run.pieces[:-1] if p.mode == "back"]
+    sticks = [p for p in run.pieces[1:-1] if p.mode == "stuck"]
+    assert slips[-1].duration == pytest.approx(values["slip"], rel=1e-12)
+    assert sticks[-1].duration == pytest.approx(values["stick"], rel=1e-12)
+    assert slips[-1].state["x"] == pytest.approx(values["end"], rel=1e-12)
+    # a sine around its middle: the extremes lie where the velocity, or the acceleration, is zero
+    middle = scenario.system.law.kinetic / scenario.system.stiffness
+    omega = 2 * math.pi * scenario.system.frequency
+    radius = math.hypot(slips[-1].state["x"] - middle, slips[-1].state["v"] / omega)
+    assert middle + radius == pytest.approx(values["most"], rel=1e-12)
+    assert middle - radius == pytest.approx(values["least"], rel=1e-12)
+    assert -radius * omega == pytest.approx(values["slowest"], rel=1e-12)
+    times = np.linspace(slips[-1].start, slips[-1].start + slips[-1].duration, 4001)
+    x, v = run.sample(times, ("x", "v"))[0]
+    assert (x.max(), x.min(), v.min()) == pytest.approx((values["most"], values["least"], values["slowest"]), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "places", "misses"),
+    [
+        ("INERTIAL Xm=20", (2.0312968536160702, 2.7784191644503746), (0.0277637, 0.0292141, 0.00417475)),
+        ("INERTIAL Xm=10", (0.31592533919560971, 0.2922294944960769, 0.75095770799205397), ()),
+    ],
+)
+def test_where_the_inertial_contact_stops(name: str, places: tuple[float, ...], misses: tuple[float, ...]) -> None:
+    """Equation 4.7: the places of the abnormal stops, and how near the first slip comes to stopping before."""
+    steady = steady_state(scenarios.get(name).system)
+    sticks = sorted((p for p in around(steady.orbit) if p[0] == "stick"), key=lambda p: p[2])
+    short = sorted(abs(p[5]) for p in sticks if p[2] < 5)
+    assert short == pytest.approx(sorted(2 * places), rel=1e-9)
+    if misses:
+        orbit = steady.orbit
+        j = max((j for j in range(1, len(orbit.modes) - 1) if orbit.table.modes[orbit.modes[j]].kind == "slip"),
+                key=lambda j: orbit.durations[j])  # fmt: skip
+        times = np.linspace(orbit.starts[j], orbit.starts[j] + orbit.durations[j], 400_001)[1:-1]
+        speed = np.abs(orbit.sample(times, ("v",))[0][0])
+        dips = speed[1:-1][(speed[1:-1] < speed[:-2]) & (speed[1:-1] < speed[2:])]
+        assert dips == pytest.approx(misses, rel=2e-6)

@@ -89,6 +89,7 @@ if TYPE_CHECKING:
         Ramp as Ramp,
         RecordedBase as RecordedBase,
         Release as Release,
+        SpeedProfile as SpeedProfile,
     )
     from stickslip.laws.compliant import CompliantContact as CompliantContact
     from stickslip.laws.coulomb import Coulomb as Coulomb
@@ -167,6 +168,7 @@ _ROOMS = {
     "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",
     "Release": "drives", "HarmonicBase": "drives", "HarmonicForce": "drives", "MultiTone": "drives",
     "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives",
+    "SpeedProfile": "drives",
     "Oscillator": "oscillator", "Structure": "structure", "Contact": "structure",
     "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
     "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",

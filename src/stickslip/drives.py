@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import ModelError
 
 Row = Mapping[str, float]
-LARGEST_FREQUENCY = 1e9  # Hz; above it a period is shorter than what the clock of a long run resolves
+LARGEST_FREQUENCY = 1e10  # Hz; more is a wrong unit
 
 
 @dataclass(frozen=True)
@@ -354,6 +354,67 @@ class RecordedBase:
             dict(zip(names, knots[0, 1:], strict=True)),
             base=row,
             face=row if self.contact == "base" else {},
+            knots=knots,
+            knotted=names,
+        )
+
+
+@dataclass(frozen=True)
+class SpeedProfile:
+    """The spring's end or the counter-face follows a profile of speeds, straight between given instants.
+
+    A motor's trapezoid, a start and a stop, or dither of any shape: triangles, near squares. The displacement starts at
+    zero and is a parabola between two instants; after the last one the speed stays.
+
+    Attributes
+    ----------
+    times : sequence of float
+        Instants [s], increasing from 0.
+    speeds : sequence of float
+        Speed at each [m/s].
+    on : {"base", "face"}
+        What they move: the spring's end or the counter-face.
+
+    Examples
+    --------
+    >>> SpeedProfile([0.0, 1.0, 3.0, 4.0], [0.0, 0.5, 0.5, 0.0]).motion().knots[:, 1]
+    array([0.  , 0.25, 1.25, 1.5 ])
+    """
+
+    times: Sequence[float]
+    speeds: Sequence[float]
+    on: str = "base"
+
+    def __post_init__(self) -> None:
+        _require(self.on in ("base", "face"), f"on = '{self.on}'", "speeds move the 'base' or the 'face'", "choose one")
+        for name in ("times", "speeds"):
+            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
+        values = np.array([*self.times, *self.speeds])
+        _require(
+            len(self.times) == len(self.speeds) >= 2 and bool(np.all(np.isfinite(values))),
+            f"{len(self.times)} times and {len(self.speeds)} speeds",
+            "both are finite numbers, as many of one as of the other, at least two",
+            "give a speed for each instant",
+        )
+        _require(
+            self.times[0] == 0 and bool(np.all(np.diff(self.times) > 0)),
+            f"times from {self.times[0]:g} to {self.times[-1]:g} s",
+            "instants increase from 0",
+            "sort them, and leave out the same instant twice",
+        )
+
+    def motion(self) -> Motion:
+        """Displacement, speed and acceleration, set anew at every instant."""
+        times, speeds = np.array(self.times), np.array(self.speeds)
+        steps = np.diff(times)
+        ways = np.cumsum([0.0, *(steps * (speeds[1:] + speeds[:-1]) / 2)])
+        knots = np.column_stack([times, ways, speeds, [*(np.diff(speeds) / steps), 0.0]])
+        names, row = ("z0", "z1", "z2"), {"z0": 1.0}
+        return Motion(
+            {"z0": {"z1": 1.0}, "z1": {"z2": 1.0}, "z2": {}},
+            dict(zip(names, knots[0, 1:], strict=True)),
+            base=row if self.on == "base" else {},
+            face=row if self.on == "face" else {},
             knots=knots,
             knotted=names,
         )

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.drives import Belt, HarmonicBase, HarmonicForce, MultiTone, Ramp, RecordedBase, Release
+from stickslip.drives import Belt, HarmonicBase, HarmonicForce, MultiTone, Ramp, RecordedBase, Release, SpeedProfile
 from stickslip.errors import ModelError
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
@@ -47,6 +47,7 @@ LAWS: dict[str, Callable[..., Any]] = {
 DRIVES: dict[str, Callable[..., Any]] = {
     "Release": Release, "HarmonicBase": HarmonicBase, "HarmonicForce": HarmonicForce, "MultiTone": MultiTone,
     "Belt": Belt, "Ramp": Ramp, "RecordedBase": RecordedBase,
+    "SpeedProfile": SpeedProfile,
 }  # fmt: skip
 
 

@@ -36,9 +36,9 @@ UNITS = {
     "damping": "N s/m", "slope": "N s/m", "gradient": "N/m", "rate": "1/(N s)", "steepness": "s/m", "speeds": "m/s",
     "speed": "m/s", "amplitude": "m", "frequency": "Hz", "phase": "rad", "fs": "Hz", "samples": "m",
     "HarmonicForce.amplitude": "N", "viscous": "N s/m", "normal": "N", "distance": "m", "reference": "m/s",
-    "preload": "N",
+    "preload": "N", "times": "s",
 }  # fmt: skip
-STATE_UNITS = {"x": "m", "v": "m/s", "y": "m", "u": "m/s", "theta": "N"}
+STATE_UNITS = {"x": "m", "v": "m/s", "stretch": "m", "u": "m/s", "theta": "N"}
 CYCLES = 20.0  # of a run where nothing is said
 
 
