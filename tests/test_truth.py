@@ -67,8 +67,7 @@ def test_the_non_stop_boundary_at_1e_12(row: list[float], side: int) -> None:
     if damping == 0 and abs(1 / ratio / 2 - round(1 / ratio / 2)) < 1e-12:
         pytest.skip("a family of orbits: no boundary of its own")
     orbit = steady_state(system, start={"x": 2.0})
-    stopped = sum(orbit.stops) > 0
-    assert stopped == (side > 0), (orbit.stops, orbit.status)
+    assert sum(orbit.stops) == (2 * orbit.order if side > 0 else 0), (orbit.stops, orbit.status)
 
 
 def test_the_limits_of_the_boundary() -> None:

@@ -46,6 +46,15 @@ def _curve(c, low, count, u):
 
 
 @compiled(**OPTIONS)
+def _clear(g, d, most, left):
+    """How far g + d t + most t^2 / 2 stays below zero from g < 0; `left` where it never rises."""
+    if most > 0.0:
+        root = math.sqrt(d * d - 2.0 * most * g)
+        return -2.0 * g / (d + root) if d > 0.0 else (root - d) / most
+    return -g / d if d > 0.0 else left
+
+
+@compiled(**OPTIONS)
 def first_rise(c, noise, count, low, sign, start, limit):
     """First u in (start, limit] at which sign * polynomial rises through zero; `NONE` where there is none.
 
@@ -58,7 +67,7 @@ def first_rise(c, noise, count, low, sign, start, limit):
         third += j * (j - 1) * (j - 2) * abs(c[k])
     floor = noise[low]
     u = start
-    for _ in range(200):
+    for _ in range(2000):
         g, d, h = _curve(c, low, count, u)
         g, d, h = sign * g, sign * d, sign * h
         left = limit - u
@@ -77,13 +86,11 @@ def first_rise(c, noise, count, low, sign, start, limit):
             continue
         if g + max(d, 0.0) * left + 0.5 * max(most, 0.0) * left * left < 0.0:
             return NONE
-        if most > 0.0:
-            root = math.sqrt(d * d - 2.0 * most * g)
-            step = -2.0 * g / (d + root) if d > 0.0 else (root - d) / most
-        elif d > 0.0:
-            step = -g / d
-        else:
-            return NONE
+        step = _clear(g, d, most, left)
+        near = 8.0 * step
+        if near < left:
+            # nearer by, the curvature is bound more closely
+            step = max(step, min(near, _clear(g, d, h + third * near, near)))
         if step >= left:
             end = sign * _curve(c, low, count, limit)[0]
             return limit if end >= 0.0 else NONE
