@@ -33,7 +33,15 @@ if TYPE_CHECKING:
     from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
     from stickslip.files.write import write_record as write_record
     from stickslip.fit.decay import DecayFit as DecayFit, fit_decay as fit_decay
+    from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
     from stickslip.identify.decrement import Bounds as Bounds, Decrement as Decrement, decrement as decrement
+    from stickslip.identify.envelope import (
+        EnvelopeDecay as EnvelopeDecay,
+        extreme_decay as extreme_decay,
+        hilbert_decay as hilbert_decay,
+        linear_decrement as linear_decrement,
+        log_decrement as log_decrement,
+    )
     from stickslip.identify.force import friction_force as friction_force
     from stickslip.identify.loops import friction_loops as friction_loops
     from stickslip.identify.regression import regress_friction as regress_friction
@@ -157,6 +165,9 @@ _ROOMS = {
     "decrement": "identify.decrement", "Decrement": "identify.decrement", "Bounds": "identify.decrement",
     "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
     "fit_decay": "fit.decay", "DecayFit": "fit.decay",
+    "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",
+    "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",
+    "extreme_decay": "identify.envelope", "hilbert_decay": "identify.envelope", "EnvelopeDecay": "identify.envelope",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
     "analyze": "analysis", "compare": "analysis", "mend": "analysis", "Findings": "analysis", "Comparison": "analysis",
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",

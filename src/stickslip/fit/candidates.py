@@ -167,7 +167,7 @@ def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> 
     found = {name: fit_motion(MOTIONS[name], blocks, first) for name in ("both", "static")}
     base = min(found.values(), key=lambda each: each.cost)
     hopeless = HOPELESS * base.cost
-    wanted = sorted({*names, *found}, key=lambda name: MOTIONS[name].size)
+    wanted = sorted((name for name in MOTIONS if name in names or name in found), key=lambda name: MOTIONS[name].size)
     for name in wanted:
         motion = MOTIONS[name]
         tries = [found[name]] if name in found else []

@@ -156,7 +156,7 @@ class Choice:
     @property
     def chosen(self) -> Candidate:
         """The candidate of that name."""
-        return next(each for each in self.candidates if each.name == self.model)
+        return self.candidate(self.model)
 
     @property
     def kept(self) -> tuple[Candidate, ...]:
@@ -170,6 +170,10 @@ class Choice:
         """95 % interval of a parameter, whichever of the candidates not rejected is the motion."""
         ends = [each.estimate(parameter).interval for each in self.kept]
         return min(low for low, _ in ends), max(high for _, high in ends)
+
+    def candidate(self, name: str) -> Candidate:
+        """The candidate of a name in ``MOTIONS``."""
+        return next(each for each in self.candidates if each.name == name)
 
 
 def choose(

@@ -1,0 +1,179 @@
+"""Which motion does a record's free decay follow?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate, Result
+from stickslip.fit.choice import Choice, choose
+from stickslip.fit.motions import MOTIONS, Restoring
+from stickslip.identify.release import RingDown, find_releases
+from stickslip.record.record import Record
+
+Array = NDArray[np.float64]
+
+BLOCKS = 40  # a period
+SWING = 2.5  # rad, above which a pendulum lingers near its top and its phase can not be held
+TAIL = 2.0  # periods at rest that are kept
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DecayMotion(Result):
+    """Which motion a free decay follows, and what it says of its friction.
+
+    Attributes
+    ----------
+    damping_ratio, dry_displacement, frequency : Estimate
+        Damping ratio, dry friction over the stiffness [m or rad] and undamped natural frequency [Hz] if the motion is
+        `model`; exactly zero where it has no such term.
+    damping_ratio_any, dry_displacement_any : Estimate
+        The same with the interval that holds whichever candidate not rejected is the motion: the model's form counted.
+    model : str
+        The simplest candidate that the record does not speak against, by its name.
+    candidates : tuple of (str, str, str)
+        Name, words and verdict of all that were tried.
+    choice : Choice
+        Their fits.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    damping_ratio: Estimate
+    dry_displacement: Estimate
+    frequency: Estimate
+    damping_ratio_any: Estimate
+    dry_displacement_any: Estimate
+    model: str
+    candidates: tuple[tuple[str, str, str], ...]
+    choice: Choice
+    status: str
+
+
+def choose_motion(
+    record: Record,
+    *,
+    channel: str | None = None,
+    restoring: Restoring = "linear",
+    candidates: tuple[str, ...] = tuple(MOTIONS),
+) -> DecayMotion:
+    """Which motion does a free decay follow: viscous, dry, both, or one that a thesis leaves out?
+
+    The candidates are viscous damping, dry friction, both, both with static above kinetic friction, quadratic (air)
+    damping without and with dry friction, friction that rises towards rest (Stribeck), a spring that is not straight,
+    and a joint in micro-slip. Each is fitted to the whole waveform and tested against every term that it lacks, so that
+    a true one is rejected once in twenty. The simplest that is not rejected is the model. All that are not rejected
+    give a second interval, beside the statistical one: a friction that the record can not tell apart may bias an
+    estimate by far more than its noise. Where all are rejected, those that leave at most twice the best residual give
+    it.
+
+    Parameters
+    ----------
+    record : Record
+        With one release in ``x`` or ``theta``; of several the first is taken.
+    channel : str, optional
+        Which of them.
+    restoring : {"linear", "pendulum"}
+        The spring's law: x, or sin x (`theta` in rad from the vertical; swings above 2.5 rad are left out).
+    candidates : tuple of str
+        Names in ``stickslip.fit.motions.MOTIONS``.
+
+    Returns
+    -------
+    DecayMotion
+
+    Raises
+    ------
+    RecordError
+        A channel is missing or broken.
+    EstimateError
+        No free decay, one that is not a displacement, or a candidate of no known name.
+
+    Examples
+    --------
+    >>> from stickslip.fit.motions import free_decay
+    >>> t, rng = np.arange(600) / 50, np.random.default_rng(1)
+    >>> x, _, _ = free_decay(t, [6.28, 0.02, 0.02, 0, 1, 0.3, 0, 0, 0, 0, 0.5, 0])
+    >>> found = choose_motion(Record.of({"x": x + 1e-3 * rng.standard_normal(t.size)}, fs=50))
+    >>> found.model, found.dry_displacement.includes(0.02), found.dry_displacement_any.includes(0.02)
+    ('both', True, True)
+    """
+    releases = find_releases(record, channel=channel)
+    found = motion_of(releases.ring_downs[0], restoring=restoring, candidates=candidates)
+    if len(releases.ring_downs) == 1:
+        return found
+    several = f"the first of {len(releases.ring_downs)} releases alone was read"
+    return replace(found, status=several if found.status == "ok" else f"{found.status}; {several}")
+
+
+def motion_of(
+    ring_down: RingDown, *, restoring: Restoring = "linear", candidates: tuple[str, ...] = tuple(MOTIONS)
+) -> DecayMotion:
+    """:func:`choose_motion` of one release that was found already."""
+    if ring_down.order:
+        raise EstimateError(
+            f"channel '{ring_down.channel}'",
+            "the choice among motions is made on a displacement",
+            "record or integrate the displacement, or use fit_decay(record)",
+        )
+    rows, start = _begin(ring_down, restoring)
+    size = max(1, int(2 * math.pi / start[0] * ring_down.fs / BLOCKS))
+    count = (rows.stop - rows.start) // size
+    samples = ring_down.samples[rows.start : rows.start + count * size]
+    times = np.arange(count * size) / ring_down.fs
+    choice = choose(
+        times.reshape(count, size).mean(axis=1), samples.reshape(count, size).mean(axis=1), fs=ring_down.fs,
+        start=start, counts=np.full(count, float(size)), restoring=restoring, candidates=candidates,
+    )  # fmt: skip
+    return _answer(choice, ring_down.unit)
+
+
+def _begin(ring_down: RingDown, restoring: Restoring) -> tuple[slice, Array]:
+    """The rows that are fitted, and where the search begins, with times from the first of them."""
+    turns = np.asarray(ring_down.turns)
+    sizes = np.abs(ring_down.samples[turns] - ring_down.rest)
+    first = 0
+    if restoring == "pendulum":
+        first = int(np.argmax(sizes < SWING))
+    turns, sizes = turns[first:], sizes[first:]
+    if len(turns) < 4:
+        raise EstimateError(f"{len(turns)} extremes", "a motion is chosen from four at least", "give a longer record")
+    later = np.diff(turns[len(turns) // 2 :] if len(turns) > 8 else turns)
+    w = math.pi * ring_down.fs / float(np.median(later))
+    fall, less = np.polyfit(sizes[:-1], sizes[1:], 1)
+    fall = float(np.clip(fall, 0.3, 0.9999))
+    dry = float(np.clip(-less / (1 + fall), 1e-6 * sizes[0], 0.3 * sizes[0]))
+    damping = -math.log(fall) / math.pi
+    held = ring_down.held and first == 0
+    period = 2 * math.pi / w
+    release = (ring_down.release - ring_down.first) if held else turns[0] / ring_down.fs
+    begin = max(0, int((release - period / 2) * ring_down.fs)) if held else int(turns[0])
+    stop = ring_down.stop - ring_down.first + TAIL * period
+    end = min(len(ring_down.samples), int(stop * ring_down.fs) + 1)
+    amplitude = float(ring_down.samples[turns[0]] - ring_down.rest)
+    start = np.array([w, damping, dry, ring_down.rest, amplitude, release - begin / ring_down.fs])
+    return slice(begin, end), start
+
+
+def _answer(choice: Choice, unit: str) -> DecayMotion:
+    chosen = choice.chosen
+    damping = chosen.estimate("damping_ratio", name="damping ratio")
+    dry = chosen.estimate("dry_displacement", name="dry friction displacement", unit=unit)
+    frequency = chosen.estimate("angular_frequency", name="natural frequency", unit="Hz", factor=1 / (2 * math.pi))
+    kept = ", ".join(each.name for each in choice.kept)
+
+    def any_motion(estimate: Estimate, parameter: str) -> Estimate:
+        return replace(
+            estimate, name=f"{estimate.name}, whichever motion", interval=choice.interval(parameter),
+            method="all candidates not rejected", checks=(f"candidates: {kept}",),
+        )  # fmt: skip
+
+    return DecayMotion(
+        damping, dry, frequency, any_motion(damping, "damping_ratio"), any_motion(dry, "dry_displacement"),
+        choice.model, tuple((each.name, each.fitted.motion.words, each.verdict) for each in choice.candidates),
+        choice, choice.status,
+    )  # fmt: skip

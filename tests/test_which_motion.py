@@ -1,0 +1,75 @@
+"""Which motion a record's free decay follows, by the call that a user makes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.fit.motions import free_decay
+
+TIMES = np.arange(3000) / 200
+
+
+def released(damping: float, dry: float, *, seed: int, restoring: str = "linear") -> ss.Record:
+    given = [2 * np.pi, damping, dry, 0.02, 1.2, 0.5, 0, 0, 0, 0, 0.5, 0]
+    x = free_decay(TIMES, given, restoring=restoring)[0] + 1e-3 * np.random.default_rng(seed).standard_normal(
+        TIMES.size
+    )
+    return ss.Record.of({"theta": x}, fs=200)
+
+
+@pytest.mark.parametrize(
+    ("damping", "dry", "model"), [(0.02, 0.02, "both"), (0.02, 0.0, "viscous"), (0.0, 0.02, "dry")]
+)
+def test_the_model_is_chosen_from_the_record_alone(damping: float, dry: float, model: str) -> None:
+    found = ss.choose_motion(released(damping, dry, seed=1))
+    assert (found.model, found.status) == (model, "ok")
+    for narrow, wide, truth in (
+        (found.damping_ratio, found.damping_ratio_any, damping),
+        (found.dry_displacement, found.dry_displacement_any, dry),
+    ):
+        assert wide.interval[0] <= narrow.interval[0] <= narrow.interval[1] <= wide.interval[1]
+        assert wide.includes(truth)
+    assert found.frequency.value == pytest.approx(1.0, abs=1e-3)
+    assert {name for name, _, _ in found.candidates} == {
+        "viscous", "dry", "both", "static", "air", "quadratic", "stribeck", "curved spring", "micro-slip",
+    }  # fmt: skip
+
+
+def test_a_pendulum_is_told_from_a_straight_spring() -> None:
+    record = released(0.01, 0.01, seed=2, restoring="pendulum")
+    assert ss.choose_motion(record).model == "curved spring"
+    assert ss.choose_motion(record, restoring="pendulum").model == "both"
+
+
+def test_what_can_not_be_asked_is_refused() -> None:
+    speed = np.gradient(released(0.02, 0.02, seed=0)["theta"], 0.005)
+    with pytest.raises(ss.EstimateError, match="made on a displacement"):
+        ss.choose_motion(ss.Record.of({"v": speed}, fs=200))
+
+
+def test_a_real_pendulum(dataset: Callable[[str], Path]) -> None:
+    """Its authors: 4.1e-3 N m dry, 0.5e-3 N m s viscous; three other methods 3.7e-3 to 4.9e-3 and 2.6e-4 to 5.5e-4."""
+    path = dataset("pendulum_decay") / "pend1.csv"
+    record = ss.read_record(path, channels={"theta": "#2 - 3.141592653589793 [rad]"}, time="#1 [s]")
+    found = ss.choose_motion(record, restoring="pendulum", candidates=("viscous", "both", "quadratic", "stribeck"))
+    inertia = 0.2235 * 0.31692**2
+    both = found.choice.candidate("both")
+    w = both.fitted.value("angular_frequency")
+    torque, viscous = w**2 * inertia, 2 * w * inertia
+    assert both.fitted.value("dry_displacement") * torque == pytest.approx(3.95e-3, abs=0.05e-3)
+    assert both.fitted.value("damping_ratio") * viscous == pytest.approx(5.1e-4, abs=0.1e-4)
+    alone = found.choice.candidate("viscous").fitted.cost
+    assert alone > 10**2 * both.fitted.cost
+    assert alone > 50**2 * found.choice.chosen.fitted.cost
+    low, high = found.dry_displacement_any.interval
+    assert low * torque < 3.7e-3
+    assert high * torque > 4.9e-3
+    low, high = found.damping_ratio_any.interval
+    assert low * viscous < 2.6e-4
+    assert high * viscous > 5.5e-4
+    assert "no candidate fits" in found.status
