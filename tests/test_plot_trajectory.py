@@ -138,3 +138,54 @@ def test_frames_move_and_count_themselves(sticking: Trajectory) -> None:
     middle = np.array([[np.flatnonzero((image[60:130] == (213, 94, 0)).all(axis=2).any(axis=0)).mean()
                         for image in shown if (image[60:130] == (213, 94, 0)).all(axis=2).any()]])  # fmt: skip
     assert np.ptp(middle) > 50, "the sliding mass travels over the picture"
+
+
+@pytest.fixture(scope="module")
+def lifting() -> Trajectory:
+    """A mass on a belt that its load lifts off."""
+    pad = ss.Contact(ss.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    springs = [[23.25, 3.9], [3.9, 7.75]]
+    system = ss.Structure(np.eye(2), np.zeros((2, 2)), springs, contacts=[pad], drive=ss.Belt(0.8))
+    return ss.simulate(system, duration=25, start={"x1": 0.3, "v1": 0.0})
+
+
+def test_of_a_structure_every_mass_and_load_is_drawn(lifting: Trajectory) -> None:
+    figure = plot_motion(lifting)
+    displacement, _, friction, load = figure.axes
+    assert [line.get_label() for line in displacement.get_lines()[:2]] == ["x1", "x2"]
+    for ax, name in ((friction, "friction"), (load, "load")):
+        times, shown = (np.asarray(part, dtype=float) for part in ax.get_lines()[0].get_data())
+        (exact,) = lifting.sample(np.clip(times, 0, lifting.duration), (name,))[0]
+        assert np.allclose(shown, exact, rtol=0, atol=1e-9), name
+    flown = sum(piece.duration for piece in lifting.pieces if piece.mode == "lifted")
+    assert np.sum(stretches(lifting, "flight", first=0.0, last=25.0)[:, 1]) == pytest.approx(flown, rel=1e-12)
+
+
+def test_sliding_lies_on_the_wedge_of_friction_over_load(lifting: Trajectory) -> None:
+    lines = {str(line.get_label()): line for line in plot_loop(lifting, against="load").get_lines()}
+    load, friction = (np.asarray(part, dtype=float) for part in lines["last cycle"].get_data())
+    assert np.all(np.abs(friction) <= 0.6 * load + 1e-9)
+    assert friction.min() == pytest.approx(-0.6 * load.max(), rel=1e-6)
+
+
+def test_each_contact_has_its_own_loop_and_shades() -> None:
+    pads = [ss.Contact(ss.Coulomb(0.3), [1, 0]), ss.Contact(ss.CompliantContact(0.2, stiffness=50.0), [-1, 1])]
+    drive = ss.HarmonicForce(1.2, frequency=0.13)
+    system = ss.Structure(np.eye(2), 0.05 * np.eye(2), [[3.0, -1.3], [-1.3, 2.9]], contacts=pads, drive=drive)
+    run = ss.simulate(system, cycles=10)
+    names = [plate.name for plate in figures(run)]
+    assert names[2:] == [
+        "friction-displacement-1", "friction-velocity-1", "friction-displacement-2", "friction-velocity-2",
+        "phase-portrait-x1", "phase-portrait-x2",
+    ]  # fmt: skip
+    line = next(line for line in plot_loop(run, contact=1).get_lines() if line.get_label() == "last cycle")
+    assert np.abs(np.asarray(line.get_ydata(), dtype=float)).max() == pytest.approx(0.2, rel=1e-9)
+    assert len(stretches(run, "stick", first=0, last=run.duration, contact=1)) == 0
+    assert len(stretches(run, "microstick", first=0, last=run.duration, contact=1)) > 10
+
+
+def test_a_contact_that_lifts_off_rises_in_the_moving_picture(lifting: Trajectory) -> None:
+    purple = [np.argwhere((image[:150] == (176, 85, 155)).all(axis=2))[:, 0] for image in list(frames(lifting))[::5]]
+    heights = [rows.min() for rows in purple if len(rows) > 1000]
+    assert len(heights) > 3
+    assert max(heights) - min(heights) > 5

@@ -91,6 +91,29 @@ def test_what_is_not_coupled_does_not_know_of_each_other(laws: tuple[Law, Law]) 
         assert np.allclose([e.time for e in own], [e.time for e in alone.events], rtol=0, atol=1e-11)
 
 
+def test_stops_are_counted_at_each_contact() -> None:
+    """Two masses that do not know of each other stop as each alone does; of both together there is no one number."""
+    drive, laws = (
+        HarmonicForce(1.0, frequency=0.1 / (2 * math.pi)),
+        (Coulomb(0.4), CompliantContact(0.5, stiffness=50.0)),
+    )
+    both = Structure(np.eye(2), np.zeros((2, 2)), np.eye(2), drive=drive,
+                     contacts=[Contact(laws[0], [1, 0]), Contact(laws[1], [0, 1])])  # fmt: skip
+    orbit = steady_state(both)
+    for contact, law in enumerate(laws):
+        alone = steady_state(Oscillator(mass=1, stiffness=1, law=law, drive=drive))
+        single = steady_state(Structure(1.0, 0.0, 1.0, contacts=[Contact(law, [1.0])], drive=drive))
+        assert orbit.stops_at(contact) == alone.stops == single.stops
+        assert alone.stops != (0, 0)
+        speeds = [orbit.transition_speed_at(contact), single.transition_speed]
+        assert speeds == pytest.approx([alone.transition_speed] * 2, rel=1e-9, nan_ok=True)
+    for question in ("stops", "transition_speed"):
+        with pytest.raises(ModelError, match=f"ask {question}_at"):
+            getattr(orbit, question)
+    with pytest.raises(ModelError, match="counted from 0"):
+        orbit.stops_at(2)
+
+
 def some_matrices(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass and stiffness positive definite, damping small, all full."""
     full = rng.normal(size=(3, size, size))

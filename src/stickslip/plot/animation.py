@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, RecordError
-from stickslip.plot.style import BLUE, FAINT, GREEN, INK, ORANGE, SKY, Array, axis_label, prefixed, styled
-from stickslip.plot.trajectory import curve, last_cycles
+from stickslip.plot.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SKY, Array, axis_label, prefixed, styled
+from stickslip.plot.trajectory import MASSES, contacts_of, curve, kinds_of, last_cycles, numbered_words, sampled
+from stickslip.structure import Structure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,14 +28,23 @@ CYCLES = 2
 FRAMES = 150
 COLOURS_OF_GIF = 64
 COILS = 9
-_MARKS = {"slip": (ORANGE, "slips"), "stick": (BLUE, "sticks"), "microstick": (SKY, "microsticks")}
+_MARKS = {
+    "slip": (ORANGE, "slips"),
+    "stick": (BLUE, "sticks"),
+    "microstick": (SKY, "microsticks"),
+    "flight": (PURPLE, "lifts off"),
+    "landing": (PURPLE, "lands"),
+}
+_FREE = (FAINT, "")  # without contact
+MOST_SCENES = 3
 
 
 def animate(run: Trajectory, path: str | Path, *, tell: Callable[[int, int], None] | None = None) -> Path:
     """Draw the last two cycles of a run (of a motion that comes to rest: all of it) as a moving picture.
 
     The mass on its spring and the face it rubs on, coloured by what the contact does; below, its displacement over
-    time and its phase portrait.
+    time and its phase portrait. Of a structure: what slides at each contact (the first three) and how it lifts off, the
+    displacements of all masses, and the phase portrait of the first.
 
     Parameters
     ----------
@@ -90,59 +100,61 @@ def frames(run: Trajectory, *, tell: Callable[[int, int], None] | None = None) -
     """The pictures one by one: what stays is drawn once, what moves is drawn over it."""
     first, last = last_cycles(run, CYCLES)
     times = np.linspace(first, last, FRAMES)
-    motion = run.table.motion
-    signals = [name for name in motion.face if name != "1"]
-    outputs = ("x", "v", *(("z",) if motion.base else ()), *signals)
-    values, pieces = run.sample(times, outputs)
-    face = np.zeros(FRAMES)
-    for name, row in zip(signals, values[len(outputs) - len(signals) :], strict=True):
-        face += motion.face[name] * row
-    base = values[2] if motion.base else np.zeros(FRAMES)
-    canvas, scene, dots = _stage(run, values[0], base, face)
+    canvas, scenes, dots = _stage(run, times)
+    _, pieces = run.sample(times, ("x",))
     still = canvas.copy_from_bbox(canvas.figure.bbox)
+    marks = [[_MARKS.get(kind, _FREE) for kind in kinds_of(run, scene.contact)] for scene in scenes]
     for number, piece in enumerate(pieces):
         if tell is not None:
             tell(number, FRAMES)
         canvas.restore_region(still)
-        colour, words = _MARKS[run.table.modes[run.modes[piece]].kind]
-        scene.draw(number, colour, words)
-        for (dot, x_factor, y_factor), (x, y) in zip(
-            dots, ((times[number], values[0, number]), (values[0, number], values[1, number])), strict=True
-        ):
-            dot.set_data([x_factor * x], [y_factor * y])
-            dot.set_color(colour)
+        mode = run.modes[piece]
+        for scene, mark in zip(scenes, marks, strict=True):
+            scene.draw(number, *mark[mode])
+        for dot, xs, ys, colour in dots:
+            dot.set_data([xs[number]], [ys[number]])
+            dot.set_color(colour or marks[0][mode][0])
             dot.axes.draw_artist(dot)
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
 @styled
-def _stage(run: Trajectory, x: Array, base: Array, face: Array) -> tuple[Any, _Scene, list[Any]]:
+def _stage(run: Trajectory, times: Array) -> tuple[Any, list[_Scene], list[Any]]:
     """The canvas with all that stays drawn on it, and what moves."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.4, 4.8), dpi=100, layout="constrained", facecolor="white")
+    shown = max(1, min(contacts_of(run), MOST_SCENES))
+    figure = Figure(figsize=(6.4, 3.3 + 1.5 * shown), dpi=100, layout="constrained", facecolor="white")
     canvas = FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(2, 2, height_ratios=(1, 1.6), width_ratios=(1.5, 1))
-    scene = _Scene(figure.add_subplot(grid[0, :]), x, base, face)
-    first, last = last_cycles(run, CYCLES)
-    places = ((grid[1, 0], "time"), (grid[1, 1], "x"))
-    dots = [_background(figure.add_subplot(place), run, across, first, last) for place, across in places]
+    grid = figure.add_gridspec(shown + 1, 2, height_ratios=(*[1] * shown, 1.6), width_ratios=(1.5, 1))
+    scenes = [_Scene(figure.add_subplot(grid[c, :]), run, c, times) for c in range(shown)]
+    dots = [dot for place, across in ((grid[-1, 0], "time"), (grid[-1, 1], "x"))
+            for dot in _background(figure.add_subplot(place), run, across, times)]  # fmt: skip
     canvas.draw()  # type: ignore[no-untyped-call]
-    return canvas, scene, dots
+    return canvas, scenes, dots
 
 
 class _Scene:
-    """Spring, mass and counter-face; lengths in units of the largest displacement."""
+    """A mass on the face it rubs on, coloured by what the contact does; lengths in units of the largest displacement.
 
-    def __init__(self, ax: Axes, x: Array, base: Array, face: Array) -> None:
+    Of one mass its spring is drawn too; of a structure, what slides at one contact, and how high it lifts off.
+    """
+
+    def __init__(self, ax: Axes, run: Trajectory, contact: int, times: Array) -> None:
         from matplotlib.patches import Rectangle
 
+        several = isinstance(run.system, Structure)
+        self.contact = contact if contacts_of(run) else 0
+        x = sampled(run, [("way" if several and contacts_of(run) else "x", contact)], times)[0]
+        base = sampled(run, ["z"], times)[0] if run.table.motion.base and not several else np.zeros(len(times))
         middle = (np.max(x) + np.min(x)) / 2
         size = max(float(np.ptp(x)), float(np.ptp(base))) / 2 or 1.0
         self.ax, self.x, self.base = ax, (x - middle) / size, (base - np.mean(base)) / size
-        self.face = face / size
-        ax.set(xlim=(-6.2, 3.2), ylim=(-0.75, 1.6), xticks=[], yticks=[])
+        self.face = _face(run, contact, times) / size
+        self.height = _lift(run, contact, times)
+        self.name = f"contact {contact + 1}: " if contacts_of(run) > 1 else ""
+        ax.set(xlim=(-6.2, 3.2), ylim=(-0.75, 2.0 if self.height.any() else 1.6), xticks=[], yticks=[])
         ax.grid(visible=False)
         for spine in ax.spines.values():
             spine.set_visible(False)
@@ -153,11 +165,12 @@ class _Scene:
         self.wall = ax.plot([], [], color=INK, linewidth=3.5, animated=True)[0]
         self.marks = ax.plot([], [], color=FAINT, linewidth=1.0, animated=True)[0]
         self.words = ax.text(0, 1.15, "", ha="center", va="bottom", animated=True)
+        self.moving = [self.marks, *([] if several else [self.wall, self.spring]), self.mass, self.words]
 
     def draw(self, number: int, colour: str, words: str) -> None:
         """One instant."""
-        x, base = self.x[number], -5.0 + self.base[number]
-        self.mass.set_x(x - 0.7)
+        x, base, height = self.x[number], -5.0 + self.base[number], self.height[number]
+        self.mass.set_xy((x - 0.7, height))
         self.mass.set_facecolor(colour)
         ends = np.linspace(base + 0.25, x - 0.95, 2 * COILS)
         heights = 0.5 + 0.22 * np.where(np.arange(2 * COILS) % 2, 1, -1)
@@ -166,28 +179,59 @@ class _Scene:
         places = np.arange(-9, 8) * 0.6 + np.mod(self.face[number], 0.6)
         hatch = np.column_stack([places, places - 0.25, np.full(len(places), np.nan)]).ravel()
         self.marks.set_data(hatch, np.tile([-0.02, -0.3, np.nan], len(places)))
-        self.words.set_text(words)
-        self.words.set_x(x)
-        for artist in (self.marks, self.wall, self.spring, self.mass, self.words):
+        self.words.set_text(f"{self.name}{words}")
+        self.words.set_position((x, height + 1.15))
+        for artist in self.moving:
             self.ax.draw_artist(artist)
 
 
-def _background(ax: Axes, run: Trajectory, across: str, first: float, last: float) -> tuple[Any, float, float]:
-    """The whole curve in grey, and the dot that runs along it with the factors of its axes."""
-    up = "x" if across == "time" else "v"
-    times, (x, v) = curve(run, ("x", "v"), first=first, last=last)
-    y = x if up == "x" else v
-    x_factor, x_unit = (1.0, "s") if across == "time" else prefixed(x, "m")
-    y_factor, y_unit = prefixed(y, "m" if up == "x" else "m/s")
-    ax.plot(
-        x_factor * (times if across == "time" else x), y_factor * y, color=GREEN if up == "v" else BLUE, linewidth=1
-    )
+def _face(run: Trajectory, contact: int, times: Array) -> Array:
+    """The counter-face's displacement under a contact [m]."""
+    face, carried = run.table.motion.face, 1.0
+    if isinstance(run.system, Structure):
+        carried = run.system.contacts[contact].carried if run.system.contacts else 0.0
+    signals = [name for name in face if name != "1"]
+    total = np.zeros(len(times))
+    for name, row in zip(signals, sampled(run, signals, times) if signals else (), strict=True):
+        total += carried * face[name] * row
+    return total
+
+
+def _lift(run: Trajectory, contact: int, times: Array) -> Array:
+    """How high a contact has lifted off, the largest height as 0.4; the scale across is not that along."""
+    contacts = run.system.contacts if isinstance(run.system, Structure) else ()
+    if not contacts or contacts[contact].normal is None:
+        return np.zeros(len(times))
+    pad = contacts[contact]
+    across = np.asarray(pad.normal) @ run.sample(times, ("x",))[0]
+    gap = np.maximum(-pad.preload / pad.stiffness - across, 0.0)
+    return np.asarray(0.4 * gap / (np.max(gap) or 1.0))
+
+
+def _background(ax: Axes, run: Trajectory, across: str, times: Array) -> list[tuple[Any, Array, Array, str | None]]:
+    """The whole curve of every mass, and the dots that run along: artist, places, their colour if not by contact."""
+    up, count = ("x" if across == "time" else "v"), len(run.labels("x"))
+    first, last = float(times[0]), float(times[-1])
+    rows = range(count if across == "time" else 1)
+    drawn = [curve(run, (("x", j), (up, j)), first=first, last=last) for j in rows]
+    x_factor, x_unit = (1.0, "s") if across == "time" else prefixed(drawn[0][1][0], "m")
+    y_factor, y_unit = prefixed(np.concatenate([values[1] for _, values in drawn]), "m" if up == "x" else "m/s")
+    dots = []
+    for j, (instants, values) in zip(rows, drawn, strict=True):
+        colour = MASSES[j % len(MASSES)] if count > 1 else GREEN if up == "v" else BLUE
+        own = x_factor * (instants if across == "time" else values[0])
+        ax.plot(own, y_factor * values[1], color=colour, linewidth=1, label=f"x{j + 1}")
+        dot = ax.plot([], [], "o", markersize=7, markeredgecolor=INK, markeredgewidth=0.8, animated=True)[0]
+        x, y = sampled(run, (("x", j), (up, j)), times)
+        dots.append((dot, x_factor * (times if across == "time" else x), y_factor * y, colour if count > 1 else None))
+    if count > 1 and across == "time":
+        ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(0, 1.0))
+    names = [numbered_words(run, words, name, 0) for words, name in (("displacement", "x"), ("velocity", "v"))]
     ax.set(
-        xlabel=axis_label("time" if across == "time" else "displacement", x_unit),
-        ylabel=axis_label("displacement" if up == "x" else "velocity", y_unit),
+        xlabel=axis_label("time" if across == "time" else names[0], x_unit),
+        ylabel=axis_label("displacement" if across == "time" else names[1], y_unit),
     )
-    dot = ax.plot([], [], "o", markersize=7, markeredgecolor=INK, markeredgewidth=0.8, animated=True)[0]
-    return dot, x_factor, y_factor
+    return dots
 
 
 def _write_gif(images: Iterable[Image], path: Path) -> None:

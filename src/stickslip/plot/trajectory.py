@@ -49,7 +49,7 @@ _WORDS = {
     "friction": "friction", "load": "normal load", "force": "force",
 }  # fmt: skip
 _COLOURS = {"x": BLUE, "z": SKY, "v": GREEN, "friction": ORANGE, "load": INK, "force": PURPLE}
-_MASSES = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK)
+MASSES = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK)
 _KINDS = {
     "stick": ("sticks", SHADE, 0.8),
     "microstick": ("microsticks", SHADE, 0.4),
@@ -74,7 +74,10 @@ def numbered_words(run: Trajectory, words: str, name: str, row: int) -> str:
 
 def kinds_of(run: Trajectory, contact: int) -> list[str]:
     """What each mode of the table is called at one contact: "slip", "stick", "microstick", "flight"."""
-    return [mode.parts[contact].kind if isinstance(mode, JointMode) else mode.kind for mode in run.table.modes]
+    return [
+        mode.parts[contact].kind if isinstance(mode, JointMode) and mode.parts else mode.kind
+        for mode in run.table.modes
+    ]
 
 
 def cycle_of(run: Trajectory) -> float:
@@ -213,7 +216,7 @@ def _line(run: Trajectory, quantity: Quantity, wanted: list[Quantity]) -> dict[s
     name, row = quantity
     several = len(run.labels("x")) > 1
     words = {"x": f"x{row + 1}" if several else "mass", "z": "base" if several else "spring's end"}.get(name)
-    colour = _MASSES[row % len(_MASSES)] if several and name in ("x", "v") else _COLOURS[name]
+    colour = MASSES[row % len(MASSES)] if several and name in ("x", "v") else _COLOURS[name]
     alone = name == "x" and not several and len(wanted) == 1
     return {"color": colour, "linestyle": "--" if name == "z" else "-", "label": None if alone else words}
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from stickslip.solve.automaton import Array, Automaton, System, automaton, expon
 from stickslip.solve.simulate import opening, run
 from stickslip.solve.tangent import carry_tangents
 from stickslip.solve.trajectory import Event, Trajectory
+from stickslip.structure import Structure
 
 UNIT = 1e-7  # a multiplier this close to 1 is 1: its rounding grows with the square root of a double eigenvalue
 GRAZING = 1e-9  # an exit crossed this slowly, relative to the terms of its rate, is a tangency
@@ -59,41 +61,85 @@ class SteadyState:
 
     @property
     def stops(self) -> tuple[int, int]:
-        """Sticks per period: normal (motion goes on in the other direction) and abnormal (in the same one).
+        """Sticks per period of the only contact, as :meth:`stops_at` counts them."""
+        return self.stops_at(self._only_contact("stops"))
 
-        A reversal without time at rest is no stop. In a compliant contact microsticks are counted.
+    @property
+    def transition_speed(self) -> float:
+        """V_s of the thesis [m/s], of the only contact, as :meth:`transition_speed_at` finds it."""
+        return self.transition_speed_at(self._only_contact("transition_speed"))
+
+    def stops_at(self, contact: int = 0) -> tuple[int, int]:
+        """Sticks per period at a contact: normal (motion goes on in the other direction) and abnormal (in the same).
+
+        A reversal without time at rest is no stop. In a compliant contact microsticks are counted. The time that a
+        contact is lifted off counts for nothing.
+
+        Parameters
+        ----------
+        contact : int
+            Which one, from 0.
+
+        Returns
+        -------
+        tuple of int
+            Normal and abnormal stops.
         """
-        counts = [0, 0]
-        for before, after in self._rests():
-            counts[int(before * after > 0)] += 1
-        return counts[0], counts[1]
-
-    def _rests(self) -> list[tuple[int, int]]:
-        """Direction of slip before and after each rest, around the orbit."""
-        sides = [self.orbit.table.modes[m].side for m in self.orbit.modes]
-        if len(sides) > 1 and self.orbit.modes[0] == self.orbit.modes[-1]:
+        parts = [part for part in self._modes_at(contact) if part.kind not in ("flight", "landing")]
+        sides = [part.side for j, part in enumerate(parts) if j == 0 or part is not parts[j - 1]]
+        if len(sides) > 1 and parts[0] is parts[-1]:
             sides.pop()
         moving = [j for j, side in enumerate(sides) if side]
         if not moving:
-            return []
+            return 0, 0
         turned = sides[moving[0] :] + sides[: moving[0] + 1]
-        found = []
+        counts = [0, 0]
         for j in range(1, len(turned) - 1):
             if not turned[j]:
                 after = next(side for side in turned[j + 1 :] if side)
                 before = next(side for side in reversed(turned[:j]) if side)
-                found.append((before, after))
-        return found
+                counts[int(before * after > 0)] += 1
+        return counts[0], counts[1]
 
-    @property
-    def transition_speed(self) -> float:
-        """Largest speed at which a microstick goes over into slip, V_s of the thesis [m/s]; nan without microsticks."""
-        table, speeds = self.orbit.table, []
-        for j in range(len(self.orbit.modes) - 1):
-            before, after = (table.modes[self.orbit.modes[i]] for i in (j, j + 1))
-            if before.kind == "microstick" and after.kind == "slip":
-                speeds.append(abs(float(table.outputs["slip"] @ self.orbit.states[j + 1])))
+    def transition_speed_at(self, contact: int = 0) -> float:
+        """Largest speed at which a microstick of a contact goes over into slip [m/s]; nan without microsticks.
+
+        Parameters
+        ----------
+        contact : int
+            Which one, from 0.
+
+        Returns
+        -------
+        float
+        """
+        table, parts = self.orbit.table, self._modes_at(contact)
+        form = np.atleast_2d(table.outputs["slip"])[contact]
+        speeds = [
+            abs(float(form @ self.orbit.states[j + 1]))
+            for j in range(len(parts) - 1)
+            if parts[j].kind == "microstick" and parts[j + 1].kind == "slip"
+        ]
         return max(speeds, default=math.nan)
+
+    def _modes_at(self, contact: int) -> list[Any]:
+        """The mode of a contact in each piece of the orbit."""
+        modes = self.orbit.table.modes
+        if not isinstance(self.orbit.system, Structure):
+            every: list[Any] = [modes]
+        else:
+            every = [[mode.parts[c] for mode in modes] for c in range(len(self.orbit.system.contacts))]  # type: ignore[attr-defined]
+        if not 0 <= contact < len(every):
+            raise ModelError(f"contact {contact}", f"the system has {len(every)}, counted from 0", "name one of them")
+        return [every[contact][m] for m in self.orbit.modes]
+
+    def _only_contact(self, question: str) -> int:
+        count = len(self.orbit.system.contacts) if isinstance(self.orbit.system, Structure) else 1
+        if count != 1:
+            raise ModelError(
+                f"{question} of {count} contacts", "each contact has its own", f"ask {question}_at(contact) of one"
+            )
+        return 0
 
     def largest(self, output: str, *, points: int = 65) -> float:
         """Largest modulus of an output over the orbit.
