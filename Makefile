@@ -30,6 +30,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/run.py
 	$(BIN)/python benchmarks/engine.py
 	$(BIN)/python benchmarks/curved.py
+	$(BIN)/python benchmarks/motions.py
 
 smoke: $(VENV)/.dev
 	$(BIN)/python tests/smoke.py
