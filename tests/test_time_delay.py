@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -224,6 +225,25 @@ def test_a_stop_shorter_than_the_lag_remembers_the_slip_before() -> None:
     assert run.state(0.2)["friction"] == pytest.approx(3.0, rel=1e-14)
     assert run.state(0.2)["v"] == pytest.approx(0.4, rel=1e-13)
     assert run.status == "at rest"
+
+
+def test_a_lag_is_written_in_a_file_around_its_law(tmp_path: Path) -> None:
+    file = tmp_path / "late.toml"
+    text = """
+        system = {mass = 2.42, stiffness = 2310}
+        drive = {name = "HarmonicBase", amplitude = "0.65 mm", frequency = 2.5}
+        [law]
+        name = "TimeDelay"
+        lag = "7 ms"
+        law = {name = "Stribeck", kinetic = 1.1, static = 1.3, speed = "4 mm/s", exponent = 1.0, viscous = 4.0}
+    """
+    file.write_text(text)
+    case = ss.read_system(file)
+    assert case.system.law == SHAKEN.law
+    assert case.having(lag="3 ms").system.law.lag == 3e-3
+    file.write_text(text.replace('"7 ms"', '"-7 ms"'))
+    with pytest.raises(ss.ModelError, match=r"line 6.*lag = -0.007 s"):
+        ss.read_system(file)
 
 
 @pytest.mark.parametrize(("build", "word"), [

@@ -30,6 +30,7 @@ from stickslip.laws.smooth_state import SmoothStateVariable
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import FrictionCurve, Stribeck
 from stickslip.laws.tabulated import Tabulated
+from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import System, automaton
 from stickslip.solve.periodic import SteadyState, steady_state
@@ -43,6 +44,7 @@ LAWS: dict[str, Callable[..., Any]] = {
     "StateVariable": StateVariable, "InertialContact": InertialContact, "ElastoSlip": ElastoSlip,
     "PositionLoad": PositionLoad, "Stribeck": Stribeck, "Dahl": Dahl, "LuGre": LuGre, "RateState": RateState,
     "SmoothStateVariable": SmoothStateVariable, "FrictionCurve": FrictionCurve, "InSeries": InSeries,
+    "TimeDelay": TimeDelay,
 }  # fmt: skip
 DRIVES: dict[str, Callable[..., Any]] = {
     "Release": Release, "HarmonicBase": HarmonicBase, "HarmonicForce": HarmonicForce, "MultiTone": MultiTone,

@@ -22,6 +22,7 @@ from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.formula import Formula
 from stickslip.laws.stribeck import Curve
+from stickslip.laws.time_delay import SpeedCurve
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import PARTS, changed, find, places
 from stickslip.scenarios import DRIVES, LAWS
@@ -36,7 +37,7 @@ UNITS = {
     "damping": "N s/m", "slope": "N s/m", "gradient": "N/m", "rate": "1/(N s)", "steepness": "s/m", "speeds": "m/s",
     "speed": "m/s", "amplitude": "m", "frequency": "Hz", "phase": "rad", "fs": "Hz", "samples": "m",
     "HarmonicForce.amplitude": "N", "viscous": "N s/m", "normal": "N", "distance": "m", "reference": "m/s",
-    "preload": "N", "times": "s",
+    "preload": "N", "times": "s", "lag": "s",
 }  # fmt: skip
 STATE_UNITS = {"x": "m", "v": "m/s", "stretch": "m", "u": "m/s", "theta": "N"}
 CYCLES = 20.0  # of a run where nothing is said
@@ -435,7 +436,7 @@ def _kind(factory: type, name: str, on: str = "") -> Any:
         return list[tuple[amplitude, Annotated[float, quantity("Hz")], Annotated[float, quantity("rad")]]]
     if hint == Curve:
         return Annotated[Any, BeforeValidator(_formula)]
-    if hint == Law:
+    if hint in (Law, SpeedCurve):
         return Annotated[Any, BeforeValidator(_law)]
     unit = UNITS.get(f"{factory.__name__}.{name}", UNITS.get(name, "1"))
     number = Annotated[float, quantity(unit)]

@@ -77,8 +77,7 @@ class TimeDelay(Rigid):
                 "a time lag is that of a law whose friction follows the speed alone",
                 "give a Stribeck, FrictionCurve, LinearSlope or Tabulated",
             )
-        if finite("lag", self.lag, unit="s") == 0:
-            raise ModelError("lag = 0 s", "a lag is positive", "take the law itself, without TimeDelay")
+        finite("lag", self.lag, unit="s", positive=True)
 
     @property
     def entry(self) -> tuple[str, str, str]:

@@ -10,8 +10,9 @@ import numpy as np
 
 from stickslip.errors import ModelError
 from stickslip.parameters import find, places
-from stickslip.solve.automaton import Array, System, automaton
-from stickslip.solve.periodic import CLOSED, SteadyState, derivative, end_of, judged, lap
+from stickslip.solve.automaton import Array, System
+from stickslip.solve.periodic import SteadyState, judged
+from stickslip.solve.poincare import closes, derivative, end_of, extent, lap, tables
 from stickslip.solve.simulate import opening
 
 NUDGE = 1e-6  # of the parameter, relative to the way ahead: the map is differenced across twice this
@@ -199,7 +200,7 @@ def _scaled(orbit: SteadyState) -> Array:
 
 def _size(orbit: SteadyState) -> Array:
     """Largest modulus of each entry of the state; 1 where it is always zero."""
-    sizes = np.max(np.abs(orbit.orbit.states[:, : orbit.orbit.table.physical]), axis=0)
+    sizes = extent(orbit.orbit)
     sizes[0] = max(sizes[0], orbit.amplitude)
     return np.where(sizes > 0, sizes, 1.0)
 
@@ -210,7 +211,7 @@ def _family(orbit: SteadyState, parameter: str, first: float, way: float) -> _Ma
 
     def end(point: Array, mode: int) -> tuple[Array, int, SteadyState, Array]:
         varied = system.having(**{parameter: first + point[-1] * way})
-        table = automaton(varied)
+        table = tables(varied)
         state, _ = opening(table, {})
         state[: table.physical] = point[:-1] * size
         motion = lap(varied, table, state, mode, order)
@@ -257,7 +258,9 @@ def _correct(map_: _Map, point: Array, mode: int, normal: Array) -> _Look | None
         if np.max(np.abs(move)) > 1.0:
             break
         point, mode = look.point + move, look.after
-    return best if best is not None and best.miss <= CLOSED and best.after == best.orbit.orbit.modes[0] else None
+    if best is None or best.after != best.orbit.orbit.modes[0] or not closes(best.orbit.orbit, best.miss):
+        return None
+    return best
 
 
 def _step(map_: _Map, last: _Look, tangent: Array, length: float, normal: Array) -> _Look | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.solve.automaton import Array, Automaton, System, automaton, exponential
-from stickslip.solve.simulate import opening, run
-from stickslip.solve.tangent import carry_tangents
+from stickslip.solve.automaton import Array, System, exponential
+from stickslip.solve.curved import CurvedTrajectory, Tape
+from stickslip.solve.poincare import Table, closes, derivative, end_of, extent, lap, stretch, tables
+from stickslip.solve.simulate import opening
 from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.structure import Structure
 
 UNIT = 1e-7  # a multiplier this close to 1 is 1: its rounding grows with the square root of a double eigenvalue
 GRAZING = 1e-9  # an exit crossed this slowly, relative to the terms of its rate, is a tangency
-CLOSED = 1e-12  # an orbit closes when it returns this close, relative to its own size
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,8 +183,8 @@ def steady_state(
     """Which motion is left when the beginning is forgotten?
 
     The exact map over a period of the drive is iterated through a transient, then closed by Newton's method with its
-    exact derivative. A system without a periodic drive (a belt, a ramp) is followed until a stick ends as the one
-    before did.
+    exact derivative; that of a curved law is differenced, and its multipliers are known to some 1e-9. A system without
+    a periodic drive (a belt, a ramp) is followed until a stick ends as the one before did.
 
     Parameters
     ----------
@@ -207,6 +207,8 @@ def steady_state(
     ------
     SolveError
         No motion repeats because nothing drives the system.
+    ModelError
+        The law has a time lag.
 
     Examples
     --------
@@ -221,7 +223,7 @@ def steady_state(
     """
     if transient < 1 or orders < 1:
         raise ModelError(f"transient = {transient}, orders = {orders}", "both are at least 1", "raise them")
-    table = automaton(system)
+    table = tables(system)
     if not math.isfinite(table.motion.period):
         return _self_excited(system, table, start or {}, transient)
     state, mode = opening(table, start or {})
@@ -288,35 +290,23 @@ def _same(one: SteadyState, other: SteadyState) -> bool:
         return True  # a set of equilibria counts once
     if list(one.orbit.modes) != list(other.orbit.modes):
         return False
-    scale = np.max(np.abs(one.orbit.states), axis=0)
-    return bool(np.all(np.abs(one.orbit.states[0] - other.orbit.states[0]) <= 1e-8 * scale))
+    physical = one.orbit.table.physical
+    gap = np.abs(one.orbit.states[0] - other.orbit.states[0])[:physical]
+    return bool(np.all(gap <= 1e-8 * extent(one.orbit)))
 
 
-def lap(system: System, table: Automaton, state: Array, mode: int, laps: int) -> Trajectory:
-    """The motion over whole periods of the drive from a state at phase zero."""
-    return run(system, table, state, mode, span=(float(laps), 0.0))
-
-
-def end_of(orbit: Trajectory) -> tuple[Array, int]:
-    """State and mode at the end of whole laps, the event that falls on it included."""
-    from stickslip.solve.kernel import follow
-
-    last = orbit.states[-1].copy()
-    mode, size = int(orbit.modes[-1]), len(last)
-    follow(orbit.table.tables, mode, last, float(orbit.durations[-1]), np.empty((3, size)))
-    if orbit.exits[-1] >= 0:
-        leaving = int(orbit.exits[-1])
-        last, mode = orbit.table.reset[leaving] @ last, int(orbit.table.target[leaving])
-    last[orbit.table.physical :] = orbit.states[0, orbit.table.physical :]
-    return last, mode
-
-
-def _iterate(system: System, table: Automaton, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
+def _iterate(system: System, table: Table, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
     orbit = lap(system, table, state, mode, laps)
-    return *end_of(orbit), float(np.max(np.abs(orbit.states[-64:, 0])))
+    return *end_of(orbit), _size(orbit)
 
 
-def _closed(system: System, table: Automaton, state: Array, mode: int, orders: int) -> SteadyState | None:
+def _size(orbit: Trajectory) -> float:
+    """Largest displacement of late."""
+    states = orbit.step_states if isinstance(orbit, CurvedTrajectory) else orbit.states
+    return float(np.max(np.abs(states[-64:, 0])))
+
+
+def _closed(system: System, table: Table, state: Array, mode: int, orders: int) -> SteadyState | None:
     """The orbit near a state, of the least order that closes; None where Newton finds none."""
     for order in range(1, orders + 1):
         best: tuple[float, Trajectory | None, int] = (math.inf, None, 0)
@@ -324,7 +314,7 @@ def _closed(system: System, table: Automaton, state: Array, mode: int, orders: i
         for _ in range(12):
             orbit = lap(system, table, point, where, order)
             end, after = end_of(orbit)
-            size = np.max(np.abs(orbit.states), axis=0)[: table.physical]
+            size = extent(orbit)
             gap = (end - point)[: table.physical]
             relative = float(np.max(np.abs(gap) / np.maximum(size, 1e-300), initial=0.0, where=size > 0))
             if relative >= best[0]:
@@ -336,20 +326,22 @@ def _closed(system: System, table: Automaton, state: Array, mode: int, orders: i
                 break
             point, where = point.copy(), int(orbit.modes[0])
             point[: table.physical] += step
-        if best[0] <= CLOSED and best[1] is not None:
+        if best[1] is not None and closes(best[1], best[0]):
             return judged(best[1], order, *derivative(best[1], best[2]))
     return None
 
 
-def _repeats_freely(table: Automaton) -> bool:
+def _repeats_freely(table: Table) -> bool:
     """Whether free motion in every slip mode repeats after one period of the drive: b = 1/2n without damping."""
+    if isinstance(table, Tape):
+        return False
     own = 2 * table.degrees
     free = [flow[:own, :own] for flow, mode in zip(table.flow, table.modes, strict=True) if mode.kind == "slip"]
     turns = [exponential(flow, table.motion.period) for flow in free]
     return bool(turns) and all(np.allclose(turn, np.eye(own), rtol=0, atol=1e-9) for turn in turns)
 
 
-def _family(system: System, table: Automaton, state: Array, mode: int, size: float, orders: int) -> SteadyState | None:
+def _family(system: System, table: Table, state: Array, mode: int, size: float, orders: int) -> SteadyState | None:
     """An orbit inside a family whose edge is approached forever: a push off the edge closes at once."""
     for push in (0.05, 0.1, 0.2):
         pushed = state.copy()
@@ -359,17 +351,6 @@ def _family(system: System, table: Automaton, state: Array, mode: int, size: flo
         if found is not None and found.status == "not unique":
             return found
     return None
-
-
-def derivative(orbit: Trajectory, after: int) -> tuple[Array, float]:
-    """Derivative of the map over an orbit, and the slowest crossing of an exit relative to its terms."""
-    table, size = orbit.table, len(orbit.table.names)
-    tangents = np.eye(size)[: table.physical].copy()
-    slowest = carry_tangents(
-        table.tables, table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
-        np.empty((9, size)),
-    )  # fmt: skip
-    return tangents[:, : table.physical].T, slowest
 
 
 def judged(orbit: Trajectory, order: int, jacobian: Array, slowest: float) -> SteadyState:
@@ -391,7 +372,7 @@ def judged(orbit: Trajectory, order: int, jacobian: Array, slowest: float) -> St
     return SteadyState(status, order * table.motion.period, order, orbit, multipliers)
 
 
-def _self_excited(system: System, table: Automaton, start: Mapping[str, float | str], transient: int) -> SteadyState:
+def _self_excited(system: System, table: Table, start: Mapping[str, float | str], transient: int) -> SteadyState:
     """The orbit between two equal ends of a stick."""
     if not table.motion.rates:
         raise SolveError("nothing drives the system", "only a driven motion repeats", "give a drive=")
@@ -400,7 +381,7 @@ def _self_excited(system: System, table: Automaton, start: Mapping[str, float | 
     # the way of the belt moves on, so the relative coordinate is compared, not the signals
     duration = transient * scale
     for _ in range(8):
-        motion = run(system, table, state, mode, span=(0.0, duration))
+        motion = stretch(system, table, state, mode, span=(0.0, duration))
         ends = [
             j
             for j in range(1, len(motion.modes))
@@ -408,7 +389,7 @@ def _self_excited(system: System, table: Automaton, start: Mapping[str, float | 
         ]
         if len(ends) > 2:
             first, last = ends[-2], ends[-1]
-            own = slice(0, 2 * table.degrees)
+            own = slice(0, table.physical if isinstance(table, Tape) else 2 * table.degrees)
             gap = np.abs(motion.states[last, own] - motion.states[first, own])
             if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, own]), axis=0)):
                 return _between(motion, first, last)
@@ -420,12 +401,17 @@ def _self_excited(system: System, table: Automaton, start: Mapping[str, float | 
 
 
 def _between(motion: Trajectory, first: int, last: int) -> SteadyState:
-    part = slice(first, last)
-    begin = motion.starts[first]
-    orbit = Trajectory(
-        motion.system, motion.table, np.zeros(last - first, np.int32), motion.starts[part] - begin, motion.modes[part],
-        motion.durations[part], motion.states[part], motion.exits[part],
-        float(motion.starts[last] - begin), "complete",
+    """The orbit from one piece to another where it begins anew."""
+    part, begin, end = slice(first, last), motion.starts[first], motion.starts[last]
+    own: dict[str, Any] = {}
+    if isinstance(motion, CurvedTrajectory):
+        steps = slice(*np.searchsorted(motion.step_starts, [begin, end]))
+        own = {name: getattr(motion, name)[steps] for name in ("step_lengths", "step_modes", "step_states")}
+        own["step_starts"] = motion.step_starts[steps] - begin
+    orbit = replace(
+        motion, laps=np.zeros(last - first, np.int32), offsets=motion.starts[part] - begin, modes=motion.modes[part],
+        durations=motion.durations[part], kept=motion.states[part], exits=motion.exits[part],
+        duration=float(end - begin), status="complete", **own,
     )  # fmt: skip
     # a stick ends in one state alone: whatever came before is forgotten
     return SteadyState("unique", orbit.duration, 1, orbit, np.zeros(motion.table.physical, dtype=np.complex128))

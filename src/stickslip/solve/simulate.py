@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from stickslip.solve import kernel
 from stickslip.solve.automaton import DEGREE, Array, Automaton, System, automaton
 from stickslip.solve.phasors import blank_past, fast_tables
 from stickslip.solve.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from stickslip.solve.curved import Tape
 
 CHUNK = 16384  # pieces between two looks at the clock and the keyboard
 CELLS = 65536  # Taylor cells between two looks
@@ -142,7 +145,7 @@ def _end(system: System, table: Automaton, duration: float | None, cycles: float
     return 0.0, given / system.frequency
 
 
-def opening(table: Automaton, start: Mapping[str, float | str]) -> tuple[Array, int]:
+def opening(table: Automaton | Tape, start: Mapping[str, float | str]) -> tuple[Array, int]:
     """The state at time 0 and its mode, before any exit that is due at once."""
     state = np.zeros(len(table.names))
     state[table.names.index("1")] = 1.0

@@ -1,0 +1,145 @@
+"""The map over periods of the drive, of linear tables and of curved laws alike: where a motion leads, and how its
+neighbours do.
+
+Between events a linear table has its derivative in closed form, with saltation at the events. A curved law's map is
+differenced: four neighbours to each side of every entry of the state give a central difference of the fourth order.
+With steps of `STEP` of the entry's size and runs to `FINE`, its error is some 1e-9 of the entry's size; where the
+differences of the second and the fourth order part by more than `TORN`, an exit is met at a tangent within the step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stickslip.errors import ModelError
+from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.time_delay import TimeDelay
+from stickslip.oscillator import Oscillator
+from stickslip.solve.automaton import Array, Automaton, System, automaton
+from stickslip.solve.curved import CurvedTrajectory, Tape, run_curved, tape
+from stickslip.solve.kernel import follow
+from stickslip.solve.simulate import run
+from stickslip.solve.tangent import carry_tangents
+from stickslip.solve.trajectory import Trajectory
+
+Table = Automaton | Tape
+
+FINE = 1e-14  # tolerance of the runs that the map is made of
+STEP = 1e-4  # of the size of an entry of the state: what its neighbours are apart
+FORGOTTEN = 3e-9  # of the entry's size: a difference below this is rounding
+TORN = 1e-2  # relative to the largest slope
+CLOSED = 1e-12  # an orbit closes when it returns this close, relative to its own size
+
+
+def tables(system: System) -> Table:
+    """The flat tables of a system."""
+    if not (isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw)):
+        return automaton(system)
+    if isinstance(system.law, TimeDelay):
+        raise ModelError(
+            "the law has a time lag",
+            "this question needs a state of a few numbers, and that of a lag is the whole motion since",
+            "simulate() many cycles and look at the last ones",
+        )
+    return tape(system)
+
+
+def stretch(system: System, table: Table, state: Array, mode: int, *, span: tuple[float, float]) -> Trajectory:
+    """The motion from a state at phase zero over a time (laps, offset)."""
+    if isinstance(table, Tape):
+        nothing: tuple[list[int], list[float]] = ([], [])
+        return run_curved(
+            table, state, mode, course=(span, [(span, nothing)]), budget=10_000, rtol=FINE, tell=lambda _: None
+        )
+    return run(system, table, state, mode, span=span)
+
+
+def lap(system: System, table: Table, state: Array, mode: int, laps: int) -> Trajectory:
+    """The motion over whole periods of the drive from a state at phase zero."""
+    return stretch(system, table, state, mode, span=(float(laps), 0.0))
+
+
+def end_of(orbit: Trajectory) -> tuple[Array, int]:
+    """State and mode at the end of whole laps, the event that falls on it included."""
+    table, mode, leaving = orbit.table, int(orbit.modes[-1]), int(orbit.exits[-1])
+    physical = table.physical
+    last = orbit.states[0].copy()
+    if isinstance(orbit, CurvedTrajectory):
+        last[:physical] = orbit.sample([orbit.duration], ("state",))[0][:, 0]
+        return last, mode if leaving < 0 else int(orbit.table.exits[1][leaving])  # type: ignore[attr-defined]
+    end = orbit.states[-1].copy()
+    follow(table.tables, mode, end, float(orbit.durations[-1]), np.empty((3, len(last))))
+    if leaving >= 0:
+        end, mode = table.reset[leaving] @ end, int(table.target[leaving])
+    last[:physical] = end[:physical]
+    return last, mode
+
+
+def closes(orbit: Trajectory, gap: float) -> bool:
+    """Whether a return this close, relative to the orbit's size, is one to rounding."""
+    return gap <= (10 * CLOSED if isinstance(orbit, CurvedTrajectory) else CLOSED)
+
+
+def extent(orbit: Trajectory) -> Array:
+    """Largest modulus of each physical entry of the state, as the pieces or steps begin."""
+    states = orbit.step_states if isinstance(orbit, CurvedTrajectory) else orbit.states
+    return np.asarray(np.max(np.abs(states[:, : orbit.table.physical]), axis=0))
+
+
+def derivative(orbit: Trajectory, after: int) -> tuple[Array, float]:
+    """Derivative of the map over an orbit, and the slowest crossing of an exit relative to its terms."""
+    table, physical = orbit.table, orbit.table.physical
+    if isinstance(orbit, CurvedTrajectory):
+        sizes = extent(orbit)
+        columns = [_differenced(orbit, direction) for direction in np.diag(sizes)]
+        fine = np.array([column for column, _ in columns]).T
+        torn = np.array([column for _, column in columns]).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope, gap = (np.nan_to_num(part / sizes[:, None], posinf=0.0) for part in (fine, torn))
+            jacobian = np.nan_to_num(fine / sizes, posinf=0.0)
+        return jacobian, float(np.max(np.abs(gap)) <= TORN * max(1.0, np.max(np.abs(slope))))
+    size = len(table.names)
+    tangents = np.eye(size)[:physical].copy()
+    slowest = carry_tangents(
+        table.tables, table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
+        np.empty((9, size)),
+    )  # fmt: skip
+    return tangents[:, :physical].T, slowest
+
+
+def carried(orbit: Trajectory, after: int, difference: Array) -> Array:
+    """A small difference of the physical state, carried along an orbit."""
+    if isinstance(orbit, CurvedTrajectory):
+        sizes = extent(orbit)
+        share = float(np.max(np.abs(difference[sizes > 0]) / sizes[sizes > 0], initial=0.0))
+        return _differenced(orbit, difference / share)[0] * share if share else difference
+    size = len(orbit.table.names)
+    tangents = np.zeros((1, size))
+    tangents[0, : len(difference)] = difference
+    carry_tangents(
+        orbit.table.tables, orbit.table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
+        np.empty((9, size)),
+    )  # fmt: skip
+    return tangents[0, : len(difference)]
+
+
+def _differenced(orbit: CurvedTrajectory, direction: Array) -> tuple[Array, Array]:
+    """Derivative of an orbit's end along a direction of its start, and by how much the second order differs."""
+    table, mode = orbit.table, int(orbit.modes[0])
+    direction = direction.copy()
+    if table.modes[mode].friction is None:
+        direction[1] = 0.0  # what is held has no velocity of its own
+    if not np.any(direction):
+        return direction, direction
+    period = table.motion.period
+    laps = round(orbit.duration / period) if np.isfinite(period) else 0
+    span = (float(laps), 0.0 if laps else orbit.duration)
+    ends = {}
+    for steps in (-2, -1, 1, 2):
+        state = orbit.states[0].copy()
+        state[: table.physical] += steps * STEP * direction
+        beside = stretch(orbit.system, table, state, mode, span=span)
+        ends[steps] = beside.sample([beside.duration], ("state",))[0][:, 0]
+    near, far = ends[1] - ends[-1], ends[2] - ends[-2]
+    slope = (8 * near - far) / (12 * STEP)
+    return np.where(np.abs(slope) > FORGOTTEN * extent(orbit), slope, 0.0), (2 * near - far) / (12 * STEP)
