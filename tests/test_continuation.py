@@ -88,3 +88,19 @@ def test_rest_of_a_belt_is_no_start() -> None:
     belt = ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb(1.0, 1.5), drive=ss.Belt(0.5))
     with pytest.raises(ss.ModelError):
         ss.continue_orbit(ss.steady_state(belt), "speed", to=1.0)
+
+
+def test_a_branch_ends_where_another_order_of_events_begins_steeply() -> None:
+    """At 0.595944 mm the compliant contact grazes a new pair of stops: no tangent leads over, the branch says so."""
+    case = ss.scenario_case("THESIS compliant c=0 5.61Hz")
+    branch = ss.continue_orbit(ss.steady_state(case.system), "amplitude", to=0.59e-3, step=0.5)
+    end = float(branch.values[-1])
+    assert branch.status == "jump"
+    assert 0.59e-3 < end < 0.6e-3
+    assert {orbit.stops for orbit in branch.orbits} == {(2, 0)}
+    before, after = (ss.steady_state(case.system.having(amplitude=end * factor)) for factor in (1 + 1e-6, 1 - 1e-6))
+    assert before.stops == (2, 0)
+    assert after.stops == (2, 2)
+    # a millionth beyond the end the orbit is ten times less like the last one than a millionth before it
+    second = [orbit.multipliers[1].real for orbit in (branch.orbits[-1], before, after)]
+    assert abs(second[0] - second[1]) < 0.1 * abs(second[0] - second[2])
