@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.errors import EstimateError, RecordError
-from stickslip.signals.kalman import Motion, smooth_motion
+from stickslip.signals.kalman import Motion, Seen, smooth_motion
 
 CASES = {5.61: (0.6e-3, 1.05), 8.7: (1.1e-3, 1.1), 11.1: (2e-3, 1.1), 2.5: (0.65e-3, 1.1)}
 RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
@@ -70,9 +70,19 @@ def test_sensors_a_little_wrong_do_little_harm(frequency: float) -> None:
     assert error(told(measured(frequency)[0], wrong=True), measured(frequency)[1], "fusion")[0] < 0.02
 
 
-def test_the_cell_alone_is_deconvolved() -> None:
-    record, truth = measured(2.5)
+@pytest.mark.parametrize("frequency", list(CASES))
+def test_the_cell_alone_is_deconvolved(frequency: float) -> None:
+    record, truth = measured(frequency)
     assert error(told(record), truth, "load")[0] < 0.012
+
+
+def test_sensors_without_noise_are_taken_at_their_word() -> None:
+    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    run = ss.simulate(ss.Oscillator(law=law, drive=drive, **RIG), cycles=5)
+    record = ss.Rig.perfect().measure(run, fs=4000)
+    found = ss.friction_force(record, method="fusion", **RIG)
+    assert np.sqrt(np.mean((found["friction"] - record["load"]) ** 2)) < 1e-3
 
 
 def test_the_five_point_average_leaves_the_mount_ringing() -> None:
@@ -105,7 +115,7 @@ def test_the_smoother_is_the_least_squares_of_all_readings() -> None:
     size, count = 3, 12
     transition = np.eye(size) + 0.1 * rng.standard_normal((size, size))
     motion = Motion(
-        transition, rng.standard_normal(size), rng.standard_normal((2, size)), np.array([0.3, 0.5]),
+        transition[None], rng.standard_normal((1, size)), rng.standard_normal((2, size)), np.array([0.3, 0.5]),
         rng.standard_normal(size), np.array([1.0, 2.0, 3.0]),
     )  # fmt: skip
     readings, inputs = rng.standard_normal((count, 2)), rng.standard_normal((count, size))
@@ -117,7 +127,7 @@ def test_the_smoother_is_the_least_squares_of_all_readings() -> None:
     effect[0, :, :size] = np.eye(size)
     for t in range(count - 1):
         effect[t + 1] = transition @ effect[t]
-        effect[t + 1][:, size + t] += motion.spread
+        effect[t + 1][:, size + t] += motion.spread[0]
         known[t + 1] = transition @ known[t] + inputs[t]
     prior = np.diag(1 / np.concatenate([motion.doubt, unknown[:-1]]))
     mean = np.concatenate([motion.start, np.zeros(count - 1)])
@@ -127,7 +137,9 @@ def test_the_smoother_is_the_least_squares_of_all_readings() -> None:
     weight = np.diag([1 / motion.noise[k] for _, k in seen])
     covariance = np.linalg.inv(prior + rows.T @ weight @ rows)
     best = covariance @ (prior @ mean + rows.T @ weight @ target)
-    smoothed = smooth_motion(motion, readings=readings, inputs=inputs, unknown=unknown, forms=np.eye(size))
+    smoothed = smooth_motion(
+        motion, Seen(readings, inputs, np.zeros(count, dtype=np.intp)), unknown=unknown, forms=np.eye(size)
+    )
     for t in range(count):
         assert np.allclose(smoothed.values[:, t], effect[t] @ best + known[t], atol=1e-9)
         assert np.allclose(smoothed.variance[:, t], np.diag(effect[t] @ covariance @ effect[t].T), atol=1e-9)

@@ -42,6 +42,10 @@ if TYPE_CHECKING:
         linear_decrement as linear_decrement,
         log_decrement as log_decrement,
     )
+    from stickslip.identify.contact import (
+        contact_damping as contact_damping,
+        contact_stiffness as contact_stiffness,
+    )
     from stickslip.identify.force import friction_force as friction_force
     from stickslip.identify.loops import friction_loops as friction_loops
     from stickslip.identify.regression import regress_friction as regress_friction
@@ -160,6 +164,7 @@ _ROOMS = {
     "wavelet_map": "signals.wavelet", "wavelet_blocks": "signals.wavelet", "wavelet_overview": "signals.wavelet",
     "dyadic_map": "signals.wavelet", "stft_map": "signals.wavelet", "cone_of_influence": "signals.wavelet",
     "inverse_wavelet": "signals.wavelet", "plot_wavelet": "plot.wavelet",
+    "contact_stiffness": "identify.contact", "contact_damping": "identify.contact",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",
     "decrement": "identify.decrement", "Decrement": "identify.decrement", "Bounds": "identify.decrement",

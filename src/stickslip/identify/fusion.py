@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import differentiate, noise_along, smooth
-from stickslip.signals.kalman import Motion, Smoothed, smooth_motion
+from stickslip.signals.kalman import Motion, Seen, Smoothed, log_likelihood, smooth_motion
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,8 @@ PASSES = 6
 POOL = 12.0  # samples over which the unrest of the friction is averaged
 FIRST = 0.05  # share of the friction's size by which it may change in a sample, before anything is known
 LEAST = 1e-9  # share of the force's size below which the friction's wandering is none
+FINEST = 1e-6  # of a sensor's range: a sensor without noise would leave the filter no digits
+CALM = 1e-4  # share of the sliding friction by which friction strays from a holding contact in a sample
 PLACES = {"x": 0, "v": 1, "load": 2}  # of what a sensor reads in the state
 BLOCK, OVERLAP = 1 << 15, 1 << 11  # samples smoothed at a time, and those beside them that settle the ends
 
@@ -66,14 +68,16 @@ def fuse(record: Record, balance: Balance, sensors: Sequence[str]) -> Fused:
     Fused
     """
     push = _push(record, balance)
-    parts = []
+    values, sd = [], []
     for rows, inside in _blocks(len(record)):
-        parts.append((inside, _smoothed(record.rows(rows.start, rows.stop), balance, sensors, push[rows])))
-    displacement, velocity, friction = np.concatenate([part.values[:, inside] for inside, part in parts], axis=1)
-    # q found by the passes still falls where the friction is calm, and the deviation goes with its fourth root
-    sd = np.concatenate([(np.sqrt(part.variance) * _excess(part) ** 0.25)[:, inside] for inside, part in parts], axis=1)
+        known = _smoothed(record.rows(rows.start, rows.stop), balance, sensors, push[rows])
+        values.append(known.values[:, inside])
+        # q found by the passes still falls where the friction is calm, and the deviation goes with its fourth root
+        sd.append((np.sqrt(known.variance) * _excess(known) ** 0.25)[:, inside])
+    displacement, velocity, friction = np.concatenate(values, axis=1)
+    _, velocity_sd, friction_sd = np.concatenate(sd, axis=1)
     force = push - balance.stiffness * displacement - balance.damping * velocity - friction
-    return Fused(friction, sd[2], velocity, sd[1], force / balance.mass)
+    return Fused(friction, friction_sd, velocity, velocity_sd, force / balance.mass)
 
 
 def _blocks(size: int) -> Iterator[tuple[slice, slice]]:
@@ -93,20 +97,67 @@ def _push(record: Record, balance: Balance) -> Array:
     return push
 
 
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What the sensors read of a stretch, less what the push adds to them at once, and what they are."""
+
+    readings: Array
+    noise: Array
+    push: Array
+    step: float
+    force: float
+
+    @classmethod
+    def of(cls, record: Record, sensors: Sequence[str], push: Array, model: _Model, stiffness: float) -> Sensed:
+        """From a record's channels."""
+        readings = np.column_stack([record[name] for name in sensors]) - push[:, None] * model.direct
+        noise = [float(np.mean(noise_along(record[n], record.fs, record.channels[n].noise) ** 2)) for n in sensors]
+        force = float(np.std(push - stiffness * record["x"])) or 1.0
+        noise = np.maximum(noise, (FINEST * np.ptp(readings, axis=0)) ** 2)
+        return cls(readings, noise, push, 1 / record.fs, force)
+
+
 def _smoothed(record: Record, balance: Balance, sensors: Sequence[str], push: Array) -> Smoothed:
     """One block of the record."""
     model = _Model.of([record.channels[name] for name in sensors], balance)
-    readings = np.column_stack([record[name] for name in sensors]) - push[:, None] * model.direct
-    noise = [float(np.mean(noise_along(record[name], record.fs, record.channels[name].noise) ** 2)) for name in sensors]
-    force = float(np.std(push - balance.stiffness * record["x"])) or 1.0
-    motion, inputs = model.steps(1 / record.fs, readings, np.array(noise), force, push)
+    sensed = Sensed.of(record, sensors, push, model, balance.stiffness)
+    motion, seen = _steps([model], np.zeros(len(push), dtype=np.intp), sensed)
     forms = np.eye(3, len(motion.start))
-    unknown = np.full(len(push), (FIRST * force) ** 2)
+    unknown = np.full(len(push), (FIRST * sensed.force) ** 2)
     for _ in range(PASSES - 1):
-        known = smooth_motion(motion, readings=readings, inputs=inputs, unknown=unknown, forms=forms)
+        known = smooth_motion(motion, seen, unknown=unknown, forms=forms)
         unknown = unknown * _excess(known, most=math.inf)
-        unknown = np.maximum(unknown, max(float(np.median(unknown)), (LEAST * force) ** 2))
-    return smooth_motion(motion, readings=readings, inputs=inputs, unknown=unknown, forms=forms)
+        unknown = np.maximum(unknown, max(float(np.median(unknown)), (LEAST * sensed.force) ** 2))
+    return smooth_motion(motion, seen, unknown=unknown, forms=forms)
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A record in parts of which the contact holds; elsewhere the friction may do as it likes."""
+
+    model: _Model
+    sensed: Sensed
+    holds: NDArray[np.intp]
+    unknown: Array
+
+    @classmethod
+    def of(
+        cls, record: Record, balance: Balance, sensors: Sequence[str], holds: NDArray[np.bool_], level: float
+    ) -> Held:
+        """`holds` is true for each step from a sample to the next within a stick; `level` [N] is the sliding friction.
+
+        Between sticks nothing is taken over from what was found of the friction: it would lean on its own choice.
+        """
+        push = _push(record, balance)
+        model = _Model.of([record.channels[name] for name in sensors], balance)
+        sensed = Sensed.of(record, sensors, push, model, balance.stiffness)
+        unknown = np.where(holds, (CALM * level) ** 2, level**2)
+        return cls(model, sensed, holds.astype(np.intp), unknown)
+
+    def log_likelihood(self, stiffness: float, damping: float) -> float:
+        """Of all readings, were the contact so stiff [N/m] and damped [N s/m]."""
+        motion, seen = _steps([self.model, self.model.held(stiffness, damping)], self.holds, self.sensed)
+        return log_likelihood(motion, seen, unknown=self.unknown)
 
 
 def _excess(known: Smoothed, most: float = 1.0) -> Array:
@@ -125,16 +176,16 @@ class _Model:
     push: Array
     rows: Array
     direct: Array
-    rates: Array  # what makes the doubt of a mount's velocity from that of its place [1/s]
+    scales: Array  # (sensors, states): what a mount's state may be, in units of its sensor's range
 
     @classmethod
     def of(cls, channels: Sequence[Channel], balance: Balance) -> _Model:
         size = 3 + sum(2 * (c.mount is not None) + (c.discharge is not None) for c in channels)
-        flow, push, rates = np.zeros((size, size)), np.zeros(size), np.zeros(size)
+        flow, push, scales = np.zeros((size, size)), np.zeros(size), np.zeros((len(channels), size))
         flow[0, 1], push[1] = 1.0, 1 / balance.mass
         flow[1, :3] = -np.array([balance.stiffness, balance.damping, 1.0]) / balance.mass
         rows, direct, at = [], [], 3
-        for channel in channels:
+        for j, channel in enumerate(channels):
             weight = 1.0 if channel.name == "a" else channel.inertia
             row, at_once = weight * flow[1], weight * push[1]
             if channel.name in PLACES:
@@ -143,32 +194,51 @@ class _Model:
                 w, ratio = 2 * math.pi * channel.mount[0], channel.mount[1]
                 flow[at, at + 1], flow[at + 1], push[at + 1] = 1.0, w * w * row, w * w * at_once
                 flow[at + 1, at : at + 2] -= w * w, 2 * ratio * w
-                rates[at], rates[at + 1] = 1.0, w
+                scales[j, at : at + 2] = 1.0, w
                 row, at_once, at = np.eye(size)[at], 0.0, at + 2
             if channel.discharge is not None:
                 flow[at] = row / channel.discharge
                 flow[at, at] -= 1 / channel.discharge
-                push[at], rates[at] = at_once / channel.discharge, 1.0
+                push[at], scales[j, at] = at_once / channel.discharge, 1.0
                 row, at = row - np.eye(size)[at], at + 1
             rows.append(row)
             direct.append(at_once)
-        return cls(flow, push, np.array(rows), np.array(direct), rates)
+        return cls(flow, push, np.array(rows), np.array(direct), scales)
 
-    def steps(self, step: float, readings: Array, noise: Array, force: float, push: Array) -> tuple[Motion, Array]:
-        """The motion from sample to sample; the push and the friction change linearly in between."""
+    def held(self, stiffness: float, damping: float) -> _Model:
+        """The same where the contact holds: the friction follows a spring and a damper, f' = K v + c v'."""
+        flow, push = self.flow.copy(), self.push.copy()
+        flow[2], push[2] = damping * self.flow[1], damping * self.push[1]
+        flow[2, 1] += stiffness
+        return replace(self, flow=flow, push=push)
+
+    def step(self, length: float) -> tuple[Array, Array, Array, Array]:
+        """Over one sample: T, r, and what the push does at its start and by its change, both linear in between."""
         from scipy.linalg import expm
 
         size = len(self.push)
         wide = np.zeros((size + 4, size + 4))
-        wide[:size, :size], wide[:size, size], wide[size, size + 1] = self.flow, self.push, 1 / step
-        wide[:size, size + 2] = np.eye(size)[2] / step
-        whole = expm(wide * step)
-        inputs = np.outer(push, whole[:size, size])
-        inputs[:-1] += np.outer(np.diff(push), whole[:size, size + 1])
-        swing = float(np.ptp(readings[:, 0])) + math.sqrt(noise[0])
-        start, doubt = np.zeros(size), np.zeros(size)
+        wide[:size, :size], wide[:size, size], wide[size, size + 1] = self.flow, self.push, 1 / length
+        wide[:size, size + 2] = np.eye(size)[2] / length
+        whole = expm(wide * length)[:size]
+        return whole[:, :size], whole[:, size + 2], whole[:, size], whole[:, size + 1]
+
+    def start(self, step: float, readings: Array, noise: float, force: float) -> tuple[Array, Array]:
+        """The state before the first reading, as good as unknown, and its variances."""
+        ranges = np.ptp(readings, axis=0)
+        start, doubt = np.zeros(len(self.push)), (ranges @ self.scales) ** 2
         start[0] = readings[0, 0]
-        doubt[:3] = swing**2, (swing / step / 10) ** 2, (10 * force) ** 2
-        doubt[3:] = (self.rates[3:] * 10 * max(force, force * float(np.max(np.abs(self.push[1]))))) ** 2
-        transition, spread = whole[:size, :size], whole[:size, size + 2]
-        return Motion(transition, spread, self.rows, noise, start, doubt), inputs
+        doubt[:3] = ranges[0] ** 2 + noise, (ranges[0] / step / 10) ** 2, (10 * force) ** 2
+        return start, doubt
+
+
+def _steps(models: Sequence[_Model], regime: NDArray[np.intp], sensed: Sensed) -> tuple[Motion, Seen]:
+    """The motion from sample to sample, by the model of each sample's regime."""
+    transitions, spreads, pushed, changed = (
+        np.array(part) for part in zip(*(model.step(sensed.step) for model in models), strict=True)
+    )
+    inputs = sensed.push[:, None] * pushed[regime]
+    inputs[:-1] += np.diff(sensed.push)[:, None] * changed[regime[:-1]]
+    start, doubt = models[0].start(sensed.step, sensed.readings, sensed.noise[0], sensed.force)
+    motion = Motion(transitions, spreads, models[0].rows, sensed.noise, start, doubt)
+    return motion, Seen(sensed.readings, inputs, regime)

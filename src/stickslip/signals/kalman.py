@@ -12,6 +12,8 @@ from stickslip.compiled import FAST, compiled
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-12  # share of a variance before the readings that is left of it at least
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -19,9 +21,9 @@ class Motion:
 
     Attributes
     ----------
-    transition : ndarray (n, n)
-        T, over one sample.
-    spread : ndarray (n,)
+    transition : ndarray (g, n, n)
+        T, over one sample, of each regime.
+    spread : ndarray (g, n)
         r: what one unit of the unknown does in a step.
     readings : ndarray (m, n)
         H.
@@ -64,7 +66,26 @@ class Smoothed:
     likelihood: float
 
 
-def smooth_motion(motion: Motion, *, readings: Array, inputs: Array, unknown: Array, forms: Array) -> Smoothed:
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What was read of a motion, and what drove it.
+
+    Attributes
+    ----------
+    readings : ndarray (N, m)
+        NaN where nothing was read.
+    inputs : ndarray (N, n)
+        u of each step.
+    regime : ndarray (N,)
+        Which of the motion's regimes each step is in.
+    """
+
+    readings: Array
+    inputs: Array
+    regime: NDArray[np.intp]
+
+
+def smooth_motion(motion: Motion, seen: Seen, *, unknown: Array, forms: Array) -> Smoothed:
     """What was the motion, from everything that was read before and after?
 
     The Kalman filter, one sensor at a time, and the backward recursion of de Jong (1989) and of Koopman (1993), which
@@ -73,10 +94,7 @@ def smooth_motion(motion: Motion, *, readings: Array, inputs: Array, unknown: Ar
     Parameters
     ----------
     motion : Motion
-    readings : ndarray (N, m)
-        NaN where nothing was read.
-    inputs : ndarray (N, n)
-        u of each step.
+    seen : Seen
     unknown : ndarray (N,)
         Variance q of the unknown w of each step.
     forms : ndarray (p, n)
@@ -86,27 +104,53 @@ def smooth_motion(motion: Motion, *, readings: Array, inputs: Array, unknown: Ar
     -------
     Smoothed
     """
-    count, size, sensors = len(readings), len(motion.start), readings.shape[1]
-    ahead, doubt = np.empty((count, size)), np.empty((count, size, size))
-    gain, surprise, spread = np.empty((count, sensors, size)), np.zeros((count, sensors)), np.zeros((count, sensors))
-    tables = (motion.transition, motion.spread, motion.readings)
-    likelihood = _forward(
-        tables, motion.noise, readings, inputs, unknown, motion.start.copy(), np.diag(motion.doubt),
-        (ahead, doubt, gain, surprise, spread), np.empty((size, size)), np.empty(size),
-    )  # fmt: skip
+    kept, likelihood = _filtered(motion, seen, unknown)
+    count, size = len(unknown), len(motion.start)
     values, variance = np.empty((len(forms), count)), np.empty((len(forms), count))
     score, information = np.empty(count), np.empty(count)
     _backward(
-        tables, (ahead, doubt, gain, surprise, spread), forms, values, variance, score, information,
-        np.zeros((size, size)), np.empty((size, size)), np.zeros(size), np.empty(size),
+        (motion.transition, motion.spread, motion.readings, seen.regime), kept, forms, values, variance, score,
+        information, np.zeros((size, size)), np.empty((size, size)), np.zeros(size), np.empty(size),
     )  # fmt: skip
     return Smoothed(values, variance, score, information, likelihood)
+
+
+def log_likelihood(motion: Motion, seen: Seen, *, unknown: Array) -> float:
+    """How likely are the readings?
+
+    Parameters
+    ----------
+    motion : Motion
+    seen : Seen
+    unknown : ndarray (N,)
+        Variance q of the unknown w of each step.
+
+    Returns
+    -------
+    float
+        Logarithm of the likelihood, from the filter's surprises.
+    """
+    return _filtered(motion, seen, unknown)[1]
+
+
+def _filtered(motion: Motion, seen: Seen, unknown: Array) -> tuple[tuple[Array, ...], float]:
+    count, size, sensors = len(unknown), len(motion.start), seen.readings.shape[1]
+    kept = (
+        np.empty((count, size)), np.empty((count, size, size)), np.empty((count, sensors, size)),
+        np.zeros((count, sensors)), np.zeros((count, sensors)),
+    )  # fmt: skip
+    tables = (motion.transition, motion.spread, motion.readings, seen.regime)
+    likelihood = _forward(
+        tables, motion.noise, seen.readings, seen.inputs, unknown, motion.start.copy(), np.diag(motion.doubt), kept,
+        np.empty((size, size)), np.empty(size),
+    )  # fmt: skip
+    return kept, float(likelihood)
 
 
 @compiled(**FAST)
 def _forward(tables, noise, readings, inputs, unknown, a, p, kept, square, line):
     """The filter from state a and covariance p: the log likelihood; `kept` takes what the way back needs."""
-    transition, spread, forms = tables
+    transitions, spreads_, forms, regime = tables
     ahead, doubts, gains, surprises, spreads = kept
     count, sensors = readings.shape
     n = a.shape[0]
@@ -138,6 +182,7 @@ def _forward(tables, noise, readings, inputs, unknown, a, p, kept, square, line)
                 for j in range(i + 1):
                     p[i, j] -= gain * line[j]
                     p[j, i] = p[i, j]
+        transition, spread = transitions[regime[t]], spreads_[regime[t]]
         for i in range(n):
             total = inputs[t, i]
             for j in range(n):
@@ -163,11 +208,12 @@ def _forward(tables, noise, readings, inputs, unknown, a, p, kept, square, line)
 @compiled(**FAST)
 def _backward(tables, kept, forms, values, variance, score, information, m, square, r, line):
     """The way back: r and m are the slope and the curvature of the likelihood by the state."""
-    transition, spread, readings = tables
+    transitions, spreads_, readings, regime = tables
     ahead, doubts, gains, surprises, spreads = kept
     count, sensors = surprises.shape
     n = r.shape[0]
     for t in range(count - 1, -1, -1):
+        transition, spread = transitions[regime[t]], spreads_[regime[t]]
         first, second = 0.0, 0.0
         for i in range(n):
             first += spread[i] * r[i]
@@ -221,7 +267,8 @@ def _backward(tables, kept, forms, values, variance, score, information, m, squa
                 line[i] = total
                 value += forms[o, i] * ahead[t, i] + total * r[i]
                 doubt += forms[o, i] * total
+            least = ROUNDING * doubt
             for i in range(n):
                 for j in range(n):
                     doubt -= line[i] * m[i, j] * line[j]
-            values[o, t], variance[o, t] = value, doubt
+            values[o, t], variance[o, t] = value, max(doubt, least)

@@ -1,0 +1,72 @@
+"""The stiffness of the contact, on the thesis's rig with sensors that lie."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.errors import EstimateError, RecordError
+from test_fusion import RIG, measured, told
+
+STIFFNESS, DAMPING = 192000.0, 23.9
+
+
+def balanced(frequency: float, rough: float = 0.0, method: str = "fusion") -> ss.Record:
+    return ss.friction_force(told(measured(frequency, rough, seconds=3.0)[0]), method=method, **RIG)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "rough", "within"), [(2.5, 0.0, 5e-4), (2.5, 0.03, 5e-4), (8.7, 0.0, 0.011), (11.1, 0.0, 0.025)]
+)
+def test_the_likeliest_contact_is_the_true_one(frequency: float, rough: float, within: float) -> None:
+    found = ss.contact_stiffness(balanced(frequency, rough))
+    assert found.value == pytest.approx(STIFFNESS, rel=within)
+    assert abs(found.value - STIFFNESS) < 3.5 * found.sd
+    assert found.sd < within * STIFFNESS
+
+
+def test_its_damping_too() -> None:
+    found = ss.contact_damping(balanced(2.5))
+    assert found.value == pytest.approx(DAMPING, rel=0.02)
+    assert abs(found.value - DAMPING) < 3.5 * found.sd
+
+
+def test_the_slope_scatters_and_is_low_as_the_thesis_found() -> None:
+    found = ss.contact_stiffness(balanced(8.7), method="slope")
+    sticks = 2 * 3 * 8.7
+    assert 0.05 < found.sd * np.sqrt(sticks) / found.value < 0.2
+    assert -0.27 < found.value / STIFFNESS - 1 < -0.02
+
+
+def test_the_slope_is_right_where_nothing_lies() -> None:
+    record = ss.Rig.perfect("x", "z", "load").measure(_run(), fs=20_000)
+    record = record.with_channel("friction", record["load"], unit="N")
+    assert ss.contact_stiffness(record, method="slope").value == pytest.approx(STIFFNESS, rel=0.03)
+
+
+def test_loops_tell_the_slope_of_their_mean_cycle() -> None:
+    record = ss.Rig.perfect("x", "z", "load").measure(_run(), fs=20_000)
+    record = record.with_channel("friction", record["load"], unit="N")
+    found = ss.contact_stiffness(ss.friction_loops(record))
+    assert found.value == pytest.approx(STIFFNESS, rel=0.3)
+    with pytest.raises(EstimateError, match="slope"):
+        ss.contact_stiffness(ss.friction_loops(record), method="stick")
+
+
+def _run() -> ss.Trajectory:
+    contact = ss.CompliantContact(1.1, stiffness=STIFFNESS)
+    drive = ss.HarmonicBase(1.1e-3, frequency=8.7)
+    return ss.simulate(ss.Oscillator(law=contact, drive=drive, **RIG), cycles=60)
+
+
+def test_what_it_lacks_is_said() -> None:
+    record = measured(2.5, 0.0, seconds=3.0)[0]
+    with pytest.raises(RecordError, match="friction"):
+        ss.contact_stiffness(record)
+    with pytest.raises(EstimateError, match="friction_force"):
+        ss.contact_stiffness(record.with_channel("friction", record["load"], unit="N"))
+    with pytest.raises(EstimateError, match="stick, slope"):
+        ss.contact_stiffness(balanced(2.5), method="guess")
+    with pytest.raises(EstimateError, match="sticks"):
+        ss.contact_stiffness(balanced(2.5).rows(0, 300))
