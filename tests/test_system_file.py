@@ -93,6 +93,7 @@ def test_the_motion_is_that_of_the_same_system_in_python(tmp_path: Path) -> None
         ('x = "0.1 mm"', "q = 1", ["line 16", "'start.q'", "known are x, v, anchor, mode"]),
         ('x = "0.1 mm"', 'mode = "flying"', ["line 16", "'microstuck'"]),
         ("cycles = 40", "cycles = -40", ["line 18", "greater than 0"]),
+        ("cycles = 40", "cycles = 1e15", ["line 18", "less than or equal to 1000000000"]),
         ("cycles = 40", "cycles = 40\nduration = 3", ["line 17", "one of the two"]),
         ("[law]", "[laws]", ["line 6", "'laws'", "perhaps law is meant"]),
         ("[law]", "law", ["line 6", "not TOML"]),

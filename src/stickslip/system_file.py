@@ -41,6 +41,7 @@ UNITS = {
 }  # fmt: skip
 STATE_UNITS = {"x": "m", "v": "m/s", "stretch": "m", "u": "m/s", "theta": "N"}
 CYCLES = 20.0  # of a run where nothing is said
+MOST_CYCLES = 1e9  # more would not end, nor be counted
 
 
 @dataclasses.dataclass(frozen=True)
@@ -180,7 +181,7 @@ class _Run(BaseModel):
     model_config = STRICT
 
     duration: Annotated[float, quantity("s"), Field(gt=0)] | None = None
-    cycles: Annotated[float, Field(gt=0)] | None = None
+    cycles: Annotated[float, Field(gt=0, le=MOST_CYCLES)] | None = None
     fs: Annotated[float, quantity("Hz"), Field(gt=0)] | None = None
 
 
