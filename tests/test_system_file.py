@@ -256,6 +256,12 @@ def test_a_law_behind_a_compliant_contact_is_a_table_within(tmp_path: Path) -> N
             read_system(written(tmp_path, text.replace(old, new)))
 
 
+def test_a_law_with_a_time_lag_holds_its_curve(tmp_path: Path) -> None:
+    text = '[law]\nname = "TimeDelay"\nlag = "1 ms"\nlaw = { name = "LinearSlope", kinetic = 1.1, slope = 2 }\n'
+    system = read_system(written(tmp_path, WHOLE.replace(LAW, text))).system
+    assert system.law == ss.TimeDelay(ss.LinearSlope(1.1, slope=2.0), lag=1e-3)  # type: ignore[union-attr]
+
+
 def test_a_curve_is_a_formula_of_the_speed(tmp_path: Path) -> None:
     text = WHOLE.replace(LAW, '[law]\nname = "FrictionCurve"\ncurve = "3 / (1 + 1.42 * v) + 1 + 0.1 * v**2"\n')
     law = read_system(written(tmp_path, text)).system.law  # type: ignore[union-attr]

@@ -36,6 +36,7 @@ rate = ss.Oscillator(
     mass=1.0, stiffness=4.0,
     law=ss.RateState(normal=10, friction=0.6, direct=0.01, evolution=0.015, distance=1e-5, reference=1e-6),
 )
+late = ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.TimeDelay(ss.LinearSlope(1.0, slope=2.0), lag=1e-3))
 smooth = ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.SmoothStateVariable(kinetic=1, rate=100, steepness=3000))
 pad = ss.Contact(ss.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
 squeal = ss.Structure([[1, 0], [0, 1]], [[0, 0], [0, 0]], [[2, 0], [0, 2]], contacts=[pad], drive=ss.Belt(0.8))
