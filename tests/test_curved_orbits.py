@@ -9,6 +9,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import stickslip as ss
 
@@ -97,6 +98,36 @@ def test_a_belt_under_falling_friction_has_its_stick_slip_cycle() -> None:
     assert orbit.period == pytest.approx(ends[-1] - ends[-2], rel=1e-11)
     assert ss.energy(orbit.orbit).residual < 1e-12
     assert orbit.orbit.state(orbit.period / 3)["x"] == pytest.approx(run.state(ends[-2] + orbit.period / 3)["x"])
+
+
+def test_a_belt_under_a_law_that_never_holds_has_its_cycle_too() -> None:
+    law = ss.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=math.sqrt(1e5), viscous=0.4)
+    system = ss.Oscillator(mass=1, stiffness=2, law=law, drive=ss.Belt(0.1))
+    orbit = ss.steady_state(system, transient=16)
+    assert (orbit.status, orbit.period) == ("unique", pytest.approx(6.36271982, abs=1e-8))
+    assert np.max(np.abs(orbit.multipliers)) < 1e-6
+    assert ss.energy(orbit.orbit).residual < 1e-12
+    assert ss.steady_state(system.having(drive=ss.Ramp(0.1)), transient=4).status == "not periodic"
+
+
+def test_what_is_put_off_a_belts_cycle_returns_by_its_multiplier() -> None:
+    law = ss.LuGre(1.0, 1.2, speed=0.5, stiffness=400.0, damping=5.0)
+    system = ss.Oscillator(mass=1, stiffness=2, law=law, drive=ss.Belt(0.6))
+    orbit = ss.steady_state(system)
+    x, _, bristle = orbit.orbit.states[0, :3]
+    mode = orbit.orbit.table.modes[orbit.orbit.modes[0]].name
+    run = ss.simulate(
+        system,
+        duration=3.5 * orbit.period,
+        rtol=1e-14,
+        start={"x": x + 1e-5, "v": 0.0, "bristle": bristle, "mode": mode},
+    )
+    offs = []
+    for lap in (1, 2, 3):  # where the velocity rises through zero, near the end of each lap
+        near = (lap - 0.05) * orbit.period, (lap + 0.05) * orbit.period
+        offs.append(run.state(brentq(lambda t: run.state(t)["v"], *near, xtol=1e-14))["x"] - x)
+    assert offs[1] / offs[0] == pytest.approx(orbit.multipliers[0].real, rel=1e-4)
+    assert offs[2] / offs[1] == pytest.approx(orbit.multipliers[0].real, rel=1e-4)
 
 
 def test_a_branch_of_a_curved_law_ends_at_the_orbit_found_there() -> None:

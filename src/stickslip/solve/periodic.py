@@ -20,6 +20,7 @@ from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.structure import Structure
 
 UNIT = 1e-7  # a multiplier this close to 1 is 1: its rounding grows with the square root of a double eigenvalue
+ROUNDS = 16  # transients of a self-excited motion before no orbit is expected any more
 GRAZING = 1e-9  # an exit crossed this slowly, relative to the terms of its rate, is a tangency
 
 
@@ -184,7 +185,8 @@ def steady_state(
 
     The exact map over a period of the drive is iterated through a transient, then closed by Newton's method with its
     exact derivative; that of a curved law is differenced, and its multipliers are known to some 1e-9. A system without
-    a periodic drive (a belt, a ramp) is followed until a stick ends as the one before did.
+    a periodic drive (a belt, a ramp) is followed until a stick ends as the one before did, or, where the law never
+    holds the mass, until two turns of the mass on a belt are alike.
 
     Parameters
     ----------
@@ -378,6 +380,8 @@ def _self_excited(system: System, table: Table, start: Mapping[str, float | str]
         raise SolveError("nothing drives the system", "only a driven motion repeats", "give a drive=")
     state, mode = opening(table, start)
     scale = 1 / system.frequency if system.frequency else 1.0
+    if isinstance(table, Tape) and all(mode.friction is not None for mode in table.modes):
+        return _between_turns(system, table, state, mode, transient * scale)
     # the way of the belt moves on, so the relative coordinate is compared, not the signals
     duration = transient * scale
     for _ in range(8):
@@ -398,6 +402,42 @@ def _self_excited(system: System, table: Table, start: Mapping[str, float | str]
     steady = len(motion.modes) == 1 or motion.durations[-1] > 0.5 * duration
     return SteadyState("rest" if steady and table.modes[motion.modes[-1]].side == 0 else "not periodic",
                        math.nan, 0, motion, none)  # fmt: skip
+
+
+def _between_turns(system: System, table: Tape, state: Array, mode: int, duration: float) -> SteadyState:
+    """The orbit of a law that never holds the mass, from one turn of the mass to the next."""
+    physical = table.physical
+    for _ in range(ROUNDS):
+        motion = stretch(system, table, state, mode, span=(0.0, duration))
+        assert isinstance(motion, CurvedTrajectory)
+        turns = _turns(motion)
+        if len(turns) < 2 or table.motion.base or table.motion.tones:
+            break
+        values, pieces = motion.sample(turns, ("state",))
+        state, mode = state.copy(), int(motion.modes[pieces[1]])
+        state[:physical] = values[:, 1]
+        sizes = np.max(np.abs(motion.step_states[motion.step_starts > turns[0], :physical]), axis=0)
+        if np.all(np.abs(values[:, 1] - values[:, 0]) <= 1e-9 * sizes):
+            period = turns[1] - turns[0]
+            orbit = stretch(system, table, state, mode, span=(0.0, period))
+            multipliers = np.linalg.eigvals(derivative(orbit, mode)[0]).astype(np.complex128)
+            multipliers[np.argmin(np.abs(multipliers - 1))] = 0.0  # along the orbit nothing grows: its phase is free
+            multipliers = multipliers[np.argsort(-np.abs(multipliers))]
+            return SteadyState("unique" if abs(multipliers[0]) < 1 else "unstable", period, 1, orbit, multipliers)
+    none = np.full(physical, np.nan, dtype=np.complex128)
+    return SteadyState("not periodic", math.nan, 0, motion, none)
+
+
+def _turns(motion: CurvedTrajectory) -> list[float]:
+    """The last two instants at which the velocity rises through zero."""
+    from scipy.optimize import brentq
+
+    v, ends = motion.step_states[:, 1], motion.step_starts
+    rises = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0))[-2:]
+    return [
+        float(brentq(lambda t: motion.sample([t], ("v",))[0][0, 0], ends[j], ends[j + 1], xtol=1e-15 * ends[j + 1]))
+        for j in rises
+    ]
 
 
 def _between(motion: Trajectory, first: int, last: int) -> SteadyState:

@@ -18,7 +18,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import Array, Automaton, System, automaton
 from stickslip.solve.curved import CurvedTrajectory, Tape, run_curved, tape
 from stickslip.solve.kernel import follow
-from stickslip.solve.simulate import run
+from stickslip.solve.simulate import run, stops_of
 from stickslip.solve.tangent import carry_tangents
 from stickslip.solve.trajectory import Trajectory
 
@@ -47,10 +47,8 @@ def tables(system: System) -> Table:
 def stretch(system: System, table: Table, state: Array, mode: int, *, span: tuple[float, float]) -> Trajectory:
     """The motion from a state at phase zero over a time (laps, offset)."""
     if isinstance(table, Tape):
-        nothing: tuple[list[int], list[float]] = ([], [])
-        return run_curved(
-            table, state, mode, course=(span, [(span, nothing)]), budget=10_000, rtol=FINE, tell=lambda _: None
-        )
+        course = (span, stops_of(table, *span))
+        return run_curved(table, state, mode, course=course, budget=10_000, rtol=FINE, tell=lambda _: None)
     return run(system, table, state, mode, span=span)
 
 

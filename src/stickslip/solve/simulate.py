@@ -106,7 +106,7 @@ def _simulate_curved(
     table: Any = delayed_tape(system, degree(rtol)) if lags else tape(system)
     span = _end(system, table, *time_)
     state, mode = opening(table, start)
-    follow, course = run_delayed if lags else run_curved, (span, _stops(table, *span))
+    follow, course = run_delayed if lags else run_curved, (span, stops_of(table, *span))
     return follow(table, state, mode, course=course, budget=budget, rtol=rtol, tell=paced(progress))
 
 
@@ -195,7 +195,7 @@ def run(
     pieces = _Pieces(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
     try:
-        for at, (signals, values) in _stops(table, laps, offset):
+        for at, (signals, values) in stops_of(table, laps, offset):
             state[signals] = values
             kernel.measure(table.tones, state, work[3], 1.0)
             cell = min(table.cell[mode], total)
@@ -270,7 +270,7 @@ def _columns(room: int, size: int) -> tuple[NDArray[Any], ...]:
     )  # fmt: skip
 
 
-def _stops(table: Automaton, laps: float, offset: float) -> Any:
+def stops_of(table: Automaton | Tape, laps: float, offset: float) -> Any:
     """The times to which the march goes in turn, with the signals that take new values at each start."""
     knots = table.motion.knots
     if knots is None:
