@@ -115,7 +115,7 @@ class Findings(Result):
             "notes": list(self.notes),
             "history": [step.to_dict() for step in self.record.history],
         }
-        return {key: _plain(value) for key, value in told.items()}
+        return {key: plain(value) for key, value in told.items()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -484,16 +484,16 @@ def _line(design: NDArray[np.float64], levels: NDArray[np.float64], sds: NDArray
     return [{"value": v, "sd": s, "quantile": student(free)} for v, s in zip(found, sd, strict=True)]
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Plain JSON data of anything that settings, truth or history may hold; a number not finite becomes None."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, (list, tuple, set, frozenset)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return plain(value.item())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if value is None or isinstance(value, (bool, int, str)) else str(value)

@@ -21,7 +21,7 @@ import click
 import stickslip as ss
 
 if TYPE_CHECKING:
-    from stickslip import Case, Comparison, Findings, Outcome, Record, RigSettings
+    from stickslip import Case, Comparison, DecayFindings, Findings, Outcome, Record, RigSettings
 
 INTERRUPTED = 130
 SHOWN_EVENTS = 12
@@ -180,9 +180,67 @@ def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: 
         results, refused = _answers(groups, rig, method, tell)
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if output or not as_json else None
-    for error in refused:
-        click.echo(f"stickslip: left out: {_spoken(error)}", err=True)
+    _name_left_out(refused)
     _show(results, written, as_json=as_json)
+
+
+@main.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.")
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, for the friction force; of an angle in N m/rad.")
+@click.option(
+    "--method",
+    type=click.Choice(["all", "waveform", "thesis"]),
+    default="all",
+    show_default=True,
+    help="The whole waveform, the decrements of the extremes (the thesis's chapter 6), or both.",
+)
+@click.option("--channel", metavar="NAME", help="x, theta, v or a; the first of these that the file has unless given.")
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for the results; FILE-stickslip unless given.",
+)
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print the results as JSON and nothing else; a folder is written only with --output.",
+)
+@_reading
+def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options: Any) -> None:
+    """Tell viscous from dry friction by how a released mass dies away.
+
+    FILES hold free decays: displacement, angle, velocity or acceleration of something that was let go. Several
+    releases in one file are told apart. A quoted pattern ("release_*.csv") stands for all files that fit.
+
+    Results go into a folder: report.html to open in a browser, results.json, and the figures.
+
+    \b
+    stickslip decay release.csv --channels "x=disp [mm]" --stiffness "2.31 N/mm"
+    stickslip decay "release_*.csv" --method thesis --json
+    """
+    asked = {key: options.pop(key) for key in ("method", "channel", "mass", "stiffness")}
+    rig = _rig(**options)
+    groups = [group for argument in files for group in _groups(argument)]
+    folder = output or (_default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
+    found: list[DecayFindings] = []
+    refused: list[ss.StickslipError] = []
+    with _progress(2 * len(groups) + 1) as tell:
+        for number, group in enumerate(groups):
+            with _collected(refused, group):
+                tell(f"reading {_name(group)}", 2 * number)
+                record = _read(group, rig)
+                tell(f"fitting {_name(group)}", 2 * number + 1)
+                stated = {key: asked[key] or getattr(rig, key) for key in ("mass", "stiffness")}
+                found.append(ss.analyze_decay(record, **{**asked, **stated}))
+        if not found:
+            raise _none_answers(refused)
+        tell("drawing and writing", 2 * len(groups))
+        written = ss.publish(found, folder=folder) if output or not as_json else None
+    _name_left_out(refused)
+    _show(found, written, as_json=as_json)
 
 
 @main.command()
@@ -427,11 +485,20 @@ def _answers(
             tell(f"checking and analysing {_name(group)}", 2 * number + 1)
             found.append(ss.analyze(record, rig=rig, method=method))
     if not found:
-        first, many = refused[0], f"none of {len(refused)} records answers; the first: " * (len(refused) > 1)
-        raise type(first)(f"{many}{first.value}", first.rule, first.next_step)
+        raise _none_answers(refused)
     results = ss.compare(found) if len(found) > 1 else found[0]
     notes = (*results.notes, *(f"Left out: {error}" for error in refused))
     return dataclasses.replace(results, notes=notes), refused
+
+
+def _none_answers(refused: Sequence[ss.StickslipError]) -> ss.StickslipError:
+    first, many = refused[0], f"none of {len(refused)} records answers; the first: " * (len(refused) > 1)
+    return type(first)(f"{many}{first.value}", first.rule, first.next_step)
+
+
+def _name_left_out(refused: Iterable[ss.StickslipError]) -> None:
+    for error in refused:
+        click.echo(f"stickslip: left out: {_spoken(error)}", err=True)
 
 
 @contextlib.contextmanager
@@ -490,20 +557,21 @@ def _progress(steps: int) -> Iterator[Callable[[str, float], None]]:
         progress.stop()
 
 
-def _show(results: Findings | Comparison, written: Path | None, *, as_json: bool) -> None:
+def _show(results: Findings | Comparison | list[DecayFindings], written: Path | None, *, as_json: bool) -> None:
     if as_json:
-        click.echo(json.dumps(results.to_dict(), indent=2, ensure_ascii=False, allow_nan=False))
+        told = {"records": [each.to_dict() for each in results]} if isinstance(results, list) else results.to_dict()
+        click.echo(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
         return
     from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=False)
-    for part in (*getattr(results, "findings", ()), results):
+    for part in results if isinstance(results, list) else (*getattr(results, "findings", ()), results):
         _print_table(console, part)
     if written is not None:
         click.echo(f"Report: {written / 'report.html'}")
 
 
-def _print_table(console: Any, results: Findings | Comparison) -> None:
+def _print_table(console: Any, results: Findings | Comparison | DecayFindings) -> None:
     from rich.markup import escape
 
     summary = ss.summary(results)

@@ -220,7 +220,7 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
     i, m = _best_pair(upright, errors, form)
     last = _surest_dry(upright, sd, i, m, form)
 
-    frequency, notes = _frequency(times, ring_down)
+    frequency, notes = _frequency(times, values, ring_down)
 
     def answer(points: Array) -> Array:
         beta = ex.rate(points, i=i, m=m, form=form)
@@ -356,20 +356,23 @@ def _scale_sd(ring_down: RingDown, frequency: Estimate) -> float:
     return math.hypot(ring_down.order * frequency.sd / frequency.value, jump)
 
 
-def _frequency(times: Array, ring_down: RingDown) -> tuple[Estimate, tuple[str, ...]]:
-    """The frequency of the motion from its turns, and whether they are evenly spaced."""
+def _frequency(times: Array, values: Array, ring_down: RingDown) -> tuple[Estimate, tuple[str, ...]]:
+    """The frequency of the motion from its turns, each counting by how sharp it is; and whether they are even."""
     number = np.arange(len(times))
     inner = slice(1 if ring_down.held and len(times) > 4 else 0, -1 if ring_down.stopped and len(times) > 5 else None)
-    line, residual, *_ = np.polyfit(number[inner], times[inner], 1, full=True)
-    freedom = max(1, len(number[inner]) - 2)
-    centred = number[inner] - number[inner].mean()
-    half = float(line[0])
-    left = math.sqrt(float(residual[0]) / freedom) if len(residual) else 0.0
-    sd = max(left, 0.1 / ring_down.fs / math.sqrt(len(times))) / math.sqrt(float(centred @ centred))
+    at, when = number[inner], times[inner]
+    sharp = np.abs(values - ring_down.rest)[inner] + ring_down.noise
+    half, first = np.polyfit(at, when, 1, w=sharp)
+    freedom = max(1, len(at) - 2)
+    share = sharp**2 / np.sum(sharp**2)
+    spread = float(share @ (at - share @ at) ** 2)
+    left = math.sqrt(float(share @ (when - first - half * at) ** 2) * len(at) / freedom)
+    sd = max(left, 0.1 / ring_down.fs) / math.sqrt(len(at) * spread)
     notes: tuple[str, ...] = ()
     if not ring_down.isochronous:
-        gaps = np.diff(times[inner])
-        change = 100 * (float(gaps[: len(gaps) // 4 + 1].mean() / gaps[-len(gaps) // 4 :].mean()) - 1)
+        gaps = np.diff(when)
+        quarter = max(1, len(gaps) // 4)
+        change = 100 * (float(gaps[:quarter].mean() / gaps[-2 * quarter :].mean()) - 1)
         longer = "longer" if change > 0 else "shorter"
         notes = (f"the first cycles are {abs(change):.2g} % {longer} than the last: the spring is not linear",)
     method = f"straight line through {len(times)} turns"

@@ -270,3 +270,36 @@ def _fitted(ring_down: RingDown, number: int, turn: float) -> tuple[float, float
     spread = float(np.sqrt(np.linalg.pinv(design.T @ design)[0, 0]))
     noise = max(ring_down.noise, float(np.sqrt(left @ left / (len(rows) - design.shape[1]))))
     return turn, float(found[0]), noise * spread, CERTAIN * noise * spread
+
+
+def motion(times: Array, start: float, *, damping_ratio: float, dry_displacement: float, frequency: float) -> Array:
+    """The displacement from the spring's rest at `times` [s] after a release (thesis, equations 6.4, 6.5).
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,)
+        Since the release; before it the mass is held.
+    start : float
+        First extreme, from the rest position.
+    damping_ratio, dry_displacement, frequency : float
+        zeta, x_k, and the undamped natural frequency [Hz]. It stops where an extreme lies within x_k.
+
+    Examples
+    --------
+    >>> at = motion(np.array([0.0, 0.5, 1.0, 1.5]), 1.0, damping_ratio=0.0, dry_displacement=0.2, frequency=1.0)
+    >>> at.round(6).tolist()
+    [1.0, -0.6, 0.2, 0.2]
+    """
+    zeta, w = damping_ratio, 2 * math.pi * frequency
+    damped, beta = w * math.sqrt(1 - zeta**2), zeta / math.sqrt(1 - zeta**2)
+    fade, half = math.exp(-math.pi * beta), math.pi / damped
+    turns = [start]
+    while abs(turns[-1]) > dry_displacement * (1 + 1e-9) and len(turns) * half <= times[-1] + half:
+        turns.append(-fade * turns[-1] + math.copysign(1 + fade, turns[-1]) * dry_displacement)
+    number = np.clip(np.floor(times / half + 1e-9), 0, max(0, len(turns) - 2)).astype(int)
+    before = np.array(turns)[number]
+    since = np.clip(times - number * half, 0, half)
+    shape = np.exp(-zeta * w * since) * (np.cos(damped * since) + beta * np.sin(damped * since))
+    if len(turns) == 1:
+        return np.full_like(times, turns[0])
+    return np.asarray(np.sign(before) * (dry_displacement + (np.abs(before) - dry_displacement) * shape))

@@ -30,6 +30,7 @@ RISE = 3.0  # half periods in the time that a cosine takes from a quarter to thr
 PACE = (0.7, 1.4)  # a half cycle over the one before; a pendulum from near the top shortens by a third
 GROWN = 1.05  # a swing over the one before from which it is not the same decay
 UNEVEN = 0.015  # change of the half cycles over the decay, beyond which the spring is not linear
+RISEN = 1.01  # a swing over the one before that may be a rise
 STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 
 
@@ -98,11 +99,12 @@ class RingDown:
 
     @property
     def isochronous(self) -> bool:
-        """Whether the half cycles are as long at the end as at the beginning: the spring is linear."""
+        """Whether the half cycles are as long after the middle as at the beginning: the spring is linear."""
         gaps = np.diff(self.turns[1:-1] if len(self.turns) > 6 else self.turns)
-        quarter = max(1, len(gaps) // 4)
-        early, late = float(gaps[:quarter].mean()), float(gaps[-quarter:].mean())
-        return len(gaps) < 4 or abs(early / late - 1) < max(UNEVEN, 4 / (quarter * early))
+        some = max(1, len(gaps) // 8)
+        middle = gaps[len(gaps) // 2 :][: 2 * some]  # the last turns are too lopsided for their instants to be told
+        early, late = float(gaps[:some].mean()), float(middle.mean())
+        return len(gaps) < 4 or abs(early / late - 1) < max(UNEVEN, 4 / (some * early))
 
     @property
     def time(self) -> Array:
@@ -416,7 +418,7 @@ def _paced(swings: _Swings) -> list[tuple[int, int]]:
 
 def _refuse_growth(sizes: Array, grown: NDArray[np.bool_], swings: _Swings) -> None:
     """Refuse a chain of swings that grows, beats or stays."""
-    slowly = sizes[1:] > sizes[:-1] + swings.seen / 2
+    slowly = sizes[1:] > RISEN * sizes[:-1] + swings.seen / 2  # block means miss up to 0.9 % of a top
     rising = max((len(part) for part in "".join("r" if up else " " for up in slowly).split()), default=0)
     if len(sizes) >= 4 and (rising >= 3 or grown.sum() > len(sizes) / 3):
         top = int(np.argmax(sizes))

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from stickslip.analysis import Comparison, Findings
+from stickslip.decays import DecayFindings
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.contact import plot_displacement_loop, plot_sticks, plot_velocity_loop
+from stickslip.plot.decay import plates_of as decay_plates
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
@@ -15,13 +17,13 @@ if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory
 
 
-def figures(result: Findings | Comparison | Trajectory) -> tuple[Plate, ...]:
+def figures(result: Findings | Comparison | DecayFindings | Trajectory) -> tuple[Plate, ...]:
     """The figures that show a result, in reading order.
 
     Parameters
     ----------
-    result : Findings, Comparison or Trajectory
-        What :func:`analyze`, :func:`compare` or :func:`simulate` returned.
+    result : Findings, Comparison, DecayFindings or Trajectory
+        What :func:`analyze`, :func:`compare`, :func:`analyze_decay` or :func:`simulate` returned.
 
     Returns
     -------
@@ -40,6 +42,8 @@ def figures(result: Findings | Comparison | Trajectory) -> tuple[Plate, ...]:
         return tuple(_of_comparison(result))
     if isinstance(result, Findings):
         return tuple(_of_findings(result))
+    if isinstance(result, DecayFindings):
+        return tuple(decay_plates(result))
     from stickslip.plot.trajectory import plates_of
 
     return plates_of(result)

@@ -12,6 +12,7 @@ from typing import Any
 
 from stickslip import __version__
 from stickslip.analysis import Comparison, Findings
+from stickslip.decays import DecayFindings
 from stickslip.errors import ModelError, RecordError
 from stickslip.plot.plate import Plate
 from stickslip.reports.page import render, sections_of
@@ -20,7 +21,7 @@ PROGRAM = "stickslip"
 NUMBERS = "results.json"
 
 
-def publish(results: Findings | Comparison, *, folder: str | Path) -> Path:
+def publish(results: Findings | Comparison | DecayFindings | Sequence[DecayFindings], *, folder: str | Path) -> Path:
     """Write ``report.html``, ``results.json`` and the figures as SVG and PNG into a folder.
 
     The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
@@ -28,8 +29,8 @@ def publish(results: Findings | Comparison, *, folder: str | Path) -> Path:
 
     Parameters
     ----------
-    results : Findings or Comparison
-        What :func:`analyze` or :func:`compare` returned.
+    results : Findings, Comparison, DecayFindings or a sequence of these
+        What :func:`analyze`, :func:`compare` or :func:`analyze_decay` returned.
     folder : path
         The folder to make.
 
@@ -56,13 +57,18 @@ def publish(results: Findings | Comparison, *, folder: str | Path) -> Path:
     folder = Path(folder)
     check_folder(folder)
     sections = sections_of(results)
-    with results_folder(folder, results.to_dict()) as draft:
+    with results_folder(folder, as_data(results)) as draft:
         (draft / "report.html").write_text(render(sections), encoding="utf-8")
         (draft / "figures").mkdir()
         for number, section in enumerate(sections):
             prefix = f"{number}-{_fit_for_a_file(section.words.title)}-" if len(sections) > 1 else ""
             write_figures(draft / "figures", prefix, section.plates)
     return folder
+
+
+def as_data(results: Findings | Comparison | DecayFindings | Sequence[DecayFindings]) -> dict[str, Any]:
+    """Plain data for JSON of one result, or of several by record."""
+    return {"records": [each.to_dict() for each in results]} if isinstance(results, Sequence) else results.to_dict()
 
 
 @contextmanager

@@ -6,10 +6,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from stickslip import __version__
 from stickslip.analysis import Comparison, Findings
+from stickslip.decays import DecayFindings
 from stickslip.estimate import Estimate
 from stickslip.files.write import whole
 from stickslip.plot import style
@@ -34,7 +35,7 @@ class Section:
 
 
 def report(
-    results: Findings | Comparison | Estimate | Sequence[Estimate],
+    results: Findings | Comparison | Estimate | Sequence[Estimate] | DecayFindings | Sequence[DecayFindings],
     record: Record | None,
     path: str | Path,
 ) -> Path:
@@ -42,7 +43,7 @@ def report(
 
     Parameters
     ----------
-    results : Findings, Comparison, Estimate or sequence of Estimate
+    results : Findings, Comparison, DecayFindings, Estimate, or a sequence of the last two
         What was found.
     record : Record or None
         Where plain estimates were found: its faults, channels and history are told. Findings bring their own.
@@ -75,15 +76,19 @@ def report(
 
 
 def sections_of(
-    results: Findings | Comparison | Estimate | Sequence[Estimate], record: Record | None = None
+    results: Findings | Comparison | Estimate | Sequence[Estimate] | DecayFindings | Sequence[DecayFindings],
+    record: Record | None = None,
 ) -> list[Section]:
     """The sections of the page, with their figures drawn."""
+    decays = [results] if isinstance(results, DecayFindings) else results if isinstance(results, Sequence) else []
+    if decays and all(isinstance(each, DecayFindings) for each in decays):
+        return [Section(summary(each), figures(each)) for each in decays if isinstance(each, DecayFindings)]
     if isinstance(results, Comparison):
         parts: list[Findings | Comparison] = [results, *results.findings]
         return [Section(summary(part), figures(part)) for part in parts]
     if isinstance(results, Findings):
         return [Section(summary(results), figures(results))]
-    return [Section(summary(results, record=record))]
+    return [Section(summary(cast(Sequence[Estimate], results), record=record))]
 
 
 def render(sections: Sequence[Section]) -> str:

@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from stickslip.analysis import Comparison, Findings, record_name
+from stickslip.decays import DecayFindings
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record, Step
+from stickslip.reports import decay
 from stickslip.reports.words import cautions, headline, interval_of, number, value_of
 
 _CONSTANT_UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
@@ -85,12 +87,14 @@ class Summary:
         return any(line.checks for line in self.lines)
 
 
-def summary(results: Findings | Comparison | Estimate | Sequence[Estimate], *, record: Record | None = None) -> Summary:
+def summary(
+    results: Findings | DecayFindings | Comparison | Estimate | Sequence[Estimate], *, record: Record | None = None
+) -> Summary:
     """What is told of a result: sentences for a person, the table, cautions, settings, history.
 
     Parameters
     ----------
-    results : Findings, Comparison, Estimate or sequence of Estimate
+    results : Findings, DecayFindings, Comparison, Estimate or sequence of Estimate
         What was found.
     record : Record, optional
         Where plain estimates were found; Findings bring their own.
@@ -112,17 +116,21 @@ def summary(results: Findings | Comparison | Estimate | Sequence[Estimate], *, r
     """
     if isinstance(results, Comparison):
         return _of_comparison(results)
-    if isinstance(results, Findings):
+    if isinstance(results, Findings | DecayFindings):
         return _of_findings(results)
     return _of_estimates([results] if isinstance(results, Estimate) else list(results), record)
 
 
-def _of_findings(findings: Findings) -> Summary:
+def _of_findings(findings: Findings | DecayFindings) -> Summary:
     record = findings.record
+    if isinstance(findings, DecayFindings):
+        told, settings = decay.headline(findings), decay.settings(findings)
+    else:
+        told, settings = headline(findings), _settings(findings)
     return Summary(
-        findings.name, headline(findings), cautions(findings),
+        findings.name, told, cautions(findings),
         lines=[_line(estimate, findings.true_value(estimate)) for estimate in findings.estimates],
-        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
+        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=settings,
         channels=list(record.channels.values()), history=record.history,
     )  # fmt: skip
 

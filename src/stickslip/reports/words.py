@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.analysis import Comparison, Findings
+from stickslip.decays import DecayFindings
 from stickslip.estimate import NORMAL_95, Estimate, decimals
 from stickslip.plot.style import prefixed
 
@@ -58,7 +59,7 @@ def headline(result: Findings | Comparison) -> list[str]:
     return list(_of_comparison(result) if isinstance(result, Comparison) else _of_findings(result))
 
 
-def cautions(findings: Findings) -> list[str]:
+def cautions(findings: Findings | DecayFindings) -> list[str]:
     """What should keep the reader from trusting a number."""
     doubts: dict[str, list[str]] = {}
     for estimate in findings.estimates:

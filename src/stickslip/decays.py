@@ -1,0 +1,216 @@
+"""Everything that is asked of a free decay, together: the releases, the decrements, the whole waveform."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from stickslip.analysis import plain, record_name
+from stickslip.errors import EstimateError, ModelError, StickslipError
+from stickslip.estimate import Estimate, Result
+from stickslip.fit.decay import DecayFit, fit_decay
+from stickslip.identify.decrement import Decrement, decrement
+from stickslip.identify.release import Releases, find_releases
+from stickslip.record.record import Record
+from stickslip.units import parse_value
+
+if TYPE_CHECKING:
+    from stickslip.record.check import Fault
+
+Answer = TypeVar("Answer")
+
+METHODS = ("thesis", "waveform", "all")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DecayFindings(Result):
+    """What a record says about the damping of a free decay.
+
+    Attributes
+    ----------
+    name : str
+        The record's name.
+    record : Record
+        The record.
+    faults : tuple of Fault
+        What the check-up found in it.
+    releases : Releases
+        Where something is let go.
+    waveform : DecayFit or None
+        By the whole waveform.
+    thesis : Decrement or None
+        By the decrements of the extremes.
+    notes : tuple of str
+        What could not be asked, and why.
+    settings : mapping
+        What was chosen and stated.
+    """
+
+    name: str
+    record: Record
+    faults: tuple[Fault, ...]
+    releases: Releases
+    waveform: DecayFit | None = None
+    thesis: Decrement | None = None
+    notes: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def best(self) -> DecayFit | Decrement:
+        """The surest answer: of the whole waveform where there is one."""
+        found = self.waveform if self.waveform is not None else self.thesis
+        assert found is not None
+        return found
+
+    @property
+    def dry_force(self) -> Estimate | None:
+        """The dry friction as a force, where the mass or the stiffness is stated."""
+        spring = self.settings.get("stiffness")
+        if spring is None and self.settings.get("mass") is not None:
+            spring = self.settings["mass"] * (2 * math.pi * self.best.frequency.value) ** 2
+        unit = "N m" if self.best.dry_displacement.unit == "rad" else "N"
+        return None if spring is None else self.best.dry_displacement.scaled(spring, unit, "dry friction force")
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every number found, the best answer first; the decrements' are named so where both methods answer."""
+        force = self.dry_force
+        found = [] if force is None else [force]
+        if self.waveform is not None:
+            found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
+        if self.thesis is not None:
+            also = ", by decrements" if self.waveform is not None else ""
+            found += [replace(each, name=f"{each.name}{also}") for each in self.thesis.estimates]
+        return tuple(found)
+
+    def true_value(self, estimate: Estimate) -> float | None:
+        """The true value of what was estimated, where the record is simulated and tells it."""
+        true = self.record.truth.get(estimate.name.removesuffix(", by decrements"))
+        return None if true is None else float(true)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: settings, releases, estimates, bounds, faults, notes and history."""
+        told: dict[str, Any] = {
+            "name": self.name,
+            "settings": dict(self.settings),
+            "model": self.best.model,
+            "status": self.best.status,
+            "releases": [
+                {
+                    "release": each.release, "stop": each.stop, "held": each.held, "stopped": each.stopped,
+                    "channel": each.channel, "unit": each.unit, "amplitude": each.amplitude, "rest": each.rest,
+                    "noise": each.noise, "step": each.step, "extremes": len(each.turns), "status": each.status,
+                }
+                for each in self.releases.ring_downs
+            ],
+            "estimates": [estimate.to_dict() for estimate in self.estimates],
+            "decrements": None if self.thesis is None else _decrements(self.thesis),
+            "truth": dict(self.record.truth),
+            "faults": [str(fault) for fault in self.faults],
+            "notes": list(self.notes),
+            "history": [step.to_dict() for step in self.record.history],
+        }  # fmt: skip
+        return {key: plain(value) for key, value in told.items()}
+
+
+def _decrements(found: Decrement) -> dict[str, Any]:
+    """Extremes, and the table of the bounds, for JSON."""
+    bounds = found.bounds
+    rows = ("m", "rate", "rate_first_order", "rate_worst", "dry", "dry_first_order", "dry_worst")
+    return {
+        "extremes": {"time": found.time.tolist(), "value": found.extremes.tolist(), "sd": found.sd.tolist()},
+        "differences": found.differences.tolist(),
+        "bounds": {
+            "i": bounds.i, "best_m": bounds.best, "error": bounds.error,
+            **{name: getattr(bounds, name).tolist() for name in rows},
+        },
+        "scatter": {
+            name: {"mean": float(values.mean()), "sd": float(values.std())}
+            for name, values in vars(found.scatter).items() if len(values)
+        },
+    }  # fmt: skip
+
+
+def analyze_decay(
+    record: Record,
+    *,
+    method: str = "all",
+    channel: str | None = None,
+    mass: float | str | None = None,
+    stiffness: float | str | None = None,
+) -> DecayFindings:
+    """How much viscous and how much dry friction does a free decay show, by every way of asking?
+
+    The check-up, the releases (:func:`find_releases`), the whole waveform (:func:`fit_decay`) and the decrements of the
+    extremes (:func:`decrement`). A question that can not be answered becomes a note while another can.
+
+    Parameters
+    ----------
+    record : Record
+        With ``x``, ``theta``, ``v`` or ``a`` of something that was let go.
+    method : {"all", "waveform", "thesis"}
+        Which questions are asked.
+    channel : str, optional
+        Which channel; the first of these when left out.
+    mass, stiffness : float or str, optional
+        Mass [kg] or stiffness [N/m] (of an angle: kg m^2, N m/rad), for the dry friction as a force.
+
+    Returns
+    -------
+    DecayFindings
+
+    Raises
+    ------
+    EstimateError
+        None of the questions could be answered; the sentence says why.
+    RecordError
+        A channel that is missing or broken.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
+    >>> run = ss.simulate(slider, duration=40.0, start={"x": 1.0})
+    >>> found = analyze_decay(run.record(fs=100), method="thesis", stiffness=10.0)
+    >>> round(found.best.damping_ratio.value, 3), round(found.dry_force.value, 2)
+    (0.032, 0.2)
+    """
+    if method not in METHODS:
+        raise EstimateError(f"method = '{method}'", f"it is {', '.join(METHODS)}", "choose one of them")
+    faults = tuple(record.check())
+    releases = find_releases(record, channel=channel)
+    used = releases.ring_downs[0].channel
+    units = ("kg m^2", "N m/rad") if used == "theta" else ("kg", "N/m")
+    stated = {"mass": mass, "stiffness": stiffness}
+    constants = {
+        name: parse_value(value, unit)
+        for (name, value), unit in zip(stated.items(), units, strict=True)
+        if value is not None
+    }
+    for name, value in constants.items():
+        if not value > 0:
+            raise ModelError(f"{name} = {value:g}", f"a {name} is positive", f"correct the {name}")
+    refusals: list[StickslipError] = []
+    notes = list(releases.notes)
+
+    def ask(question: str, answer: Callable[[], Answer]) -> Answer | None:
+        try:
+            return answer()
+        except StickslipError as error:
+            refusals.append(error)
+            notes.append(f"{question}: {error}")
+            return None
+
+    waveform = thesis = None
+    if method != "thesis":
+        waveform = ask("The whole waveform", lambda: fit_decay(record, channel=used))
+    if method != "waveform":
+        thesis = ask("The decrements", lambda: decrement(record, channel=used))
+    if waveform is None and thesis is None:
+        raise refusals[0]
+    return DecayFindings(
+        record_name(record), record, faults, releases, waveform, thesis, tuple(dict.fromkeys(notes)),
+        {"method": method, "channel": used, **constants},
+    )  # fmt: skip

@@ -1,0 +1,258 @@
+"""A free decay: the response within its envelopes, what the identified motion leaves, the amplitude differences."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.identify import extremes as ex
+from stickslip.plot.plate import Plate, plate
+from stickslip.plot.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    SHADE,
+    axes_of,
+    axis_label,
+    envelope,
+    new_figure,
+    prefixed,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from stickslip.decays import DecayFindings
+    from stickslip.identify.decrement import Decrement
+    from stickslip.identify.release import RingDown
+
+Array = NDArray[np.float64]
+
+WORDS = {"x": "displacement", "theta": "angle", "v": "velocity", "a": "acceleration"}
+MARGIN = 0.04  # of the motion's length, shown before and after it
+POINTS = 600  # of a smooth curve
+MOST_MARKS = 60  # extremes that are marked one by one
+
+
+@styled
+def plot_decay(findings: DecayFindings, *, ax: Axes | None = None) -> Axes:
+    """The response within the envelopes that either friction alone would give (thesis, Figure 6.1).
+
+    Parameters
+    ----------
+    findings : DecayFindings
+        What :func:`~stickslip.analyze_decay` returned.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+    """
+    ax, ring = axes_of(ax), findings.releases.ring_downs[0]
+    factor, unit = prefixed(ring.samples - ring.rest, ring.unit)
+    rows = _shown(ring)
+    ax.plot(*envelope(ring.time[rows], factor * ring.samples[rows]), color=INK, linewidth=1.0, label="measured")
+    rest = findings.best.bias.value
+    time, viscous, dry = _envelopes(findings, ring)
+    for curve, colour, words in ((viscous, BLUE, "viscous friction alone"), (dry, ORANGE, "dry friction alone")):
+        for side in (1, -1):
+            label = words if side == 1 else None
+            ax.plot(time, factor * (rest + side * curve), color=colour, linestyle="--", linewidth=1.1, label=label)
+    ax.axhline(factor * rest, color=FAINT, linewidth=0.8)
+    _shade_rest(ax, ring, rows)
+    ax.set(xlabel="time [s]", ylabel=axis_label(WORDS[ring.channel], unit))
+    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    return ax
+
+
+@styled
+def plot_identified(findings: DecayFindings) -> Figure:
+    """Measured and identified response over each other, and what is left between them (thesis, Figure 6.10).
+
+    Parameters
+    ----------
+    findings : DecayFindings
+        What :func:`~stickslip.analyze_decay` returned.
+
+    Returns
+    -------
+    Figure
+    """
+    time, measured, fitted, words = _identified(findings)
+    ring = findings.releases.ring_downs[0]
+    factor, unit = prefixed(measured - findings.best.bias.value, ring.unit)
+    figure, (above, below) = new_figure(2, height=4.6, heights=[2, 1])
+    above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="measured")
+    above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=words)
+    above.set_ylabel(axis_label(WORDS[ring.channel], unit))
+    above.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    left = measured - fitted
+    small, small_unit = prefixed(left, ring.unit)
+    below.plot(*envelope(time, small * left), color=PURPLE, linewidth=0.8)
+    below.axhline(0, color=FAINT, linewidth=0.8)
+    below.set(xlabel="time [s]", ylabel=axis_label("left over", small_unit))
+    figure.align_ylabels([above, below])
+    return figure
+
+
+@styled
+def plot_differences(found: Decrement, *, ax: Axes | None = None) -> Axes:
+    """The amplitude differences on the exponential that viscous friction alone makes of them (thesis, Figure 6.2).
+
+    Parameters
+    ----------
+    found : Decrement
+        What :func:`~stickslip.decrement` returned.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+    """
+    ax = axes_of(ax)
+    factor, unit = prefixed(found.differences, found.ring_down.unit)
+    spread = np.hypot(found.sd[2:], found.sd[:-2]) if len(found.differences) == len(found.sd) - 2 else found.sd[1:]
+    number = np.arange(1, len(found.differences) + 1)
+    zeta = found.damping_ratio.value
+    beta = zeta / math.sqrt(1 - zeta**2)
+    along = np.linspace(number[0], number[-1], POINTS)
+    first = found.bounds.i
+    scale = abs(float(found.differences[first - 1])) * math.exp(math.pi * beta * first)
+    for side in (1, -1):
+        label = f"exponential of the damping ratio {zeta:.3g}" if side == 1 else None
+        ax.plot(along, side * factor * scale * np.exp(-math.pi * beta * along), color=BLUE, linestyle="--", label=label)
+    ax.errorbar(
+        number, factor * found.differences, yerr=1.96 * factor * spread, fmt="o", color=INK, markersize=3.5,
+        linewidth=0.9, label="amplitude differences, 95 %", zorder=3,
+    )  # fmt: skip
+    ax.axhline(0, color=FAINT, linewidth=0.8)
+    ax.set(xlabel="number i of the extreme", ylabel=axis_label("X(i+1) - X(i-1)", unit))
+    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    return ax
+
+
+@styled
+def plot_bounds(found: Decrement) -> Figure:
+    """The viscous rate and the dry friction against the number m of half cycles, each with its worst case.
+
+    Parameters
+    ----------
+    found : Decrement
+        What :func:`~stickslip.decrement` returned.
+
+    Returns
+    -------
+    Figure
+    """
+    bounds = found.bounds
+    factor, unit = prefixed(bounds.dry, found.ring_down.unit)
+    figure, axes = new_figure(2, height=4.6)
+    rows = (
+        (bounds.rate, bounds.rate_first_order, bounds.rate_worst, "viscous rate β"),
+        (factor * bounds.dry, factor * bounds.dry_first_order, factor * bounds.dry_worst, axis_label("x_k", unit)),
+    )
+    for ax, (value, first_order, worst, label) in zip(axes, rows, strict=True):
+        ax.fill_between(
+            bounds.m, value - worst, value + worst, color=ORANGE, alpha=0.2, linewidth=0, label="exact worst case"
+        )
+        for side in (1, -1):
+            words = "to first order" if side == 1 else None
+            ax.plot(bounds.m, value + side * first_order, color=BLUE, linestyle="--", linewidth=1.0, label=words)
+        ax.plot(bounds.m, value, "o-", color=INK, markersize=3, linewidth=0.9, label="estimate")
+        ax.axvline(bounds.best, color=GREEN, linewidth=0.9, linestyle=":")
+        middle = float(np.median(value))
+        reach = 3 * float(np.nanmedian(np.where(np.isfinite(worst), worst, np.nan))) + float(np.ptp(value))
+        ax.set_ylim(middle - reach, middle + reach)
+        ax.set_ylabel(label)
+    axes[0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    axes[1].set_xlabel("half cycles m between the two differences")
+    figure.align_ylabels(list(axes))
+    return figure
+
+
+def plates_of(findings: DecayFindings) -> list[Plate]:
+    """The figures of a decay, in reading order."""
+    ring, thesis = findings.releases.ring_downs[0], findings.thesis
+    many = " The first release of several." if len(findings.releases.ring_downs) > 1 else ""
+    plates = [
+        plate("decay", plot_decay(findings), "How it dies away",
+              "Viscous friction alone would let it die away along the curved envelope, dry friction alone along the "
+              f"straight one; together they are faster than either. Grey: at rest before the release and after.{many}")
+    ]  # fmt: skip
+    if findings.waveform is not None or ring.order == 0:
+        plates.append(
+            plate("identified", plot_identified(findings), "Measured and identified",
+                  "Top: the motion that the identified friction gives, over the measured one. Bottom: what is left "
+                  "between them; a pattern there is friction of another kind.")
+        )  # fmt: skip
+    if thesis is not None:
+        plates.append(
+            plate("differences", plot_differences(thesis), "Amplitude differences",
+                  "Differences of every other extreme know nothing of dry friction. On the exponential, the rest of "
+                  "the damping is viscous; beside it, the friction is of another kind, or an extreme was misread.")
+        )  # fmt: skip
+        if len(thesis.bounds.m) > 2:
+            plates.append(
+                plate("bounds", plot_bounds(thesis), "How far errors of the extremes can reach",
+                      f"If no extreme is off by more than {_length(thesis)}, the truth lies in the band: over few half "
+                      "cycles the differences change little, over many they become small. Dotted: the best choice.")
+            )  # fmt: skip
+    return plates
+
+
+def _length(found: Decrement) -> str:
+    factor, unit = prefixed(found.bounds.error, found.ring_down.unit)
+    return f"{factor * found.bounds.error:.3g} {unit}"
+
+
+def _shown(ring: RingDown) -> slice:
+    """Rows of the motion and a little of what lies on either side."""
+    motion = ring.motion
+    margin = max(5, round(MARGIN * (motion.stop - motion.start)))
+    return slice(max(0, motion.start - margin), min(len(ring.samples), motion.stop + margin))
+
+
+def _shade_rest(ax: Axes, ring: RingDown, rows: slice) -> None:
+    first, last = float(ring.time[rows][0]), float(ring.time[rows][-1])
+    for seen, begin, end in ((ring.held, first, ring.release), (ring.stopped, ring.stop, last)):
+        if seen and end > begin:
+            ax.axvspan(begin, end, color=SHADE, alpha=0.5, linewidth=0)
+    ax.set_xlim(first, last)
+
+
+def _envelopes(findings: DecayFindings, ring: RingDown) -> tuple[Array, Array, Array]:
+    """Times, and the envelopes of either friction alone, from the first amplitude."""
+    best = findings.best
+    time = np.linspace(ring.release, ring.stop, POINTS)
+    since, w = time - ring.release, 2 * math.pi * best.frequency.value
+    viscous = abs(ring.amplitude) * np.exp(-best.damping_ratio.value * w * since)
+    fall = best.dry_displacement.value * w**ring.order * 4 * best.frequency.value
+    return time, viscous, np.maximum(0.0, abs(ring.amplitude) - fall * since)
+
+
+def _identified(findings: DecayFindings) -> tuple[Array, Array, Array, str]:
+    """Time, measured, identified, and by which method."""
+    if findings.waveform is not None:
+        fit, ring = findings.waveform, findings.releases.ring_downs[0]
+        shown = ring.time[_shown(ring)]
+        near = (fit.time[0] >= shown[0]) & (fit.time[0] <= shown[-1])
+        return fit.time[0][near], fit.measured[0][near], fit.fitted[0][near], "identified by the whole waveform"
+    found, ring = findings.thesis, findings.releases.ring_downs[0]
+    assert found is not None
+    rows = _shown(ring)
+    time, rest = ring.time[rows], found.bias.value
+    fitted = rest + ex.motion(
+        time - float(found.time[0]), float(found.extremes[0]) - rest, damping_ratio=found.damping_ratio.value,
+        dry_displacement=found.dry_displacement.value, frequency=found.frequency.value,
+    )  # fmt: skip
+    return time, ring.samples[rows], fitted, "identified by the decrements"

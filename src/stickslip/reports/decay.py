@@ -1,0 +1,89 @@
+"""A free decay in sentences that a person understands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from stickslip.decays import DecayFindings
+from stickslip.estimate import Estimate
+from stickslip.reports.words import interval_of, number, value_of
+
+METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
+
+
+def headline(findings: DecayFindings) -> list[str]:
+    """What was found, in a few sentences."""
+    return list(_sentences(findings))
+
+
+def settings(findings: DecayFindings) -> dict[str, str]:
+    """Choices and constants, as text."""
+    units = {"mass": "kg", "stiffness": "N/m"}
+    if findings.settings["channel"] == "theta":
+        units = {"mass": "kg m^2", "stiffness": "N m/rad"}
+    told = {key: number(value, 0.0, units[key]) for key, value in findings.settings.items() if key in units}
+    record = findings.record
+    return {
+        "methods": METHODS[findings.settings["method"]],
+        "channel": findings.settings["channel"],
+        **told,
+        "sampling rate": f"{record.fs:g} Hz",
+        "length": f"{len(record)} samples, {record.duration:g} s",
+    }
+
+
+def _sentences(findings: DecayFindings) -> Iterator[str]:
+    best = findings.best
+    ratio, dry = best.damping_ratio, best.dry_displacement
+    if "no friction" in best.model:
+        yield "Neither viscous nor dry friction can be told from zero."
+    else:
+        yield f"The motion dies away by {best.model.removesuffix(' friction')} friction: {_both(ratio, dry)}."
+    force = findings.dry_force
+    if force is not None:
+        yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
+    elif dry.interval[0] > 0:
+        yield "The dry friction force is that displacement times the spring's stiffness; state --stiffness or --mass."
+    yield from _motion(findings)
+    yield from _compared(findings)
+
+
+def _both(ratio: Estimate, dry: Estimate) -> str:
+    return (
+        f"a damping ratio of {value_of(ratio)} (95 % sure: {interval_of(ratio)}) and a dry friction displacement of "
+        f"{value_of(dry)} (95 % sure: {interval_of(dry)})"
+    )
+
+
+def _motion(findings: DecayFindings) -> Iterator[str]:
+    rings = findings.releases.ring_downs
+    many = f"{len(rings)} releases were found; the first" if len(rings) > 1 else "The motion"
+    first = rings[0]
+    end = f"comes to rest at {first.stop:.4g} s" if first.stopped else "is still going on at the end"
+    begin = f"begins at {first.release:.4g} s" if first.held else "is under way when the record begins"
+    yield (
+        f"{many} {begin}, swings at {value_of(findings.best.frequency)} through {len(first.turns)} extremes from "
+        f"{number(abs(first.amplitude), abs(first.amplitude) / 1000, first.unit)}, and {end}."
+    )
+
+
+def _compared(findings: DecayFindings) -> Iterator[str]:
+    """Where two methods answer: whether they agree."""
+    if findings.waveform is None or findings.thesis is None:
+        return
+    apart = []
+    for name in ("damping_ratio", "dry_displacement"):
+        mine, theirs = getattr(findings.waveform, name), getattr(findings.thesis, name)
+        gap = abs(mine.value - theirs.value)
+        reach = max(abs(end - theirs.value) for end in theirs.interval) + max(
+            abs(end - mine.value) for end in mine.interval
+        )
+        if gap > reach:
+            apart.append(f"{mine.name} {value_of(theirs)}")
+    if apart:
+        yield (
+            f"The decrements of the extremes give another {' and '.join(apart)}: neither interval knows of friction "
+            "that is of another kind than these two."
+        )
+    else:
+        yield "The decrements of the extremes agree within their intervals."

@@ -1,0 +1,142 @@
+"""A free decay from file to page: one command, its table, folder, JSON and exit codes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import stickslip as ss
+from motions import free_decay
+from stickslip.cli import main
+
+
+@pytest.fixture
+def release(tmp_path, monkeypatch):
+    """A ring-down in millimetres as a rig writes it, in the folder where the commands run."""
+    monkeypatch.chdir(tmp_path)
+    values, fs, _ = free_decay(amplitude=5.0, dry=0.1)
+    noisy = values + 5e-3 * np.random.default_rng(5).standard_normal(len(values)) + 1.0
+    columns = np.column_stack([np.arange(len(values)) / fs, noisy])
+    np.savetxt("release.csv", columns, delimiter=",", header="t [s],pos [mm]", comments="", fmt="%.6f")
+    return tmp_path / "release.csv"
+
+
+def run(*words):
+    return CliRunner().invoke(main, ["decay", *map(str, words)])
+
+
+READ = ("--channels", "x=pos [mm]")
+
+
+@pytest.mark.parametrize("method", ["thesis", "waveform", "all"])
+def test_the_command_answers_and_leaves_a_page(release, method):
+    answer = run(release, *READ, "--method", method, "--stiffness", "2 N/mm", "--output", "out")
+    assert answer.exit_code == 0, answer.output
+    assert "damping ratio" in answer.output
+    assert "dry friction force" in answer.output
+    assert ("by decrements" in answer.output) == (method == "all")
+    folder = release.parent / "out"
+    page = (folder / "report.html").read_text("utf-8")
+    assert "Measured and identified" in page
+    told = json.loads((folder / "results.json").read_text("utf-8"))
+    estimates = {each["name"]: each for each in told["records"][0]["estimates"]}
+    low, high = estimates["damping ratio"]["interval"]
+    assert low < 0.0316 < high
+    low, high = estimates["dry friction force"]["interval"]
+    assert low < 0.2 < high
+    drawn = {path.name for path in (folder / "figures").iterdir()}
+    assert {"decay.svg", "decay.png", "identified.svg"} <= drawn
+    assert ("differences.svg" in drawn) == (method != "waveform")
+    assert set(told["files"]) >= {"report.html", "results.json"}
+
+
+def test_json_alone_writes_nothing(release):
+    answer = run(release, *READ, "--json", "--method", "thesis")
+    told = json.loads(answer.output)["records"][0]
+    assert told["releases"][0]["stopped"]
+    bounds = told["decrements"]["bounds"]
+    assert len(bounds["m"]) == len(bounds["rate_worst"])
+    assert bounds["best_m"] in bounds["m"]
+    assert sorted(path.name for path in release.parent.iterdir()) == ["release.csv"]
+
+
+def test_several_files_share_a_page_and_the_faulty_one_is_named(release):
+    t = np.arange(1000) / 100
+    np.savetxt(
+        "forced.csv", np.column_stack([t, np.sin(6 * t)]), delimiter=",", header="t [s],pos [mm]", comments="", fmt="%f"
+    )
+    answer = run(release, "forced.csv", *READ, "--method", "thesis")
+    assert answer.exit_code == 0, answer.output
+    assert "left out: forced.csv" in answer.output
+    assert (release.parent / "decays-stickslip" / "report.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("forced.csv", *READ), 1, "a free decay dies away"),
+        (("release.csv", *READ, "--stiffness", "-3"), 2, "stiffness"),
+        (("release.csv", *READ, "--method", "guess"), 2, "guess"),
+        (("release.csv", "--channels", "pressure=pos [mm]"), 1, "read from x, theta, v or a"),
+        (("nowhere.csv",), 2, "nowhere.csv"),
+        (("release.csv", *READ, "--channel", "v"), 1, "channel v is missing"),
+    ],
+)
+def test_what_can_not_be_is_one_sentence_and_a_code(release, words, code, said):
+    t = np.arange(1000) / 100
+    np.savetxt(
+        "forced.csv", np.column_stack([t, np.sin(6 * t)]), delimiter=",", header="t [s],pos [mm]", comments="", fmt="%f"
+    )
+    answer = run(*words)
+    assert answer.exit_code == code, answer.output
+    assert said in answer.output
+    assert len(answer.output.strip().splitlines()) == 1
+    assert not (release.parent / "release-stickslip").exists()
+
+
+def test_the_force_follows_from_mass_or_stiffness(release):
+    record = ss.read_record(release, channels={"x": "pos [mm]"})
+    by_spring = ss.analyze_decay(record, method="thesis", stiffness=39.478)
+    by_mass = ss.analyze_decay(record, method="thesis", mass=1.0)
+    assert by_spring.dry_force.value == pytest.approx(by_mass.dry_force.value, rel=1e-3)
+    assert ss.analyze_decay(record, method="thesis").dry_force is None
+    assert "state --stiffness" in " ".join(ss.summary(ss.analyze_decay(record, method="thesis")).headline)
+
+
+def test_every_figure_can_be_drawn(release):
+    record = ss.read_record(release, channels={"x": "pos [mm]"})
+    for method in ("thesis", "all"):
+        plates = ss.figures(ss.analyze_decay(record, method=method))
+        assert [plate.name for plate in plates] == ["decay", "identified", "differences", "bounds"]
+        assert all(plate.png().startswith(b"\x89PNG") for plate in plates)
+    values, fs, _ = free_decay(order=1)
+    velocity = ss.analyze_decay(ss.Record.of({"v": values}, fs=fs), method="thesis")
+    assert [plate.name for plate in ss.figures(velocity)] == ["decay", "differences", "bounds"]
+
+
+def test_the_identified_motion_is_the_measured_one(release):
+    """What the decrements identify leaves noise alone, over the whole motion (thesis, Figures 6.10 and 6.15)."""
+    from stickslip.plot.decay import _identified
+
+    record = ss.read_record(release, channels={"x": "pos [mm]"})
+    _, measured, fitted, _ = _identified(ss.analyze_decay(record, method="thesis"))
+    assert np.std(measured - fitted) < 2 * 5e-6
+
+
+def test_too_few_extremes_for_any_method_are_refused():
+    values, fs, turns = free_decay(damping_ratio=0.4, dry=0.04)
+    assert len(turns) == 3
+    with pytest.raises(ss.EstimateError, match="4 are needed"):
+        ss.analyze_decay(ss.Record.of({"x": values}, fs=fs), method="thesis")
+
+
+def test_the_pendulum_has_a_page(dataset, tmp_path):
+    path = dataset("pendulum_decay") / "pend1.csv"
+    record = ss.read_record(path, channels={"theta": "#2 [rad]"}, time="#1")
+    found = ss.analyze_decay(record, stiffness=0.2235 * 9.82 * 0.31692)
+    assert found.dry_force.unit == "N m"
+    folder = ss.publish(found, folder=tmp_path / "out")
+    assert "not linear" in (folder / "report.html").read_text("utf-8")
