@@ -76,7 +76,7 @@ def candidates(trials: int) -> None:
 def power(trials: int) -> None:
     print(f"{'term':>31}  strength  power  limit  bias seen at 99 % [standard errors]  held by both  by all motions")
     values = motion(**BOTH)
-    blocks = BlockMeans(TIMES, free_decay(TIMES, values)[0], np.ones(TIMES.size), FS)
+    blocks = BlockMeans(TIMES, free_decay(TIMES, values)[0], np.ones(TIMES.size), np.ones(TIMES.size), FS)
     fitted = fit_motion(MOTIONS["both"], blocks, values)
     inverse = np.linalg.pinv(fitted.jacobian)
     spread = NOISE * np.linalg.norm(inverse, axis=1)

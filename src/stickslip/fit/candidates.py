@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 from stickslip.fit.motions import MOTIONS, PARAMETERS, Motion, Restoring, free_decay
 
 Array = NDArray[np.float64]
-Whiten = Callable[[Array], Array]
 
 TRIES = 12  # numbers of half cycles
 FIRST = 4.0  # periods fitted first; then twice as many, till the end: the phase can not slip
@@ -49,28 +47,26 @@ class BlockMeans:
         Sampling rate [Hz].
     restoring : {"linear", "pendulum"}
         The spring's law.
-    whiten : callable or None
-        Takes a vector or matrix of n rows to one whose noise is white; None for noise that is white in the samples.
+    weights : ndarray, shape (n,)
+        Independent readings in each block.
     """
 
     times: Array
     values: Array
     counts: Array
+    weights: Array
     fs: float
     restoring: Restoring = "linear"
-    whiten: Whiten | None = None
 
     @cached_property
     def spread(self) -> Array:
         """Standard deviation in time of each block's samples [s]."""
         return np.asarray(np.sqrt((self.counts**2 - 1) / 12) / self.fs)
 
-    def whitened(self, matrix: Array) -> Array:
-        """`matrix` (n,) or (n, m) scaled so that the noise of its rows is white and of one variance."""
-        if self.whiten is not None:
-            return self.whiten(matrix)
-        weights = np.sqrt(self.counts)
-        return np.asarray(matrix * (weights if matrix.ndim == 1 else weights[:, None]))
+    def weighted(self, matrix: Array) -> Array:
+        """`matrix` (n,) or (n, m) scaled so that the noise of its rows is of one variance."""
+        roots = np.sqrt(self.weights)
+        return np.asarray(matrix * (roots if matrix.ndim == 1 else roots[:, None]))
 
     def motion(
         self, parameters: Array, *, free: tuple[str, ...] = (), half_cycles: int | None = None
@@ -81,9 +77,11 @@ class BlockMeans:
         )
 
     def until(self, time: float) -> BlockMeans:
-        """The blocks up to an instant, their noise taken as white."""
+        """The blocks up to an instant."""
         rows = slice(0, max(int(np.searchsorted(self.times, time)), min(LEAST, len(self.times))))
-        return BlockMeans(self.times[rows], self.values[rows], self.counts[rows], self.fs, self.restoring)
+        return replace(
+            self, times=self.times[rows], values=self.values[rows], counts=self.counts[rows], weights=self.weights[rows]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +99,9 @@ class Fitted:
     forced : bool
         Whether it stays where its kinetic friction would let it go on.
     residual : ndarray, shape (n,)
-        Whitened data minus motion.
+        Data minus motion, weighted.
     jacobian : ndarray, shape (n, p)
-        Whitened sensitivities to the free parameters.
+        Weighted sensitivities to the free parameters.
     blocks : BlockMeans
         What was fitted.
     """
@@ -177,7 +175,8 @@ def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> 
             within = set(other.motion.terms) < set(motion.terms) and other.motion.sticks_early <= motion.sticks_early
             if within and other.cost < min(each.cost for each in tries):
                 tries += [
-                    fit_motion(motion, blocks, s, hopeless=hopeless) for s in _shaped(motion, other.parameters.copy())
+                    fit_motion(motion, blocks, s, hopeless=hopeless)
+                    for s in _shaped(motion, other.parameters.copy(), share=1e-3)
                 ]
         found[name] = min(tries, key=lambda each: each.cost)
     return {name: found[name] for name in wanted}
@@ -252,7 +251,7 @@ def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int |
             x, jacobian, begun = blocks.motion(trial, free=motion.free, half_cycles=half_cycles)
             if len(last) > 1:
                 last.pop(next(iter(last)))
-            last[key] = blocks.whitened(blocks.values - x), blocks.whitened(jacobian), begun
+            last[key] = blocks.weighted(blocks.values - x), blocks.weighted(jacobian), begun
         return last[key]
 
     def residual_at(free: Array) -> Array:
@@ -300,7 +299,7 @@ def _starts(motion: Motion, both: Fitted) -> list[Array]:
     return _shaped(motion, start)
 
 
-def _shaped(motion: Motion, start: Array) -> list[Array]:
+def _shaped(motion: Motion, start: Array, *, share: float = 1.0) -> list[Array]:
     """A start with a little of each term that it has none of yet, one for each shape that is tried."""
     amplitude, speed = abs(start[NUMBERS["amplitude"]]), first_speed(start)
     little = {
@@ -309,10 +308,10 @@ def _shaped(motion: Motion, start: Array) -> list[Array]:
     }  # fmt: skip
     for name, value in little.items():
         if name in motion.terms and start[NUMBERS[name]] == 0:
-            start[NUMBERS[name]] = value
+            start[NUMBERS[name]] = share * value
     if "stribeck_speed" not in motion.terms or start[NUMBERS["stribeck_speed"]] > 0:
         return [start]
     starts = [start.copy() for _ in STRIBECK_SPEEDS]
-    for each, share in zip(starts, STRIBECK_SPEEDS, strict=True):
-        each[NUMBERS["stribeck_speed"]] = share * speed
+    for each, ratio in zip(starts, STRIBECK_SPEEDS, strict=True):
+        each[NUMBERS["stribeck_speed"]] = ratio * speed
     return starts

@@ -18,7 +18,6 @@ from stickslip.fit.candidates import (
     STRIBECK_SPEEDS,
     BlockMeans,
     Fitted,
-    Whiten,
     first_speed,
     fit_candidates,
     fit_motion,
@@ -185,7 +184,7 @@ def choose(
     counts: ArrayLike | None = None,
     restoring: Restoring = "linear",
     candidates: tuple[str, ...] = tuple(MOTIONS),
-    whiten: Whiten | None = None,
+    weights: ArrayLike | None = None,
 ) -> Choice:
     """Which motion does a free decay follow?
 
@@ -208,8 +207,8 @@ def choose(
         The spring's law: x, or sin x.
     candidates : tuple of str
         Names in ``MOTIONS``.
-    whiten : callable, optional
-        Takes a vector or matrix of n rows to one whose noise is white, where the samples' noise is not.
+    weights : array_like, shape (n,), optional
+        Independent readings in each block, where they are not as many as its samples.
 
     Returns
     -------
@@ -241,7 +240,9 @@ def choose(
         raise EstimateError(
             f"{len(instants)} samples", f"{most} parameters need three times as many", "give a longer record"
         )
-    fits = fit_candidates(candidates, BlockMeans(instants, data, each, fs, restoring, whiten), np.asarray(start, float))
+    independent = each if weights is None else np.asarray(weights, dtype=float)
+    blocks = BlockMeans(instants, data, each, independent, fs, restoring)
+    fits = fit_candidates(candidates, blocks, np.asarray(start, float))
     best = min(fits.values(), key=lambda fitted: fitted.cost)
     noise = Noise(best.residual, best.jacobian.shape[1])
     tried = tuple(_tested(fitted, noise, best) for name, fitted in fits.items() if name in candidates)
@@ -346,7 +347,7 @@ def _greatest_p(statistic: float, correlation: Array, freedom: float) -> float:
 
 
 def _directions(fitted: Fitted, best: Fitted) -> list[tuple[str, Array]]:
-    """How the whitened motion would move with each named term that the candidate lacks."""
+    """How the weighted motion would move with each named term that the candidate lacks."""
     terms, blocks = fitted.motion.terms, fitted.blocks
     dry = "dry_displacement" in terms
 
@@ -355,7 +356,7 @@ def _directions(fitted: Fitted, best: Fitted) -> list[tuple[str, Array]]:
         for other, value in shape.items():
             parameters[NUMBERS[other]] = value
         jacobian = blocks.motion(parameters, free=(name,), half_cycles=fitted.half_cycles if dry else None)[1]
-        return blocks.whitened(jacobian)[:, 0]
+        return blocks.weighted(jacobian)[:, 0]
 
     found = [
         (name, column(name))

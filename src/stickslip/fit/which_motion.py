@@ -128,8 +128,16 @@ def motion_of(
     choice = choose(
         times.reshape(count, size).mean(axis=1), samples.reshape(count, size).mean(axis=1), fs=ring_down.fs,
         start=start, counts=np.full(count, float(size)), restoring=restoring, candidates=candidates,
+        weights=(1 / _run_lengths(samples)).reshape(count, size).sum(axis=1),
     )  # fmt: skip
     return _answer(choice, ring_down.unit)
+
+
+def _run_lengths(samples: Array) -> Array:
+    """How many equal readings stand in a row at each sample: of a coarse digitiser they are one reading, not many."""
+    begins = np.flatnonzero(np.diff(samples, prepend=np.nan))
+    lengths = np.diff(np.append(begins, len(samples)))
+    return np.repeat(lengths, lengths).astype(float)
 
 
 def _begin(ring_down: RingDown, restoring: Restoring) -> tuple[slice, Array]:
