@@ -31,6 +31,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/engine.py
 	$(BIN)/python benchmarks/curved.py
 	$(BIN)/python benchmarks/motions.py
+	$(BIN)/python benchmarks/decay.py
 
 smoke: $(VENV)/.dev
 	$(BIN)/python tests/smoke.py
