@@ -245,13 +245,15 @@ def other_noise(trials: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", type=int, default=1000, help="records a condition in white noise")
-    parser.add_argument("--others", type=int, default=300, help="records a condition in other noise")
+    parser.add_argument("--trials", type=int, default=1000, help="records a condition in white noise, 0 for none")
+    parser.add_argument("--others", type=int, default=300, help="records a condition in other noise, 0 for none")
     arguments = parser.parse_args()
     white(Condition(0.0316, 0.02, 1e-2, 20, "to rest"), 3, Search(), 0)  # compile
-    tell(grid(arguments.trials), arguments.trials)
-    rates(min(arguments.trials, 50))
-    other_noise(arguments.others)
+    if arguments.trials:
+        tell(grid(arguments.trials), arguments.trials)
+        rates(50)
+    if arguments.others:
+        other_noise(arguments.others)
 
 
 if __name__ == "__main__":

@@ -196,6 +196,29 @@ def test_coarse_counts_are_fitted_by_their_intervals() -> None:
     assert np.mean(inside, axis=0)[1] < 0.7
 
 
+@pytest.mark.parametrize(
+    ("mass", "damping", "stiffness", "kinetic", "amplitude"),
+    [(1.92, 2.3577, 2310.0, 0.413, 0.006), (2.42, 3.0, 2310.0, 1.1, 0.01)],
+)
+def test_a_slider_seen_in_hundredths_of_a_millimetre(
+    mass: float, damping: float, stiffness: float, kinetic: float, amplitude: float
+) -> None:
+    """Like the thesis's rig, section 6.5, in steps of 0.01 mm: both frictions to a few tenths of a percent."""
+    slider = ss.Oscillator(mass=mass, stiffness=stiffness, damping=damping, law=ss.Coulomb(kinetic))
+    motion = ss.simulate(slider, duration=2.0, start={"x": amplitude}).record(fs=1000)["x"]
+    for seed in range(3):
+        noise = 5e-7 * np.random.default_rng(seed).standard_normal(len(motion) + 200)
+        seen = np.round((np.concatenate([np.full(200, amplitude), motion]) + noise) / 1e-5) * 1e-5
+        found = ss.fit_decay(ss.Record.of({"x": seen}, fs=1000.0), stiffness=stiffness)
+        assert found.dry_force is not None
+        ratio = damping / 2 / math.sqrt(stiffness * mass)
+        assert found.status == "ok"
+        assert found.dry_force.value == pytest.approx(kinetic, rel=1.5e-3)
+        assert found.damping_ratio.value == pytest.approx(ratio, rel=3e-3)
+        assert abs(found.dry_force.value - kinetic) < 4 * found.dry_force.sd
+        assert abs(found.damping_ratio.value - ratio) < 4 * found.damping_ratio.sd
+
+
 @pytest.mark.parametrize("corner", [1.0, 10.0])
 def test_drift_widens_the_interval(corner: float) -> None:
     inside = []
@@ -253,3 +276,45 @@ def test_a_hand_that_pulls_and_touches_is_left_out() -> None:
     found = ss.fit_decay(ss.Record.of({"x": whole}, fs=1 / dt))
     assert abs(found.damping_ratio.value - DAMPING) < 4 * bound[1]
     assert abs(found.dry_displacement.value - DRY) < 4 * bound[2]
+
+
+def test_clipped_swings_are_left_out() -> None:
+    samples, dt, bound = ring_down()
+    found = ss.fit_decay(ss.Record.of({"x": np.clip(samples, REST - 0.7, REST + 0.7)}, fs=1 / dt))
+    assert "clipped swings are left out" in found.status
+    assert abs(found.damping_ratio.value - DAMPING) < 8 * bound[1]
+    assert abs(found.dry_displacement.value - DRY) < 8 * bound[2]
+
+
+@pytest.mark.parametrize(("damping", "dry"), [(DAMPING, 0.0), (0.0, DRY)], ids=["viscous", "dry"])
+def test_one_friction_alone_is_told_from_both(damping: float, dry: float) -> None:
+    truth = TRUTH.copy()
+    truth[1:3] = damping, dry
+    count = 40 if dry == 0 else half_cycles(damping, dry)
+    clean, _ = motion(truth, count, 1200, 0.01)
+    samples = clean + 1e-3 * np.random.default_rng(2).standard_normal(1200)
+    found = ss.fit_decay(ss.Record.of({"x": samples}, fs=100.0))
+    assert abs(found.damping_ratio.value - damping) < 4 * found.damping_ratio.sd
+    assert abs(found.dry_displacement.value - dry) < 4 * found.dry_displacement.sd
+    assert found.status == "ok"
+
+
+def test_static_friction_above_the_kinetic_is_bracketed() -> None:
+    slider = ss.Oscillator(mass=1.0, stiffness=1000.0, damping=2.0, law=ss.Coulomb(0.3, 1.5))
+    seen = ss.simulate(slider, duration=4.0, start={"x": 0.01}).record(fs=500)["x"]
+    found = ss.fit_decay(ss.Record.of({"x": seen + 1e-5 * np.random.default_rng(0).standard_normal(len(seen))}, fs=500))
+    assert abs(found.dry_displacement.value - 3e-4) < 4 * found.dry_displacement.sd
+    assert found.static_displacement.includes(1.5e-3)
+
+
+def test_another_motion_is_flagged() -> None:
+    t = np.arange(3000) / 500
+    seen = np.exp(-0.4 * t) * np.cos(30 * t) + 0.02 * t + 1e-3 * np.random.default_rng(0).standard_normal(3000)
+    assert "times the noise" in ss.fit_decay(ss.Record.of({"x": seen}, fs=500)).status
+
+
+def test_a_growing_swing_is_refused() -> None:
+    t = np.arange(3000) / 500
+    seen = 1e-3 * np.exp(0.4 * t) * np.cos(30 * t) + 1e-6 * np.random.default_rng(0).standard_normal(3000)
+    with pytest.raises(ss.EstimateError, match="grow"):
+        ss.fit_decay(ss.Record.of({"x": seen}, fs=500))

@@ -130,6 +130,9 @@ def fit_decay(
     the probability of each count's interval; or white and drift with a 1/f spectrum, by restricted maximum likelihood.
     Several releases are fitted together: they share frequency and friction, and narrow the static friction's bracket.
 
+    Another motion leaves a residual larger than the noise, and the status says so: :func:`choose_motion` tells which it
+    is, also for a pendulum of large swings.
+
     The record is reduced to means over a fortieth of a period first, which costs 0.15 % of the accuracy and makes the
     time of a fit independent of the sampling rate. The model's means are exact.
 
@@ -176,7 +179,9 @@ def fit_decay(
         raise EstimateError("no record", "a decay is fitted to one record at least", "pass a record, or several")
     found = [find_releases(each, channel=channel) for each in records]
     ring_downs = [
-        _whole(ring_down, each) for each, those in zip(records, found, strict=True) for ring_down in those.ring_downs
+        _described(ring_down, each)
+        for each, those in zip(records, found, strict=True)
+        for ring_down in those.ring_downs
     ]
     names = {each.channel for each in ring_downs}
     if len(names) > 1:
@@ -192,17 +197,20 @@ def fit_decay(
     return _answer(ring_downs, releases, motion, known, notes, tuple(step for each in records for step in each.history))
 
 
-def _whole(ring_down: RingDown, record: Record) -> RingDown:
-    """A velocity or an acceleration with the swing before its first extreme: there it was let go."""
+def _described(ring_down: RingDown, record: Record) -> RingDown:
+    """What the model describes: no clipped swings; a velocity or an acceleration from before its first extreme."""
+    cut = np.flatnonzero(~ring_down.sound[:-1])
+    if len(cut):
+        first = int(ring_down.turns[cut[-1] : cut[-1] + 2].mean())
+        samples = ring_down.samples[first:]
+        return replace(ring_down, first=ring_down.first + first / ring_down.fs, samples=samples, held=False)
     if ring_down.order == 0:
         return ring_down
     record = without_delays(record, ring_down.channel)
     first = round((ring_down.first - record.start) * record.fs)
     before = min(first, round(record.fs / ring_down.frequency))
-    values = record[ring_down.channel][first - before : first]
-    return replace(
-        ring_down, first=ring_down.first - before / record.fs, samples=np.concatenate([values, ring_down.samples])
-    )
+    samples = np.concatenate([record[ring_down.channel][first - before : first], ring_down.samples])
+    return replace(ring_down, first=ring_down.first - before / record.fs, samples=samples)
 
 
 def _release(ring_down: RingDown, noise: str | None) -> Release:
@@ -305,7 +313,7 @@ def _answer(
     length, unit = ("rad" if name == "theta" else "m"), ring_downs[0].unit
     half_cycles, likelihood = motion.candidates[0]
     fitted = [_fitted(each.blocks, n, p) for each, n, p in zip(releases, half_cycles, motion.motions[0], strict=True)]
-    cut = ("extremes are clipped, and fitted as they are",) if not all(each.sound.all() for each in ring_downs) else ()
+    cut = ("clipped swings are left out",) if not all(each.sound.all() for each in ring_downs) else ()
     worries = (*cut, *_misfit(releases, fitted))
     status = "; ".join(worries) or "ok"
     many = ", ".join(map(str, half_cycles))
@@ -370,7 +378,7 @@ def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[str, ...]:
             worst = max(worst, math.sqrt(float(left @ left) / release.blocks.freedom) / floor)
     if worst <= UNLIKE:
         return ()
-    return (f"the residual is {worst:.2g} times the noise: drift, or not quite viscous and dry friction",)
+    return (f"the residual is {worst:.2g} times the noise: drift, or another motion (see choose_motion)",)
 
 
 def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:
