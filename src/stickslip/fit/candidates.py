@@ -24,9 +24,8 @@ SHAPES = {
     "stribeck_speed": (0.02, 1.0),
     "exponent": (0.1, 1.0),
 }  # lowest and highest; speeds in units of the first speed
-SHAPED = {"stribeck_speed": "rise", "exponent": "micro_slip"}  # the term that each shapes
 ADDED = ("quadratic", "rise", "micro_slip")
-FAINT, CLEAR = 0.01, 10.0  # effect over noise below which a term is at zero, above which its shape is known
+CLEAR = 10.0  # effect over noise above which the shape of a term is known
 HIGHEST = {"damping_ratio": 0.95, "rise": 1.0}
 STRIBECK_SPEEDS = (0.05, 0.3)  # of the first speed, at which a slope is looked for
 EXPONENT = 0.5  # of the micro-slip that is looked for
@@ -124,18 +123,21 @@ class Fitted:
         return float(self.parameters[NUMBERS[name]])
 
     @property
+    def added(self) -> str | None:
+        """The term that it adds to viscous damping and dry friction, with a range of its own."""
+        return next((name for name in ADDED if name in self.motion.terms), None)
+
+    @property
     def settled(self) -> tuple[int, ...]:
-        """Columns whose uncertainty counts: no added term that is at zero, no shape of a faint one."""
-        noise = math.sqrt(self.cost / len(self.residual))
-        found = []
-        for column, name in enumerate(self.motion.free):
-            term = SHAPED.get(name, name)
-            if term in ADDED:
-                effect = self.value(term) * np.linalg.norm(self.jacobian[:, self.motion.free.index(term)])
-                if effect < (CLEAR if name in SHAPES else FAINT) * noise:
-                    continue
-            found.append(column)
-        return tuple(found)
+        """Columns beside the added term, without the shape of one that is faint."""
+        added = self.added
+        clear = False
+        if added is not None:
+            effect = self.value(added) * np.linalg.norm(self.jacobian[:, self.motion.free.index(added)])
+            clear = bool(effect > CLEAR * math.sqrt(self.cost / len(self.residual)))
+        return tuple(
+            column for column, name in enumerate(self.motion.free) if name != added and (clear or name not in SHAPES)
+        )
 
 
 def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> dict[str, Fitted]:

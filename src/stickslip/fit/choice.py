@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate
+from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.fit.candidates import (
     EXPONENT,
+    HIGHEST,
     HOPELESS,
     NUMBERS,
     STRIBECK_SPEEDS,
@@ -113,17 +114,48 @@ class Candidate:
 
     @cached_property
     def _influences(self) -> dict[str, Array]:
+        """How each parameter follows the data, the added term held."""
         columns = self.fitted.settled
         rows = np.linalg.pinv(self.fitted.jacobian[:, columns])
         return {self.fitted.motion.free[column]: row for column, row in zip(columns, rows, strict=True)}
 
+    @cached_property
+    def _term(self) -> tuple[Array, float, float]:
+        """The added term's direction, and how far it may lie below and above its value: never below zero."""
+        fitted, added = self.fitted, self.fitted.added
+        if added is None:
+            return np.zeros(len(fitted.residual)), 0.0, 0.0
+        direction = fitted.jacobian[:, fitted.motion.free.index(added)]
+        others = fitted.jacobian[:, fitted.settled]
+        left = direction - others @ (np.linalg.pinv(others) @ direction)
+        power, value = float(left @ left), fitted.value(added)
+        room = HIGHEST.get(added, math.inf) - value
+        if power <= (APART * np.linalg.norm(direction)) ** 2:
+            return direction, -value, room if math.isfinite(room) else 0.0
+        sd, freedom = self.noise.along(left / power)
+        reach = student(freedom) * sd
+        return direction, -min(reach, value), min(reach, room)
+
     def estimate(self, parameter: str, *, name: str | None = None, unit: str = "1", factor: float = 1.0) -> Estimate:
         """One of its parameters with the interval that holds if this is the motion; exactly zero where it has none."""
         row = self._influences.get(parameter)
-        sd, freedom = (0.0, math.inf) if row is None else self.noise.along(row)
-        return Estimate.normal(
-            name or parameter, factor * self.fitted.value(parameter), sd=factor * sd, unit=unit,
-            method=f"least squares, {self.fitted.motion.words}", quantile=student(freedom), status=self._status,
+        value = self.fitted.value(parameter)
+        if parameter == self.fitted.added:
+            _, below, above = self._term
+            low, high, sd = value + below, value + above, (above - below) / (2 * NORMAL_95)
+        elif row is None:
+            low = high = value
+            sd = 0.0
+        else:
+            sd, freedom = self.noise.along(row)
+            direction, below, above = self._term
+            moves = [-float(row @ direction) * end for end in (below, above)]
+            reach = student(freedom) * sd
+            low, high = value - math.hypot(reach, min(0.0, *moves)), value + math.hypot(reach, max(0.0, *moves))
+            sd = (high - low) / (2 * NORMAL_95)
+        return Estimate(
+            name or parameter, factor * value, (factor * low, factor * high), factor * sd, unit,
+            f"least squares, {self.fitted.motion.words}", self._status,
         )  # fmt: skip
 
     @property
