@@ -195,6 +195,13 @@ def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: 
     show_default=True,
     help="The whole waveform, the decrements of the extremes (the thesis's chapter 6), or both.",
 )
+@click.option(
+    "--restoring",
+    type=click.Choice(["linear", "pendulum"]),
+    default="linear",
+    show_default=True,
+    help="The spring's law; pendulum for an angle that swings far.",
+)
 @click.option("--channel", metavar="NAME", help="x, theta, v or a; the first of these that the file has unless given.")
 @click.option(
     "--output",
@@ -221,7 +228,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options:
     stickslip decay release.csv --channels "x=disp [mm]" --stiffness "2.31 N/mm"
     stickslip decay "release_*.csv" --method thesis --json
     """
-    asked = {key: options.pop(key) for key in ("method", "channel", "mass", "stiffness")}
+    asked = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
     rig = _rig(**options)
     groups = [group for argument in files for group in _groups(argument)]
     folder = output or (_default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -11,7 +12,10 @@ from stickslip.analysis import plain, record_name
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Estimate, Result
 from stickslip.fit.decay import DecayFit, fit_decay
+from stickslip.fit.motions import Restoring
+from stickslip.fit.which_motion import DecayMotion, choose_motion
 from stickslip.identify.decrement import Decrement, decrement
+from stickslip.identify.envelope import EnvelopeDecay, hilbert_decay, linear_decrement, log_decrement
 from stickslip.identify.release import Releases, find_releases
 from stickslip.record.record import Record
 from stickslip.units import parse_value
@@ -22,6 +26,9 @@ if TYPE_CHECKING:
 Answer = TypeVar("Answer")
 
 METHODS = ("thesis", "waveform", "all")
+OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
+    "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, "Hilbert envelope": hilbert_decay,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,6 +49,10 @@ class DecayFindings(Result):
         By the whole waveform.
     thesis : Decrement or None
         By the decrements of the extremes.
+    motion : DecayMotion or None
+        Which motion it was, of all those that a decay may follow.
+    older : mapping of str to EnvelopeDecay
+        What the older methods say, for comparison.
     notes : tuple of str
         What could not be asked, and why.
     settings : mapping
@@ -54,36 +65,65 @@ class DecayFindings(Result):
     releases: Releases
     waveform: DecayFit | None = None
     thesis: Decrement | None = None
+    motion: DecayMotion | None = None
+    older: Mapping[str, EnvelopeDecay] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def best(self) -> DecayFit | Decrement:
-        """The surest answer: of the whole waveform where there is one."""
-        found = self.waveform if self.waveform is not None else self.thesis
+    def best(self) -> DecayFit | Decrement | DecayMotion:
+        """The surest answer: of the whole waveform where there is one; of a pendulum's, where it is said to be one."""
+        swings = self.motion if self.settings.get("restoring") == "pendulum" else None
+        found = next((each for each in (swings, self.waveform, self.thesis, self.motion) if each is not None), None)
         assert found is not None
         return found
 
     @property
+    def rest(self) -> float:
+        """Where the spring is at rest, in the record's zero."""
+        if self.motion is not None and self.best is self.motion:
+            return self.motion.choice.chosen.fitted.value("rest")
+        told = next((each.bias.value for each in (self.waveform, self.thesis) if each is not None), None)
+        return self.releases.ring_downs[0].rest if told is None else told
+
+    @property
     def dry_force(self) -> Estimate | None:
         """The dry friction as a force, where the mass or the stiffness is stated."""
+        return self.as_force(self.best.dry_displacement, "dry friction force")
+
+    def as_force(self, displacement: Estimate, name: str) -> Estimate | None:
+        """A displacement of the spring as its force, where the mass or the stiffness is stated."""
         spring = self.settings.get("stiffness")
         if spring is None and self.settings.get("mass") is not None:
             spring = self.settings["mass"] * (2 * math.pi * self.best.frequency.value) ** 2
-        unit = "N m" if self.best.dry_displacement.unit == "rad" else "N"
-        return None if spring is None else self.best.dry_displacement.scaled(spring, unit, "dry friction force")
+        return (
+            None if spring is None else displacement.scaled(spring, "N m" if displacement.unit == "rad" else "N", name)
+        )
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number found, the best answer first; the decrements' are named so where both methods answer."""
         force = self.dry_force
         found = [] if force is None else [force]
-        if self.waveform is not None:
+        if self.best is self.motion:
+            found += self.motion.estimates
+        elif self.waveform is not None:
             found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
+            found += [] if self.motion is None else [self.motion.damping_ratio_any, self.motion.dry_displacement_any]
         if self.thesis is not None:
-            also = ", by decrements" if self.waveform is not None else ""
+            also = ", by decrements" if self.best is not self.thesis else ""
             found += [replace(each, name=f"{each.name}{also}") for each in self.thesis.estimates]
         return tuple(found)
+
+    @property
+    def comparisons(self) -> tuple[Estimate, ...]:
+        """What the older methods say, each with what it gets wrong; not to be relied on."""
+        return tuple(
+            replace(estimate, name=f"{estimate.name}, {name}", method=f"for comparison: {each.bias}", status="ok")
+            for name, each in self.older.items()
+            for estimate in (each.damping_ratio, each.dry_displacement)
+            if estimate is not None
+        )
 
     def true_value(self, estimate: Estimate) -> float | None:
         """The true value of what was estimated, where the record is simulated and tells it."""
@@ -106,6 +146,10 @@ class DecayFindings(Result):
                 for each in self.releases.ring_downs
             ],
             "estimates": [estimate.to_dict() for estimate in self.estimates],
+            "motions": [] if self.motion is None else [
+                {"name": name, "words": words, "verdict": verdict} for name, words, verdict in self.motion.candidates
+            ],
+            "comparisons": [estimate.to_dict() for estimate in self.comparisons],
             "decrements": None if self.thesis is None else _decrements(self.thesis),
             "truth": dict(self.record.truth),
             "faults": [str(fault) for fault in self.faults],
@@ -140,22 +184,26 @@ def analyze_decay(
     channel: str | None = None,
     mass: float | str | None = None,
     stiffness: float | str | None = None,
+    restoring: Restoring = "linear",
 ) -> DecayFindings:
     """How much viscous and how much dry friction does a free decay show, by every way of asking?
 
-    The check-up, the releases (:func:`find_releases`), the whole waveform (:func:`fit_decay`) and the decrements of the
-    extremes (:func:`decrement`). A question that can not be answered becomes a note while another can.
+    The check-up, the releases (:func:`find_releases`), the whole waveform (:func:`fit_decay`), the decrements of the
+    extremes (:func:`decrement`), which motion it was (:func:`choose_motion`) and, for comparison, what older methods
+    say. A question that can not be answered becomes a note while another can.
 
     Parameters
     ----------
     record : Record
         With ``x``, ``theta``, ``v`` or ``a`` of something that was let go.
     method : {"all", "waveform", "thesis"}
-        Which questions are asked.
+        Which questions are asked: all, those of the whole waveform, or the decrements alone.
     channel : str, optional
         Which channel; the first of these when left out.
     mass, stiffness : float or str, optional
         Mass [kg] or stiffness [N/m] (of an angle: kg m^2, N m/rad), for the dry friction as a force.
+    restoring : {"linear", "pendulum"}
+        The spring's law: x, or sin x of a pendulum's angle; then the answer is that of :func:`choose_motion`.
 
     Returns
     -------
@@ -203,14 +251,21 @@ def analyze_decay(
             notes.append(f"{question}: {error}")
             return None
 
-    waveform = thesis = None
+    waveform = thesis = motion = None
     if method != "thesis":
         waveform = ask("The whole waveform", lambda: fit_decay(record, channel=used))
+        if releases.ring_downs[0].order == 0:
+            motion = ask("Which motion", lambda: choose_motion(record, channel=used, restoring=restoring))
     if method != "waveform":
         thesis = ask("The decrements", lambda: decrement(record, channel=used))
-    if waveform is None and thesis is None:
+    if waveform is None and thesis is None and motion is None:
         raise refusals[0]
+    older = {
+        name: found
+        for name, way in (OLDER if method == "all" and releases.ring_downs[0].order == 0 else {}).items()
+        if (found := ask(name.capitalize(), functools.partial(way, record, channel=used))) is not None
+    }
     return DecayFindings(
-        record_name(record), record, faults, releases, waveform, thesis, tuple(dict.fromkeys(notes)),
-        {"method": method, "channel": used, **constants},
+        record_name(record), record, faults, releases, waveform, thesis, motion, older,
+        tuple(dict.fromkeys(notes)), {"method": method, "channel": used, "restoring": restoring, **constants},
     )  # fmt: skip

@@ -61,9 +61,10 @@ def plot_decay(findings: DecayFindings, *, ax: Axes | None = None) -> Axes:
     factor, unit = prefixed(ring.samples - ring.rest, ring.unit)
     rows = _shown(ring)
     ax.plot(*envelope(ring.time[rows], factor * ring.samples[rows]), color=INK, linewidth=1.0, label="measured")
-    rest = findings.best.bias.value
+    rest = findings.rest
     time, viscous, dry = _envelopes(findings, ring)
-    for curve, colour, words in ((viscous, BLUE, "viscous friction alone"), (dry, ORANGE, "dry friction alone")):
+    alone = ((viscous, BLUE, "viscous friction alone"), (dry, ORANGE, "dry friction alone"))
+    for curve, colour, words in alone if ring.isochronous else ():  # of a linear spring
         for side in (1, -1):
             label = words if side == 1 else None
             ax.plot(time, factor * (rest + side * curve), color=colour, linestyle="--", linewidth=1.1, label=label)
@@ -89,7 +90,7 @@ def plot_identified(findings: DecayFindings) -> Figure:
     """
     time, measured, fitted, words = _identified(findings)
     ring = findings.releases.ring_downs[0]
-    factor, unit = prefixed(measured - findings.best.bias.value, ring.unit)
+    factor, unit = prefixed(measured - findings.rest, ring.unit)
     figure, (above, below) = new_figure(2, height=4.6, heights=[2, 1])
     above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="measured")
     above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=words)
@@ -184,10 +185,13 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
     """The figures of a decay, in reading order."""
     ring, thesis = findings.releases.ring_downs[0], findings.thesis
     many = " The first release of several." if len(findings.releases.ring_downs) > 1 else ""
+    envelopes = (
+        "Viscous friction alone would let it die away along the curved envelope, dry friction alone along the straight "
+        "one; together they are faster than either. "
+    ) * ring.isochronous
     plates = [
         plate("decay", plot_decay(findings), "How it dies away",
-              "Viscous friction alone would let it die away along the curved envelope, dry friction alone along the "
-              f"straight one; together they are faster than either. Grey: at rest before the release and after.{many}")
+              f"{envelopes}Grey: at rest before the release and after.{many}")
     ]  # fmt: skip
     if findings.waveform is not None or ring.order == 0:
         plates.append(
@@ -242,6 +246,10 @@ def _envelopes(findings: DecayFindings, ring: RingDown) -> tuple[Array, Array, A
 
 def _identified(findings: DecayFindings) -> tuple[Array, Array, Array, str]:
     """Time, measured, identified, and by which method."""
+    if findings.best is findings.motion:
+        chosen = findings.motion.choice.chosen.fitted
+        fitted, _, _ = chosen.blocks.motion(chosen.parameters, half_cycles=chosen.half_cycles)
+        return chosen.blocks.times, chosen.blocks.values, fitted, "identified by the whole waveform"
     if findings.waveform is not None:
         fit, ring = findings.waveform, findings.releases.ring_downs[0]
         shown = ring.time[_shown(ring)]

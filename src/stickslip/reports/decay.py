@@ -26,6 +26,7 @@ def settings(findings: DecayFindings) -> dict[str, str]:
     return {
         "methods": METHODS[findings.settings["method"]],
         "channel": findings.settings["channel"],
+        "spring": findings.settings["restoring"],
         **told,
         "sampling rate": f"{record.fs:g} Hz",
         "length": f"{len(record)} samples, {record.duration:g} s",
@@ -38,14 +39,45 @@ def _sentences(findings: DecayFindings) -> Iterator[str]:
     if "no friction" in best.model:
         yield "Neither viscous nor dry friction can be told from zero."
     else:
-        yield f"The motion dies away by {best.model.removesuffix(' friction')} friction: {_both(ratio, dry)}."
+        yield f"The motion dies away by {_model(findings)}: {_both(ratio, dry)}."
     force = findings.dry_force
     if force is not None:
         yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
     elif dry.interval[0] > 0:
         yield "The dry friction force is that displacement times the spring's stiffness; state --stiffness or --mass."
     yield from _motion(findings)
+    yield from _chosen(findings)
     yield from _compared(findings)
+
+
+def _model(findings: DecayFindings) -> str:
+    if findings.best is findings.motion:
+        return next(words for name, words, _ in findings.motion.candidates if name == findings.motion.model)
+    return f"{findings.best.model.removesuffix(' friction')} friction"
+
+
+def _chosen(findings: DecayFindings) -> Iterator[str]:
+    """Which motions the record leaves possible, and what counting them does to the dry friction."""
+    motion = findings.motion
+    if motion is None:
+        return
+    kept = [each.fitted.motion.words for each in motion.choice.candidates if each.kept]
+    tried = len(motion.candidates)
+    if not kept:
+        yield f"The record speaks against each of the {tried} motions tried: there is friction of another kind too."
+    else:
+        yield f"Of {tried} motions tried the record does not speak against {len(kept)}: {'; '.join(kept)}."
+    dry = motion.dry_displacement_any
+    force = findings.as_force(dry, "")
+    also = f", its force within {interval_of(force)}" if force is not None else ""
+    yield f"Whichever of them it is, the dry friction displacement lies within {interval_of(dry)}{also}."
+
+
+def notes(findings: DecayFindings) -> list[str]:
+    """What could not be asked, and the verdict on each motion tried."""
+    motion = findings.motion
+    verdicts = () if motion is None else motion.candidates
+    return [*findings.notes, *(f"Motion tried, {words}: {verdict}." for _, words, verdict in verdicts)]
 
 
 def _both(ratio: Estimate, dry: Estimate) -> str:
@@ -69,7 +101,7 @@ def _motion(findings: DecayFindings) -> Iterator[str]:
 
 def _compared(findings: DecayFindings) -> Iterator[str]:
     """Where two methods answer: whether they agree."""
-    if findings.waveform is None or findings.thesis is None:
+    if findings.waveform is None or findings.thesis is None or findings.best is findings.motion:
         return
     apart = []
     for name in ("damping_ratio", "dry_displacement"):

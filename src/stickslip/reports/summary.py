@@ -124,13 +124,15 @@ def summary(
 def _of_findings(findings: Findings | DecayFindings) -> Summary:
     record = findings.record
     if isinstance(findings, DecayFindings):
-        told, settings = decay.headline(findings), decay.settings(findings)
+        told, settings, notes = decay.headline(findings), decay.settings(findings), decay.notes(findings)
+        estimates = (*findings.estimates, *findings.comparisons)
     else:
-        told, settings = headline(findings), _settings(findings)
+        told, settings, notes = headline(findings), _settings(findings), list(findings.notes)
+        estimates = findings.estimates
     return Summary(
         findings.name, told, cautions(findings),
-        lines=[_line(estimate, findings.true_value(estimate)) for estimate in findings.estimates],
-        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=settings,
+        lines=[_line(estimate, findings.true_value(estimate)) for estimate in estimates],
+        faults=[str(fault) for fault in findings.faults], notes=notes, settings=settings,
         channels=list(record.channels.values()), history=record.history,
     )  # fmt: skip
 
