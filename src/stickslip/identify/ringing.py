@@ -1,0 +1,225 @@
+"""The acceleration in and around each stick, cut into pieces: here the contact rings, there the mass glides."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.identify.motion import forcing_frequency
+from stickslip.identify.sticks import Sticks, find_sticks
+from stickslip.record.record import Record
+from stickslip.signals.noise import noise_level
+from stickslip.signals.pieces import GLIDE, RING, Piece, Splitter
+
+Array = NDArray[np.float64]
+
+LEAD = 0.12  # of a stick's duration that is looked at before it, and LAG after it
+LAG = 0.06
+COARSE = 90  # samples of a window in the search
+FREQUENCIES = np.geomspace(1.2, 9.0, 22)  # in cycles per stick: where the search looks
+DAMPINGS = (0.02, 0.07, 0.16, 0.3)
+STARTS = 3  # of the grid's best that are refined
+AT_ONCE = 16  # windows that are cut together
+PENALTY = 30.0  # what a piece must spare, in variances of the noise
+MISFIT = 0.005  # of the acceleration's standard deviation: how well parabolas and one mode are trusted to fit
+SETTLED = 0.2  # of a cycle: a ring lasts longer
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """One stick and its surroundings.
+
+    Attributes
+    ----------
+    first : int
+        Row of the record where the window begins.
+    values : ndarray
+        The acceleration in it.
+    pieces : tuple of Piece
+        Glides and rings in turn; rows count from `first`.
+    """
+
+    first: int
+    values: Array
+    pieces: tuple[Piece, ...]
+
+    @property
+    def rings(self) -> list[Piece]:
+        """The pieces in which the contact rings."""
+        return [piece for piece in self.pieces if piece.kind == RING]
+
+    @property
+    def glides(self) -> list[Piece]:
+        """The glides within the stick: micro-slips."""
+        return [piece for piece in self.pieces[1:-1] if piece.kind == GLIDE]
+
+
+@dataclass(frozen=True, eq=False)
+class Ringing:
+    """The sticks of a record, each in pieces, and the mode in which the contact rings.
+
+    Attributes
+    ----------
+    windows : tuple of Window
+        One a stick.
+    pole : complex
+        Decay rate (negative) and angular frequency [rad/s] of the rings.
+    noise : float
+        Standard deviation of the acceleration's noise.
+    sticks : Sticks
+        When it sticks, as the velocity tells.
+    fs, start : float
+        Of the acceleration.
+    """
+
+    windows: tuple[Window, ...]
+    pole: complex
+    noise: float
+    sticks: Sticks
+    fs: float
+    start: float
+
+    def time(self, window: Window, row: float) -> float:
+        """Time [s] of a row of a window."""
+        return self.start + (window.first + row) / self.fs
+
+
+def find_ringing(record: Record, channel: str, *, question: str) -> Ringing:
+    """Cut the acceleration around each stick into glides and rings of one mode.
+
+    Sticks come from ``x`` or ``v`` where the record has them, else from the acceleration's integral. The mode is
+    searched on a grid and refined for the least cost of all windows together.
+    """
+    record.require_clean(channel, question=question, samples=256)
+    values = record[channel]
+    if np.ptp(values) == 0:
+        raise EstimateError(f"{channel} is constant", f"{question} needs sticks and slips", "choose another channel")
+    moving = record if any(name in record for name in ("x", "v")) else with_velocity(record, channel, question)
+    sticks = _sticks(moving, question)
+    spans = _spans(sticks, record, values)
+    noise = noise_level(values, record.fs)
+    trusted = max(noise, MISFIT * float(values.std()))
+    centred = values - _zero(values, sticks, record)
+    windows = [centred[first:last] for first, last in spans]
+    pole = _pole(windows, record.fs, trusted, sticks)
+    pieces = [
+        each
+        for few in range(0, len(windows), AT_ONCE)
+        for each in Splitter(windows[few : few + AT_ONCE], trusted**2, PENALTY).split(
+            pole / record.fs, _shortest(pole, record.fs)
+        )
+    ]
+    found = tuple(Window(first, v, p) for (first, _), v, p in zip(spans, windows, pieces, strict=True))
+    return Ringing(found, pole, noise, sticks, record.fs, record.start)
+
+
+def with_velocity(record: Record, channel: str, question: str) -> Record:
+    """The record's acceleration alone, with its integral ``v``, whose drift is taken off as its mean over a cycle."""
+    values, fs = record[channel], record.fs
+    level = values - values.mean()
+    velocity = np.concatenate([[0.0], np.cumsum((level[1:] + level[:-1]) / 2)]) / fs
+    frequency = forcing_frequency(velocity, fs).value  # harmonics are weaker in it than in the acceleration
+    cycle = fs / frequency
+    if not 32 <= cycle <= len(values) / 3:
+        raise EstimateError(
+            f"the strongest line of {channel}, {frequency:.4g} Hz, has {cycle:.3g} samples a cycle and "
+            f"{len(values) / cycle:.3g} cycles",
+            f"{question} of an acceleration alone needs three cycles of 32 samples at least",
+            "give a longer record, or one with x or v",
+        )
+    total = np.concatenate([[0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2)])
+    rows = np.arange(math.ceil(cycle / 2), len(values) - math.ceil(cycle / 2))
+    about = [np.interp(rows + side * cycle / 2, np.arange(len(values)), total) for side in (-1, 1)]
+    slow = (about[1] - about[0]) / cycle
+    kept = record.rows(int(rows[0]), int(rows[-1]) + 1)
+    return Record.of({channel: kept[channel], "v": velocity[rows] - slow}, fs=fs, start=kept.start)
+
+
+def _sticks(record: Record, question: str) -> Sticks:
+    try:
+        sticks = find_sticks(record)
+    except EstimateError as error:
+        raise EstimateError(f"no transition: {error.value}", error.rule, error.next_step) from error
+    if not any(event.kind == "stick" and event.whole for event in sticks.events):
+        raise EstimateError(
+            "no transition: the record holds no whole stick",
+            f"{question} looks at what the contact does while the mass sticks",
+            "give a record in which it sticks and slips",
+        )
+    return sticks
+
+
+def _spans(sticks: Sticks, record: Record, values: Array) -> list[tuple[int, int]]:
+    """Rows around each whole stick; none where slips are so short that windows would overlap."""
+    spans = []
+    for event in sticks.events:
+        if event.kind != "stick" or not event.whole:
+            continue
+        begin, long = (event.time - record.start) * record.fs, event.duration * record.fs
+        first, last = math.floor(begin - LEAD * long), math.ceil(begin + (1 + LAG) * long)
+        if first >= 0 and last <= len(values) and last - first >= 24:
+            spans.append((first, last))
+    if not spans:
+        raise EstimateError(
+            "no transition: no stick has its surroundings in the record, in 24 samples at least",
+            "the pieces of a stick are told apart within it",
+            "give a longer record, or one at a higher rate",
+        )
+    return spans
+
+
+def _zero(values: Array, sticks: Sticks, record: Record) -> float:
+    """The accelerometer's reading of no acceleration: the mean over whole cycles."""
+    cycle = record.fs / sticks.frequency.value if sticks.frequency.value > 0 else len(values)
+    whole = math.floor(len(values) / cycle) * cycle
+    return float(values[: max(1, round(whole))].mean()) if whole else float(values.mean())
+
+
+def _shortest(pole: complex, fs: float) -> int:
+    return max(5, round(SETTLED * 2 * math.pi / pole.imag * fs))
+
+
+def _pole(windows: list[Array], fs: float, noise: float, sticks: Sticks) -> complex:
+    """The mode that leaves the least cost, on averaged samples."""
+    from scipy.optimize import minimize
+
+    block = max(1, int(np.median([len(values) for values in windows])) // COARSE)
+    short = [values[: len(values) // block * block].reshape(-1, block).mean(axis=1) for values in windows]
+    durations = [event.duration for event in sticks.events if event.kind == "stick" and event.whole]
+    rate, variance, long = fs / block, noise**2 / block, float(np.median(durations))
+
+    def cost(splitter: Splitter, frequency: float, damping: float) -> float:
+        if not (lowest <= frequency <= highest and 0 <= damping < 0.9):
+            return math.inf
+        shortest = max(3, round(SETTLED / frequency * rate))
+        return float(splitter.cost(_mode(frequency, damping) / rate, shortest).sum())
+
+    lowest, highest = FREQUENCIES[0] / long, min(FREQUENCIES[-1] / long, rate / 5)
+    few = Splitter(short[:: max(1, len(short) // 6)][:6], variance, PENALTY)
+    grid = [(cost(few, f, z), f, z) for f in FREQUENCIES / long if f <= highest for z in DAMPINGS]
+    if not grid:
+        raise EstimateError(
+            f"no transition: a rate of {fs:g} Hz", "a ring needs five samples a cycle", "record at a higher rate"
+        )
+    some = Splitter(short[:: max(1, len(short) // 16)][:16], variance, PENALTY)
+    tried = []
+    for _, f, z in sorted(grid)[:STARTS]:
+        corners = [(math.log(f), z), (math.log(f) + 0.05, z), (math.log(f), 1.4 * z + 0.01)]
+        tried.append(
+            minimize(
+                lambda p: cost(some, math.exp(p[0]), p[1]), corners[0], method="Nelder-Mead",
+                options={"xatol": 5e-4, "fatol": 0.2, "maxiter": 40, "initial_simplex": corners},
+            )
+        )  # fmt: skip
+    found = min(tried, key=lambda each: float(each.fun)).x
+    return _mode(math.exp(found[0]), float(found[1]))
+
+
+def _mode(frequency: float, damping: float) -> complex:
+    """Pole of a mode from its damped frequency [Hz] and damping ratio."""
+    turn = 2 * math.pi * frequency
+    return complex(-damping * turn / math.sqrt(1 - damping**2), turn)

@@ -1,0 +1,374 @@
+"""What does the acceleration do while the mass sticks: at which frequency does the contact ring, and how is it damped?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate, Result
+from stickslip.identify.ringing import Ringing, Window, find_ringing
+from stickslip.record.record import Record
+from stickslip.signals.morlet import ridge_centre
+from stickslip.signals.wavelet import CENTRE, wavelet_map
+from stickslip.statistics import correlation_time, least_squares, mean_of_cycles, student
+from stickslip.units import parse_value
+
+Array = NDArray[np.float64]
+
+QUESTION = "the transition"
+AFTER, BEFORE = 0.09, 0.03  # of a cycle at the ends of a ring that are not trusted: where it begins is less sure
+LEAST_RING = 0.2  # of a cycle that must be left
+FAINT = 0.05  # of the acceleration's range: rings that are smaller are none
+AUDIBLE = 5.0  # standard deviations of a ring's amplitude that it must have
+OCTAVE = 1.6  # the wavelet's local maximum is looked for within this factor of the mode's frequency
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StickTransition(Result):
+    """How the contact rings in one stick.
+
+    Attributes
+    ----------
+    time, duration : float
+        When the stick begins and how long it lasts [s].
+    frequency, damping, amplitude : Estimate
+        Damped frequency [Hz], damping ratio, and the amplitude at which the first ring begins.
+    wavelet_frequency : float
+        Where the wavelet map has its local maximum [Hz]; NaN where it has none.
+    rings : int
+        Stretches of ringing, with a micro-slip between each two.
+    """
+
+    time: float
+    duration: float
+    frequency: Estimate
+    damping: Estimate
+    amplitude: Estimate
+    wavelet_frequency: float
+    rings: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Transition(Result):
+    """How a contact rings while the mass sticks.
+
+    Attributes
+    ----------
+    frequency : Estimate
+        Damped frequency of the mode [Hz], from the rings of all sticks together.
+    damping : Estimate
+        Damping ratio.
+    amplitude : Estimate
+        At which the first ring of a stick begins, mean of the sticks.
+    wavelet_frequency : Estimate
+        Where the wavelet map has its local maximum [Hz], mean of the sticks.
+    agreement : str
+        Whether both frequencies agree, in words.
+    stiffness : Estimate or None
+        Of the contact [N/m], implied by the frequency: ``K = m |p|^2 - k``.
+    loop_stiffness : Estimate or None
+        Of the contact [N/m], from friction against displacement within the same rings.
+    sticks : tuple of StickTransition
+        Stick by stick.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    frequency: Estimate
+    damping: Estimate
+    amplitude: Estimate
+    wavelet_frequency: Estimate
+    agreement: str
+    stiffness: Estimate | None
+    loop_stiffness: Estimate | None
+    sticks: tuple[StickTransition, ...]
+    status: str
+
+
+def transition(
+    record: Record, *, channel: str = "a", mass: float | str | None = None, stiffness: float | str | None = None
+) -> Transition:
+    """At which frequency does the contact ring while the mass sticks, how is it damped, how stiff is the contact?
+
+    A compliant contact that sticks rings with the mass, ``a = Re c exp(p t)`` about zero (thesis chapters 4 and 5),
+    until the friction limit is reached and it slips by a little. Each stick is cut into rings and glides by dynamic
+    programming; one mode p is fitted to the rings of all sticks together by least squares, each ring with its own
+    amplitude and phase, each stick with its own straight line for the drive. A single spectrum, or a wavelet, of the
+    whole stick reads 2 to 10 % low where micro-slips interrupt the ringing.
+
+    The frequency is ``Im p / 2 pi``, the damping ratio ``-Re p / |p|``, and the contact's stiffness
+    ``K = m |p|^2 - k`` for a mass m on a spring k.
+
+    Parameters
+    ----------
+    record : Record
+        With an acceleration; sticks are taken from ``x`` or ``v`` where the record has them, else from the
+        acceleration's integral.
+    channel : str
+        The acceleration.
+    mass : float or str, optional
+        Oscillating mass [kg], for the contact's stiffness.
+    stiffness : float or str, optional
+        Spring [N/m], for the same.
+
+    Returns
+    -------
+    Transition
+
+    Raises
+    ------
+    EstimateError
+        "no transition": no stick, or no ringing in the sticks.
+    RecordError
+        A channel that is missing or not finite, a broken clock.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> case = ss.scenarios.get("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)")
+    >>> record = ss.simulate(case.system, cycles=8).record(fs=4000).between(1.0, 3.2)
+    >>> found = transition(record, mass=2.42, stiffness=2310)
+    >>> round(found.frequency.value, 1), round(found.damping.value, 3), round(found.stiffness.value / 1000)
+    (45.1, 0.017, 192)
+    """
+    ringing = find_ringing(record, channel, question=QUESTION)
+    pooled = _fitted(ringing.windows, ringing)
+    if pooled is None:
+        raise _none("the sticks hold no stretch of ringing", "ringing lasts a third of a cycle at least")
+    loud = float(np.median([_amplitude(window, pooled, ringing)[0] for window in pooled.windows]))
+    spread = float(np.median([np.ptp(window.values) for window in ringing.windows]))
+    if loud < max(FAINT * spread, AUDIBLE * pooled.noise):
+        raise _none(
+            f"the sticks are quiet: {loud:.3g} m/s^2 where the acceleration changes by {spread:.3g}",
+            f"a ring is {FAINT:.0%} of that change at least, and five times the noise, {pooled.noise:.3g}",
+        )
+    sticks = _stick_by_stick(record, channel, ringing, pooled)
+    unit = record.channels[channel].unit
+    frequency, damping = pooled.frequency, pooled.damping
+    wavelet = mean_of_cycles(
+        "transition frequency by wavelet", [stick.wavelet_frequency for stick in sticks] or [math.nan], unit="Hz",
+        method="local maximum of the Morlet map in each stick, mean of sticks",
+    )  # fmt: skip
+    return Transition(
+        frequency=frequency,
+        damping=damping,
+        amplitude=mean_of_cycles(
+            "transition amplitude", [stick.amplitude.value for stick in sticks], unit=unit,
+            method="of the first ring of each stick, at its begin; mean of sticks",
+        ),
+        wavelet_frequency=wavelet,
+        agreement=_agreement(frequency, wavelet),
+        stiffness=_stiffness(pooled, mass, stiffness),
+        loop_stiffness=_loop_stiffness(record, ringing, pooled),
+        sticks=sticks,
+        status=_status(ringing, pooled),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Mode:
+    """One mode fitted to the rings of some windows."""
+
+    pole: complex
+    frequency: Estimate
+    damping: Estimate
+    noise: float
+    windows: tuple[Window, ...]
+    correlation: float
+
+
+def _none(value: str, rule: str) -> EstimateError:
+    return EstimateError(
+        f"no transition: {value}", rule, "see mechanism(record) for what the sticks are like, or take a quieter record"
+    )
+
+
+def _stretches(window: Window, pole: complex, fs: float) -> list[slice]:
+    """The rows of a window that ring for sure."""
+    cycle = 2 * math.pi / pole.imag * fs
+    inner = [
+        slice(math.ceil(piece.first + AFTER * cycle), math.floor(piece.last - BEFORE * cycle))
+        for piece in window.rings
+    ]  # fmt: skip
+    return [rows for rows in inner if rows.stop - rows.start >= max(8, LEAST_RING * cycle)]
+
+
+def _design(window: Window, rows: list[slice], pole: complex, fs: float) -> tuple[Array, Array]:
+    """Columns: cosine and sine of each ring, level and slope of the window; and the samples."""
+    total = sum(part.stop - part.start for part in rows)
+    design, at = np.zeros((total, 2 * len(rows) + 2)), 0
+    for number, part in enumerate(rows):
+        count = part.stop - part.start
+        wave = np.exp(pole * np.arange(count) / fs)
+        design[at : at + count, 2 * number] = wave.real
+        design[at : at + count, 2 * number + 1] = wave.imag
+        design[at : at + count, -2] = 1.0
+        design[at : at + count, -1] = (np.arange(part.start, part.stop) / len(window.values)) - 0.5
+        at += count
+    return design, np.concatenate([window.values[part] for part in rows])
+
+
+def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> _Mode | None:
+    """The mode of the windows' rings by least squares; amplitudes and lines are eliminated (variable projection)."""
+    from scipy.optimize import least_squares as nonlinear
+
+    fs, start = ringing.fs, ringing.pole
+    used = [(window, rows) for window in windows if (rows := _stretches(window, start, fs))]
+    if not used:
+        return None
+
+    def left(parameters: Array) -> Array:
+        pole = complex(parameters[0], parameters[1])
+        rests = []
+        for window, rows in used:
+            design, data = _design(window, rows, pole, fs)
+            q, _ = np.linalg.qr(design)
+            rests.append(data - q @ (q.T @ data))
+        return np.concatenate(rests)
+
+    scale = abs(start)
+    found = nonlinear(left, [start.real, start.imag], x_scale=[scale, scale], jac="3-point", method="lm", max_nfev=60)
+    linear = sum(2 * len(rows) + 2 for _, rows in used)
+    free = len(found.fun) - linear - 2
+    normal = found.jac.T @ found.jac
+    if free < 4 or not np.isfinite(normal).all() or np.linalg.cond(normal) > 1e12:
+        return None
+    variance = float(found.fun @ found.fun) / free
+    tau = max(1.0, float(correlation_time(found.fun)))
+    spread = np.linalg.inv(normal) * variance * tau
+    pole = complex(*found.x)
+    if not (0 < pole.imag and abs(pole - start) < 0.5 * abs(start)):
+        return None
+    size = abs(pole)
+    slope = np.array([-(pole.imag**2), pole.real * pole.imag]) / size**3  # of the damping ratio
+    quantile = student(free / tau)
+    method = f"one decaying mode, least squares over {sum(len(rows) for _, rows in used)} rings"
+    frequency = Estimate.normal(
+        "transition frequency", pole.imag / (2 * math.pi), sd=math.sqrt(spread[1, 1]) / (2 * math.pi), unit="Hz",
+        method=method, quantile=quantile, checks=(f"{len(used)} sticks",),
+    )  # fmt: skip
+    damping = Estimate.normal(
+        "transition damping ratio", -pole.real / size, sd=math.sqrt(float(slope @ spread @ slope)), unit="1",
+        method=method, quantile=quantile,
+    )  # fmt: skip
+    return _Mode(pole, frequency, damping, math.sqrt(variance), tuple(window for window, _ in used), tau)
+
+
+def _amplitude(window: Window, mode: _Mode, ringing: Ringing) -> tuple[float, float]:
+    """Amplitude at which the window's first ring begins, and its standard deviation."""
+    rows = _stretches(window, ringing.pole, ringing.fs)
+    design, data = _design(window, rows, mode.pole, ringing.fs)
+    fit = np.linalg.lstsq(design, data, rcond=None)[0]
+    early = rows[0].start - next(piece.first for piece in window.rings if piece.first <= rows[0].start < piece.last)
+    growth = math.exp(-mode.pole.real * early / ringing.fs)
+    inverse = np.linalg.pinv(design.T @ design)[:2, :2] * mode.noise**2 * mode.correlation
+    size = math.hypot(*fit[:2])
+    along = fit[:2] / size if size else np.array([1.0, 0.0])
+    return size * growth, math.sqrt(float(along @ inverse @ along)) * growth
+
+
+def _stick_by_stick(
+    record: Record, channel: str, ringing: Ringing, pooled: _Mode
+) -> tuple[StickTransition, ...]:  # fmt: skip
+    found, events = [], [event for event in ringing.sticks.events if event.kind == "stick" and event.whole]
+    peaks = _local_maxima(record, channel, ringing, pooled)
+    for window, peak in zip(pooled.windows, peaks, strict=True):
+        own = _fitted((window,), ringing)
+        begin, middle = window.rings[0].first, ringing.time(window, len(window.values) / 2)
+        event = min(events, key=lambda event: abs(event.time + event.duration / 2 - middle))
+        size, sd = _amplitude(window, pooled, ringing)
+        unsure = "this stick alone does not tell it"
+        frequency, damping = (
+            (own.frequency, own.damping)
+            if own is not None
+            else (replace(each, sd=math.inf, interval=(-math.inf, math.inf), status=unsure)
+                  for each in (pooled.frequency, pooled.damping))
+        )  # fmt: skip
+        found.append(
+            StickTransition(
+                time=ringing.time(window, begin), duration=event.duration, frequency=frequency, damping=damping,
+                amplitude=Estimate.normal(
+                    "transition amplitude", size, sd=sd, unit=record.channels[channel].unit,
+                    method="of the first ring, at its begin",
+                ),
+                wavelet_frequency=peak, rings=len(window.rings),
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: _Mode) -> list[float]:
+    """Frequency [Hz] of the largest local maximum of the wavelet map within each stick, near the mode's."""
+    wanted = pooled.frequency.value * np.geomspace(1 / OCTAVE, min(OCTAVE, 0.45 * ringing.fs / pooled.frequency.value), 61)
+    reach = math.ceil(7 * ridge_centre(CENTRE, "energy") / (2 * math.pi * wanted[0]) * ringing.fs)
+    found = []
+    for window in pooled.windows:
+        first, last = max(0, window.first - reach), min(len(record), window.first + len(window.values) + reach)
+        part = record.rows(first, last)
+        moduli = np.abs(wavelet_map(part, channel, frequencies=wanted, precision="single").values)
+        inside = moduli[:, window.first - first : window.first - first + len(window.values)]
+        ridge = inside.max(axis=1)
+        peak = int(ridge[1:-1].argmax()) + 1
+        higher = ridge[peak] >= ridge[peak - 1] and ridge[peak] >= ridge[peak + 1]
+        found.append(float(wanted[peak]) if higher else math.nan)
+    return found
+
+
+def _agreement(frequency: Estimate, wavelet: Estimate) -> str:
+    """In words: whether the wavelet's frequency is the mode's as nearly as a wavelet can tell."""
+    apart = wavelet.value / frequency.value - 1
+    width = math.sqrt(math.log(2)) * 2 / ridge_centre(CENTRE, "energy")  # half of the bandwidth at half power
+    told = f"the wavelet reads {wavelet.value:.4g} Hz, {abs(apart):.1%} {'lower' if apart < 0 else 'higher'}"
+    if abs(apart) < width / 2:
+        return f"they agree within the wavelet's bandwidth: {told}"
+    return f"they disagree: {told}, more than its bandwidth explains"
+
+
+def _stiffness(mode: _Mode, mass: float | str | None, spring: float | str | None) -> Estimate | None:
+    if mass is None:
+        return None
+    kilograms, k = parse_value(mass, "kg"), parse_value(spring, "N/m") if spring is not None else 0.0
+    if not (kilograms > 0 and k >= 0):
+        raise EstimateError(f"mass = {mass}, stiffness = {spring}", "a mass is positive, a spring not negative", "mend")
+    square = abs(mode.pole) ** 2
+    # |p|^2 = w^2 / (1 - z^2): the frequency carries nearly all of its uncertainty
+    z, sd_z = mode.damping.value, mode.damping.sd
+    relative = math.hypot(2 * mode.frequency.sd / mode.frequency.value, 2 * z / (1 - z**2) * sd_z)
+    quantile = (mode.frequency.interval[1] - mode.frequency.value) / mode.frequency.sd
+    status = "ok" if spring is not None else "the spring's own stiffness is part of it"
+    return Estimate.normal(
+        "contact stiffness by frequency", kilograms * square - k, sd=kilograms * square * relative, unit="N/m",
+        method="K = m |p|^2 - k", quantile=quantile, status=status,
+    )  # fmt: skip
+
+
+def _loop_stiffness(record: Record, ringing: Ringing, mode: _Mode) -> Estimate | None:
+    """Slope of friction against displacement in the rings, beside a term in the velocity and a level for each ring."""
+    if "friction" not in record or "x" not in record or record.channels["friction"].unit != "N":
+        return None
+    x, friction = record["x"], record["friction"]
+    if not (np.isfinite(x).all() and np.isfinite(friction).all()):
+        return None
+    velocity = record["v"] if "v" in record else np.gradient(x) * record.fs
+    parts, force = [], []
+    for window in mode.windows:
+        for rows in _stretches(window, ringing.pole, ringing.fs):
+            at = slice(window.first + rows.start, window.first + rows.stop)
+            parts.append(np.column_stack([x[at] - x[at].mean(), velocity[at] - velocity[at].mean()]))
+            force.append(friction[at] - friction[at].mean())
+    design = np.vstack(parts)
+    if np.linalg.cond(design / np.linalg.norm(design, axis=0)) > 100:
+        return None
+    return least_squares(design, np.concatenate(force)).estimate(0, "contact stiffness by loops", "N/m", "friction on x and v in the rings")
+
+
+def _status(ringing: Ringing, pooled: _Mode) -> str:
+    words = [] if ringing.sticks.status == "ok" else [ringing.sticks.status]
+    silent = len(ringing.windows) - len(pooled.windows)
+    if silent:
+        words.append(f"{silent} of {len(ringing.windows)} sticks hold no ringing long enough")
+    return "; ".join(words) or "ok"
