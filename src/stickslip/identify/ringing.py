@@ -26,6 +26,8 @@ STARTS = 3  # of the grid's best that are refined
 AT_ONCE = 16  # windows that are cut together
 PENALTY = 30.0  # what a piece must spare, in variances of the noise
 MISFIT = 0.005  # of the acceleration's standard deviation: how well parabolas and one mode are trusted to fit
+QUIET = 1.05  # times the mean square that rings leave: then rest explains as much
+FAINT = 0.02  # of the acceleration's range, root mean square: rings that are smaller are none
 SETTLED = 0.2  # of a cycle: a ring lasts longer
 
 
@@ -70,6 +72,10 @@ class Ringing:
         Decay rate (negative) and angular frequency [rad/s] of the rings.
     noise : float
         Standard deviation of the acceleration's noise.
+    excess : float
+        Mean square that the pieces leave, over the variance that they were to leave.
+    rest : float
+        The same, were the mass at rest where it rings.
     sticks : Sticks
         When it sticks, as the velocity tells.
     fs, start : float
@@ -79,9 +85,23 @@ class Ringing:
     windows: tuple[Window, ...]
     pole: complex
     noise: float
+    excess: float
+    rest: float
     sticks: Sticks
     fs: float
     start: float
+
+    @property
+    def loudness(self) -> float:
+        """Root mean square of the rings over the range of the acceleration in the windows."""
+        rings = [window.values[p.first : p.last] for window in self.windows for p in window.rings]
+        span = float(np.median([np.ptp(window.values) for window in self.windows]))
+        return float(np.sqrt(np.mean(np.concatenate(rings) ** 2))) / span if rings else 0.0
+
+    @property
+    def silent(self) -> bool:
+        """Whether the mass rests where it might ring: the rings are no larger than the noise, or than a trifle."""
+        return self.rest < QUIET * self.excess or self.loudness < FAINT
 
     def time(self, window: Window, row: float) -> float:
         """Time [s] of a row of a window."""
@@ -106,15 +126,15 @@ def find_ringing(record: Record, channel: str, *, question: str) -> Ringing:
     centred = values - _zero(values, sticks, record)
     windows = [centred[first:last] for first, last in spans]
     pole = _pole(windows, record.fs, trusted, sticks)
-    pieces = [
-        each
-        for few in range(0, len(windows), AT_ONCE)
-        for each in Splitter(windows[few : few + AT_ONCE], trusted**2, PENALTY).split(
-            pole / record.fs, _shortest(pole, record.fs)
-        )
-    ]
-    found = tuple(Window(first, v, p) for (first, _), v, p in zip(spans, windows, pieces, strict=True))
-    return Ringing(found, pole, noise, sticks, record.fs, record.start)
+    shortest, pieces, left, rest, count = _shortest(pole, record.fs), [], 0.0, 0.0, sum(map(len, windows))
+    for few in range(0, len(windows), AT_ONCE):
+        splitter = Splitter(windows[few : few + AT_ONCE], trusted**2, PENALTY)
+        found = splitter.split(pole / record.fs, shortest)
+        pieces += found
+        left += float(splitter.cost(pole / record.fs, shortest).sum()) - PENALTY * sum(map(len, found))
+        rest += float(splitter.cost(0.0, shortest).sum()) - PENALTY * sum(map(len, splitter.split(0.0, shortest)))
+    cut = tuple(Window(first, v, p) for (first, _), v, p in zip(spans, windows, pieces, strict=True))
+    return Ringing(cut, pole, noise, left / count, rest / count, sticks, record.fs, record.start)
 
 
 def with_velocity(record: Record, channel: str, question: str) -> Record:

@@ -1,4 +1,4 @@
-"""What does the acceleration do while the mass sticks: at which frequency does the contact ring, and how is it damped?"""
+"""How a contact rings while the mass sticks: frequency, damping, amplitude, and the contact's stiffness."""
 
 from __future__ import annotations
 
@@ -135,7 +135,13 @@ def transition(
     >>> round(found.frequency.value, 1), round(found.damping.value, 3), round(found.stiffness.value / 1000)
     (45.1, 0.017, 192)
     """
-    ringing = find_ringing(record, channel, question=QUESTION)
+    return transition_of(find_ringing(record, channel, question=QUESTION), record, channel, mass, stiffness)
+
+
+def transition_of(
+    ringing: Ringing, record: Record, channel: str, mass: float | str | None, stiffness: float | str | None
+) -> Transition:
+    """The transition of sticks that are cut into pieces already."""
     pooled = _fitted(ringing.windows, ringing)
     if pooled is None:
         raise _none("the sticks hold no stretch of ringing", "ringing lasts a third of a cycle at least")
@@ -241,7 +247,7 @@ def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> _Mode | None:
     tau = max(1.0, float(correlation_time(found.fun)))
     spread = np.linalg.inv(normal) * variance * tau
     pole = complex(*found.x)
-    if not (0 < pole.imag and abs(pole - start) < 0.5 * abs(start)):
+    if not (pole.imag > 0 and abs(pole - start) < 0.5 * abs(start)):
         return None
     size = abs(pole)
     slope = np.array([-(pole.imag**2), pole.real * pole.imag]) / size**3  # of the damping ratio
@@ -303,7 +309,8 @@ def _stick_by_stick(
 
 def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: _Mode) -> list[float]:
     """Frequency [Hz] of the largest local maximum of the wavelet map within each stick, near the mode's."""
-    wanted = pooled.frequency.value * np.geomspace(1 / OCTAVE, min(OCTAVE, 0.45 * ringing.fs / pooled.frequency.value), 61)
+    centre = pooled.frequency.value
+    wanted = centre * np.geomspace(1 / OCTAVE, min(OCTAVE, 0.45 * ringing.fs / centre), 61)
     reach = math.ceil(7 * ridge_centre(CENTRE, "energy") / (2 * math.pi * wanted[0]) * ringing.fs)
     found = []
     for window in pooled.windows:
@@ -363,7 +370,8 @@ def _loop_stiffness(record: Record, ringing: Ringing, mode: _Mode) -> Estimate |
     design = np.vstack(parts)
     if np.linalg.cond(design / np.linalg.norm(design, axis=0)) > 100:
         return None
-    return least_squares(design, np.concatenate(force)).estimate(0, "contact stiffness by loops", "N/m", "friction on x and v in the rings")
+    line = least_squares(design, np.concatenate(force))
+    return line.estimate(0, "contact stiffness by loops", "N/m", "friction on x and v in the rings")
 
 
 def _status(ringing: Ringing, pooled: _Mode) -> str:

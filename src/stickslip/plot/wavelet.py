@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import RecordError
-from stickslip.plot.style import BLUE, INK, WIDTH, Array, axis_label, envelope, prefixed, styled
-from stickslip.signals.wavelet import ends
+from stickslip.plot.plate import Plate, plate
+from stickslip.plot.style import BLUE, INK, ORANGE, SHADE, WIDTH, Array, axis_label, envelope, prefixed, styled
+from stickslip.signals.pieces import RING
+from stickslip.signals.wavelet import CENTRE, ends, wavelet_map
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip.record.record import Record
+    from stickslip.timefrequency import TimeFrequency
 
 SPAN = 80.0  # dB between the largest modulus and the threshold
 LEVELS = 18  # contour lines across them, as in the thesis
@@ -94,6 +97,61 @@ def plot_wavelet(
                 lines.set_linewidth(2.0)
         bar.outline.set_visible(False)
     return figure
+
+
+@styled
+def plot_stick(found: TimeFrequency) -> Figure:
+    """One stick from the middle of the record: its acceleration in pieces, and the map up to high frequencies.
+
+    Parameters
+    ----------
+    found : TimeFrequency
+        With ringing.
+
+    Returns
+    -------
+    Figure
+    """
+    ringing = found.ringing
+    assert ringing is not None
+    window = ringing.windows[len(ringing.windows) // 2]
+    margin = len(window.values) // 2
+    first, last = max(0, window.first - margin), min(len(found.record), window.first + len(window.values) + margin)
+    lowest = 0.3 * ringing.pole.imag / (2 * np.pi)
+    reach = int(2 * CENTRE / (2 * np.pi * lowest) * ringing.fs) + 1
+    around = found.record.rows(max(0, first - reach), min(len(found.record), last + reach))
+    wavelets = wavelet_map(around, found.channel, frequencies=(lowest, 0.4 * ringing.fs))
+    shown = wavelets.sel(time=slice(found.record.time[first], found.record.time[last - 1]))
+    figure = plot_wavelet(shown, record=found.record)
+    top = figure.axes[0]
+    for number, piece in enumerate(window.pieces):
+        begin, end = ringing.time(window, piece.first), ringing.time(window, piece.last)
+        if piece.kind == RING:
+            top.axvspan(begin, end, color=ORANGE, alpha=0.18, linewidth=0, label="rings" if number == 1 else None)
+        elif 0 < number < len(window.pieces) - 1:
+            top.axvspan(begin, end, color=SHADE, alpha=0.8, linewidth=0, label="micro-slip" if number == 2 else None)
+    top.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    return figure
+
+
+def plates_of(found: TimeFrequency) -> list[Plate]:
+    """The figures of a channel over time and frequency."""
+    record = found.record
+    words = (
+        "Above: the signal. Below: how strong each frequency is at each time, in decibel below the strongest; bright is "
+        "strong. Hatched: an end of the record is felt there. A band that runs along is a vibration; an upright spike is "
+        "a jump or a kink."
+    )
+    plates = [plate("map", plot_wavelet(found.wavelets, record=record), "Time and frequency", words)]
+    if found.ringing is not None:
+        plates.append(
+            plate("stick", plot_stick(found), "A stick, looked at closely",
+                  "A closed island is a contact that rings while the mass sticks; the spikes around it are where it "
+                  "sticks, slips by a little, and slips. The map reads lower than the mode where micro-slips cut it off.")
+        )  # fmt: skip
+    lines = plot_wavelet(found.wavelets, record=record, style="lines")
+    plates.append(plate("contours", lines, "The same map in contour lines", f"{LEVELS} lines span {SPAN:g} dB."))
+    return plates
 
 
 def decibels(wavelets: xr.DataArray, span: float = SPAN) -> Array:

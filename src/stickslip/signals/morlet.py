@@ -15,6 +15,7 @@ ACCURACY = {"double": 2e-11, "single": 1e-6}  # of the interpolation, where the 
 SPARE = 1.35  # samples per unit of bandwidth that a row is interpolated from
 MOST_PHASES = 64  # samples made of one
 FEWEST = 64  # samples that are interpolated from
+SHORT = 1 << 15  # samples, below which a whole transform costs less than the weights of an interpolation
 GROUP = 32  # outputs of one product of matrices, or more: fewer are slower than their inputs are copied
 AT_ONCE = 1 << 16  # outputs in the processor's cache
 
@@ -54,7 +55,7 @@ def _length(least: int) -> int:
     """A length that the transform is fast for, divisible by the numbers of phases."""
     from scipy.fft import next_fast_len
 
-    phases = min(MOST_PHASES, 1 << max(0, int(math.log2(max(least, 1) / FEWEST))) if least > FEWEST else 1)
+    phases = MOST_PHASES if least > SHORT else 1
     return int(next_fast_len(-(-least // phases))) * phases
 
 
@@ -88,7 +89,8 @@ def _fill(
     reach = REACH[precision]
     phases = 1
     while (
-        phases < MOST_PHASES
+        size > SHORT
+        and phases < MOST_PHASES
         and size % (2 * phases) == 0
         and size // (2 * phases) >= max(FEWEST, SPARE * 2 * reach * width)
     ):

@@ -1,0 +1,119 @@
+"""Micro-slips: how often, when and for how long does a sticking contact give way a little?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate, Result
+from stickslip.identify.ringing import Ringing, find_ringing
+from stickslip.record.record import Record
+from stickslip.statistics import mean_of_cycles
+
+QUESTION = "micro-slips"
+
+
+@dataclass(frozen=True)
+class MicroSlip:
+    """One micro-slip.
+
+    Attributes
+    ----------
+    time : float
+        When it begins [s].
+    duration : float
+        How long it lasts [s].
+    stick : int
+        Number of the stick it lies in.
+    """
+
+    time: float
+    duration: float
+    stick: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MicroSlips(Result):
+    """The micro-slips of a record.
+
+    Attributes
+    ----------
+    per_stick : Estimate
+        How many in one stick, mean of the sticks.
+    events : tuple of MicroSlip
+        In order.
+    counts : tuple of int
+        How many in each stick.
+    kind : str
+        "double stick-slip" where most sticks hold a micro-slip; "no micro-slips", or "some sticks slip".
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    per_stick: Estimate
+    events: tuple[MicroSlip, ...]
+    counts: tuple[int, ...]
+    kind: str
+    status: str
+
+
+def find_microslips(record: Record, *, channel: str = "a") -> MicroSlips:
+    """How many times does the contact slip by a little within each stick, when, and for how long?
+
+    While a compliant contact sticks it rings with the mass; where the friction limit cuts a swing off, the mass slips
+    until it stops again (thesis chapters 4 and 5: micro-slip; with the slip from one stick to the next it makes double
+    stick-slip). There the acceleration follows the drive alone, a parabola, and not the ring: the cuts between them are
+    found by dynamic programming, as in :func:`transition`. A micro-slip's begin is a kink of the acceleration and told
+    to a sample or two; its end is smoother and less sure.
+
+    Parameters
+    ----------
+    record : Record
+        With an acceleration; see :func:`transition`.
+    channel : str
+        The acceleration.
+
+    Returns
+    -------
+    MicroSlips
+
+    Raises
+    ------
+    EstimateError
+        "no transition": no stick.
+    RecordError
+        A channel that is missing or not finite, a broken clock.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> case = ss.scenarios.get("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)")
+    >>> record = ss.simulate(case.system, cycles=8).record(fs=4000).between(1.0, 3.2)
+    >>> found = find_microslips(record)
+    >>> found.kind, round(found.per_stick.value)
+    ('double stick-slip', 2)
+    """
+    return microslips_of(find_ringing(record, channel, question=QUESTION))
+
+
+def microslips_of(ringing: Ringing) -> MicroSlips:
+    """The micro-slips of sticks that are cut into pieces already."""
+    if ringing.silent:
+        raise EstimateError(
+            "no transition: the sticks do not ring",
+            "a micro-slip interrupts the ringing of a contact, and a mass at rest shows none",
+            "see mechanism(record) for what the sticks are like",
+        )
+    counts = tuple(len(window.glides) for window in ringing.windows)
+    events = tuple(
+        MicroSlip(ringing.time(window, piece.first), (piece.last - piece.first) / ringing.fs, number)
+        for number, window in enumerate(ringing.windows)
+        for piece in window.glides
+    )
+    share = sum(count > 0 for count in counts) / len(counts)
+    kind = "double stick-slip" if share > 0.5 else "some sticks slip" if share > 0 else "no micro-slips"
+    per_stick = mean_of_cycles(
+        "micro-slips per stick", [float(count) for count in counts], unit="1",
+        method="cuts between rings of one mode, by dynamic programming",
+    )  # fmt: skip
+    return MicroSlips(per_stick, events, counts, kind, ringing.sticks.status)
