@@ -99,6 +99,8 @@ def test_the_commands_run(folder: Path, line: str) -> None:
         elif command[1] == "decay":
             assert "damping ratio" in run.stdout
             assert (folder / run.stdout.split()[-1]).stat().st_size > 10_000, "the report that it names is there"
+        elif command[1] == "wavelet":
+            assert "jumps or kinks" in run.stdout
         else:
             assert command[1] == "analyze", f"a command whose answer no test looks at: {line}"
             assert "sliding friction" in run.stdout

@@ -93,6 +93,18 @@ if TYPE_CHECKING:
         wavelet_map as wavelet_map,
         wavelet_overview as wavelet_overview,
     )
+    from stickslip.signals.ridges import (
+        LocalMaximum as LocalMaximum,
+        Ridge as Ridge,
+        Spike as Spike,
+        find_ridges as find_ridges,
+        find_spikes as find_spikes,
+        local_maxima as local_maxima,
+    )
+    from stickslip.identify.mechanism import Mechanism as Mechanism, mechanism as mechanism
+    from stickslip.identify.microslip import find_microslips as find_microslips
+    from stickslip.identify.transition import Transition as Transition, transition as transition
+    from stickslip.timefrequency import TimeFrequency as TimeFrequency, time_frequency as time_frequency
     from stickslip.plot.wavelet import plot_wavelet as plot_wavelet
     from stickslip.drives import (
         Belt as Belt,
@@ -164,6 +176,11 @@ _ROOMS = {
     "differentiate": "signals.differentiate", "smooth": "signals.differentiate",
     "wavelet_map": "signals.wavelet", "wavelet_blocks": "signals.wavelet", "wavelet_overview": "signals.wavelet",
     "dyadic_map": "signals.wavelet", "stft_map": "signals.wavelet", "cone_of_influence": "signals.wavelet",
+    "find_ridges": "signals.ridges", "local_maxima": "signals.ridges", "find_spikes": "signals.ridges",
+    "Ridge": "signals.ridges", "LocalMaximum": "signals.ridges", "Spike": "signals.ridges",
+    "transition": "identify.transition", "Transition": "identify.transition",
+    "find_microslips": "identify.microslip", "mechanism": "identify.mechanism", "Mechanism": "identify.mechanism",
+    "time_frequency": "timefrequency", "TimeFrequency": "timefrequency",
     "inverse_wavelet": "signals.wavelet", "plot_wavelet": "plot.wavelet",
     "contact_stiffness": "identify.contact", "contact_damping": "identify.contact",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",

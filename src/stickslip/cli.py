@@ -21,7 +21,7 @@ import click
 import stickslip as ss
 
 if TYPE_CHECKING:
-    from stickslip import Case, Comparison, DecayFindings, Findings, Outcome, Record, RigSettings
+    from stickslip import Case, Comparison, DecayFindings, Findings, Outcome, Record, RigSettings, TimeFrequency
 
 INTERRUPTED = 130
 SHOWN_EVENTS = 12
@@ -339,6 +339,63 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
 
 @main.command()
 @click.argument("file")
+@click.option("--channel", metavar="NAME", help="Which channel; a, sound, force, load, friction, v or x unless given.")
+@click.option("--frequencies", metavar="LOW:HIGH", help="Range of the map in Hz; what the record allows unless given.")
+@click.option(
+    "--wavelet-frequency", type=float, default=4.5, show_default=True, help="Oscillations of a wavelet, in radians."
+)
+@click.option(
+    "--normalisation",
+    type=click.Choice(["energy", "amplitude"]),
+    default="energy",
+    show_default=True,
+    help="What a modulus means: the thesis's, or a tone's amplitude.",
+)
+@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, or with its unit, for the contact's stiffness.")
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit, for the same.")
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for the results; FILE-wavelet unless given.",
+)
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print the results as JSON and nothing else; a folder is written only with --output.",
+)
+@_reading
+def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | None, **options: Any) -> None:
+    """Map a channel over time and frequency, and tell what its sticks are like.
+
+    Of an acceleration: at which frequency the contact rings while the mass sticks, how many micro-slips there are,
+    and which mechanism that shows. FILE may be several joined with +, as in x.mat+a.mat.
+
+    \b
+    stickslip wavelet run.csv --channels "a=acc [m/s^2]" --mass 2.42 --stiffness 2310
+    stickslip wavelet squeal.ogg --frequencies 500:8000 --wavelet-frequency 20
+    """
+    groups = _groups(file)
+    if len(groups) != 1:
+        raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is mapped at a time", param_hint="FILE")
+    asked = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation", "mass", "stiffness")}
+    rig = _rig(**options)
+    folder = output or (None if as_json else Path(f"{groups[0][0].stem}-wavelet"))
+    with _progress(3) as tell:
+        tell(f"reading {_name(groups[0])}", 0)
+        record = _read(groups[0], rig)
+        tell("mapping", 1)
+        for name in ("mass", "stiffness"):
+            asked[name] = asked[name] if asked[name] is not None else getattr(rig, name)
+        found = ss.time_frequency(record, frequencies=_range(frequencies), **asked)
+        tell("drawing and writing", 2)
+        written = ss.publish(found, folder=folder) if folder else None
+    _show(found, written, as_json=as_json)
+
+
+@main.command()
+@click.argument("file")
 @_reading
 def check(file: str, **options: Any) -> None:
     """Tell what is wrong with a record, with row numbers."""
@@ -383,6 +440,16 @@ def datasets(name: str | None) -> None:
         return
     for each in ss.datasets.names():
         click.echo(f"{ss.datasets.info(each)}\n")
+
+
+def _range(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        low, high = (float(end) for end in text.split(":"))
+    except ValueError as error:
+        raise click.BadParameter(f"'{text}' is not LOW:HIGH in Hz", param_hint="--frequencies") from error
+    return low, high
 
 
 def _case(name: str, *, duration: str | None, cycles: float | None, changes: Sequence[str], fs: str | None) -> Case:
@@ -564,7 +631,9 @@ def _progress(steps: int) -> Iterator[Callable[[str, float], None]]:
         progress.stop()
 
 
-def _show(results: Findings | Comparison | list[DecayFindings], written: Path | None, *, as_json: bool) -> None:
+def _show(
+    results: Findings | Comparison | TimeFrequency | list[DecayFindings], written: Path | None, *, as_json: bool
+) -> None:
     if as_json:
         told = {"records": [each.to_dict() for each in results]} if isinstance(results, list) else results.to_dict()
         click.echo(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
@@ -578,7 +647,7 @@ def _show(results: Findings | Comparison | list[DecayFindings], written: Path | 
         click.echo(f"Report: {written / 'report.html'}")
 
 
-def _print_table(console: Any, results: Findings | Comparison | DecayFindings) -> None:
+def _print_table(console: Any, results: Findings | Comparison | TimeFrequency | DecayFindings) -> None:
     from rich.markup import escape
 
     summary = ss.summary(results)

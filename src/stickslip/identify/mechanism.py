@@ -27,6 +27,7 @@ MEANINGS = {
     UNTOLD: "no mechanism stands out",
 }
 SURE = 0.8  # probability that a verdict has at least
+FASTEST = 10.0  # cycles of the mode in a window: there the search for it ends
 STRANGE = 4.5  # standard deviations from what the simulated records of its kind were like
 
 
@@ -37,8 +38,8 @@ class Mechanism:
     Attributes
     ----------
     name : str
-        "bare spikes", "oscillation without micro-slip", "double stick-slip", "non-sinusoidal oscillation", or "cannot be
-        told from this record".
+        "bare spikes", "oscillation without micro-slip", "double stick-slip", "non-sinusoidal oscillation", or
+        "cannot be told from this record".
     probability : float
         Of that name, among the four; NaN where it can not be told at all.
     probabilities : mapping of str to float
@@ -74,10 +75,10 @@ class Mechanism:
 def mechanism(record: Record, *, channel: str = "a") -> Mechanism:
     """Do the sticks show a rigid contact, a compliant one with or without micro-slips, or friction with a memory?
 
-    What the thesis read from wavelet maps by eye (chapter 5). The sticks are cut into rings of one mode and glides, as in
-    :func:`transition`; features of the pieces are weighed by multinomial logistic regression. Its weights were fitted
-    to simulated records of the four kinds with random parameters, at signal-to-noise ratios of 22 to 50 dB, so that the
-    probabilities hold for such records; a record unlike all of them is not told.
+    What the thesis read from wavelet maps by eye (chapter 5). The sticks are cut into rings of one mode and glides,
+    as in :func:`transition`; features of the pieces are weighed by multinomial logistic regression. Its weights were
+    fitted to simulated records of the four kinds with random parameters, at signal-to-noise ratios of 22 to 50 dB, so
+    that the probabilities hold for such records; a record unlike all of them is not told.
 
     Parameters
     ----------
@@ -112,6 +113,9 @@ def mechanism(record: Record, *, channel: str = "a") -> Mechanism:
 def mechanism_of(ringing: Ringing) -> Mechanism:
     """The mechanism of sticks that are cut into pieces already."""
     found, table = features(ringing), _learnt()
+    if found["frequency"] >= FASTEST and not ringing.silent:
+        reason = f"what rings in the sticks is faster than {FASTEST:g} cycles in each, and was not looked for"
+        return Mechanism(UNTOLD, math.nan, features=found, reason=reason)
     vector = columns(found)
     scaled = (vector - np.array(table["mean"])) / np.array(table["sd"])
     score = np.array(table["weights"]) @ np.append(scaled, 1.0)
@@ -160,8 +164,8 @@ def columns(found: Mapping[str, float]) -> NDArray[np.float64]:
     """The features as the regression takes them: logarithms and bounds keep single ones from deciding alone."""
     return np.array([
         math.log10(found["loudness"] + 0.005),
-        math.log10(min(max(found["excess"], 0.7), 10.0)),
-        math.log10(min(max(found["rest"] / max(found["excess"], 1e-3), 1.0), 1e3)),
+        math.log10(min(max(found["excess"], 1.0), 10.0)),
+        math.log10(min(max(found["rest"] / max(found["excess"], 1.0), 1.0), 1e3)),
         math.log10(min(max(found["noise"], 3e-3), 0.3)),
         min(found["glides"], 6.0),
         min(found["glides"], 1.0),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,7 +147,7 @@ def with_velocity(record: Record, channel: str, question: str) -> Record:
     cycle = fs / frequency
     if not 32 <= cycle <= len(values) / 3:
         raise EstimateError(
-            f"the strongest line of {channel}, {frequency:.4g} Hz, has {cycle:.3g} samples a cycle and "
+            f"no transition: the strongest line of {channel}, {frequency:.4g} Hz, has {cycle:.3g} samples a cycle and "
             f"{len(values) / cycle:.3g} cycles",
             f"{question} of an acceleration alone needs three cycles of 32 samples at least",
             "give a longer record, or one with x or v",
@@ -205,8 +206,9 @@ def _shortest(pole: complex, fs: float) -> int:
 
 def _pole(windows: list[Array], fs: float, noise: float, sticks: Sticks) -> complex:
     """The mode that leaves the least cost, on averaged samples."""
-    from scipy.optimize import minimize
+    from scipy import optimize
 
+    minimize: Any = optimize.minimize
     block = max(1, int(np.median([len(values) for values in windows])) // COARSE)
     short = [values[: len(values) // block * block].reshape(-1, block).mean(axis=1) for values in windows]
     durations = [event.duration for event in sticks.events if event.kind == "stick" and event.whole]
@@ -218,6 +220,9 @@ def _pole(windows: list[Array], fs: float, noise: float, sticks: Sticks) -> comp
         shortest = max(3, round(SETTLED / frequency * rate))
         return float(splitter.cost(_mode(frequency, damping) / rate, shortest).sum())
 
+    def of_pole(parameters: Any) -> Any:
+        return cost(some, math.exp(parameters[0]), float(parameters[1]))
+
     lowest, highest = FREQUENCIES[0] / long, min(FREQUENCIES[-1] / long, rate / 5)
     few = Splitter(short[:: max(1, len(short) // 6)][:6], variance, PENALTY)
     grid = [(cost(few, f, z), f, z) for f in FREQUENCIES / long if f <= highest for z in DAMPINGS]
@@ -228,13 +233,9 @@ def _pole(windows: list[Array], fs: float, noise: float, sticks: Sticks) -> comp
     some = Splitter(short[:: max(1, len(short) // 16)][:16], variance, PENALTY)
     tried = []
     for _, f, z in sorted(grid)[:STARTS]:
-        corners = [(math.log(f), z), (math.log(f) + 0.05, z), (math.log(f), 1.4 * z + 0.01)]
-        tried.append(
-            minimize(
-                lambda p: cost(some, math.exp(p[0]), p[1]), corners[0], method="Nelder-Mead",
-                options={"xatol": 5e-4, "fatol": 0.2, "maxiter": 40, "initial_simplex": corners},
-            )
-        )  # fmt: skip
+        corners = np.array([(math.log(f), z), (math.log(f) + 0.05, z), (math.log(f), 1.4 * z + 0.01)])
+        options: dict[str, Any] = {"xatol": 5e-4, "fatol": 0.2, "maxiter": 40, "initial_simplex": corners}
+        tried.append(minimize(of_pole, corners[0], method="Nelder-Mead", options=options))
     found = min(tried, key=lambda each: float(each.fun)).x
     return _mode(math.exp(found[0]), float(found[1]))
 

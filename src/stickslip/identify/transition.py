@@ -240,7 +240,8 @@ def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> _Mode | None:
     found = nonlinear(left, [start.real, start.imag], x_scale=[scale, scale], jac="3-point", method="lm", max_nfev=60)
     linear = sum(2 * len(rows) + 2 for _, rows in used)
     free = len(found.fun) - linear - 2
-    normal = found.jac.T @ found.jac
+    slopes = np.asarray(found.jac)
+    normal = slopes.T @ slopes
     if free < 4 or not np.isfinite(normal).all() or np.linalg.cond(normal) > 1e12:
         return None
     variance = float(found.fun @ found.fun) / free
@@ -320,8 +321,12 @@ def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: _Mode)
         inside = moduli[:, window.first - first : window.first - first + len(window.values)]
         ridge = inside.max(axis=1)
         peak = int(ridge[1:-1].argmax()) + 1
-        higher = ridge[peak] >= ridge[peak - 1] and ridge[peak] >= ridge[peak + 1]
-        found.append(float(wanted[peak]) if higher else math.nan)
+        low, middle, high = np.log(np.maximum(ridge[peak - 1 : peak + 2], 1e-300)).tolist()
+        bend = low - 2 * middle + high
+        higher = bend < 0 and middle >= max(low, high)
+        found.append(
+            float(wanted[peak] * (wanted[1] / wanted[0]) ** (0.5 * (low - high) / bend)) if higher else math.nan
+        )
     return found
 
 

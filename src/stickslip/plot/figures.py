@@ -12,18 +12,20 @@ from stickslip.plot.decay import plates_of as decay_plates
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
+from stickslip.timefrequency import TimeFrequency
 
 if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory
 
 
-def figures(result: Findings | Comparison | DecayFindings | Trajectory) -> tuple[Plate, ...]:
+def figures(result: Findings | Comparison | DecayFindings | TimeFrequency | Trajectory) -> tuple[Plate, ...]:
     """The figures that show a result, in reading order.
 
     Parameters
     ----------
-    result : Findings, Comparison, DecayFindings or Trajectory
-        What :func:`analyze`, :func:`compare`, :func:`analyze_decay` or :func:`simulate` returned.
+    result : Findings, Comparison, DecayFindings, TimeFrequency or Trajectory
+        What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`time_frequency` or :func:`simulate`
+        returned.
 
     Returns
     -------
@@ -44,6 +46,10 @@ def figures(result: Findings | Comparison | DecayFindings | Trajectory) -> tuple
         return tuple(_of_findings(result))
     if isinstance(result, DecayFindings):
         return tuple(decay_plates(result))
+    if isinstance(result, TimeFrequency):
+        from stickslip.plot.wavelet import plates_of as plates_of_map
+
+        return tuple(plates_of_map(result))
     from stickslip.plot.trajectory import plates_of
 
     return plates_of(result)

@@ -117,7 +117,7 @@ def plot_stick(found: TimeFrequency) -> Figure:
     window = ringing.windows[len(ringing.windows) // 2]
     margin = len(window.values) // 2
     first, last = max(0, window.first - margin), min(len(found.record), window.first + len(window.values) + margin)
-    lowest = 0.3 * ringing.pole.imag / (2 * np.pi)
+    lowest = 0.4 * ringing.pole.imag / (2 * np.pi)
     reach = int(2 * CENTRE / (2 * np.pi * lowest) * ringing.fs) + 1
     around = found.record.rows(max(0, first - reach), min(len(found.record), last + reach))
     wavelets = wavelet_map(around, found.channel, frequencies=(lowest, 0.4 * ringing.fs))
@@ -138,16 +138,16 @@ def plates_of(found: TimeFrequency) -> list[Plate]:
     """The figures of a channel over time and frequency."""
     record = found.record
     words = (
-        "Above: the signal. Below: how strong each frequency is at each time, in decibel below the strongest; bright is "
-        "strong. Hatched: an end of the record is felt there. A band that runs along is a vibration; an upright spike is "
-        "a jump or a kink."
+        "Above: the signal. Below: how strong each frequency is at each time, in decibel below the strongest; bright "
+        "is strong. Hatched: an end of the record is felt there. A band that runs along is a vibration; an upright "
+        "spike is a jump or a kink."
     )
     plates = [plate("map", plot_wavelet(found.wavelets, record=record), "Time and frequency", words)]
     if found.ringing is not None:
         plates.append(
             plate("stick", plot_stick(found), "A stick, looked at closely",
                   "A closed island is a contact that rings while the mass sticks; the spikes around it are where it "
-                  "sticks, slips by a little, and slips. The map reads lower than the mode where micro-slips cut it off.")
+                  "sticks, slips by a little, and slips. The map reads lower than the mode where micro-slips cut in.")
         )  # fmt: skip
     lines = plot_wavelet(found.wavelets, record=record, style="lines")
     plates.append(plate("contours", lines, "The same map in contour lines", f"{LEVELS} lines span {SPAN:g} dB."))

@@ -16,12 +16,15 @@ from stickslip.decays import DecayFindings
 from stickslip.errors import ModelError, RecordError
 from stickslip.plot.plate import Plate
 from stickslip.reports.page import render, sections_of
+from stickslip.timefrequency import TimeFrequency
 
 PROGRAM = "stickslip"
 NUMBERS = "results.json"
 
 
-def publish(results: Findings | Comparison | DecayFindings | Sequence[DecayFindings], *, folder: str | Path) -> Path:
+def publish(
+    results: Findings | Comparison | TimeFrequency | DecayFindings | Sequence[DecayFindings], *, folder: str | Path
+) -> Path:
     """Write ``report.html``, ``results.json`` and the figures as SVG and PNG into a folder.
 
     The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
@@ -29,8 +32,8 @@ def publish(results: Findings | Comparison | DecayFindings | Sequence[DecayFindi
 
     Parameters
     ----------
-    results : Findings, Comparison, DecayFindings or a sequence of these
-        What :func:`analyze`, :func:`compare` or :func:`analyze_decay` returned.
+    results : Findings, Comparison, TimeFrequency, DecayFindings or a sequence of these
+        What :func:`analyze`, :func:`compare`, :func:`time_frequency` or :func:`analyze_decay` returned.
     folder : path
         The folder to make.
 

@@ -18,6 +18,7 @@ from stickslip.plot.figures import figures
 from stickslip.plot.plate import Plate
 from stickslip.record.record import Record
 from stickslip.reports.summary import Summary, summary
+from stickslip.timefrequency import TimeFrequency
 
 TEMPLATE = "page.html.jinja"
 _COLOURS = {
@@ -35,7 +36,13 @@ class Section:
 
 
 def report(
-    results: Findings | Comparison | Estimate | Sequence[Estimate] | DecayFindings | Sequence[DecayFindings],
+    results: Findings
+    | Comparison
+    | TimeFrequency
+    | Estimate
+    | Sequence[Estimate]
+    | DecayFindings
+    | Sequence[DecayFindings],
     record: Record | None,
     path: str | Path,
 ) -> Path:
@@ -43,7 +50,7 @@ def report(
 
     Parameters
     ----------
-    results : Findings, Comparison, DecayFindings, Estimate, or a sequence of the last two
+    results : Findings, Comparison, TimeFrequency, DecayFindings, Estimate, or a sequence of the last two
         What was found.
     record : Record or None
         Where plain estimates were found: its faults, channels and history are told. Findings bring their own.
@@ -76,7 +83,13 @@ def report(
 
 
 def sections_of(
-    results: Findings | Comparison | Estimate | Sequence[Estimate] | DecayFindings | Sequence[DecayFindings],
+    results: Findings
+    | Comparison
+    | TimeFrequency
+    | Estimate
+    | Sequence[Estimate]
+    | DecayFindings
+    | Sequence[DecayFindings],
     record: Record | None = None,
 ) -> list[Section]:
     """The sections of the page, with their figures drawn."""
@@ -86,7 +99,7 @@ def sections_of(
     if isinstance(results, Comparison):
         parts: list[Findings | Comparison] = [results, *results.findings]
         return [Section(summary(part), figures(part)) for part in parts]
-    if isinstance(results, Findings):
+    if isinstance(results, Findings | TimeFrequency):
         return [Section(summary(results), figures(results))]
     return [Section(summary(cast(Sequence[Estimate], results), record=record))]
 

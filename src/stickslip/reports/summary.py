@@ -12,7 +12,8 @@ from stickslip.estimate import Estimate
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record, Step
 from stickslip.reports import decay
-from stickslip.reports.words import cautions, headline, interval_of, number, value_of
+from stickslip.reports.words import cautions, doubts, headline, interval_of, number, ringing_told, value_of
+from stickslip.timefrequency import TimeFrequency
 
 _CONSTANT_UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 
@@ -88,13 +89,15 @@ class Summary:
 
 
 def summary(
-    results: Findings | DecayFindings | Comparison | Estimate | Sequence[Estimate], *, record: Record | None = None
+    results: Findings | DecayFindings | Comparison | TimeFrequency | Estimate | Sequence[Estimate],
+    *,
+    record: Record | None = None,
 ) -> Summary:
     """What is told of a result: sentences for a person, the table, cautions, settings, history.
 
     Parameters
     ----------
-    results : Findings, DecayFindings, Comparison, Estimate or sequence of Estimate
+    results : Findings, DecayFindings, Comparison, TimeFrequency, Estimate or sequence of Estimate
         What was found.
     record : Record, optional
         Where plain estimates were found; Findings bring their own.
@@ -118,6 +121,8 @@ def summary(
         return _of_comparison(results)
     if isinstance(results, Findings | DecayFindings):
         return _of_findings(results)
+    if isinstance(results, TimeFrequency):
+        return _of_time_frequency(results)
     return _of_estimates([results] if isinstance(results, Estimate) else list(results), record)
 
 
@@ -133,6 +138,20 @@ def _of_findings(findings: Findings | DecayFindings) -> Summary:
         findings.name, told, cautions(findings),
         lines=[_line(estimate, findings.true_value(estimate)) for estimate in estimates],
         faults=[str(fault) for fault in findings.faults], notes=notes, settings=settings,
+        channels=list(record.channels.values()), history=record.history,
+    )  # fmt: skip
+
+
+def _of_time_frequency(found: TimeFrequency) -> Summary:
+    record = found.record
+    return Summary(
+        found.name, list(ringing_told(found)), doubts(found.estimates), lines=[_line(each) for each in found.estimates],
+        faults=[str(fault) for fault in record.check()], notes=found.notes,
+        settings={
+            "channel": found.channel, "wavelet frequency": f"{found.wavelets.attrs['wavelet_frequency']:g}",
+            "normalisation": str(found.wavelets.attrs["normalisation"]), "sampling rate": f"{record.fs:g} Hz",
+            "length": f"{len(record)} samples, {record.duration:g} s",
+        },
         channels=list(record.channels.values()), history=record.history,
     )  # fmt: skip
 

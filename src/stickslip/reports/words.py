@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from stickslip.analysis import Comparison, Findings
 from stickslip.decays import DecayFindings
 from stickslip.estimate import NORMAL_95, Estimate, decimals
 from stickslip.plot.style import prefixed
+from stickslip.timefrequency import TimeFrequency
 
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
@@ -61,15 +62,46 @@ def headline(result: Findings | Comparison) -> list[str]:
 
 def cautions(findings: Findings | DecayFindings) -> list[str]:
     """What should keep the reader from trusting a number."""
-    doubts: dict[str, list[str]] = {}
-    for estimate in findings.estimates:
-        if estimate.status != "ok":
-            doubts.setdefault(estimate.status, []).append(estimate.name)
-    flagged = [_sentence(f"{', '.join(names)}: {status}.") for status, names in doubts.items()]
+    flagged = doubts(findings.estimates)
     if findings.faults:
         many = len(findings.faults)
         flagged.append(f"The check-up found {many} fault{'s' * (many > 1)} in the record, listed below.")
     return flagged
+
+
+def doubts(estimates: Sequence[Estimate]) -> list[str]:
+    """The estimates that are flagged, with the reason, each reason once."""
+    flagged: dict[str, list[str]] = {}
+    for estimate in estimates:
+        if estimate.status != "ok":
+            flagged.setdefault(estimate.status, []).append(estimate.name)
+    return [_sentence(f"{', '.join(names)}: {status}.") for status, names in flagged.items()]
+
+
+def ringing_told(found: TimeFrequency) -> Iterator[str]:
+    """What a channel holds over time and frequency, in a few sentences."""
+    if found.mechanism is not None:
+        sure = f" (probability {found.mechanism.probability:.2f})" if math.isfinite(found.mechanism.probability) else ""
+        yield _sentence(f"{found.mechanism.name}{sure}: {found.mechanism.reason.rstrip('.')}.")
+    if found.transition is not None:
+        ring = found.transition
+        yield (
+            f"In the sticks the contact rings at {value_of(ring.frequency)} (95 % sure: {interval_of(ring.frequency)}) "
+            f"with a damping ratio of {value_of(ring.damping)}; {ring.agreement}."
+        )
+        if ring.stiffness is not None:
+            yield f"That takes a contact of {value_of(ring.stiffness)} (95 % sure: {interval_of(ring.stiffness)})."
+    if found.microslips is not None:
+        slips = found.microslips
+        yield f"{len(slips.events)} micro-slips are found in {len(slips.counts)} sticks: {slips.kind}."
+    if found.ridges:
+        ridge = found.ridges[0]
+        low, high = (number(float(end(ridge.frequency)), 0.0, "Hz") for end in (np.min, np.max))
+        span = low if low == high else f"{low} to {high}"
+        yield f"The strongest ridge of the map: {span}, from {ridge.time[0]:.4g} s to {ridge.time[-1]:.4g} s."
+    if found.spikes:
+        groups = found.spikes[-1].group + 1
+        yield f"The signal jumps or kinks {len(found.spikes)} times, in {groups} group{'s' * (groups > 1)}."
 
 
 def _of_findings(findings: Findings) -> Iterator[str]:

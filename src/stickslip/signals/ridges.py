@@ -22,6 +22,7 @@ STEP = 0.25  # of the shortest scale: the columns of a map that are looked at
 LEVEL_STEP = 0.5  # dB: how finely a prominence is told
 OCTAVES, VOICES = (1 / 16, 1 / 4), 4  # of the rate: where spikes are looked for
 FLOOR = 1e-7  # of a row's largest modulus, below which nothing is told
+BLIND = 6.0  # wavelet frequency: one of 4.5 sees exp(-10) of the level, which may be more than a kink
 FLAT = 0.5  # of a spike's level that every frequency reaches: a tone does not
 
 
@@ -172,9 +173,7 @@ def local_maxima(wavelets: xr.DataArray, *, prominence: float = 3.0, span: float
     from scipy.ndimage import label, maximum_filter
 
     if not prominence > 0:
-        raise RecordError(
-            f"prominence = {prominence} dB", "a peak stands out by more than nothing", "give a positive one"
-        )
+        raise RecordError(f"prominence = {prominence} dB", "a peak stands out by more than 0 dB", "give a positive one")
     modulus, times, frequencies = _coarse(wavelets)
     if not modulus.any():
         return ()
@@ -246,7 +245,7 @@ def find_spikes(
     from scipy.signal import find_peaks
 
     wanted = np.asarray(OCTAVES) * record.fs if frequencies is None else np.asarray(frequencies, dtype=float)
-    wavelets = wavelet_map(record, channel, frequencies=wanted, voices=VOICES)
+    wavelets = wavelet_map(record, channel, frequencies=wanted, voices=VOICES, wavelet_frequency=BLIND)
     modulus = np.abs(wavelets.values)
     largest = modulus.max(axis=1, keepdims=True)
     if not largest.all():
@@ -254,14 +253,20 @@ def find_spikes(
     about = np.maximum(np.median(modulus, axis=1, keepdims=True), FLOOR * largest)
     level = 20 * np.log10(np.maximum(modulus, FLOOR * largest) / about)
     mean = level.mean(axis=0)
-    apart = max(1, math.ceil(float(wavelets.scale.min()) * record.fs))
+    apart = max(1, math.ceil(float(wavelets.scale.max()) * record.fs))
     peaks, _ = find_peaks(mean, height=threshold, distance=apart)
     broad = [
         row for row in peaks if (level[:, max(0, row - apart) : row + apart + 1].max(axis=1) > FLAT * mean[row]).all()
     ]  # fmt: skip
-    times = record.time[np.asarray(broad, dtype=np.intp)]
+    times = record.start + np.array([_centre(mean, int(row), apart // 2) for row in broad]) / record.fs
     groups = _grouped(times, within)
     return tuple(Spike(float(t), float(mean[r]), int(g)) for t, r, g in zip(times, broad, groups, strict=True))
+
+
+def _centre(level: Array, row: int, reach: int) -> float:
+    """Where the power about a peak has its centre, in samples."""
+    rows = np.arange(max(0, row - reach), min(len(level), row + reach + 1))
+    return float(np.average(rows, weights=10 ** (level[rows] / 10)))
 
 
 def _grouped(times: Array, within: float | None) -> NDArray[np.intp]:
@@ -310,4 +315,4 @@ def _refined(level: Array, rows: NDArray[np.intp], columns: NDArray[np.intp]) ->
     bend = low - 2 * middle + high
     shift = np.where(bend < 0, 0.5 * (low - high) / np.where(bend < 0, bend, -1.0), 0.0)
     shift = np.clip(shift, -0.5, 0.5)
-    return rows + shift, middle - 0.25 * (low - high) * shift
+    return np.asarray(rows + shift, dtype=float), middle - 0.25 * (low - high) * shift

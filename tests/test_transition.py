@@ -1,0 +1,195 @@
+"""What sticks tell, on simulated truth: the mode, the micro-slips, the mechanism; and what is refused."""
+
+from __future__ import annotations
+
+import functools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import stickslip as ss
+from stickslip.cli import main
+from stickslip.errors import EstimateError, RecordError
+from stickslip.identify.mechanism import UNTOLD
+
+MASS, SPRING, CONTACT, FS = 2.42, 2310.0, 192000.0, 4000.0
+
+
+def compliant(kinetic: float, damping: float) -> ss.CompliantContact:
+    return ss.CompliantContact(kinetic=kinetic, stiffness=CONTACT, damping=damping)
+
+
+@functools.cache
+def truth(name: str, cycles: int = 10) -> tuple[ss.Record, ss.Trajectory]:
+    """The thesis's case of 2.5 Hz with the contact of that name, once it is steady."""
+    laws = {
+        "rigid": ss.Coulomb(kinetic=1.1),
+        "two": compliant(1.1, 23.8635),
+        "one": compliant(1.1, 200.0),
+        "none": compliant(1.1, 320.0),
+        "state": ss.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
+    }
+    drive = ss.HarmonicBase(amplitude=0.6e-3 if name == "state" else 0.65e-3, frequency=2.5)
+    run = ss.simulate(ss.Oscillator(mass=MASS, stiffness=SPRING, law=laws[name], drive=drive), cycles=6 + cycles)
+    return run.record(fs=FS).between(2.4, 2.4 + cycles / 2.5), run
+
+
+def noisy(name: str, level: float, seed: int = 0, cycles: int = 10) -> ss.Record:
+    """The acceleration alone, with white noise `level` decibel below it."""
+    clean = truth(name, cycles)[0]
+    values, rng = clean["a"], np.random.default_rng(seed)
+    values = values + rng.normal(size=len(values)) * values.std() * 10 ** (-level / 20)
+    return ss.Record.of({"a": values}, fs=FS, start=clean.start)
+
+
+def test_the_mode_of_a_contact_without_noise() -> None:
+    found = ss.transition(truth("two")[0], mass=MASS, stiffness=SPRING)
+    damping = 23.8635 / (2 * np.sqrt(MASS * (SPRING + CONTACT)))
+    natural = np.sqrt((SPRING + CONTACT) / MASS)
+    assert found.frequency.value == pytest.approx(natural * np.sqrt(1 - damping**2) / (2 * np.pi), rel=2e-4)
+    assert found.damping.value == pytest.approx(damping, rel=0.01)
+    assert found.stiffness is not None
+    assert found.stiffness.value == pytest.approx(CONTACT, rel=1e-3)
+    assert found.loop_stiffness is not None
+    assert found.loop_stiffness.value == pytest.approx(CONTACT, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["two", "one", "none"])
+def test_the_mode_at_40_db(name: str) -> None:
+    damping = truth(name)[1].system.law.damping / (2 * np.sqrt(MASS * (SPRING + CONTACT)))
+    true = np.sqrt((SPRING + CONTACT) / MASS * (1 - damping**2)) / (2 * np.pi)
+    found = ss.transition(noisy(name, 40), mass=MASS, stiffness=SPRING)
+    assert found.frequency.value == pytest.approx(true, rel=3e-3)
+    assert found.frequency.sd < 1e-3 * true * 2
+    assert abs(found.frequency.value - true) < 4 * found.frequency.sd
+    assert abs(found.damping.value - damping) < 5 * found.damping.sd
+    assert len(found.sticks) >= 16
+    within = [abs(stick.frequency.value - true) < 4 * stick.frequency.sd for stick in found.sticks]
+    assert np.mean(within) > 0.9
+
+
+def test_the_wavelet_reads_low_where_micro_slips_cut_in() -> None:
+    """The local maximum of the simulated transition, by the thesis's wavelet: 39.0 Hz at 1.1 N."""
+    found = ss.transition(truth("two")[0])
+    assert found.wavelet_frequency.value == pytest.approx(39.0, rel=0.02)
+    assert "lower" in found.agreement
+
+
+@pytest.mark.parametrize(("name", "count"), [("two", 2), ("one", 1), ("none", 0)])
+def test_micro_slips_are_counted_and_timed(name: str, count: int) -> None:
+    record, run = noisy(name, 40), truth(name)[1]
+    found = ss.find_microslips(record)
+    assert found.per_stick.value == pytest.approx(count, abs=0.1)
+    assert found.kind == ("double stick-slip" if count else "no micro-slips")
+    slips = [event.time for event in run.events if event.kind == "slip"]
+    ends = [event.time for event in run.events if event.kind == "microstick"]
+    for event in found.events:
+        nearest = min(slips, key=lambda time: abs(time - event.time))
+        assert abs(nearest - event.time) < 0.5e-3
+        end = min(end for end in ends if end > nearest)
+        assert abs(end - event.time - event.duration) < 3e-3  # the end is smooth
+
+
+@pytest.mark.parametrize(
+    ("name", "mechanism"),
+    [
+        ("rigid", "bare spikes"),
+        ("two", "double stick-slip"),
+        ("one", "double stick-slip"),
+        ("none", "oscillation without micro-slip"),
+        ("state", "non-sinusoidal oscillation"),
+    ],
+)
+@pytest.mark.parametrize("level", [40, 25])
+def test_the_mechanism_is_named(name: str, mechanism: str, level: float) -> None:
+    found = ss.mechanism(noisy(name, level, cycles=6))
+    assert max(found.probabilities, key=lambda each: found.probabilities[each]) == mechanism
+    assert sum(found.probabilities.values()) == pytest.approx(1)
+
+
+def test_a_rigid_contact_has_no_transition() -> None:
+    with pytest.raises(EstimateError, match="no transition"):
+        ss.transition(noisy("rigid", 40))
+    with pytest.raises(EstimateError, match="no transition"):
+        ss.find_microslips(noisy("rigid", 40))
+
+
+def spurious(kind: str) -> ss.Record:
+    t, rng = np.arange(16000) / FS, np.random.default_rng(3)
+    values = {
+        "noise": rng.normal(size=t.size),
+        "tone": np.sin(2 * np.pi * 2.5 * t) + rng.normal(0, 1e-3, t.size),
+        "fast tone": np.sin(2 * np.pi * 45 * t),
+        "two tones": np.sin(2 * np.pi * 2.5 * t) + 0.3 * np.sin(2 * np.pi * 45 * t) + rng.normal(0, 0.01, t.size),
+        "constant": np.full(t.size, 9.81),
+    }
+    return ss.Record.of({"a": values[kind]}, fs=FS)
+
+
+@pytest.mark.parametrize("kind", ["noise", "tone", "fast tone", "two tones", "constant"])
+def test_what_never_sticks_has_no_transition(kind: str) -> None:
+    record = spurious(kind)
+    with pytest.raises(EstimateError, match=r"no transition|constant"):
+        ss.transition(record)
+    found = ss.mechanism(record)
+    assert found.name == UNTOLD
+    assert found.reason
+
+
+def test_bad_records_are_refused() -> None:
+    with pytest.raises(RecordError, match="channel a is missing"):
+        ss.transition(ss.Record.of({"x": np.arange(300.0)}, fs=FS))
+    broken = truth("two")[0]["a"].copy()
+    broken[100] = np.nan
+    with pytest.raises(RecordError, match="fill_missing"):
+        ss.mechanism(ss.Record.of({"a": broken}, fs=FS))
+    with pytest.raises(EstimateError, match="mass is positive"):
+        ss.transition(noisy("none", 40, cycles=6), mass=-1)
+
+
+def test_the_answer_does_not_know_units_of_time_and_length() -> None:
+    """Ten times as fast and a thousand times as large: the same pieces."""
+    slow = noisy("one", 40, cycles=6)
+    fast = ss.Record.of({"a": 1000 * slow["a"]}, fs=10 * FS)
+    one, two = ss.transition(slow), ss.transition(fast)
+    assert two.frequency.value == pytest.approx(10 * one.frequency.value, rel=1e-6)
+    assert two.damping.value == pytest.approx(one.damping.value, rel=1e-6)
+    assert ss.find_microslips(fast).counts == ss.find_microslips(slow).counts
+
+
+def test_everything_at_once() -> None:
+    found = ss.time_frequency(noisy("two", 40, cycles=6), mass="2.42 kg", stiffness="2.31 N/mm")
+    assert found.transition is not None
+    assert found.microslips is not None
+    assert found.transition.stiffness is not None
+    assert [plate.name for plate in ss.figures(found)] == ["map", "stick", "contours"]
+    told = found.to_dict()
+    assert json.loads(json.dumps(told, allow_nan=False))["channel"] == "a"
+    sentences = " ".join(ss.summary(found).headline)
+    assert "the contact rings at 45" in sentences
+
+
+def test_a_channel_that_is_no_acceleration_is_mapped_alone() -> None:
+    record = ss.Record.of({"x": np.sin(2 * np.pi * 40 * np.arange(8000) / 1000)}, fs=1000.0)
+    found = ss.time_frequency(record)
+    assert (found.channel, found.mechanism, found.transition) == ("x", None, None)
+    assert float(np.median(found.ridges[0].frequency)) == pytest.approx(40, rel=0.01)
+    assert "no acceleration" in found.notes[-1]
+
+
+def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    ss.write_record(noisy("two", 40, cycles=6), "run.csv")
+    shown = CliRunner().invoke(main, ["wavelet", "run.csv", "--mass", "2.42", "--stiffness", "2.31 N/mm"])
+    assert shown.exit_code == 0, shown.output
+    assert "contact stiffness by frequency" in shown.output
+    assert {path.name for path in Path("run-wavelet").iterdir()} == {"figures", "report.html", "results.json"}
+    plain = CliRunner().invoke(main, ["wavelet", "run.csv", "--json", "--frequencies", "5:500"])
+    assert json.loads(plain.output)["channel"] == "a"
+    refused = CliRunner().invoke(main, ["wavelet", "run.csv", "--frequencies", "5:9000"])
+    assert refused.exit_code == 1
+    assert "nothing is known above half the rate" in refused.output
+    assert CliRunner().invoke(main, ["wavelet", "run.csv", "--frequencies", "5-9"]).exit_code == 2
