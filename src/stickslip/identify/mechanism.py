@@ -26,7 +26,7 @@ MEANINGS = {
     "non-sinusoidal oscillation": "the sticks swing, but not as one mode: friction with a memory (a state variable)",
     UNTOLD: "no mechanism stands out",
 }
-SURE = 0.8  # probability that a verdict has at least
+SURE = 0.7  # probability that a verdict has at least
 FASTEST = 10.0  # cycles of the mode in a window: there the search for it ends
 STRANGE = 4.5  # standard deviations from what the simulated records of its kind were like
 
