@@ -341,30 +341,12 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
 @click.argument("file")
 @click.option("--channel", metavar="NAME", help="Which channel; a, sound, force, load, friction, v or x unless given.")
 @click.option("--frequencies", metavar="LOW:HIGH", help="Range of the map in Hz; what the record allows unless given.")
-@click.option(
-    "--wavelet-frequency", type=float, default=4.5, show_default=True, help="Oscillations of a wavelet, in radians."
-)
-@click.option(
-    "--normalisation",
-    type=click.Choice(["energy", "amplitude"]),
-    default="energy",
-    show_default=True,
-    help="What a modulus means: the thesis's, or a tone's amplitude.",
-)
+@click.option("--wavelet-frequency", type=float, default=4.5, show_default=True, help="How long a wavelet is.")
+@click.option("--normalisation", type=click.Choice(["energy", "amplitude"]), default="energy", show_default=True)
 @click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, or with its unit, for the contact's stiffness.")
 @click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit, for the same.")
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder for the results; FILE-wavelet unless given.",
-)
-@click.option(
-    "--json",
-    "as_json",
-    is_flag=True,
-    help="Print the results as JSON and nothing else; a folder is written only with --output.",
-)
+@click.option("--output", type=click.Path(path_type=Path), metavar="DIR", help="Folder for the results; FILE-wavelet.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else; a folder only with --output.")
 @_reading
 def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | None, **options: Any) -> None:
     """Map a channel over time and frequency, and tell what its sticks are like.

@@ -69,7 +69,7 @@ def publish(
     return folder
 
 
-def as_data(results: Findings | Comparison | DecayFindings | Sequence[DecayFindings]) -> dict[str, Any]:
+def as_data(results: Findings | Comparison | TimeFrequency | DecayFindings | Sequence[DecayFindings]) -> dict[str, Any]:
     """Plain data for JSON of one result, or of several by record."""
     return {"records": [each.to_dict() for each in results]} if isinstance(results, Sequence) else results.to_dict()
 
