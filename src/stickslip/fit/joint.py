@@ -71,11 +71,11 @@ def candidates(releases: list[Release]) -> list[Candidate]:
 
 
 def _neighbours(release: Release) -> set[int]:
-    """Where least squares are not the likelihood, its neighbours may be the likeliest number."""
+    """Where least squares are not the likelihood, its neighbours may be the likeliest."""
     n = int(release.fits[np.argmin(release.fits[:, 1]), 0])
     p = release.fits[np.argmin(release.fits[:, 1]), 3:]
     rests = p[5] + n * math.pi / (p[0] * math.sqrt(1 - p[1] ** 2)) < release.blocks.total * release.blocks.dt
-    return {n - 1, n + 1} if rests and release.noise.kind != "white" else set()
+    return {n - 2, n - 1, n + 1, n + 2} if rests and release.noise.kind != "white" else set()
 
 
 def _fitted(releases: list[Release], half_cycles: tuple[int, ...], start: Array | None = None) -> Candidate:

@@ -168,11 +168,13 @@ def over_half_cycles(start, first, means, size, total, dt, order, fits, work):
             limit = best * (1.0 + WORSE / max(1.0, total / size - 6.0))
             possible = last_swing(p, n)[0] > 0.0
             if possible and squares <= limit:
+                if squares < best:
+                    best = squares
+                    kept = _keep(fits, kept, best * (1.0 + WORSE / max(1.0, total / size - 6.0)))
                 fits[kept, 0], fits[kept, 1], fits[kept, 2] = n, squares, log_determinant(hessian, work[4])
                 for k in range(6):
                     fits[kept, 3 + k] = p[k]
                 kept += 1
-                best = min(best, squares)
                 bad = 0
             else:
                 bad += 2 if direction == 1 and not possible else 1 if kept > 0 else 0
@@ -180,6 +182,18 @@ def over_half_cycles(start, first, means, size, total, dt, order, fits, work):
             if direction == 1 and p[RELEASE] + n * half > total * dt:
                 break
             n += direction
+    return kept
+
+
+@compiled(**FAST)
+def _keep(fits, count, limit):
+    """Drop the rows whose sum of squares is above the limit; how many are left."""
+    kept = 0
+    for row in range(count):
+        if fits[row, 1] <= limit:
+            for column in range(fits.shape[1]):
+                fits[kept, column] = fits[row, column]
+            kept += 1
     return kept
 
 

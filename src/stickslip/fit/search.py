@@ -13,7 +13,7 @@ from stickslip.statistics import student
 
 Array = NDArray[np.float64]
 
-CANDIDATES = 16  # numbers of half cycles kept
+CANDIDATES = 40  # numbers of half cycles kept
 
 
 @dataclass(frozen=True, eq=False)
