@@ -218,8 +218,8 @@ def records(
 def other_noise(trials: int) -> None:
     """Through the public function, which chooses the noise by itself.
 
-    With a dry friction of 0.02 the last swing would be a fifteenth of the longest that there can be, and noise of half a
-    percent would hide it: the bound would not be sharp. With 0.019 it is half of it.
+    With a dry friction of 0.02 the last swing would be a fifteenth of the longest that there can be, and noise of half
+    a percent would hide it: the bound would not be sharp. With 0.019 it is half of it.
     """
     condition = Condition(0.0316, 0.019, 1e-3, 100, "to rest")
     print(f"\nother noise: damping 0.0316, dry 0.019, 100 samples a period, {trials} records each")
