@@ -61,6 +61,8 @@ def test_json_alone_writes_nothing(release):
     assert len(bounds["m"]) == len(bounds["rate_worst"])
     assert bounds["best_m"] in bounds["m"]
     assert sorted(path.name for path in release.parent.iterdir()) == ["release.csv"]
+    spoken = run(release, *READ, "--method", "thesis", "--output", "out").output
+    assert "state --stiffness or --mass" in " ".join(spoken.split())
 
 
 def test_several_files_share_a_page_and_the_faulty_one_is_named(release):
@@ -103,7 +105,7 @@ def test_the_force_follows_from_mass_or_stiffness(release):
     by_mass = ss.analyze_decay(record, method="thesis", mass=1.0)
     assert by_spring.dry_force.value == pytest.approx(by_mass.dry_force.value, rel=1e-3)
     assert ss.analyze_decay(record, method="thesis").dry_force is None
-    assert "state --stiffness" in " ".join(ss.summary(ss.analyze_decay(record, method="thesis")).headline)
+    assert "state stiffness=" in " ".join(ss.summary(ss.analyze_decay(record, method="thesis")).headline)
 
 
 def test_every_figure_can_be_drawn(release):

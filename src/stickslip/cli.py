@@ -38,7 +38,7 @@ _SPOKEN = (
     (r"\brecord\.rows\(\)", "--rows"),
     (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
-    (r"\b(channels|units|fs|time|delimiter|decimal|method|damper|contact)=(?=\W|$)", r"--\1"),
+    (r"\b(channels|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness)=(?=\W|$)", r"--\1"),
 )
 
 

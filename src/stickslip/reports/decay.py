@@ -44,7 +44,7 @@ def _sentences(findings: DecayFindings) -> Iterator[str]:
     if force is not None:
         yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
     elif dry.interval[0] > 0:
-        yield "The dry friction force is that displacement times the spring's stiffness; state --stiffness or --mass."
+        yield "The dry friction force is that displacement times the spring's stiffness; state stiffness= or mass=."
     yield from _motion(findings)
     yield from _chosen(findings)
     yield from _compared(findings)
