@@ -102,7 +102,7 @@ class Ringing:
     @property
     def silent(self) -> bool:
         """Whether the mass rests where it might ring: the rings are no larger than the noise, or than a trifle."""
-        return self.rest < QUIET * self.excess or self.loudness < FAINT
+        return self.rest < QUIET * max(self.excess, 1.0) or self.loudness < FAINT
 
     def time(self, window: Window, row: float) -> float:
         """Time [s] of a row of a window."""

@@ -1,0 +1,137 @@
+"""Wavelet maps against named peers, in one run: a million samples by 200 frequencies, on one thread.
+
+Processor time, for other work on the machine must not count; candidates in turn, round by round, each after a first
+round that is not counted (compilation, plans, first touch of memory). Beside every time stands the largest error of ten
+rows over the row's largest value, away from the ends, against the transform without any short cut; peers normalise
+differently, so each row may be scaled. PyWavelets, ssqueezepy and fCWT are compared where they are installed
+(``pip install PyWavelets ssqueezepy fcwt``; fCWT also needs libfftw3f). ``make bench`` sets one thread, and
+an allocator that keeps its memory, for all of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.fft import fft, ifft, next_fast_len
+
+from stickslip.signals.morlet import ridge_centre, transform
+
+CENTRE, FS = 4.5, 4000.0
+LOWEST, HIGHEST = 1.0, 800.0
+ROWS = 10  # whose error is told
+EDGE = 20_000  # samples at either end that are left out of the errors
+
+
+def signal(count: int) -> np.ndarray:
+    """Noise and a chirp."""
+    t = np.arange(count) / FS
+    return np.random.default_rng(0).normal(size=count) + np.sin(2 * np.pi * (2 * t + 3 * t**2))
+
+
+def true_row(values: np.ndarray, scale: float) -> np.ndarray:
+    size = next_fast_len(len(values) + int(10 * scale * FS))
+    turn = 2 * np.pi * np.fft.fftfreq(size, 1 / FS)
+    window = np.sqrt(scale) * np.exp(-0.5 * (scale * turn - CENTRE) ** 2)
+    return np.asarray(ifft(fft(values, size) * window)[: len(values)])
+
+
+def candidates(values: np.ndarray, scales: np.ndarray) -> dict[str, Callable[[], Any]]:
+    """Each returns its map with the scales rising."""
+    frequencies = CENTRE / (2 * np.pi * scales)
+    found: dict[str, Callable[[], Any]] = {
+        f"stickslip {kind}": lambda kind=kind: transform(
+            values, FS, scales, centre=CENTRE, normalisation="energy", precision=kind
+        )
+        for kind in ("double", "single")
+    }
+    if importlib.util.find_spec("pywt"):
+        import pywt
+
+        name = f"cmor2.0-{CENTRE / (2 * np.pi)}"
+        found["PyWavelets"] = lambda: pywt.cwt(values, scales * FS, name, 1 / FS, method="fft")[0]
+    if importlib.util.find_spec("ssqueezepy"):
+        import ssqueezepy
+
+        for kind in ("float64", "float32"):
+            wavelet = ssqueezepy.Wavelet(("morlet", {"mu": CENTRE, "dtype": kind}))
+            taken = values.astype(kind)
+            found[f"ssqueezepy {kind}"] = lambda wavelet=wavelet, taken=taken: ssqueezepy.cwt(
+                taken, wavelet, scales=scales * FS, padtype="zero", astensor=False
+            )[0]
+    if importlib.util.find_spec("fcwt"):
+        try:
+            import fcwt
+        except ImportError as error:  # libfftw3f is not there
+            print(f"fCWT is left out: {error}")
+        else:
+            single = values.astype(np.float32)
+            found["fCWT"] = lambda: _fcwt(fcwt, single, frequencies)
+    return found
+
+
+def _fcwt(fcwt: Any, single: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
+    """Its wavelet is of another width (sigma 2 pi for fb = 1): set to the same number of oscillations."""
+    wavelet = fcwt.Morlet(CENTRE / (2 * np.pi))
+    scales = fcwt.Scales(
+        wavelet, fcwt.FCWT_LOGSCALES, int(FS), float(frequencies[-1]), float(frequencies[0]), len(frequencies)
+    )
+    out = np.zeros((len(frequencies), len(single)), dtype=np.complex64)
+    fcwt.FCWT(wavelet, 1, False, False).cwt(single, scales, out)
+    return out
+
+
+def error(found: np.ndarray, values: np.ndarray, scales: np.ndarray) -> float:
+    worst = 0.0
+    for row in np.linspace(0, len(scales) - 1, ROWS).astype(int):
+        true = true_row(values, float(scales[row]))[EDGE:-EDGE]
+        got = np.asarray(found[row][EDGE:-EDGE], dtype=complex)
+        best = min(
+            np.abs(turned - np.vdot(true, turned) / np.vdot(true, true) * true).max() / np.abs(
+                np.vdot(true, turned) / np.vdot(true, true) * true).max()
+            for turned in (got, got.conj())
+        )  # fmt: skip
+        worst = max(worst, float(best))
+    return worst
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--samples", type=int, default=1_000_000)
+    parser.add_argument("--frequencies", type=int, default=200)
+    parser.add_argument("--rounds", type=int, default=3)
+    given = parser.parse_args()
+    values = signal(given.samples)
+    scales = ridge_centre(CENTRE, "energy") / (2 * np.pi * np.geomspace(HIGHEST, LOWEST, given.frequencies))
+    peers = candidates(values, scales)
+    seconds: dict[str, list[float]] = {name: [] for name in peers}
+    errors: dict[str, float] = {}
+    for number in range(given.rounds + 1):
+        for name, run in peers.items():
+            began = time.process_time()
+            found = run()
+            taken = time.process_time() - began
+            if number:
+                seconds[name].append(taken)
+            else:
+                errors[name] = error(found, values, scales)
+            del found
+    base = {kind: statistics.median(seconds[f"stickslip {kind}"]) for kind in ("double", "single")}
+    print(
+        f"\nMorlet, {given.samples:,} samples by {given.frequencies} frequencies, {LOWEST:g} to {HIGHEST:g} Hz at {FS:g} Hz"
+    )
+    print(f"  {'':22}{'processor':>11}{'over double':>13}{'over single':>13}{'error':>10}")
+    for name in peers:
+        median = statistics.median(seconds[name])
+        print(
+            f"  {name:22}{median:9.2f} s{median / base['double']:13.1f}{median / base['single']:13.1f}{errors[name]:10.1g}"
+        )
+
+
+if __name__ == "__main__":
+    main()
