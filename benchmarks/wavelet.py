@@ -122,15 +122,13 @@ def main() -> None:
                 errors[name] = error(found, values, scales)
             del found
     base = {kind: statistics.median(seconds[f"stickslip {kind}"]) for kind in ("double", "single")}
-    print(
-        f"\nMorlet, {given.samples:,} samples by {given.frequencies} frequencies, {LOWEST:g} to {HIGHEST:g} Hz at {FS:g} Hz"
-    )
+    asked = f"{given.samples:,} samples at {FS:g} Hz by {given.frequencies} frequencies"
+    print(f"\nMorlet, {asked} of {LOWEST:g} to {HIGHEST:g} Hz, one thread")
     print(f"  {'':22}{'processor':>11}{'over double':>13}{'over single':>13}{'error':>10}")
     for name in peers:
         median = statistics.median(seconds[name])
-        print(
-            f"  {name:22}{median:9.2f} s{median / base['double']:13.1f}{median / base['single']:13.1f}{errors[name]:10.1g}"
-        )
+        ratios = "".join(f"{median / base[kind]:13.1f}" for kind in ("double", "single"))
+        print(f"  {name:22}{median:9.2f} s{ratios}{errors[name]:10.1g}")
 
 
 if __name__ == "__main__":

@@ -145,3 +145,18 @@ def test_no_other_cut_costs_less() -> None:
         for b in range(a + 5, len(signal) - 3):
             best = min(best, left(0, a, False) + left(a, b, True) + left(b, len(signal), False))
     assert splitter.cost(pole, 5)[0] == pytest.approx(best, rel=1e-9)
+
+
+def test_a_band_brake_rings_after_slip_begins(dataset: Callable[[str], Path]) -> None:
+    """At 41 to 56 Hz, and higher one way than the other: the strong peaks of the map of its friction."""
+    path = dataset("band_brake_damper") / "0.5Hz35lbtension.json"
+    record = ss.read_record(path, channels={"friction": "c3 [kip]", "v": "#4 [in/s]"}, time="#1")
+    wavelets = ss.wavelet_map(record, "friction", frequencies=(20, 120), wavelet_frequency=6)
+    peaks = [peak for peak in ss.local_maxima(wavelets, prominence=20, span=30) if peak.frequency > 30]
+    velocity = np.convolve(record["v"], np.full(64, 1 / 64), "same")
+    ways = np.sign(np.interp([peak.time for peak in peaks], record.time, velocity))
+    forward, back = (
+        np.median([peak.frequency for peak, way in zip(peaks, ways, strict=True) if way == sign]) for sign in (1, -1)
+    )
+    assert 41 < forward < 50
+    assert 50 < back < 58
