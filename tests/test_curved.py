@@ -11,7 +11,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import stickslip as ss
-from stickslip.laws.curved import exp, symbol
+from stickslip.laws.curved import asinh, exp, log, sqrt, symbol, tanh
+from stickslip.solve import march
+from stickslip.solve.series import expansion
+from stickslip.solve.tape import tape
 
 HEAVY = 1e30  # kg: whatever friction does, the mass keeps its speed
 LUGRE = ss.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=math.sqrt(1e5), viscous=0.4)
@@ -310,11 +313,82 @@ def test_bad_input_is_named(build: object) -> None:
     assert all((error.value.value, error.value.rule, error.value.next_step))
 
 
-def test_a_stiff_contact_is_refused_in_words() -> None:
-    light = ss.Oscillator(mass=1.0, stiffness=2.5e9, law=ROCK, drive=ss.Belt(1e-6))
+def test_stiff_bristles_move_as_an_implicit_solver_says() -> None:
+    stiffness, damping = 1e9, math.sqrt(1e9 * 2.42)
+    law = ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=stiffness, damping=damping, viscous=0.4)
+    run = ss.simulate(THESIS.having(law=law), cycles=1, rtol=1e-9)
+    assert len(run.reach) > 20
+    assert len(run.step_starts) < 5000  # a million for an explicit method
+
+    def slope(t: float, s: np.ndarray) -> list[float]:
+        x, v, z = s
+        rate = v - stiffness * abs(v) * z / (1.1 + 0.2 * math.exp(-((v / 1e-3) ** 2)))
+        force = stiffness * z + damping * rate + 0.4 * v
+        return [v, (2310 * (0.6e-3 * math.cos(2 * math.pi * 2.5 * t) - x) - force) / 2.42, rate]
+
+    times = np.linspace(0, 0.4, 21)
+    peer = solve_ivp(slope, (0, 0.4), [0, 0, 0], method="Radau", rtol=1e-9, atol=[1e-13, 1e-12, 1e-18], t_eval=times)
+    for own, other in zip(run.sample(times, ("x", "v", "bristle"))[0], peer.y, strict=True):
+        assert own == pytest.approx(other, abs=3e-8 * np.max(np.abs(other)))
+
+
+@pytest.mark.parametrize("law", [
+    ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=1e8, damping=1e4, viscous=0.4), ss.Dahl(1.1, 1e8),
+], ids=lambda law: type(law).__name__)  # fmt: skip
+def test_leaps_change_no_event(law: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = ss.simulate(THESIS.having(law=law), cycles=1, rtol=1e-9)
+    monkeypatch.setattr(march, "PATIENCE", math.inf)
+    small = ss.simulate(THESIS.having(law=law), cycles=1, rtol=1e-9)
+    assert len(small.reach) == 0 < len(run.reach)
+    assert len(run.step_starts) < 0.5 * len(small.step_starts)
+    assert [event.mode for event in run.events] == [event.mode for event in small.events]
+    assert [e.time for e in run.events] == pytest.approx([e.time for e in small.events], rel=1e-9)
+    times = np.linspace(0, 0.4, 301)
+    for own, other in zip(run.sample(times, ("x", "v"))[0], small.sample(times, ("x", "v"))[0], strict=True):
+        assert own == pytest.approx(other, abs=1e-8 * np.max(np.abs(other)))
+
+
+def test_a_stiff_creep_comes_to_steady_sliding() -> None:
+    light = ss.Oscillator(mass=1.0, stiffness=2.6e9, law=ROCK, drive=ss.Belt(1e-6))
     rest = ss.steady_sliding(light).state
-    with pytest.raises(ss.SolveError, match="stiff"):
-        ss.simulate(light, duration=100, start={**rest, "v": 1e-8})
+    run = ss.simulate(light, duration=100, start={**rest, "v": 1e-8}, rtol=1e-9)
+    assert len(run.step_starts) < 5000
+    assert run.state(100)["x"] == pytest.approx(rest["x"], rel=1e-12)
+    assert run.state(100)["age"] == pytest.approx(rest["age"], rel=1e-9)
+
+
+@pytest.mark.parametrize(("short", "crossings"), [(1e-6, 2), (1e-9, 2), (-1e-9, 0), (-1e-12, 0)])
+def test_two_crossings_within_a_step_are_two(short: float, crossings: int) -> None:
+    fastest = 1e-3 * 2 * math.pi
+    system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=ss.Dahl(1.0, stiffness=100.0),
+                           drive=ss.MultiTone([(1e-3, 1.0, 0.0)], on="face"))  # fmt: skip
+    run = ss.simulate(system, duration=0.95, start={"v": fastest * (1 - short)})
+    assert len(run.events) == crossings
+    if crossings:
+        apart = run.events[1].time - run.events[0].time
+        assert apart == pytest.approx(math.acos(1 - short) / math.pi, rel=1e-4)
+        assert np.median(run.step_lengths) > 20 * apart
+        assert [event.mode for event in run.events] == ["back", "forward"]
+
+
+def test_every_function_moves_as_a_general_solver_says() -> None:
+    curve = ss.FrictionCurve(
+        lambda v: 1 + 0.1 * tanh(5 * v) + 0.2 * log(1 + v) - 0.1 * sqrt(1 + v * v) + 0.1 * asinh(3 * v)
+        + 0.3 * exp(-v) + 0.1 / (1 + v) ** 1.5 + v**3
+    )  # fmt: skip
+    run = ss.simulate(ss.Oscillator(mass=1, stiffness=0, law=curve), duration=0.8, start={"v": 2.0}, rtol=1e-9)
+    known = solve_ivp(
+        lambda t, s: [s[1], -curve.friction(s[1])], (0, 0.8), [0, 2.0], method="DOP853", rtol=1e-12, atol=1e-14
+    )
+    end = run.state(0.8)
+    assert not run.events
+    assert (end["x"], end["v"]) == pytest.approx(known.y[:, -1], rel=1e-9)
+
+
+def test_laws_that_differ_by_numbers_share_their_code() -> None:
+    laws = (ss.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5), ss.LuGre(2.0, 2.5, speed=3e-3, stiffness=2e5))
+    codes = [expansion(t.nodes, t.kept, 1)[0] for t in (tape(THESIS.having(law=law)) for law in laws)]
+    assert codes[0] is codes[1]
 
 
 def test_an_expression_differentiates_itself() -> None:

@@ -8,16 +8,20 @@ A CUDA kernel calls the same functions: numba compiles them anew for the device.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
 import sys
 import tempfile
 from collections.abc import Callable
 from functools import cache
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
-from numba import config, njit
+from numba import cfunc, config, njit
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
@@ -25,18 +29,51 @@ FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """numba's `njit` with these options, kept in :func:`folder`."""
+    return _keeping(njit, options)
 
+
+def pointer(signature: str, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """As :func:`compiled`, at once and for one signature: a function that compiled code takes as an argument."""
+    return _keeping(lambda **more: cfunc(signature, **more), options)
+
+
+def _keeping(compiler: Callable[..., Any], options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
     def compile_(function: Callable[..., Any]) -> Any:
         kept, place = config.CACHE_DIR, folder()
         if place is None or config.DISABLE_JIT:
-            return njit(**options)(function)
+            return compiler(**options)(function)
         config.CACHE_DIR = str(place)
         try:
-            return njit(cache=True, **options)(function)
+            return compiler(cache=True, **options)(function)
         finally:
             config.CACHE_DIR = kept
 
     return compile_
+
+
+def generated(source: str) -> ModuleType:
+    """The module of a text, kept beside what is compiled of it."""
+    name = "generated_" + hashlib.sha256(source.encode()).hexdigest()[:16]
+    file = (folder() or _passing()) / f"{name}.txt"  # no module of the package
+    if not file.exists() or file.read_text("utf-8") != source:
+        part = file.with_suffix(f".{os.getpid()}")
+        part.write_text(source, "utf-8")
+        part.replace(file)
+    loader = SourceFileLoader(f"{__package__}.{name}", str(file))
+    spec = spec_from_loader(loader.name, loader)
+    assert spec is not None
+    module = module_from_spec(spec)
+    sys.modules[loader.name] = module
+    loader.exec_module(module)
+    return module
+
+
+@cache
+def _passing() -> Path:
+    """A folder that lasts as long as the process."""
+    place = tempfile.TemporaryDirectory()
+    atexit.register(place.cleanup)
+    return Path(place.name)
 
 
 @cache

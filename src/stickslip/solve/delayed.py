@@ -26,8 +26,9 @@ from stickslip.laws.base import Rigid, Row
 from stickslip.laws.curved import CurvedMode, lifted, symbol
 from stickslip.laws.time_delay import DELAYED, TimeDelay
 from stickslip.oscillator import Oscillator
-from stickslip.solve import taylor
-from stickslip.solve.curved import CHUNK, STEPS, Array, CurvedTrajectory, Stops, Tape, room_for, run_curved, tape
+from stickslip.solve import march, taylor
+from stickslip.solve.curved import CHUNK, STEPS, Array, CurvedTrajectory, Stops, code, degree, room_for, run_curved
+from stickslip.solve.tape import Tape, tape
 
 PAST = 2  # where the chain of the past stands in the state: behind x and v
 REACH = 4.0  # longest look ahead of a step of the past, in lags
@@ -66,7 +67,7 @@ def delayed_tape(system: Oscillator, order: int) -> Tape:
 
 
 def run_delayed(
-    table: Tape, state: Array, mode: int, *, course: tuple[tuple[float, float], Stops], **rest: Any
+    table: Tape, state: Array, mode: int, *, course: tuple[tuple[float, float], Stops], rtol: float, **rest: Any
 ) -> CurvedTrajectory:
     """As :func:`run_curved`, from a state before which the speed was what it is."""
     period, law = table.motion.period, table.system.law
@@ -79,15 +80,15 @@ def run_delayed(
             f"a step is no longer than the lag, and a run takes at most {STEPS:g} steps",
             "take a longer lag=, a shorter time, or the law without its lag",
         )
-    march = _Past(table, law)
-    return run_curved(table, state, march.opening(state, mode), course=course, march=march, **rest)
+    past = _Past(table, law, degree(rtol))
+    return run_curved(table, state, past.opening(state, mode), course=course, rtol=rtol, follow=past, **rest)
 
 
 class _Past:
     """The march of a system with a time lag; remembers the steps of the last lag. Lives for one run."""
 
-    def __init__(self, table: Tape, law: TimeDelay) -> None:
-        self.lag, self.table = law.lag, table
+    def __init__(self, table: Tape, law: TimeDelay, order: int) -> None:
+        self.lag, self.table, self.code = law.lag, table, code(table, order)
         self.slip = table.outputs["slip"]
         self.sides = np.array([mode.side for mode in table.modes], dtype=np.float64)
         self.lows = [low for low, _ in law.law.branches()]
@@ -102,23 +103,25 @@ class _Past:
         return mode % 3 + 3 * (int(np.searchsorted(self.lows, state[PAST], side="right")) - 1)
 
     def __call__(
-        self, clock: Array, state: Array, mode: int, at: tuple[float, float], tolerance: float, order: int, big: Array,
-        room: tuple[NDArray[Any], ...], work: tuple[Array, ...],
-    ) -> tuple[int, int, int]:  # fmt: skip
-        """As :func:`taylor.march`."""
+        self, clock: Array, state: Array, mode: int, at: tuple[float, float], physical: int, tolerance: float,
+        order: int, big: Array, room: tuple[NDArray[Any], ...], *work: Any,
+    ) -> tuple[int, int, int, int]:  # fmt: skip
+        """As :func:`march.march`; without leaps, whose polynomials are no Taylor steps."""
         table = self.table
+        clock[5] = math.inf
         big[PAST + 1 : PAST + order + 1] = np.inf  # a polynomial's own chain is exact at any step
         self._forget(len(room[0]))
         before = self.known
         outcome, self.known, mode = _march(
-            table.nodes, table.exits, table.guards, table.tones, clock, state, mode, np.array(at), table.motion.period,
-            tolerance, order, big, tuple(column[: before + len(room[0])] for column in self.columns), work,
+            *self.code, table.sums, table.exits, table.guards, table.tones, clock, state, mode, np.array(at),
+            table.motion.period, physical, tolerance, order, big,
+            tuple(column[: before + len(room[0])] for column in self.columns), *work,
             self.lag, self.slip, self.sides, self.edge, self.cursor, before,
         )  # fmt: skip
         written = self.known - before
         for column, own in zip(room, self.columns, strict=True):
             column[:written] = own[before : self.known]
-        return outcome, written, mode
+        return outcome, written, 0, mode
 
     def _forget(self, count: int) -> None:
         """Make room for steps: drop those before the lag, grow where the lag is longer than the room."""
@@ -157,20 +160,21 @@ def _coefficient(row, s, width, k):
 
 
 @compiled(**taylor.EXACT)
-def _recall(tape, steps, count, clock, state, period, tolerance, order, big, work, lag, slip, sides, edge, cursor):
+def _recall(
+    series, numbers, steps, count, clock, state, period, tolerance, order, big, s, lag, slip, sides, edge, cursor
+):
     """Set the chain of the past to the step at the cursor, and its edge to where that step's polynomial ends to hold.
 
     The polynomial of a step that was cut short may hold over the steps that follow it.
     """
-    laps, offsets, lengths, modes, states, _ = steps
-    s = work[0]
+    laps, offsets, lengths, modes, states, _, _ = steps
     width, size = order + 1, len(state)
     j = cursor[0]
     mode, h, u = modes[j], lengths[j], 1.0
     side = sides[mode]
     for _ in range(40):
-        taylor.expand(tape, mode, states[j], h, order, width, s)
-        u = taylor._length(s, width, order, size, tolerance, big)
+        series(numbers, mode, states[j], h, s)
+        u = taylor.length(s, width, order, size, tolerance, big)
         if not (u >= taylor.GROWTH and h < REACH * lag):
             break
         h *= taylor.GROWTH
@@ -205,30 +209,32 @@ def _recall(tape, steps, count, clock, state, period, tolerance, order, big, wor
 
 @compiled(**taylor.EXACT)
 def _march(
-    tape, exits, guards, tones, clock, state, mode, until, period, tolerance, order, big, steps, work, lag, slip, sides,
-    edge, cursor, count,
+    series, numbers, rates, scheme, sums, exits, guards, tones, clock, state, mode, until, period, physical, tolerance,
+    order, big, steps, polys, reach, work, long_work, lag, slip, sides, edge, cursor, count,
 ):  # fmt: skip
-    """As `taylor.march`, from edge to edge of the past; `count` steps are known, and new ones are put behind them."""
-    laps, offsets, lengths, modes, states, ends = steps
+    """As `march.march`, from edge to edge of the past; `count` steps are known, and new ones are put behind them."""
+    laps, offsets, lengths, modes, states, ends, leaps = steps
     _, target, _, _, bound, _, _ = exits
     while True:
         if cursor[1]:
-            _recall(tape, steps, count, clock, state, period, tolerance, order, big, work, lag, slip, sides, edge,
-                    cursor)  # fmt: skip
+            _recall(series, numbers, steps, count, clock, state, period, tolerance, order, big, work[0], lag, slip,
+                    sides, edge, cursor)  # fmt: skip
             cursor[1] = 0
         first = _apart((edge[0], edge[1]), (until[0], until[1]), period) <= 0.0
         aim = (edge[0], edge[1]) if first else (until[0], until[1])
         clock[2] = min(clock[2], lag)  # at rest steps would grow for ever
-        free = (laps[count:], offsets[count:], lengths[count:], modes[count:], states[count:], ends[count:])
-        outcome, written, mode = taylor.march(
-            tape, exits, guards, tones, clock, state, mode, aim, period, tolerance, order, big, free, work
-        )
+        free = (laps[count:], offsets[count:], lengths[count:], modes[count:], states[count:], ends[count:],
+                leaps[count:])  # fmt: skip
+        outcome, written, _, mode = march.march(
+            series, numbers, rates, scheme, sums, exits, guards, tones, clock, state, mode, aim, period, physical,
+            tolerance, order, big, free, polys, reach, work, long_work,
+        )  # fmt: skip
         if count > 0 and written > 0 and modes[count] != modes[count - 1] and ends[count - 1] < 0:
             for e in range(bound[modes[count - 1]], bound[modes[count - 1] + 1]):  # an exit due at the edge itself
                 if target[e] == modes[count] or ends[count - 1] < 0:
                     ends[count - 1] = e
         count += written
-        if outcome != taylor.DONE:
+        if outcome != march.DONE:
             return outcome, count, mode
         if first:
             clock[0], clock[1] = edge[0], edge[1]

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve.automaton import Array, System, exponential
-from stickslip.solve.curved import CurvedTrajectory, Tape
+from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.poincare import Table, closes, derivative, end_of, extent, lap, stretch, tables
 from stickslip.solve.simulate import opening
+from stickslip.solve.tape import Tape
 from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.structure import Structure
 

@@ -16,10 +16,11 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import Array, Automaton, System, automaton
-from stickslip.solve.curved import CurvedTrajectory, Tape, run_curved, tape
+from stickslip.solve.curved import CurvedTrajectory, run_curved
 from stickslip.solve.kernel import follow
 from stickslip.solve.simulate import run, stops_of
 from stickslip.solve.tangent import carry_tangents
+from stickslip.solve.tape import Tape, tape
 from stickslip.solve.trajectory import Trajectory
 
 Table = Automaton | Tape

@@ -20,7 +20,7 @@ from stickslip.solve.phasors import blank_past, fast_tables
 from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from stickslip.solve.curved import Tape
+    from stickslip.solve.tape import Tape
 
 CHUNK = 16384  # pieces between two looks at the clock and the keyboard
 CELLS = 65536  # Taylor cells between two looks
@@ -40,7 +40,8 @@ def simulate(
     """How does the system move?
 
     Every mode is linear, so the motion between events is a closed form, and the first exit of each mode is found with
-    a certificate that none was jumped over. A law with curved modes is followed by Taylor series, to a tolerance.
+    a certificate that none was jumped over. A law with curved modes is followed by Taylor series, and by implicit steps
+    where it is stiff, to a tolerance.
 
     Parameters
     ----------
@@ -99,8 +100,9 @@ def _simulate_curved(
     rtol: float,
     progress: Callable[[float], object] | None,
 ) -> Trajectory:
-    from stickslip.solve.curved import degree, run_curved, tape
+    from stickslip.solve.curved import degree, run_curved
     from stickslip.solve.delayed import delayed_tape, run_delayed
+    from stickslip.solve.tape import tape
 
     lags = isinstance(system.law, TimeDelay)
     table: Any = delayed_tape(system, degree(rtol)) if lags else tape(system)
