@@ -16,6 +16,7 @@ from stickslip.solve import simulate as simulate_module
 from stickslip.solve.energy import energy
 
 RIGID = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5))
+RECORDED = ss.RecordedBase([0.0, 1e-3, 0.0, -1e-3], fs=10.0)  # 0.3 s
 CONTACT = ss.CompliantContact(1.1, 192000, 23.8635)
 COMPLIANT = RIGID.having(law=CONTACT)
 DRIVES = (
@@ -339,6 +340,18 @@ def test_critical_damping_and_no_spring_are_exact() -> None:
         lambda: ss.simulate(RIGID, duration=0.0),
         lambda: ss.simulate(RIGID, duration=1.0, cycles=1.0),
         lambda: ss.simulate(RIGID, duration=1.0, start={"y": 1.0}),
+        lambda: ss.simulate(RIGID, duration=1.0, start={"x": "far"}),
+        lambda: ss.simulate(RIGID, duration=1.0, start={"v": 1.0, "mode": "stuck"}),
+        lambda: ss.simulate(RIGID, duration=1.0, start={"v": 1.0, "mode": "back"}),
+        lambda: ss.simulate(RIGID, duration=1.0, budget=0),
+        lambda: ss.simulate(RIGID.having(drive=RECORDED), duration=1.0),
+        lambda: ss.steady_state(RIGID.having(drive=RECORDED)),
+        lambda: ss.steady_state(RIGID, orders=0),
+        lambda: ss.Oscillator(mass="heavy", stiffness=1, law=ss.Coulomb(1)),
+        lambda: ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb),
+        lambda: ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb(1), drive=2.5),
+        lambda: ss.HarmonicForce("1 N", 2.5),
+        lambda: ss.MultiTone([(1.0, 2.5)]),
         lambda: RIGID.having(colour=1),
         lambda: scenarios.get("none"),
     ],
@@ -352,6 +365,38 @@ def test_what_has_no_meaning_is_refused(call) -> None:  # type: ignore[no-untype
 def test_chatter_ends_in_an_error_that_names_the_state() -> None:
     with pytest.raises(ss.SolveError, match="x = "):
         ss.simulate(RIGID, cycles=2000, budget=1)
+
+
+@pytest.mark.parametrize("budget", [3, 4])
+def test_a_budget_counts_in_short_runs_too(budget: int) -> None:
+    """Four events in each of ten periods."""
+    if budget < 4:
+        with pytest.raises(ss.SolveError, match="at most 3 events"):
+            ss.simulate(RIGID, cycles=10, budget=budget)
+    else:
+        assert len(ss.simulate(RIGID, cycles=10, budget=budget).events) <= 4 * 10
+
+
+def test_growth_without_end_is_no_number() -> None:
+    growing = RIGID.having(damping=-100.0)
+    assert ss.steady_state(growing).status == "unbounded"
+    with pytest.raises(ss.SolveError, match="beyond the largest number"):
+        ss.simulate(growing.having(damping=-1e4), cycles=40)
+
+
+@pytest.mark.parametrize(
+    ("call", "names"),
+    [
+        (lambda run: run.sample([0.5, 0.2], ("x",)), "run back"),
+        (lambda run: run.sample([0.5], ("colour",)), "there are x, v"),
+        (lambda run: run.state(2.0), "from 0 to 1 s"),
+        (lambda run: run.record(fs=0.0), "fs = 0"),
+        (lambda run: run.record(fs=1e300), "up to 1e\\+10"),
+    ],
+)
+def test_a_run_is_asked_for_what_it_knows(call, names: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(ss.SolveError, match=names):
+        call(ss.simulate(RIGID, duration=1.0))
 
 
 def test_chaos_has_a_positive_exponent() -> None:

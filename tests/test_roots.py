@@ -9,7 +9,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.solve.automaton import automaton
-from stickslip.solve.roots import NOISE, NONE, first_rise, opening_order
+from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise, opening_order
 
 
 def rise(roots: list[float], *, lead: float = 1.0, low: int = 0, limit: float = 1.0) -> float:
@@ -55,6 +55,26 @@ def test_no_earlier_root_is_jumped_over_in_a_thousand_polynomials() -> None:
         if gap < 1e-4 or abs(ordered[0] - 1.0) < 1e-9:
             continue
         assert rise(roots, lead=lead) == pytest.approx(known, abs=1e-10), roots
+
+
+def test_a_rise_after_a_fall_is_not_jumped_over() -> None:
+    """Above zero at the start, down through it, and up again: with whatever curvature where it falls."""
+    g = np.random.default_rng(0)
+    for fall, away, *others in [(0.1, 0.2, -0.1), *g.uniform([0.02, 0.06, -3, -3], [0.6, 0.35, 0, 0], (2000, 4))]:
+        c = np.zeros(21)
+        whole = np.poly([fall, fall + away, *others])[::-1]
+        c[: len(whole)] = whole
+        noise = np.full(21, NOISE * np.sum(np.abs(c)))
+        down = first_rise(c, noise, 21, 0, -1.0, 0.0, 1.0)
+        assert down == pytest.approx(fall, abs=1e-9)
+        assert first_rise(c, noise, 21, 0, 1.0, down + 1e-12, 1.0) == pytest.approx(fall + away, abs=1e-9)
+
+
+def test_a_march_that_runs_out_of_steps_says_so() -> None:
+    """A touch of the twentieth order, where each step is a tenth of the one left: nothing is proved there."""
+    c, noise = np.zeros(21), np.full(21, 1e-300)
+    c[:] = [-math.comb(20, k) * (-2.0) ** k for k in range(21)]  # -(1 - 2 u)^20
+    assert first_rise(c, noise, 21, 0, 1.0, 0.0, 1.0) in (NONE, UNSURE)
 
 
 def test_zeros_at_the_start_are_the_way_in() -> None:

@@ -36,6 +36,8 @@ class Motion:
         Times [s] (first column) at which the signals in `knotted` take new values (further columns).
     knotted : tuple of str
         The signals of `knots`.
+    end : float
+        Time [s] up to which the drive is known.
     """
 
     rates: Mapping[str, Row] = field(default_factory=dict)
@@ -47,6 +49,7 @@ class Motion:
     face: Row = field(default_factory=dict)
     knots: NDArray[np.float64] | None = None
     knotted: tuple[str, ...] = ()
+    end: float = math.inf
 
 
 class Drive(Protocol):
@@ -61,9 +64,24 @@ def _require(condition: bool, value: str, rule: str, next_step: str) -> None:
         raise ModelError(value, rule, next_step)
 
 
+def require_drive(drive: object) -> None:
+    """Refuse what does not drive."""
+    _require(
+        hasattr(drive, "motion") and not isinstance(drive, type), f"drive = {drive!r}", "a drive says what moves",
+        "give one, as drive=HarmonicBase(1e-3, frequency=2.5), or leave it out",
+    )  # fmt: skip
+
+
+def _finite(value: object) -> bool:
+    try:
+        return math.isfinite(value)  # type: ignore[arg-type]
+    except TypeError:
+        return False  # no number at all
+
+
 def _check_frequency(frequency: float) -> None:
     _require(
-        math.isfinite(frequency) and 0 < frequency <= LARGEST_FREQUENCY,
+        _finite(frequency) and 0 < frequency <= LARGEST_FREQUENCY,
         f"frequency = {frequency} Hz",
         f"a drive repeats between 0 and {LARGEST_FREQUENCY:g} times a second",
         "give frequency= in Hz",
@@ -72,7 +90,7 @@ def _check_frequency(frequency: float) -> None:
 
 def _check_finite(**values: float) -> None:
     for name, value in values.items():
-        _require(math.isfinite(value), f"{name} = {value}", f"{name} is a finite number", f"correct {name}=")
+        _require(_finite(value), f"{name} = {value}", f"{name} is a finite number", f"correct {name}=")
 
 
 def _check_contact(contact: str) -> None:
@@ -217,7 +235,13 @@ class MultiTone:
             "tones move the 'base', the 'face' or act as 'force'",
             "choose one of the three",
         )
-        object.__setattr__(self, "tones", tuple((a, f, p) for a, f, p in self.tones))
+        object.__setattr__(self, "tones", tuple(map(tuple, self.tones)))
+        _require(
+            all(len(tone) == 3 for tone in self.tones),
+            f"tones = {self.tones}",
+            "a tone is its amplitude, frequency [Hz] and phase [rad]",
+            "give three numbers for each",
+        )
         self.motion()
 
     def motion(self) -> Motion:
@@ -288,7 +312,7 @@ class Ramp:
 class RecordedBase:
     """A recorded base motion: between samples a linear or a cubic (natural spline) piece, solved in closed form.
 
-    Before the first sample's time and after the last one there is no motion to follow: simulate within the record.
+    After the last sample there is no motion to follow: a longer run is refused.
 
     Attributes
     ----------
@@ -315,7 +339,7 @@ class RecordedBase:
 
     def __post_init__(self) -> None:
         _check_contact(self.contact)
-        _require(math.isfinite(self.fs) and self.fs > 0, f"fs = {self.fs} Hz", "the rate is positive", "give fs= in Hz")
+        _require(_finite(self.fs) and self.fs > 0, f"fs = {self.fs} Hz", "the rate is positive", "give fs= in Hz")
         _require(self.order in (1, 3), f"order = {self.order}", "pieces are linear (1) or cubic (3)", "choose one")
         _require(
             self.order == 3 or self.contact == "ground",
@@ -356,6 +380,7 @@ class RecordedBase:
             face=row if self.contact == "base" else {},
             knots=knots,
             knotted=names,
+            end=(len(values) - 1) / self.fs,
         )
 
 

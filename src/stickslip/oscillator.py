@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from stickslip.drives import Drive, Release
+from stickslip.drives import Drive, Release, require_drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law, finite
 from stickslip.laws.curved import CurvedLaw
@@ -56,6 +56,9 @@ class Oscillator:
         finite("mass", self.mass, unit="kg", positive=True)
         finite("stiffness", self.stiffness, unit="N/m")
         finite("damping", self.damping, unit="N s/m", signed=True)
+        if isinstance(self.law, type) or not (hasattr(self.law, "modes") or hasattr(self.law, "rates")):
+            raise ModelError(f"law = {self.law!r}", "a mass rubs under a friction law", "give one, as law=Coulomb(1.1)")
+        require_drive(self.drive)
         if self.damper not in ("ground", "base"):
             raise ModelError(
                 f"damper = '{self.damper}'", "the damper is fixed to the 'ground' or the 'base'", "choose one"

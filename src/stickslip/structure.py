@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.drives import Drive, Release
+from stickslip.drives import Drive, Release, require_drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, finite
 from stickslip.laws.compliant import CompliantContact
@@ -207,6 +207,7 @@ class Structure:
         if isinstance(self.contacts, Contact) or not all(isinstance(contact, Contact) for contact in self.contacts):
             raise ModelError(f"contacts = {self.contacts!r}", "contacts are a list of Contact", "give contacts=[...]")
         object.__setattr__(self, "contacts", tuple(self.contacts))
+        require_drive(self.drive)
         for contact in self.contacts:
             for name in ("tangent", "normal"):
                 row = getattr(contact, name)

@@ -109,7 +109,10 @@ class Rigid:
 
 def finite(name: str, value: float, *, unit: str, positive: bool = False, signed: bool = False) -> float:
     """`value`, if the parameter can have it: finite, and not negative unless `signed`, not zero if `positive`."""
-    number = float(value)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise ModelError(f"{name} = {value!r}", f"{name} is a number [{unit}]", f"correct {name}=") from None
     if not math.isfinite(number) or (number < 0 and not signed) or (number == 0 and positive):
         rule = (
             "is a finite number" if signed else "is finite and positive" if positive else "is finite and not negative"

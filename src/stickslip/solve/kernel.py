@@ -10,9 +10,9 @@ import math
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.solve.automaton import SPLITTER
 from stickslip.solve.phasors import glide
-from stickslip.solve.roots import NOISE, NONE, first_rise, opening_order
+from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise, opening_order
 
-DONE, FULL, CHATTER, LOST = 0, 1, 2, 3
+DONE, FULL, CHATTER, LOST, UNPROVED = 0, 1, 2, 3, 4
 CHAIN = 64  # transitions without time in between before a run is given up
 
 
@@ -157,7 +157,7 @@ def settle(tables, mode, state, scale, cell, work, c, noise):
 
 @compiled(**OPTIONS)
 def next_exit(tables, mode, state, scale, opened, armed, span, c, noise):
-    """The first exit within `span` [s] of the cell ahead: (time, exit, armed), or (-1, -1, armed).
+    """The first exit within `span` [s] of the cell ahead: (time, exit, armed), or (-1, -1, armed); -2 if unproved.
 
     `opened` is true in the first cell of a piece, where roots at the very start are the way in, not the way out.
     `armed` has a bit for each exit that has been below zero, so that a crossing at the seam of two cells is seen.
@@ -182,10 +182,14 @@ def next_exit(tables, mode, state, scale, opened, armed, span, c, noise):
                 start = first_rise(c, noise, count, low, -1.0, 0.0, limit)
                 if start == NONE:
                     continue
+                if start == UNSURE:
+                    return -1.0, -2, armed
                 start = min(limit, start + 1e-12)
             elif c[low] > noise[low]:
                 return 0.0, e, armed
         root = first_rise(c, noise, count, low, 1.0, start, limit)
+        if root == UNSURE:
+            return -1.0, -2, armed
         if root < best:
             best, which = root, e
     return (best * cell, which, armed) if which >= 0 else (-1.0, -1, armed)
@@ -260,6 +264,8 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
             cell = cells[mode]
             dt, leaving, armed = next_exit(tables, mode, held, scale, opened, armed, span, c, noise)
             opened = False
+            if leaving == -2:
+                return UNPROVED, count, mode
             if leaving >= 0:
                 advance(flow[mode], held, tail, dt, scratch)
                 gone += dt

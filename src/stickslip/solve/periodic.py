@@ -22,6 +22,7 @@ from stickslip.structure import Structure
 
 UNIT = 1e-7  # a multiplier this close to 1 is 1: its rounding grows with the square root of a double eigenvalue
 ROUNDS = 16  # transients of a self-excited motion before no orbit is expected any more
+RUNAWAY = 1e30  # of the first period's size: what grows so far has no bound
 GRAZING = 1e-9  # an exit crossed this slowly, relative to the terms of its rate, is a tangency
 
 
@@ -211,7 +212,7 @@ def steady_state(
     SolveError
         No motion repeats because nothing drives the system.
     ModelError
-        The law has a time lag.
+        The law has a time lag, or a number of periods is none.
 
     Examples
     --------
@@ -224,18 +225,22 @@ def steady_state(
     >>> orbit.status, round(orbit.amplitude, 6), orbit.stops
     ('unique', 2.332235, (0, 0))
     """
-    if transient < 1 or orders < 1:
-        raise ModelError(f"transient = {transient}, orders = {orders}", "both are at least 1", "raise them")
+    counts = {"transient": transient, "orders": orders, "patience": patience}
+    if not all(isinstance(count, int | np.integer) and count >= 1 for count in counts.values()):
+        raise ModelError(f"{', '.join(f'{name} = {count}' for name, count in counts.items())}",
+                         "they are whole numbers of periods, at least 1", "correct them")  # fmt: skip
     table = tables(system)
     if not math.isfinite(table.motion.period):
         return _self_excited(system, table, start or {}, transient)
     state, mode = opening(table, start or {})
-    laps, sizes = 0, []
+    laps, sizes, first = 0, [], _iterate(system, table, state, mode, 1)[2]
     count = transient
     while laps < patience:
         state, mode, size = _iterate(system, table, state, mode, count)
         laps += count
         sizes.append(size)
+        if size > RUNAWAY * first:
+            break
         found = _closed(system, table, state, mode, orders)
         if found is None and _repeats_freely(table):
             found = _family(system, table, state, mode, size, orders)
@@ -243,7 +248,9 @@ def steady_state(
             return found
         count = laps
     orbit = lap(system, table, state, mode, 1)
-    growing = len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:]))
+    growing = sizes[-1] > RUNAWAY * first or (
+        len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:]))
+    )
     none = np.full(table.physical, np.nan, dtype=np.complex128)
     return SteadyState("unbounded" if growing else "not periodic", math.nan, 0, orbit, none)
 

@@ -353,10 +353,6 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
         if not t < 0.999 * min(left, period):
             break
         first_node, mode_nodes, mode_density = int(modes[mode, 8]), int(modes[mode, 9]), modes[mode, 7]
-        if lr > 0.0:
-            grown = math.exp(1.1 * lr * t)
-            for q in range(number):
-                piece[q, 9] *= grown
         k = leaving - low
         done = False
         cr, ci, yr, yi = 1.0, 0.0, 0.0, 0.0
@@ -383,6 +379,10 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
                 break
         if not done or t >= 0.9999 * left or t >= period:
             break
+        if lr > 0.0:
+            grown = math.exp(1.000001 * lr * t)
+            for q in range(number):
+                piece[q, 9] *= grown
         parts = past_parts[slot]
         grid = (turns, density, first_node, mode_nodes, mode_density)
         end = (cr, ci, yr, yi)

@@ -12,6 +12,7 @@ with a noise level per coefficient that bounds its rounding.
 * Marching: where g < 0, and g'' <= M on the rest of the cell, g + g' d + M d^2/2 < 0 certifies that no root lies
   within d. Steps of that length never pass a root and converge to it quadratically.
 * A near tangency whose crest stays within the noise counts as no crossing.
+* A quantity that falls through zero first is followed down as far as its slope provably stays negative.
 * A root at the very end of the time span belongs to the span.
 """
 
@@ -22,6 +23,7 @@ import math
 from stickslip.compiled import OPTIONS, compiled
 
 NONE = 2.0  # no root in the cell
+UNSURE = 3.0  # the march through the cell ran out of steps: nothing is proved
 NOISE = 64 * 2.220446049250313e-16
 
 
@@ -55,8 +57,23 @@ def _clear(g, d, most, left):
 
 
 @compiled(**OPTIONS)
+def _walk(d, h, third, floor):
+    """How far to go on from a value within the noise: no rise that stands out from it lies before.
+
+    Down a slope d < 0 as far as neither h nor a third derivative of up to `third` can turn it; else until value and
+    crest are told from the noise.
+    """
+    bend, twist = max(abs(h), 1e-300), max(third, 1e-300)
+    far = min(2.0 * math.sqrt(2.0 * floor / bend) + max(d, 0.0) / bend, 2.0 * (6.0 * floor / twist) ** (1.0 / 3.0))
+    if d < 0.0:
+        up = max(h, 0.0)
+        far = max(far, -2.0 * d / (up + math.sqrt(up * up - 2.0 * twist * d)))
+    return far
+
+
+@compiled(**OPTIONS)
 def first_rise(c, noise, count, low, sign, start, limit):
-    """First u in (start, limit] at which sign * polynomial rises through zero; `NONE` where there is none.
+    """First u in (start, limit] at which sign * polynomial rises through zero; else `NONE` or `UNSURE`.
 
     The polynomial starts at coefficient `low` (the zeros at the start divided out) and is negative at `start` once
     multiplied by `sign`.
@@ -75,13 +92,12 @@ def first_rise(c, noise, count, low, sign, start, limit):
         if g >= -floor:
             if d > 0.0 and (g >= 0.0 or d * d >= 2.0 * floor * abs(h)):
                 return min(limit, max(start, u - g / d))
-            # a tangency within the noise: walk past its crest, and count it only if the crest stands out
-            reach = 2.0 * math.sqrt(2.0 * floor / max(abs(h), 1e-300)) + abs(d) / max(abs(h), 1e-300)
-            ahead = min(limit, u + max(reach, 1e-9))
-            if ahead >= limit:
-                return NONE
+            # past a crest within the noise, or down from the zero; a crossing counts once it stands out
+            ahead = min(limit, u + max(_walk(d, h, third, floor), 1e-9))
             if sign * _curve(c, low, count, ahead)[0] > floor:
                 return ahead
+            if ahead >= limit:
+                return NONE
             u = ahead
             continue
         if g + max(d, 0.0) * left + 0.5 * max(most, 0.0) * left * left < 0.0:
@@ -97,4 +113,4 @@ def first_rise(c, noise, count, low, sign, start, limit):
         if step <= 4e-16 * max(u, 1e-3):
             return u if d > 0.0 else NONE
         u += step
-    return u
+    return UNSURE

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
+from stickslip.laws.base import finite
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
@@ -69,9 +70,10 @@ def simulate(
     Raises
     ------
     ModelError
-        The time or the start has no meaning.
+        The time, the start or the budget has no meaning, or the drive was not recorded as long.
     SolveError
-        More events than the budget, or transitions that chase each other; the message names the state.
+        More events than the budget, transitions that chase each other, or motion beyond the largest number; the
+        message names the state.
 
     Examples
     --------
@@ -84,6 +86,8 @@ def simulate(
     >>> run.status, run.state(10)["x"]
     ('at rest', 0.25)
     """
+    if not budget >= 1:
+        raise ModelError(f"budget = {budget}", "a period has room for at least one event", "raise budget=")
     if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
         return _simulate_curved(system, (duration, cycles), start or {}, budget, rtol, progress)
     table = automaton(system)
@@ -160,15 +164,30 @@ def opening(table: Automaton | Tape, start: Mapping[str, float | str]) -> tuple[
             raise ModelError(
                 f"start has '{name}'", f"it may have {', '.join(table.names[: table.physical])} and mode", "correct it"
             )
-        if not math.isfinite(given[name]):
-            raise ModelError(f"start has {name} = {given[name]}", "a start is finite", f"correct {name}")
+        unit = "m" if name[0] == "x" else "m/s" if name[0] == "v" else "SI"
+        given[name] = finite(name, given[name], unit=unit, signed=True)
     for j, name in enumerate(table.names[: table.physical]):
         state[j] = given.get(name, table.opening[j] @ state)
     if mode_name is not None:
-        return state, table.index(mode_name)
+        mode = table.index(mode_name)
+        _require_fit(table, state, mode)
+        return state, mode
     if len(set(table.entry)) == 1:
         return state, table.entry[1]
     return state, table.entry[int(np.sign(table.outputs["slip"] @ state)) + 1]
+
+
+def _require_fit(table: Automaton | Tape, state: Array, mode: int) -> None:
+    """Refuse the rigid contact of one mass that starts held while it slides, or slides against its mode."""
+    part = table.modes[mode]
+    slip = float(np.max(table.outputs["slip"] @ state)) if getattr(table, "degrees", 1) == 1 else 0.0
+    slides = part.friction is None or (len(set(table.entry)) > 1 and part.side * slip < 0)
+    if slip != 0.0 and slides:
+        raise ModelError(
+            f"start has a slip of {slip:g} m/s in the mode '{part.name}'",
+            "a contact that holds does not slip, and one that slips does so to the mode's side",
+            "correct v or mode, or leave mode out",
+        )
 
 
 def run(
@@ -204,7 +223,7 @@ def run(
             mode = kernel.settle(
                 table.tables, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]
             )
-            _refuse_chatter(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock, mode)
+            _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
             outcome = kernel.FULL
             while outcome == kernel.FULL:
                 before = clock.copy()
@@ -213,8 +232,8 @@ def run(
                 )
                 passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
                 pieces.keep(count, passed, total)
-                _refuse_chatter(outcome, table, state, clock, mode)
-                if outcome == kernel.FULL and count > budget * max(1.0, passed / scale):
+                _refuse(outcome, table, state, clock)
+                if count - (outcome == kernel.DONE) > budget * max(1.0, passed / scale):
                     raise SolveError(
                         f"{count} events within {passed:g} s at {_named(table, state)}",
                         f"a period of {scale:g} s has at most {budget} events",
@@ -274,7 +293,10 @@ def _columns(room: int, size: int) -> tuple[NDArray[Any], ...]:
 
 def stops_of(table: Automaton | Tape, laps: float, offset: float) -> Any:
     """The times to which the march goes in turn, with the signals that take new values at each start."""
-    knots = table.motion.knots
+    knots, end = table.motion.knots, table.motion.end
+    if offset > end * (1 + 1e-12):
+        raise ModelError(f"{offset:g} s of a drive recorded for {end:g} s", "a run ends where its drive is known last",
+                         f"simulate {end:g} s at most, or record longer")  # fmt: skip
     if knots is None:
         yield (laps, offset), ([], [])
         return
@@ -289,12 +311,25 @@ def _at_rest(table: Automaton, state: Array, mode: int) -> bool:
     return bool(np.all(table.flow[mode] @ state == 0.0))
 
 
-def _refuse_chatter(outcome: int, table: Automaton, state: Array, clock: Array, mode: int) -> None:
+def _refuse(outcome: int, table: Automaton, state: Array, clock: Array) -> None:
+    place = f"lap {clock[0]:g}, {clock[1]:g} s, at {_named(table, state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
         raise SolveError(
-            f"transitions without time between them, lap {clock[0]:g}, {clock[1]:g} s, at {_named(table, state)}",
+            f"transitions without time between them, {place}",
             "a law leaves every state in one direction",
             "check the law's exits there",
+        )
+    if outcome == kernel.UNPROVED:
+        raise SolveError(
+            f"an exit that can not be told from a tangency, {place}",
+            "the first exit of a mode is certified",
+            "check the law's exits there, or start a little beside",
+        )
+    if not np.all(np.isfinite(state)):
+        raise SolveError(
+            f"motion beyond the largest number, {place}",
+            "a motion is finite",
+            "simulate a shorter time; a negative damping or slope makes it grow",
         )
 
 

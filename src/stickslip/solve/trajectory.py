@@ -17,6 +17,8 @@ from stickslip.record.record import Record, Step
 from stickslip.solve.automaton import Array, Automaton, System
 from stickslip.solve.kernel import sample
 
+MOST = 1e10  # samples of a record; more fit no desk
+
 
 class Event(NamedTuple):
     """One change of mode: when [s], what it is called, the mode it leads to, that mode's side, and which contact."""
@@ -191,6 +193,11 @@ class Trajectory:
         values : ndarray (R, T)
         piece : ndarray (T,)
             Number of the piece each instant falls in.
+
+        Raises
+        ------
+        SolveError
+            Instants out of order or outside the simulated time, or an output that the system does not have.
         """
         times = np.ascontiguousarray(times, dtype=np.float64)
         if len(times) and not (times[0] >= 0 and times[-1] <= self.duration * (1 + 1e-12)):
@@ -199,6 +206,8 @@ class Trajectory:
                 f"the motion is known from 0 to {self.duration:g} s",
                 "simulate longer, or ask within it",
             )
+        if np.any(np.diff(times) < 0):
+            raise SolveError("instants that run back", "they are looked up in the order of time", "sort them")
         rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
         out, piece = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
         work = np.empty((6, self.states.shape[1]))
@@ -253,6 +262,9 @@ class Trajectory:
         if name in table.outputs:
             forms = np.atleast_2d(table.outputs[name])
             return np.broadcast_to(forms, (count, *forms.shape[-2:]))
+        if name not in spans and name not in table.names:
+            known = (*spans, "a", "friction", *table.outputs, *table.names[2 * degrees : table.physical])
+            raise SolveError(f"no output is called '{name}'", f"there are {', '.join(known)}", "name one of them")
         places = list(spans[name]) if name in spans else [table.names.index(name)]
         return np.broadcast_to(np.eye(size)[places], (count, len(places), size))
 
@@ -274,7 +286,18 @@ class Trajectory:
         Record
             Channels x, v, a, friction, and z where the base moves, force where a force acts; x1, x2 ... of a
             structure.
+
+        Raises
+        ------
+        SolveError
+            The rate is not positive, or asks for more samples than can be held.
         """
+        if not (fs > 0 and self.duration * fs < MOST):
+            raise SolveError(
+                f"fs = {fs} Hz over {self.duration:g} s",
+                f"the rate is positive, and a record has up to {MOST:g} samples",
+                "give fs= in Hz, or simulate a shorter time",
+            )
         count = int(np.floor(self.duration * fs * (1 + 1e-12))) + 1
         times = np.minimum(np.arange(count) / fs, self.duration)
         names = ["x", "v", "a", "friction"]
