@@ -23,6 +23,7 @@ import math
 from stickslip.compiled import OPTIONS, compiled
 
 NONE = 2.0  # no root in the cell
+STEPS = 20_000  # of the march through a cell
 UNSURE = 3.0  # the march through the cell ran out of steps: nothing is proved
 NOISE = 64 * 2.220446049250313e-16
 
@@ -84,7 +85,7 @@ def first_rise(c, noise, count, low, sign, start, limit):
         third += j * (j - 1) * (j - 2) * abs(c[k])
     floor = noise[low]
     u = start
-    for _ in range(2000):
+    for _ in range(STEPS):
         g, d, h = _curve(c, low, count, u)
         g, d, h = sign * g, sign * d, sign * h
         left = limit - u
