@@ -182,6 +182,11 @@ def grid(name: str) -> dict[str, Any]:
     dict
         Lists of numbers by name.
 
+    Raises
+    ------
+    ModelError
+        No grid has that name.
+
     Examples
     --------
     >>> len(grid("HL-1")["ratios"]), len(grid("HL-1")["loads"])

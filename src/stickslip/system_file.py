@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, BeforeValidator, Field, create_model
 
 from stickslip import scenarios
-from stickslip.drives import RecordedBase
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
@@ -331,29 +330,21 @@ def _structure(whole: _File, drive: Any, source: _Source) -> Structure:
 
 def _whole_run(system: System) -> dict[str, float]:
     """What is run where nothing is said: the whole recorded motion, else some cycles."""
-    drive = system.drive
-    return {"duration": _length(drive)} if isinstance(drive, RecordedBase) else {"cycles": CYCLES}
-
-
-def _length(drive: RecordedBase) -> float:
-    return (np.size(drive.samples) - 1) / drive.fs
+    end = system.drive.motion().end
+    return {"duration": end} if np.isfinite(end) else {"cycles": CYCLES}
 
 
 def _check_run(case: Case) -> None:
     if len(case.run) > 1:
         raise ModelError("duration and cycles are given", "a run has one of the two", "leave one out")
-    drive = case.system.drive
     if not np.isfinite(case.duration):
         raise ModelError(
             "a system without spring or periodic drive has no cycles", "it is run for a time", "give a duration"
         )
-    if not isinstance(drive, RecordedBase):
-        return
-    if case.duration > _length(drive) * (1 + 1e-9):
+    end = case.system.drive.motion().end
+    if case.duration > end * (1 + 1e-9):
         raise ModelError(
-            f"duration = {case.duration:g} s",
-            f"the recorded base motion ends at {_length(drive):g} s",
-            "run it no longer",
+            f"duration = {case.duration:g} s", f"the recorded base motion ends at {end:g} s", "run it no longer"
         )
 
 

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve import collocation, march
+from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
 from stickslip.solve.series import expansion
 from stickslip.solve.tape import Tape
 from stickslip.solve.trajectory import Trajectory
@@ -178,13 +179,10 @@ def run_curved(
                 passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
                 ahead = total - clock[1] - (clock[0] * period if clock[0] else 0.0)
                 _refuse(outcome, table, state, clock, passed, ahead, CHUNK * len(kept))
-                left = int(np.sum(room[5][:written] >= 0))
-                if outcome == march.FULL and left > budget * max(1.0, passed / scale):
-                    raise SolveError(
-                        f"{left} events within {passed:g} s at {_named(table, state)}",
-                        f"a period of {scale:g} s has at most {budget} events",
-                        "check the law there (chatter), or raise budget=",
-                    )
+                require_budget(
+                    int(np.sum(room[5][:written] >= 0)), passed=passed, scale=scale, budget=budget,
+                    state=named(table.names[: table.physical], state),
+                )  # fmt: skip
                 tell(1.0 - ahead / total)
     except KeyboardInterrupt:
         if not kept:
@@ -245,13 +243,11 @@ def _assembled(
 
 
 def _refuse(outcome: int, table: Tape, state: Array, clock: Array, passed: float, ahead: float, done: int) -> None:
-    place = f"lap {clock[0]:g}, {clock[1]:g} s, at {_named(table, state)}"
+    place = f"lap {clock[0]:g}, {clock[1]:g} s, at {named(table.names[: table.physical], state)}"
     if outcome == march.CHATTER:
-        raise SolveError(
-            f"transitions without time between them, {place}",
-            "a law leaves every state in one direction",
-            "check the law's exits there",
-        )
+        raise chatter(place)
+    if outcome == march.UNPROVED:
+        raise unproved(place)
     if outcome == march.STALL:
         raise SolveError(
             f"a step of no length, {place}",
@@ -264,7 +260,4 @@ def _refuse(outcome: int, table: Tape, state: Array, clock: Array, passed: float
             f"a run takes at most {STEPS:g} steps; the contact is far faster here than the motion",
             "take a larger mass, a larger rtol=, or a shorter time",
         )
-
-
-def _named(table: Tape, state: Array) -> str:
-    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(table.names[: table.physical], state, strict=False))
+    require_numbers(state, place)

@@ -19,7 +19,7 @@ from stickslip.solve.taylor import (
     woken,
 )  # fmt: skip
 
-DONE, FULL, CHATTER, STALL = range(4)
+DONE, FULL, CHATTER, STALL, UNPROVED = range(5)
 CHAIN = 16  # most transitions without time between them
 LEAP = 40.0  # Taylor steps that a leap replaces, at least half of them: it costs as much as about 40
 PATIENCE = 256.0  # Taylor steps without event after which a leap is tried
@@ -46,7 +46,10 @@ def _polish(series, numbers, node, tones, mode, h, time, state, order, s):
 
 @compiled(**EXACT, forceinline=True)
 def _explicit(sums, exits, guards, mode, size, h, u, order, big, tolerance, s, c, noise):
-    """The Taylor step, shortened to where a function wakes or an exit ends the mode, and that exit (-1: none)."""
+    """The Taylor step, shortened to where a function wakes or an exit ends the mode, and that exit (-1: none).
+
+    A negative length: a root could neither be found nor excluded.
+    """
     width, asleep, safe = order + 1, 4.0 - math.log(tolerance), max(NOISE, 1e3 * tolerance)
     node, _, crossing, _, bound, _, scale = exits
     kind, argument, mind = guards
@@ -55,6 +58,8 @@ def _explicit(sums, exits, guards, mode, size, h, u, order, big, tolerance, s, c
         a = argument[g] * width
         if not awake(kind[g], s[a], asleep):
             u = woken(kind[g], s, a, order, u, asleep, c, noise)
+            if u < 0.0:
+                return u, leaving
     for e in range(bound[mode], bound[mode + 1]):
         i = node[e]
         far = i < size and scale[e] * s[i * width] < -abs(scale[e]) * safe * big[i]
@@ -66,7 +71,7 @@ def _explicit(sums, exits, guards, mode, size, h, u, order, big, tolerance, s, c
         when = rise(sums, rows + e, mode * size, crossing[e], i, scale[e], size, h, u, order, width, big, s, c, noise)
         if when < u or (when == u and leaving < 0):
             leaving, u = e, when
-            if u == 0.0:
+            if u <= 0.0:
                 break
     return u, leaving
 
@@ -158,6 +163,8 @@ def march(
             u, leaving = _explicit(
                 sums, exits, guards, mode, size, h, min(full, remaining / h), order, big, tolerance, s, c, noise
             )
+            if u < 0.0:
+                return UNPROVED, written, leapt, mode
             step = u * h
             clock[4] += 1.0
         if step > 0.0:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import ModelError, SolveError
+from stickslip.errors import ModelError
 from stickslip.laws.base import finite
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
@@ -18,6 +18,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
 from stickslip.solve.automaton import DEGREE, Array, Automaton, System, automaton
 from stickslip.solve.phasors import blank_past, fast_tables
+from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
 from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -233,12 +234,10 @@ def run(
                 passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
                 pieces.keep(count, passed, total)
                 _refuse(outcome, table, state, clock)
-                if count - (outcome == kernel.DONE) > budget * max(1.0, passed / scale):
-                    raise SolveError(
-                        f"{count} events within {passed:g} s at {_named(table, state)}",
-                        f"a period of {scale:g} s has at most {budget} events",
-                        "check the law there (chatter), or raise budget=",
-                    )
+                require_budget(
+                    count - (outcome == kernel.DONE), passed=passed, scale=scale, budget=budget,
+                    state=named(table.names[: table.physical], state),
+                )  # fmt: skip
                 if tell:
                     tell(pieces.passed / total)
     except KeyboardInterrupt:
@@ -312,26 +311,9 @@ def _at_rest(table: Automaton, state: Array, mode: int) -> bool:
 
 
 def _refuse(outcome: int, table: Automaton, state: Array, clock: Array) -> None:
-    place = f"lap {clock[0]:g}, {clock[1]:g} s, at {_named(table, state)}"
+    place = f"lap {clock[0]:g}, {clock[1]:g} s, at {named(table.names[: table.physical], state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
-        raise SolveError(
-            f"transitions without time between them, {place}",
-            "a law leaves every state in one direction",
-            "check the law's exits there",
-        )
+        raise chatter(place)
     if outcome == kernel.UNPROVED:
-        raise SolveError(
-            f"an exit that can not be told from a tangency, {place}",
-            "the first exit of a mode is certified",
-            "check the law's exits there, or start a little beside",
-        )
-    if not np.all(np.isfinite(state)):
-        raise SolveError(
-            f"motion beyond the largest number, {place}",
-            "a motion is finite",
-            "simulate a shorter time; a negative damping or slope makes it grow",
-        )
-
-
-def _named(table: Automaton, state: Array) -> str:
-    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(table.names[: table.physical], state, strict=False))
+        raise unproved(place)
+    require_numbers(state, place)

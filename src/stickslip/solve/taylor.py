@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from stickslip.compiled import compiled
-from stickslip.solve.roots import NOISE, NONE, first_rise
+from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise
 
 OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}
 EXACT = {"error_model": "numpy"}
@@ -117,7 +117,7 @@ def waking(kind, at, asleep):
 
 @compiled(**EXACT)
 def woken(kind, s, a, order, u, asleep, c, noise):
-    """The step, shortened to where a sleeping function wakes: until then its series does not know of it."""
+    """The step, shortened to where a sleeping function wakes: its series does not know of it until then; -1: unsure."""
     level, sign = waking(kind, s[a], asleep)
     if surely_below(s, a, order - 1, sign, -level, u):
         return u
@@ -127,6 +127,8 @@ def woken(kind, s, a, order, u, asleep, c, noise):
         power *= u
     c[0] += level
     at = first_rise(c, noise, order, 0, 1.0, 0.0, 1.0)
+    if at == UNSURE:
+        return -1.0
     return u if at == NONE else u * at
 
 
@@ -159,7 +161,7 @@ def resolved(s, start, top, floor, u):
 
 @compiled(**EXACT)
 def rise(sums, row, rates, crossing, node, scale, size, h, u, order, width, big, s, c, noise):
-    """When an exit ends the mode, in units of h, up to u; infinite where it does not."""
+    """When an exit ends the mode, in units of h, up to u; infinite where it does not, -1 where nothing is proved."""
     j, low = node * width, 0
     top = order if node < size else order - 1
     floor = _exit_noise(sums, row, rates, 0, size, h, width, big, s)
@@ -178,6 +180,8 @@ def rise(sums, row, rates, crossing, node, scale, size, h, u, order, width, big,
         noise[k] = floor * power
         power *= u
     at = first_rise(c, noise, top + 1, low, 1.0, 0.0, 1.0)
+    if at == UNSURE:
+        return -1.0
     return math.inf if at == NONE else at * u
 
 

@@ -1,0 +1,53 @@
+"""Why a run is given up, in the same words for tables of linear modes and for curved laws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stickslip.errors import SolveError
+from stickslip.solve.automaton import Array
+
+
+def named(names: Sequence[str], state: Array) -> str:
+    """The first entries of a state, by name."""
+    return ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, state, strict=False))
+
+
+def chatter(place: str) -> SolveError:
+    """Modes that follow one another without end while no time passes."""
+    return SolveError(
+        f"transitions without time between them, {place}",
+        "a law leaves every state in one direction",
+        "check the law's exits there",
+    )
+
+
+def unproved(place: str) -> SolveError:
+    """A first exit without its certificate."""
+    return SolveError(
+        f"an exit that can not be told from a tangency, {place}",
+        "the first exit of a mode is certified",
+        "check the law's exits there, or start a little beside",
+    )
+
+
+def require_numbers(state: Array, place: str) -> None:
+    """Refuse a motion that has outgrown the numbers."""
+    if not np.all(np.isfinite(state)):
+        raise SolveError(
+            f"motion beyond the largest number, {place}",
+            "a motion is finite",
+            "simulate a shorter time; a negative damping or slope makes it grow",
+        )
+
+
+def require_budget(events: int, *, passed: float, scale: float, budget: int, state: str) -> None:
+    """Refuse more than `budget` events in a period of `scale` [s], counted over the time `passed` [s]."""
+    if events > budget * max(1.0, passed / scale):
+        raise SolveError(
+            f"{events} events within {passed:g} s at {state}",
+            f"a period of {scale:g} s has at most {budget} events",
+            "check the law there (chatter), or raise budget=",
+        )
