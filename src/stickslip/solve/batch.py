@@ -31,7 +31,7 @@ class Batch:
     counts : ndarray (B,)
         Number of pieces; what stands after them in a row has no meaning.
     statuses : ndarray (B,)
-        DONE of :mod:`stickslip.solve.kernel`, or why a motion ended early: FULL, CHATTER, LOST.
+        DONE of :mod:`stickslip.solve.kernel`, or why a motion ended early: FULL, CHATTER, LOST, UNPROVED.
     laps, offsets, modes, durations : ndarray (B, P)
         Start of each piece as full periods and time within the period [s], number of its mode, length [s].
     states : ndarray (B, P, N)
