@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.fit.motions import free_decay
 from stickslip.fit.search import Search
 from stickslip.fit.waveform import normal_equations, sample_motion
 
@@ -166,6 +167,70 @@ def test_mistakes_are_told() -> None:
         ss.fit_decay(record, mass=-1)
     with pytest.raises(ss.RecordError, match="channel v is missing"):
         ss.fit_decay(record, channel="v")
+    with pytest.raises(ss.EstimateError, match="no step"):
+        ss.fit_decay(record, noise="quantised")
+    with pytest.raises(ss.EstimateError, match="restoring = 'round'"):
+        ss.fit_decay(record, restoring="round")
+    with pytest.raises(ss.EstimateError, match="an angle in rad"):
+        ss.fit_decay(record, restoring="pendulum")
+
+
+PENDULUM = [OMEGA, 0.01, 0.015, 0.05, 1.4, 0.5, 0, 0, 0, 0, 0.5, 0]
+
+
+def pendulum(*, seed: int = 0, noise: float = 1e-3, seconds: float = 20.0) -> ss.Record:
+    """An angle released from 80 degrees: half a percent off in the zero, and its swings not of one length."""
+    t = np.arange(int(200 * seconds)) / 200
+    theta = free_decay(t, PENDULUM, restoring="pendulum")[0]
+    return ss.Record.of({"theta": theta + noise * np.random.default_rng(seed).standard_normal(t.size)}, fs=200)
+
+
+def test_a_pendulum_of_large_swings_is_fitted_with_its_sine() -> None:
+    """Values and intervals by 30 records; the straight spring is far off and says so."""
+    inside = []
+    for seed in range(30):
+        found = ss.fit_decay(pendulum(seed=seed), restoring="pendulum", stiffness=2.0)
+        answers = (found.damping_ratio, found.dry_displacement, found.bias, found.amplitude, found.release_time)
+        inside.append([each.includes(true) for each, true in zip(answers, PENDULUM[1:6], strict=True)])
+        assert abs(found.dry_displacement.value - 0.015) < 4.5 * found.dry_displacement.sd
+    assert found.status == "ok"
+    assert "sin x" in found.model
+    assert found.frequency.value == pytest.approx(1.0, abs=1e-4)
+    assert found.dry_force is not None
+    assert found.dry_force.includes(0.03)
+    assert np.all(np.mean(inside, axis=0) > 0.83)
+    assert np.std(found.residual[0]) == pytest.approx(1e-3 / math.sqrt(5), rel=0.15)
+    assert found.noise_level == pytest.approx(1e-3, rel=0.1)
+    straight = ss.fit_decay(pendulum())
+    assert "times the noise" in straight.status
+
+
+def test_a_pendulum_s_static_friction_is_bracketed() -> None:
+    """Its dry friction is static too: the sine of where it stays lies below it, that of where it turned above."""
+    found = ss.fit_decay(pendulum(seconds=40.0), restoring="pendulum")
+    assert found.static_displacement.includes(0.015)
+    assert found.static_displacement.status == "ok"
+    early = ss.fit_decay(pendulum(seconds=6.0), restoring="pendulum")
+    assert "only an upper bound" in early.static_displacement.status
+
+
+def test_what_a_pendulum_s_fit_does_not_do_is_refused() -> None:
+    with pytest.raises(ss.EstimateError, match="2 releases"):
+        ss.fit_decay([pendulum(), pendulum(seed=1)], restoring="pendulum")
+    with pytest.raises(ss.EstimateError, match="noise = 'coloured'"):
+        ss.fit_decay(pendulum(), restoring="pendulum", noise="coloured")
+
+
+def test_a_lost_extreme_is_said_in_the_status() -> None:
+    samples, dt, _ = ring_down(per_period=200)
+    found = ss.fit_decay(ss.Record.of({"x": np.delete(samples, slice(430, 480))}, fs=1 / dt))
+    assert "an extreme was lost" in found.status
+
+
+def test_the_noise_of_every_release_is_told() -> None:
+    samples, dt, _ = ring_down(noise=2e-4)
+    records = [ss.Record.of({"x": each}, fs=1 / dt) for each in (samples, np.round(samples / 0.01) * 0.01)]
+    assert ss.fit_decay(records).noise == "white; counts of 0.01"
 
 
 def drift(total: int, dt: float, corner: float, random: np.random.Generator) -> np.ndarray:

@@ -50,6 +50,18 @@ def test_what_can_not_be_asked_is_refused() -> None:
     speed = np.gradient(released(0.02, 0.02, seed=0)["theta"], 0.005)
     with pytest.raises(ss.EstimateError, match="made on a displacement"):
         ss.choose_motion(ss.Record.of({"v": speed}, fs=200))
+    record = released(0.02, 0.02, seed=0)
+    with pytest.raises(ss.EstimateError, match="restoring = 'round'"):
+        ss.choose_motion(record, restoring="round")
+    with pytest.raises(ss.EstimateError, match="an angle in rad"):
+        ss.choose_motion(ss.Record.of({"x": record["theta"]}, fs=200), restoring="pendulum")
+
+
+def test_clipped_swings_are_left_out() -> None:
+    found = ss.choose_motion(ss.Record.of({"theta": np.clip(released(0.02, 0.02, seed=1)["theta"], -0.7, 0.7)}, fs=200))
+    assert found.model == "both"
+    assert found.status == "clipped swings are left out"
+    assert abs(found.dry_displacement.value - 0.02) < 4.5 * found.dry_displacement.sd
 
 
 def test_a_real_pendulum(dataset: Callable[[str], Path]) -> None:

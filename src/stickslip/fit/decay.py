@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
-from stickslip.identify.release import RingDown, find_releases
+from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
@@ -20,6 +20,7 @@ from stickslip.units import parse_value
 
 if TYPE_CHECKING:
     from stickslip.fit.joint import Release
+    from stickslip.fit.motions import Restoring
     from stickslip.fit.search import Blocks
 
 Array = NDArray[np.float64]
@@ -59,9 +60,9 @@ class DecayFit(Result):
     model : str
         The motion fitted, in words.
     noise : str
-        The noise found, in words.
+        The noise found, in words; where releases differ, of each.
     noise_level : float
-        Its standard deviation a sample, in the channel's unit.
+        Its standard deviation a sample in the first release, in the channel's unit.
     channel : str
         The channel fitted.
     ring_downs : tuple of RingDown
@@ -111,6 +112,7 @@ def fit_decay(
     mass: float | str | None = None,
     stiffness: float | str | None = None,
     noise: str | None = None,
+    restoring: Restoring = "linear",
 ) -> DecayFit:
     r"""How much viscous and how much dry friction does a free decay show?
 
@@ -130,8 +132,9 @@ def fit_decay(
     the probability of each count's interval; or white and drift with a 1/f spectrum, by restricted maximum likelihood.
     Several releases are fitted together: they share frequency and friction, and narrow the static friction's bracket.
 
-    Another motion leaves a residual larger than the noise, and the status says so: :func:`choose_motion` tells which it
-    is, also for a pendulum of large swings.
+    A pendulum's spring is ``sin x``: with ``restoring="pendulum"`` its motion is integrated, and the intervals are
+    those of linear propagation with the noise of the residual. Another motion leaves a residual larger than the noise,
+    and the status says so: :func:`choose_motion` tells which it is, with the interval that counts the model's form.
 
     The record is reduced to means over a fortieth of a period first, which costs 0.15 % of the accuracy and makes the
     time of a fit independent of the sampling rate. The model's means are exact.
@@ -147,6 +150,8 @@ def fit_decay(
         Mass [kg] or stiffness [N/m] (of an angle: kg m^2, N m/rad), for the dry friction as a force.
     noise : {"white", "quantised", "coloured"}, optional
         The noise's kind; told from the record when not given.
+    restoring : {"linear", "pendulum"}
+        The spring's law: x, or sin x of one release of an angle ``theta`` [rad].
 
     Returns
     -------
@@ -157,7 +162,8 @@ def fit_decay(
     RecordError
         The channel is missing, broken or too short.
     EstimateError
-        No free decay (see :func:`find_releases`), or fewer than two swings.
+        No free decay (see :func:`find_releases`), fewer than two swings, a noise that the record does not have, or a
+        pendulum that is no single angle.
 
     Examples
     --------
@@ -178,11 +184,7 @@ def fit_decay(
     if not records:
         raise EstimateError("no record", "a decay is fitted to one record at least", "pass a record, or several")
     found = [find_releases(each, channel=channel) for each in records]
-    ring_downs = [
-        _described(ring_down, each)
-        for each, those in zip(records, found, strict=True)
-        for ring_down in those.ring_downs
-    ]
+    ring_downs = [ring_down for each in found for ring_down in each.ring_downs]
     names = {each.channel for each in ring_downs}
     if len(names) > 1:
         raise EstimateError(
@@ -191,10 +193,17 @@ def fit_decay(
             "choose channel=",
         )
     known = _constants(mass, stiffness, ring_downs[0].channel)
+    history = tuple(step for each in records for step in each.history)
+    notes = tuple(dict.fromkeys(note for each in found for note in each.notes))
+    if restoring != "linear":
+        from stickslip.fit.pendulum import fit_pendulum
+
+        return fit_pendulum(ring_downs, restoring=restoring, noise=noise, known=known, notes=notes, history=history)
+    sources = [each for each, those in zip(records, found, strict=True) for _ in those.ring_downs]
+    ring_downs = [_described(ring_down, each) for ring_down, each in zip(ring_downs, sources, strict=True)]
     releases = [_release(each, noise) for each in ring_downs]
     motion = _alone(releases[0]) if len(releases) == 1 and releases[0].noise.kind == "white" else _together(releases)
-    notes = tuple(dict.fromkeys(note for each in found for note in each.notes))
-    return _answer(ring_downs, releases, motion, known, notes, tuple(step for each in records for step in each.history))
+    return _answer(ring_downs, releases, motion, known, notes, history)
 
 
 def _described(ring_down: RingDown, record: Record) -> RingDown:
@@ -301,6 +310,12 @@ def _constants(mass: float | str | None, stiffness: float | str | None, name: st
     return values[0], values[1]
 
 
+def spring_of(known: tuple[float | None, float | None], angular_frequency: float) -> float | None:
+    """The stiffness that is stated, or that of the stated mass; None where neither is."""
+    mass, stiffness = known
+    return stiffness if stiffness is not None or mass is None else mass * angular_frequency**2
+
+
 def _answer(
     ring_downs: list[RingDown],
     releases: list[Release],
@@ -313,13 +328,14 @@ def _answer(
     length, unit = ("rad" if name == "theta" else "m"), ring_downs[0].unit
     half_cycles, likelihood = motion.candidates[0]
     fitted = [_fitted(each.blocks, n, p) for each, n, p in zip(releases, half_cycles, motion.motions[0], strict=True)]
-    cut = ("clipped swings are left out",) if not all(each.sound.all() for each in ring_downs) else ()
-    worries = (*cut, *_misfit(releases, fitted))
+    cut = (CLIPPED,) if not all(each.sound.all() for each in ring_downs) else ()
+    lost = (LOST,) if any(LOST in each.notes for each in ring_downs) else ()
+    worries = (*cut, *lost, *_misfit(releases, fitted))
     status = "; ".join(worries) or "ok"
     many = ", ".join(map(str, half_cycles))
     checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)
-    noise = releases[0].noise
-    method = f"whole waveform, noise {noise.words}, profile likelihood"
+    noise = "; ".join(dict.fromkeys(each.noise.words for each in releases))
+    method = f"whole waveform, noise {noise}, profile likelihood"
     starts = [each.first for each in ring_downs]
 
     def estimate(index: int, words: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
@@ -328,10 +344,9 @@ def _answer(
         return Estimate(words, value, (low, high), spread, unit, method, status, checks)
 
     dry = estimate(2, "dry friction displacement", length)
-    mass, stiffness = known
-    spring = stiffness if stiffness is not None or mass is None else mass * float(motion.values[0]) ** 2
+    spring = spring_of(known, float(motion.values[0]))
     frequency = estimate(0, "natural frequency", "Hz", 1 / (2 * math.pi))
-    step = Step("fit_decay", {"channel": name}, f"{many} half cycles of {frequency.value:.6g} Hz, noise {noise.words}")
+    step = Step("fit_decay", {"channel": name}, f"{many} half cycles of {frequency.value:.6g} Hz, noise {noise}")
     return DecayFit(
         damping_ratio=estimate(1, "damping ratio", "1"),
         dry_displacement=dry,
@@ -344,8 +359,8 @@ def _answer(
         half_cycles=half_cycles,
         alternatives=motion.candidates,
         model="viscous and dry friction",
-        noise=noise.words,
-        noise_level=noise.level,
+        noise=noise,
+        noise_level=releases[0].noise.level,
         channel=name,
         ring_downs=tuple(ring_downs),
         time=tuple(start + each.blocks.centres for start, each in zip(starts, releases, strict=True)),

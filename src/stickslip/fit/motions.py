@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Restoring = Literal["linear", "pendulum"]
+RESTORING: tuple[str, ...] = get_args(Restoring)
 
 PARAMETERS = (
     "angular_frequency", "damping_ratio", "dry_displacement", "rest", "amplitude", "release",

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.errors import EstimateError
 from stickslip.fit.counts import add_counts
 from stickslip.fit.likelihood import Objective, solve
 from stickslip.fit.search import Blocks
@@ -27,6 +28,7 @@ FINEST = 0.02  # of the step: less noise than this is not told from it
 CORNERS = 30  # trial corners of the drift's spectrum
 GAINED = 2.7  # minus twice the log likelihood that drift must gain before it is believed
 COARSE = 0.7  # of the step: noise, the counts' own included, below which counts are not a sum of white noises
+SHORT = 24  # blocks in which drift is not told from the motion
 KINDS = ("white", "quantised", "coloured")
 
 
@@ -58,7 +60,17 @@ class Noise:
 
 
 def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: str | None = None) -> Noise:
-    """What the noise of a release is, from its fits in white noise, or the likelihood of the kind that is asked for."""
+    """What the noise of a release is, from its fits in white noise, or the likelihood of the kind that is asked for.
+
+    Raises
+    ------
+    EstimateError
+        Counts are asked for where no step is seen, or drift in a record too short to tell it.
+    """
+    if kind == "quantised" and not step > 0:
+        raise EstimateError(
+            "noise = 'quantised'", "no step of a digitiser is seen in the samples", "leave noise= out, or choose white"
+        )
     row = fits[np.argmin(fits[:, 1])]
     variance = max(row[1] / blocks.freedom, 1e-300)
     level = math.sqrt(variance * blocks.size)
@@ -68,7 +80,13 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
             "quantised", least, f"counts of {step:.3g}",
             lambda n: quantised(samples, n, step, blocks.dt, blocks.order),
         )  # fmt: skip
-    if kind != "white" and len(blocks.means) > 24:
+    if kind == "coloured" and len(blocks.means) <= SHORT:
+        raise EstimateError(
+            f"noise = 'coloured' of {len(blocks.means)} blocks",
+            f"drift is told from {SHORT + 1} on",
+            "leave noise= out",
+        )
+    if kind != "white" and len(blocks.means) > SHORT:
         corner, power, gain = drift(blocks, int(row[0]), row[3:])
         if kind == "coloured" or gain > GAINED:
             smooth = _refined(blocks, int(row[0]), row[3:], power)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.fit.choice import Choice, choose
-from stickslip.fit.motions import MOTIONS, Restoring
-from stickslip.identify.release import RingDown, find_releases
+from stickslip.fit.motions import MOTIONS, RESTORING, Restoring
+from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
@@ -91,7 +91,8 @@ def choose_motion(
     RecordError
         A channel is missing or broken.
     EstimateError
-        No free decay, one that is not a displacement, or a candidate of no known name.
+        No free decay, one that is not a displacement (of a pendulum: an angle), or a spring or a candidate of no known
+        name.
 
     Examples
     --------
@@ -114,6 +115,30 @@ def motion_of(
     ring_down: RingDown, *, restoring: Restoring = "linear", candidates: tuple[str, ...] = tuple(MOTIONS)
 ) -> DecayMotion:
     """:func:`choose_motion` of one release that was found already."""
+    choice, _ = choice_of(ring_down, restoring=restoring, candidates=candidates)
+    return _answer(choice, ring_down)
+
+
+def choice_of(
+    ring_down: RingDown, *, restoring: Restoring, candidates: tuple[str, ...] = tuple(MOTIONS)
+) -> tuple[Choice, float]:
+    """The choice among the candidates, and the record's time [s] at its zero.
+
+    Raises
+    ------
+    EstimateError
+        No displacement, a pendulum without an angle, an unknown spring or candidate, or fewer than four sound extremes.
+    """
+    if restoring not in RESTORING:
+        raise EstimateError(
+            f"restoring = '{restoring}'", f"the spring is one of {', '.join(RESTORING)}", "choose one of them"
+        )
+    if restoring == "pendulum" and ring_down.unit != "rad":
+        raise EstimateError(
+            f"channel '{ring_down.channel}' in {ring_down.unit}",
+            "a pendulum is read from an angle in rad, theta",
+            "divide a displacement by the pendulum's length, or leave restoring= out",
+        )
     if ring_down.order:
         raise EstimateError(
             f"channel '{ring_down.channel}'",
@@ -130,7 +155,7 @@ def motion_of(
         start=start, counts=np.full(count, float(size)), restoring=restoring, candidates=candidates,
         weights=(1 / _run_lengths(samples)).reshape(count, size).sum(axis=1),
     )  # fmt: skip
-    return _answer(choice, ring_down.unit)
+    return choice, ring_down.first + rows.start / ring_down.fs
 
 
 def _run_lengths(samples: Array) -> Array:
@@ -147,9 +172,12 @@ def _begin(ring_down: RingDown, restoring: Restoring) -> tuple[slice, Array]:
     first = 0
     if restoring == "pendulum":
         first = int(np.argmax(sizes < SWING))
+    first = max(first, _unclipped(ring_down))
     turns, sizes = turns[first:], sizes[first:]
     if len(turns) < 4:
-        raise EstimateError(f"{len(turns)} extremes", "a motion is chosen from four at least", "give a longer record")
+        raise EstimateError(
+            f"{len(turns)} sound extremes", "a motion is chosen from four at least", "give a longer record"
+        )
     later = np.diff(turns[len(turns) // 2 :] if len(turns) > 8 else turns)
     w = math.pi * ring_down.fs / float(np.median(later))
     fall, less = np.polyfit(sizes[:-1], sizes[1:], 1)
@@ -167,8 +195,21 @@ def _begin(ring_down: RingDown, restoring: Restoring) -> tuple[slice, Array]:
     return slice(begin, end), start
 
 
-def _answer(choice: Choice, unit: str) -> DecayMotion:
-    chosen = choice.chosen
+def _unclipped(ring_down: RingDown) -> int:
+    """Number of the first extreme after the last that the instrument cut off."""
+    cut = np.flatnonzero(~ring_down.sound[:-1])
+    return int(cut[-1]) + 1 if len(cut) else 0
+
+
+def told(choice: Choice, ring_down: RingDown) -> str:
+    """The choice's status, and what was left out of the record."""
+    left_out = [CLIPPED] if _unclipped(ring_down) else []
+    left_out += [LOST] if LOST in ring_down.notes else []
+    return "; ".join([*left_out, *([] if choice.status == "ok" else [choice.status])]) or "ok"
+
+
+def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
+    chosen, unit = choice.chosen, ring_down.unit
     damping = chosen.estimate("damping_ratio", name="damping ratio")
     dry = chosen.estimate("dry_displacement", name="dry friction displacement", unit=unit)
     frequency = chosen.estimate("angular_frequency", name="natural frequency", unit="Hz", factor=1 / (2 * math.pi))
@@ -183,5 +224,5 @@ def _answer(choice: Choice, unit: str) -> DecayMotion:
     return DecayMotion(
         damping, dry, frequency, any_motion(damping, "damping_ratio"), any_motion(dry, "dry_displacement"),
         choice.model, tuple((each.name, each.fitted.motion.words, each.verdict) for each in choice.candidates),
-        choice, choice.status,
+        choice, told(choice, ring_down),
     )  # fmt: skip

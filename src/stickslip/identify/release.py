@@ -31,6 +31,8 @@ PACE = (0.7, 1.4)  # a half cycle over the one before; a pendulum from near the 
 GROWN = 1.05  # a swing over the one before from which it is not the same decay
 UNEVEN = 0.015  # change of the half cycles over the decay, beyond which the spring is not linear
 RISEN = 1.01  # a swing over the one before that may be a rise
+LOST = "an extreme was lost, and what lies beyond it is left out"
+CLIPPED = "clipped swings are left out"
 STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 
 
@@ -535,5 +537,5 @@ def _notes(levels: Array, sound: NDArray[np.bool_], order: int, run: _Run, noise
         if abs(rise) > max(0.03 * abs(levels[0] - levels[1]), 4 * noise):
             notes.append(f"the rest position drifts by {rise:.2g}: see remove_drift(record)")
     if run.parted:
-        notes.append("an extreme was lost, and what lies beyond it is left out")
+        notes.append(LOST)
     return tuple(notes)

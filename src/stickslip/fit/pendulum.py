@@ -1,0 +1,126 @@
+"""Viscous and dry friction of one pendulum's free decay, by its whole waveform with sin x for the spring."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
+from stickslip.fit.candidates import Fitted
+from stickslip.fit.choice import COLOURED, Candidate
+from stickslip.fit.decay import DecayFit, spring_of
+from stickslip.fit.motions import Restoring, free_decay
+from stickslip.fit.which_motion import choice_of, told
+from stickslip.identify.release import RingDown
+from stickslip.record.record import Step
+
+SURE = 3.0  # standard deviations of the noise by which a bracket is widened
+
+
+def fit_pendulum(
+    ring_downs: list[RingDown],
+    *,
+    restoring: Restoring,
+    noise: str | None,
+    known: tuple[float | None, float | None],
+    notes: tuple[str, ...],
+    history: tuple[Step, ...],
+) -> DecayFit:
+    """:func:`~stickslip.fit.decay.fit_decay` of a pendulum: ``x'' = -w^2 sin x - 2 zeta w v - w^2 x_k sgn v``.
+
+    Parameters
+    ----------
+    ring_downs : list of RingDown
+        One release of an angle.
+    restoring : {"pendulum"}
+        The spring's law.
+    noise : str or None
+        No kind can be asked for: the residual tells.
+    known : tuple of (float or None)
+        Moment of inertia [kg m^2] and stiffness of the small swings [N m/rad], where stated.
+    notes, history : tuple
+        What was noticed in the record, and what was done to it.
+
+    Raises
+    ------
+    EstimateError
+        Several releases, a noise that is asked for, or what :func:`choice_of` refuses.
+    """
+    if len(ring_downs) > 1:
+        raise EstimateError(
+            f"{len(ring_downs)} releases", "a pendulum's are fitted one at a time", "cut one out: record.between(a, b)"
+        )
+    if noise is not None:
+        raise EstimateError(f"noise = '{noise}'", "a pendulum's is told from its residual", "leave noise= out")
+    ring_down = ring_downs[0]
+    choice, zero = choice_of(ring_down, restoring=restoring, candidates=("both", "static"))
+    chosen, status = choice.chosen, told(choice, ring_down)
+    fitted = chosen.fitted
+    blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
+    kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"
+
+    def estimate(parameter: str, name: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
+        found = chosen.estimate(parameter, name=name, unit=unit, factor=factor)
+        low, high = found.interval
+        return replace(
+            found, value=found.value + offset, interval=(low + offset, high + offset), status=status,
+            method=f"whole waveform, spring sin x, noise {kind}", checks=(f"{fitted.half_cycles} half cycles",),
+        )  # fmt: skip
+
+    dry = estimate("dry_displacement", "dry friction displacement", "rad")
+    frequency = estimate("angular_frequency", "natural frequency", "Hz", 1 / (2 * math.pi))
+    spring = spring_of(known, fitted.value("angular_frequency"))
+    done = f"{fitted.half_cycles} half cycles of {frequency.value:.6g} Hz, spring sin x, noise {kind}"
+    return DecayFit(
+        damping_ratio=estimate("damping_ratio", "damping ratio", "1"),
+        dry_displacement=dry,
+        frequency=frequency,
+        bias=estimate("rest", "rest position", "rad"),
+        release_time=estimate("release", "release time", "s", offset=zero),
+        amplitude=estimate("amplitude", "amplitude at release", "rad"),
+        static_displacement=_static(chosen, ring_down),
+        dry_force=None if spring is None else dry.scaled(spring, "N m", "dry friction"),
+        half_cycles=(fitted.half_cycles,),
+        alternatives=(((fitted.half_cycles,), 1.0),),
+        model=model,
+        noise=kind,
+        noise_level=_level(chosen),
+        channel=ring_down.channel,
+        ring_downs=(ring_down,),
+        time=(zero + blocks.times,),
+        measured=(blocks.values,),
+        fitted=(blocks.values - fitted.residual / np.sqrt(blocks.weights),),
+        status=status,
+        notes=notes,
+        history=(*history, Step("fit_decay", {"channel": ring_down.channel, "restoring": restoring}, done)),
+    )
+
+
+def _level(candidate: Candidate) -> float:
+    """Standard deviation of a sample."""
+    fitted = candidate.fitted
+    return math.sqrt(fitted.cost / max(1, len(fitted.residual) - fitted.jacobian.shape[1]))
+
+
+def _static(candidate: Candidate, ring_down: RingDown) -> Estimate:
+    """Static friction lies between the pull where it stayed and the pull where it last turned, sin x each."""
+    fitted = candidate.fitted
+    error = SURE * _level(candidate) / math.sqrt(max(1.0, ring_down.fs / ring_down.frequency / 2))
+    low = max(_pull(fitted, fitted.half_cycles) - error, 0.0) if ring_down.stopped else 0.0
+    high = _pull(fitted, fitted.half_cycles - 1) + error
+    status = "ok" if ring_down.stopped else "the mass does not come to rest in the record: only an upper bound"
+    return Estimate(
+        "static friction displacement", (low + high) / 2, (low, high), (high - low) / math.sqrt(12), ring_down.unit,
+        "between where it stayed and where it last turned", status,
+    )  # fmt: skip
+
+
+def _pull(fitted: Fitted, half_cycles: int) -> float:
+    """Torque over the stiffness at the turning point after so many half cycles."""
+    period = 2 * math.pi / fitted.value("angular_frequency")
+    later = fitted.value("release") + (half_cycles + 2) * period  # a half cycle below 2.5 rad takes less
+    at = free_decay([later], fitted.parameters, restoring=fitted.blocks.restoring, half_cycles=half_cycles)[0][0]
+    return abs(math.sin(float(at) - fitted.value("rest")))
