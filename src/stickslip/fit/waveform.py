@@ -26,7 +26,6 @@ import math
 from stickslip.compiled import FAST, compiled
 
 RATE, DAMPING, DRY, REST, AMPLITUDE, RELEASE = range(6)
-NAMES = ("angular_frequency", "damping_ratio", "dry_displacement", "rest", "amplitude", "release")
 VALUE = 6  # the row of the value itself, after those of its derivatives
 
 

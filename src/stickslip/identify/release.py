@@ -31,9 +31,9 @@ PACE = (0.7, 1.4)  # a half cycle over the one before; a pendulum from near the 
 GROWN = 1.05  # a swing over the one before from which it is not the same decay
 UNEVEN = 0.015  # change of the half cycles over the decay, beyond which the spring is not linear
 RISEN = 1.01  # a swing over the one before that may be a rise
+STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 LOST = "an extreme was lost, and what lies beyond it is left out"
 CLIPPED = "clipped swings are left out"
-STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 
 
 @dataclass(frozen=True, eq=False)
