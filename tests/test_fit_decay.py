@@ -383,3 +383,14 @@ def test_a_growing_swing_is_refused() -> None:
     seen = 1e-3 * np.exp(0.4 * t) * np.cos(30 * t) + 1e-6 * np.random.default_rng(0).standard_normal(3000)
     with pytest.raises(ss.EstimateError, match="grow"):
         ss.fit_decay(ss.Record.of({"x": seen}, fs=500))
+
+
+def test_a_motion_without_noise_that_came_to_rest_is_not_taken_for_counts() -> None:
+    slider = ss.Oscillator(mass=1, stiffness=10, damping=0.2, law=ss.Coulomb(0.2))
+    run = ss.simulate(slider, duration=60, start={"x": 1.0})
+    found = ss.fit_decay(run.record(fs=200), stiffness=10)
+    assert found.noise == "white"
+    assert found.damping_ratio.value == pytest.approx(0.1 / math.sqrt(10), rel=1e-9)
+    assert found.dry_force is not None
+    assert found.dry_force.value == pytest.approx(0.2, rel=1e-9)
+    assert found.dry_displacement.sd < 1e-8

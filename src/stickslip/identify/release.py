@@ -31,6 +31,7 @@ PACE = (0.7, 1.4)  # a half cycle over the one before; a pendulum from near the 
 GROWN = 1.05  # a swing over the one before from which it is not the same decay
 UNEVEN = 0.015  # change of the half cycles over the decay, beyond which the spring is not linear
 RISEN = 1.01  # a swing over the one before that may be a rise
+EVEN = 0.5  # of the median gap between levels: less is no digitiser's
 STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 LOST = "an extreme was lost, and what lies beyond it is left out"
 CLIPPED = "clipped swings are left out"
@@ -247,10 +248,15 @@ def _noise(record: Record, name: str) -> float:
 
 
 def _step(values: Array) -> float:
-    """Step of the digitiser; where its levels were rounded to be written, their median gap."""
+    """Step of the digitiser; where its levels were rounded to be written, their median gap.
+
+    A motion without noise that came to rest has few levels too, but they lie at all distances.
+    """
     step, levels = quantisation_step(values), np.unique(values)
     if step == 0 and 2 < len(levels) < len(values) / 6:
-        return float(np.median(np.diff(levels)))
+        gaps = np.diff(levels)
+        least, usual = np.quantile(gaps, [0.1, 0.5])
+        return float(usual) if least > EVEN * usual else 0.0
     return step
 
 
