@@ -142,3 +142,36 @@ def test_the_pendulum_has_a_page(dataset, tmp_path):
     assert found.dry_force.unit == "N m"
     folder = ss.publish(found, folder=tmp_path / "out")
     assert "not linear" in (folder / "report.html").read_text("utf-8")
+
+
+def test_viscous_damping_alone_leaves_ten_times_the_residual_of_a_real_pendulum(dataset):
+    record = ss.read_record(dataset("pendulum_decay") / "pend1.csv", channels={"theta": "#2 [rad]"}, time="#1")
+    found = ss.analyze_decay(record, method="waveform", restoring="pendulum", stiffness="0.6956 N m/rad")
+    assert found.viscous_residual > 10
+    told = ss.summary(found)
+    assert f"alone leaves {found.viscous_residual:.3g} times the residual" in " ".join(told.headline)
+    assert [words for words, _ in told.verdicts] == [words for _, words, _ in found.motion.candidates]
+    low, high = found.as_force(found.motion.dry_displacement_any, "").interval
+    assert low < 3.6e-3 < 4.8e-3 < high
+
+
+def test_a_record_without_noise_is_no_digitiser_however_long_it_rests():
+    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
+    record = ss.simulate(slider, duration=80.0, start={"x": 1.0}).record(fs=200)
+    found = ss.analyze_decay(record, method="waveform", stiffness=10.0)
+    assert found.releases.ring_downs[0].step == 0
+    assert found.waveform.damping_ratio.value == pytest.approx(0.1 / 10**0.5, rel=1e-5)
+    assert found.waveform.damping_ratio.sd < 1e-5
+    told = " ".join(ss.summary(found).headline)
+    assert "within within" not in told
+
+
+def test_every_release_is_drawn():
+    values, fs, _ = free_decay()
+    values = np.asarray(values)
+    pull = np.linspace(values[-1], values[0], 150)
+    twice = np.concatenate([values, np.full(100, values[-1]), pull, np.full(200, values[0]), values])
+    twice += 1e-5 * np.random.default_rng(1).standard_normal(len(twice))
+    found = ss.analyze_decay(ss.Record.of({"x": twice}, fs=fs), method="waveform")
+    assert len(found.releases.ring_downs) == 2
+    assert [plate.name for plate in ss.figures(found)] == ["decay", "identified", "identified-2"]

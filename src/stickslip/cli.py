@@ -643,6 +643,8 @@ def _print_table(console: Any, results: Findings | Comparison | TimeFrequency | 
         for line in summary.lines
     )
     console.print(_table(headings, rows))
+    if summary.verdicts:
+        console.print(_table(("motion tried", "verdict"), summary.verdicts))
     for note in summary.notes:
         console.print(f"[dim]Note: {escape(_spoken(note))}[/dim]")
 

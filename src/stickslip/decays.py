@@ -87,6 +87,14 @@ class DecayFindings(Result):
         return self.releases.ring_downs[0].rest if told is None else told
 
     @property
+    def viscous_residual(self) -> float | None:
+        """What viscous damping alone leaves of the motion, over what it leaves together with dry friction (RMS)."""
+        fits = {} if self.motion is None else {each.name: each.fitted for each in self.motion.choice.candidates}
+        if not {"viscous", "both"} <= set(fits) or fits["both"].cost == 0:
+            return None
+        return math.sqrt(fits["viscous"].cost / fits["both"].cost)
+
+    @property
     def dry_force(self) -> Estimate | None:
         """The dry friction as a force, where the mass or the stiffness is stated."""
         return self.as_force(self.best.dry_displacement, "dry friction force")
@@ -149,6 +157,7 @@ class DecayFindings(Result):
             "motions": [] if self.motion is None else [
                 {"name": name, "words": words, "verdict": verdict} for name, words, verdict in self.motion.candidates
             ],
+            "viscous_residual": self.viscous_residual,
             "comparisons": [estimate.to_dict() for estimate in self.comparisons],
             "decrements": None if self.thesis is None else _decrements(self.thesis),
             "truth": dict(self.record.truth),

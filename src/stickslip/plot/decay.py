@@ -43,13 +43,15 @@ MOST_MARKS = 60  # extremes that are marked one by one
 
 
 @styled
-def plot_decay(findings: DecayFindings, *, ax: Axes | None = None) -> Axes:
+def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = None) -> Axes:
     """The response within the envelopes that either friction alone would give (thesis, Figure 6.1).
 
     Parameters
     ----------
     findings : DecayFindings
         What :func:`~stickslip.analyze_decay` returned.
+    release : int
+        Which of several releases, from 0.
     ax : Axes, optional
         Where to draw.
 
@@ -57,7 +59,7 @@ def plot_decay(findings: DecayFindings, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
     """
-    ax, ring = axes_of(ax), findings.releases.ring_downs[0]
+    ax, ring = axes_of(ax), findings.releases.ring_downs[release]
     factor, unit = prefixed(ring.samples - ring.rest, ring.unit)
     rows = _shown(ring)
     ax.plot(*envelope(ring.time[rows], factor * ring.samples[rows]), color=INK, linewidth=1.0, label="measured")
@@ -76,20 +78,22 @@ def plot_decay(findings: DecayFindings, *, ax: Axes | None = None) -> Axes:
 
 
 @styled
-def plot_identified(findings: DecayFindings) -> Figure:
+def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
     """Measured and identified response over each other, and what is left between them (thesis, Figure 6.10).
 
     Parameters
     ----------
     findings : DecayFindings
         What :func:`~stickslip.analyze_decay` returned.
+    release : int
+        Which of several releases, from 0; beyond the first by the whole waveform alone.
 
     Returns
     -------
     Figure
     """
-    time, measured, fitted, words = _identified(findings)
-    ring = findings.releases.ring_downs[0]
+    time, measured, fitted, words = _identified(findings, release)
+    ring = findings.releases.ring_downs[release]
     factor, unit = prefixed(measured - findings.rest, ring.unit)
     figure, (above, below) = new_figure(2, height=4.6, heights=[2, 1])
     above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="measured")
@@ -184,7 +188,8 @@ def plot_bounds(found: Decrement) -> Figure:
 def plates_of(findings: DecayFindings) -> list[Plate]:
     """The figures of a decay, in reading order."""
     ring, thesis = findings.releases.ring_downs[0], findings.thesis
-    many = " The first release of several." if len(findings.releases.ring_downs) > 1 else ""
+    several = len(findings.releases.ring_downs)
+    many = f" The first of {several} releases; the others are below." if several > 1 else ""
     envelopes = (
         "Viscous friction alone would let it die away along the curved envelope, dry friction alone along the straight "
         "one; together they are faster than either. "
@@ -199,6 +204,15 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
                   "Top: the motion that the identified friction gives, over the measured one. Bottom: what is left "
                   "between them; a pattern there is friction of another kind.")
         )  # fmt: skip
+    for release in range(1, several):
+        words = f"Release {release + 1} of {several}"
+        fitted = 0 if findings.waveform is None else len(findings.waveform.time)
+        if release >= fitted or findings.best is findings.motion:
+            swings = plot_decay(findings, release=release)
+            plates.append(plate(f"decay-{release + 1}", swings, words, envelopes.strip()))
+        else:
+            drawn = plot_identified(findings, release=release)
+            plates.append(plate(f"identified-{release + 1}", drawn, words, "Measured, identified and what is left."))
     if thesis is not None:
         plates.append(
             plate("differences", plot_differences(thesis), "Amplitude differences",
@@ -244,17 +258,17 @@ def _envelopes(findings: DecayFindings, ring: RingDown) -> tuple[Array, Array, A
     return time, viscous, np.maximum(0.0, abs(ring.amplitude) - fall * since)
 
 
-def _identified(findings: DecayFindings) -> tuple[Array, Array, Array, str]:
+def _identified(findings: DecayFindings, release: int = 0) -> tuple[Array, Array, Array, str]:
     """Time, measured, identified, and by which method."""
-    if findings.best is findings.motion:
+    if findings.best is findings.motion and release == 0:
         chosen = findings.motion.choice.chosen.fitted
         fitted, _, _ = chosen.blocks.motion(chosen.parameters, half_cycles=chosen.half_cycles)
         return chosen.blocks.times, chosen.blocks.values, fitted, "identified by the whole waveform"
     if findings.waveform is not None:
-        fit, ring = findings.waveform, findings.releases.ring_downs[0]
-        shown = ring.time[_shown(ring)]
-        near = (fit.time[0] >= shown[0]) & (fit.time[0] <= shown[-1])
-        return fit.time[0][near], fit.measured[0][near], fit.fitted[0][near], "identified by the whole waveform"
+        fit, ring = findings.waveform, findings.releases.ring_downs[release]
+        shown, time = ring.time[_shown(ring)], fit.time[release]
+        near = (time >= shown[0]) & (time <= shown[-1])
+        return time[near], fit.measured[release][near], fit.fitted[release][near], "identified by the whole waveform"
     found, ring = findings.thesis, findings.releases.ring_downs[0]
     assert found is not None
     rows = _shown(ring)

@@ -8,6 +8,7 @@ from stickslip.decays import DecayFindings
 from stickslip.estimate import Estimate
 from stickslip.reports.words import interval_of, number, value_of
 
+LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
 METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
 
 
@@ -67,17 +68,26 @@ def _chosen(findings: DecayFindings) -> Iterator[str]:
         yield f"The record speaks against each of the {tried} motions tried: there is friction of another kind too."
     else:
         yield f"Of {tried} motions tried the record does not speak against {len(kept)}: {'; '.join(kept)}."
+    more = findings.viscous_residual
+    if more is not None and more > LEAVES_MORE:
+        yield f"Viscous damping alone leaves {more:.3g} times the residual that it leaves together with dry friction."
     dry = motion.dry_displacement_any
     force = findings.as_force(dry, "")
-    also = f", its force within {interval_of(force)}" if force is not None else ""
-    yield f"Whichever of them it is, the dry friction displacement lies within {interval_of(dry)}{also}."
+    also = f", its force {_reach(force)}" if force is not None else ""
+    which = "Whichever of them it is" if kept else "By all that leave at most twice the least residual"
+    yield f"{which}, the dry friction displacement is {_reach(dry)}{also}."
 
 
-def notes(findings: DecayFindings) -> list[str]:
-    """What could not be asked, and the verdict on each motion tried."""
-    motion = findings.motion
-    verdicts = () if motion is None else motion.candidates
-    return [*findings.notes, *(f"Motion tried, {words}: {verdict}." for _, words, verdict in verdicts)]
+def _reach(estimate: Estimate) -> str:
+    """The interval; the value where it is narrower than the digits shown."""
+    low, high = estimate.interval
+    words = interval_of(estimate)
+    return f"within {words}" if " to " in words else value_of(estimate) if low < high else words
+
+
+def verdicts(findings: DecayFindings) -> list[tuple[str, str]]:
+    """The motions that were tried, in words, and what the record says of each."""
+    return [] if findings.motion is None else [(words, verdict) for _, words, verdict in findings.motion.candidates]
 
 
 def _both(ratio: Estimate, dry: Estimate) -> str:

@@ -61,6 +61,8 @@ class Summary:
         What was assumed, and what could not be asked.
     settings : mapping of str to str
         Constants and choices.
+    verdicts : sequence of (str, str)
+        The motions that were tried, and what the record says of each.
     channels : sequence of Channel
         The record's channels.
     history : sequence of Step
@@ -74,6 +76,7 @@ class Summary:
     faults: Sequence[str] | None = None
     notes: Sequence[str] = ()
     settings: Mapping[str, str] | None = None
+    verdicts: Sequence[tuple[str, str]] = ()
     channels: Sequence[Channel] = ()
     history: Sequence[Step] = ()
 
@@ -129,7 +132,7 @@ def summary(
 def _of_findings(findings: Findings | DecayFindings) -> Summary:
     record = findings.record
     if isinstance(findings, DecayFindings):
-        told, settings, notes = decay.headline(findings), decay.settings(findings), decay.notes(findings)
+        told, settings, notes = decay.headline(findings), decay.settings(findings), list(findings.notes)
         estimates = (*findings.estimates, *findings.comparisons)
     else:
         told, settings, notes = headline(findings), _settings(findings), list(findings.notes)
@@ -138,6 +141,7 @@ def _of_findings(findings: Findings | DecayFindings) -> Summary:
         findings.name, told, cautions(findings),
         lines=[_line(estimate, findings.true_value(estimate)) for estimate in estimates],
         faults=[str(fault) for fault in findings.faults], notes=notes, settings=settings,
+        verdicts=decay.verdicts(findings) if isinstance(findings, DecayFindings) else (),
         channels=list(record.channels.values()), history=record.history,
     )  # fmt: skip
 
