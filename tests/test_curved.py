@@ -303,6 +303,7 @@ def test_a_run_becomes_a_record_and_pieces() -> None:
     lambda: ss.Dahl(0.0, 1.0), lambda: ss.Dahl(1.0, -1.0), lambda: ss.LuGre(1.0, 0.5, speed=1.0, stiffness=1.0),
     lambda: ss.LuGre(1.0, 1.5, speed=1.0, stiffness=math.inf), lambda: ss.RateState(1, 0.6, 1e-9, 0.1, 1e-5, 1e-6),
     lambda: ss.RateState(1, 0.6, 0.01, 0.1, 1e-5, 1e-6, law="Ruina"), lambda: ss.SmoothStateVariable(1.1, 0.0, 3000.0),
+    lambda: ss.FrictionCurve("1 / (1 + v)"), lambda: ss.FrictionCurve(lambda v: 1.0),
     lambda: ss.FrictionCurve(lambda v: 1 / (1 + v), static=0.5), lambda: ss.simulate(THESIS, cycles=1, rtol=0.0),
     lambda: ss.simulate(THESIS, cycles=1, start={"theta": math.nan}), lambda: ss.steady_sliding(THESIS),
     lambda: ss.steady_state(THESIS, orders=0), lambda: exp(symbol("v")).at(w=1.0),

@@ -54,6 +54,18 @@ def test_a_start_far_out_finds_its_cell() -> None:
     assert run.state(0.0)["friction"] == pytest.approx(1.1 * law.profile(5e-3), rel=1e-12)
 
 
+@pytest.mark.parametrize("static", [1.1, 1.4])
+def test_rest_is_held_by_the_friction_of_its_place_alone(static: float) -> None:
+    law = ss.RoughSurface(ss.Coulomb(1.1, static), **{**SURFACE, "share": 0.2})
+    knots = law.knots[::3, 0]
+    for x in (*knots, *np.random.default_rng(0).uniform(1.2 * knots[0], 1.2 * knots[-1], 20)):
+        free = ss.Oscillator(mass=2.42, stiffness=2310, law=law)
+        run = ss.simulate(free, duration=2.0, start={"x": float(x)})
+        rest = run.state(2.0)
+        assert (len(run.events) == 0) == (2310 * abs(x) <= static * law.profile(x))
+        assert abs(rest["friction"]) <= static * law.profile(rest["x"]) * (1 + 1e-12)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [

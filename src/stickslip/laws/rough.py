@@ -152,19 +152,13 @@ class RoughSurface:
             put_ = {**other, "1": force * level, "x": other.get("x", 0.0) + force * slope}
             return {name: value for name, value in put_.items() if value}
 
-        exits = [
-            Exit(
-                put(exit_.quantity),
-                f"{exit_.to} {cell}",
-                {name: put(form) for name, form in exit_.reset.items()},
-                exit_.crossing,
-            )
-            for exit_ in mode.exits
-        ]
-        if mode.kind != "stick":
-            if np.isfinite(edges[cell + 1]):
-                exits.append(Exit({"x": 1.0, "1": -float(edges[cell + 1])}, f"{mode.name} {cell + 1}"))
-            if np.isfinite(edges[cell]):
-                exits.append(Exit({"x": -1.0, "1": float(edges[cell])}, f"{mode.name} {cell - 1}"))
+        exits = []
+        if np.isfinite(edges[cell + 1]):
+            exits.append(Exit({"x": 1.0, "1": -float(edges[cell + 1])}, f"{mode.name} {cell + 1}"))
+        if np.isfinite(edges[cell]):
+            exits.append(Exit({"x": -1.0, "1": float(edges[cell])}, f"{mode.name} {cell - 1}"))
+        for exit_ in mode.exits:
+            reset = {name: put(form) for name, form in exit_.reset.items()}
+            exits.append(Exit(put(exit_.quantity), f"{exit_.to} {cell}", reset, exit_.crossing))
         friction = None if mode.friction is None else put(mode.friction)
         return _Over(f"{mode.name} {cell}", mode.kind, mode.side, friction, tuple(exits))

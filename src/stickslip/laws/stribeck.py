@@ -120,7 +120,7 @@ class FrictionCurve(Rigid):
     Raises
     ------
     ModelError
-        The curve has no finite value at rest, or `static` is below it.
+        The curve is no function of the speed, or has no finite value at rest, or `static` is below it.
 
     Examples
     --------
@@ -133,6 +133,13 @@ class FrictionCurve(Rigid):
     static: float | None = None
 
     def __post_init__(self) -> None:
+        if not (callable(self.curve) and isinstance(self.curve(symbol("v")), Expression)):
+            raise ModelError(
+                f"curve = {self.curve!r}",
+                "a curve is a function that makes an Expression of the sliding speed, by + - * / ** and the functions"
+                " of stickslip.laws.curved",
+                "give one, as lambda v: 1 + 0.2 / (1 + v); for friction without speed take Coulomb",
+            )
         rest = finite("curve at rest", self.friction(0.0), unit="N")
         if self.static is not None and finite("static", self.static, unit="N") < rest:
             raise ModelError(
