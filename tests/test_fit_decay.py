@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -212,6 +214,79 @@ def test_a_pendulum_s_static_friction_is_bracketed() -> None:
     assert found.static_displacement.status == "ok"
     early = ss.fit_decay(pendulum(seconds=6.0), restoring="pendulum")
     assert "only an upper bound" in early.static_displacement.status
+
+
+def test_a_pendulum_s_fit_is_that_of_the_choice_among_motions() -> None:
+    record = pendulum()
+    found = ss.fit_decay(record, restoring="pendulum", candidates=("both", "viscous"))
+    chosen = ss.choose_motion(record, restoring="pendulum", candidates=("both", "static"))
+    for name in ("damping_ratio", "dry_displacement", "frequency"):
+        one, other = getattr(found, name), getattr(chosen, name)
+        assert (one.value, one.interval, one.sd) == (other.value, other.interval, other.sd)
+    assert found.dry_displacement_any is not None
+    assert found.dry_displacement_any.includes(found.dry_displacement.value)
+
+
+def test_a_real_pendulum(dataset: Callable[[str], Path]) -> None:
+    """Its authors: 4.1e-3 N m dry, 0.5e-3 N m s viscous; three other methods 3.7e-3 to 4.9e-3 and 2.6e-4 to 5.5e-4."""
+    path = dataset("pendulum_decay") / "pend1.csv"
+    record = ss.read_record(path, channels={"theta": "#2 - 3.141592653589793 [rad]"}, time="#1 [s]")
+    inertia = 0.2235 * 0.31692**2
+    found = ss.fit_decay(record, restoring="pendulum", mass=inertia, candidates="all")
+    assert found.dry_force is not None
+    assert 3.6e-3 < found.dry_force.value < 4.9e-3
+    w = 2 * math.pi * found.frequency.value
+    assert 2e-4 < 2 * w * inertia * found.damping_ratio.value < 6e-4
+    dry, damping = found.dry_displacement_any, found.damping_ratio_any
+    assert dry is not None
+    assert damping is not None
+    for torque in (3.7e-3, 4.1e-3, 4.89e-3):
+        assert dry.includes(torque / (w**2 * inertia))
+    for viscous in (2.6e-4, 5e-4, 5.5e-4):
+        assert damping.includes(viscous / (2 * w * inertia))
+    tried = {each.name: each.fitted.cost for each in found.motions[0].choice.candidates}
+    assert tried["viscous"] > 10**2 * float(sum(each @ each for each in found.residual))
+    assert "Stribeck" in found.status
+
+
+def test_the_interval_that_counts_the_model_s_form_stands_beside_the_statistical_one() -> None:
+    """In noise of 3 % a friction that rises by 30 % towards rest is not seen, and biases viscous and dry friction."""
+    t = np.arange(480) / 40
+    x = free_decay(t, [2 * math.pi, 0.02, 0.02, 0.01, 1.0, 0.27, 0, 0.3, 0.3 * 2 * math.pi, 0, 0.5, 0])[0]
+    record = ss.Record.of({"x": x + 3e-2 * np.random.default_rng(1).standard_normal(480)}, fs=40)
+    plain, found = ss.fit_decay(record), ss.fit_decay(record, candidates="all")
+    assert plain.dry_displacement_any is None
+    assert plain.motions == ()
+    assert found.dry_displacement == plain.dry_displacement
+    dry = found.dry_displacement_any
+    assert dry is not None
+    assert not plain.dry_displacement.includes(0.02)
+    assert dry.includes(0.02)
+    assert dry.interval[0] <= plain.dry_displacement.interval[0]
+    assert "stribeck" in dry.checks[0]
+    with pytest.raises(ss.EstimateError, match="candidates = coulomb; each is one of"):
+        ss.fit_decay(record, candidates="coulomb")
+
+
+def test_several_releases_reject_a_motion_together() -> None:
+    """Friction that one release leaves open is seen by three; a true motion is not rejected the oftener for it."""
+    truth, records = TRUTH.copy(), []
+    for seed in range(3):
+        truth[3:] = 0.1 * seed, 1.0 - 0.2 * seed, 0.3
+        samples, dt, _ = ring_down(seed=seed, truth=truth)
+        records.append(ss.Record.of({"x": samples}, fs=1 / dt))
+    alone = ss.fit_decay(records[0], candidates=("both", "quadratic"))
+    found = ss.fit_decay(records, candidates=("both", "quadratic"))
+    assert len(found.motions) == 3
+    assert found.status == "ok"
+    for one, all_ in (
+        (alone.damping_ratio_any, found.damping_ratio_any), (alone.dry_displacement_any, found.dry_displacement_any)
+    ):  # fmt: skip
+        assert one is not None
+        assert all_ is not None
+        assert all_.sd < one.sd
+    assert found.dry_displacement_any is not None
+    assert found.dry_displacement_any.includes(DRY)
 
 
 def test_what_a_pendulum_s_fit_does_not_do_is_refused() -> None:

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from stickslip.estimate import Estimate as Estimate
     from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
     from stickslip.files.write import write_record as write_record
-    from stickslip.fit.decay import DecayFit as DecayFit, fit_decay as fit_decay
+    from stickslip.fit.answer import DecayFit as DecayFit
+    from stickslip.fit.decay import fit_decay as fit_decay
     from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
     from stickslip.identify.decrement import Bounds as Bounds, Decrement as Decrement, decrement as decrement
     from stickslip.identify.envelope import (
@@ -187,7 +188,7 @@ _ROOMS = {
     "regress_friction": "identify.regression",
     "decrement": "identify.decrement", "Decrement": "identify.decrement", "Bounds": "identify.decrement",
     "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
-    "fit_decay": "fit.decay", "DecayFit": "fit.decay",
+    "fit_decay": "fit.decay", "DecayFit": "fit.answer",
     "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",
     "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",
     "extreme_decay": "identify.envelope", "hilbert_decay": "identify.envelope", "EnvelopeDecay": "identify.envelope",

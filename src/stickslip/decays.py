@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from stickslip.analysis import plain, record_name
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit.decay import DecayFit, fit_decay
+from stickslip.fit.answer import DecayFit
+from stickslip.fit.decay import fit_decay
 from stickslip.fit.motions import Restoring
 from stickslip.fit.which_motion import DecayMotion, choose_motion
 from stickslip.identify.decrement import Decrement, decrement

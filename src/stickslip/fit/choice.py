@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -105,6 +106,11 @@ class Candidate:
         """Whether no named term that it lacks is seen."""
         return self.p_value >= SIZE
 
+    @cached_property
+    def whiteness(self) -> float:
+        """p-value of its residual being white."""
+        return white_noise_test(self.fitted.residual)
+
     @property
     def verdict(self) -> str:
         """In words."""
@@ -192,15 +198,19 @@ class Choice:
     @property
     def kept(self) -> tuple[Candidate, ...]:
         """Those not rejected; where all are, those that leave at most twice the residual of the best."""
-        near = NEAR**2 * min(each.fitted.cost for each in self.candidates)
-        return tuple(each for each in self.candidates if each.kept) or tuple(
-            each for each in self.candidates if each.fitted.cost <= near
-        )
+        return tuple(self.candidate(name) for name in kept_by_all((self,)))
 
     def interval(self, parameter: str) -> tuple[float, float]:
         """95 % interval of a parameter, whichever of the candidates not rejected is the motion."""
-        ends = [each.estimate(parameter).interval for each in self.kept]
-        return min(low for low, _ in ends), max(high for _, high in ends)
+        return interval_of((self,), parameter)
+
+    def seen_beside(self, *names: str) -> str:
+        """What is seen beside the motions of these names, in words; empty where one of them is not rejected."""
+        tried = [each for each in self.candidates if each.name in names]
+        if not tried or any(each.kept for each in tried):
+            return ""
+        best = min(tried, key=lambda each: each.fitted.cost)
+        return f"{best.against} is seen beside {best.fitted.motion.words}"
 
     def candidate(self, name: str) -> Candidate:
         """The candidate of a name in ``MOTIONS``."""
@@ -263,7 +273,9 @@ def choose(
     unknown = [name for name in candidates if name not in MOTIONS]
     if unknown or not candidates:
         raise EstimateError(
-            f"candidates = {candidates}", f"each is one of {', '.join(MOTIONS)}", "name one of them at least"
+            f"candidates = {', '.join(unknown) or 'none'}",
+            f"each is one of {', '.join(MOTIONS)}",
+            "name one of them at least",
         )
     instants, data = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
     each = np.ones(len(instants)) if counts is None else np.asarray(counts, dtype=float)
@@ -281,20 +293,50 @@ def choose(
     return _chosen(tried)
 
 
+def kept_by_all(choices: Sequence[Choice]) -> tuple[str, ...]:
+    """Names of the candidates that no release speaks against; where there is none, those that leave least.
+
+    A true candidate is rejected once in twenty, however many releases look for it (Bonferroni). Least is up to twice
+    the best residual of all releases together.
+    """
+    tried = {each.name: [choice.candidate(each.name) for choice in choices] for each in choices[0].candidates}
+    kept = tuple(name for name, each in tried.items() if len(choices) * min(one.p_value for one in each) >= SIZE)
+    costs = {name: sum(one.fitted.cost for one in each) for name, each in tried.items()}
+    return kept or tuple(name for name, cost in costs.items() if cost <= NEAR**2 * min(costs.values()))
+
+
+def interval_of(choices: Sequence[Choice], parameter: str) -> tuple[float, float]:
+    """95 % interval of what several releases share, whichever of the candidates not rejected is the motion."""
+    ends = [_pooled([each.candidate(name).estimate(parameter) for each in choices]) for name in kept_by_all(choices)]
+    return min(low for low, _ in ends), max(high for _, high in ends)
+
+
+def _pooled(estimates: Sequence[Estimate]) -> tuple[float, float]:
+    """Interval of the mean of estimates, each as heavy as it is sure."""
+    sd = np.array([each.sd for each in estimates])
+    share = 1.0 * (sd == 0) if (sd == 0).any() else sd.min() ** 2 / sd**2
+    share /= share.sum()
+    value = share @ [each.value for each in estimates]
+    low, high = (np.array([each.interval[side] - each.value for each in estimates]) for side in (0, 1))
+    return float(value - np.linalg.norm(share * low)), float(value + np.linalg.norm(share * high))
+
+
 def _chosen(tried: tuple[Candidate, ...]) -> Choice:
     """The simplest candidate kept, or the nearest of all."""
     kept = [each for each in tried if each.kept]
     fewest = min((each.fitted.motion.size for each in kept), default=0)
     simplest = [each for each in kept if each.fitted.motion.size == fewest] or tried
     best = min(simplest, key=lambda each: each.fitted.cost)
-    lack = white_noise_test(best.fitted.residual)
-    if not kept:
-        status = f"no candidate fits: {best.against} is seen beside {best.fitted.motion.words}"
-    elif lack < COLOURED:
-        status = f"the residual of {best.fitted.motion.words} is not white (p = {lack:.1g})"
-    else:
-        status = "ok"
-    return Choice(best.name, tried, lack, status)
+    seen = f"no candidate fits: {best.against} is seen beside {best.fitted.motion.words}"
+    status = lack_of_fit(best) if kept else seen
+    return Choice(best.name, tried, best.whiteness, status or "ok")
+
+
+def lack_of_fit(candidate: Candidate) -> str:
+    """What is left unexplained, in words; empty where the residual is white."""
+    if candidate.whiteness >= COLOURED:
+        return ""
+    return f"the residual of {candidate.fitted.motion.words} is not white (p = {candidate.whiteness:.1g})"
 
 
 def white_noise_test(residual: ArrayLike) -> float:

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Estimate
+from stickslip.fit.answer import DecayFit, constants, spring_of
+from stickslip.fit.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
-from stickslip.units import parse_value
 
 if TYPE_CHECKING:
     from stickslip.fit.joint import Release
@@ -29,82 +30,6 @@ UNLIKE = 2.0  # times the noise that the residual may be before the model is dou
 DOUBTED = 0.01  # likelihood below which a number of half cycles does not widen the static friction's bracket
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class DecayFit(Result):
-    """Viscous and dry friction of a free decay.
-
-    Attributes
-    ----------
-    damping_ratio : Estimate
-        Viscous damping over the critical one.
-    dry_displacement : Estimate
-        Dry friction over the stiffness [m or rad]: half the width of the band in which the mass can rest.
-    frequency : Estimate
-        Undamped natural frequency [Hz].
-    bias : Estimate
-        Of the first release, as the two that follow: rest position in the record's zero [m or rad]; for velocity and
-        acceleration the sensor's offset.
-    release_time : Estimate
-        When the mass was let go [s]; in a record that begins in motion, when it last turned before.
-    amplitude : Estimate
-        Amplitude at the release, from the rest position [m or rad].
-    static_displacement : Estimate
-        Static friction over the stiffness [m or rad]: the interval from where the mass stayed to where it last turned,
-        in all releases.
-    dry_force : Estimate or None
-        Dry friction [N or N m], where the stiffness or the mass is known.
-    half_cycles : tuple of int
-        Half cycles until rest of each release, the likeliest number.
-    alternatives : tuple of (tuple of int, float)
-        Every number of half cycles (of each release) that may be, with its weight by likelihood.
-    model : str
-        The motion fitted, in words.
-    noise : str
-        The noise found, in words; where releases differ, of each.
-    noise_level : float
-        Its standard deviation a sample in the first release, in the channel's unit.
-    channel : str
-        The channel fitted.
-    ring_downs : tuple of RingDown
-        The releases found: hold, motion and tail.
-    time, measured, fitted : tuple of ndarray
-        For each release: time [s] of each block's centre, the block means and those of the model.
-    status : str
-        "ok", or in words what to beware of.
-    notes : tuple of str
-        What was noticed when the releases were sought.
-    history : tuple of Step
-        What was done to the records, and this fit.
-    """
-
-    damping_ratio: Estimate
-    dry_displacement: Estimate
-    frequency: Estimate
-    bias: Estimate
-    release_time: Estimate
-    amplitude: Estimate
-    static_displacement: Estimate
-    dry_force: Estimate | None
-    half_cycles: tuple[int, ...]
-    alternatives: tuple[tuple[tuple[int, ...], float], ...]
-    model: str
-    noise: str
-    noise_level: float
-    channel: str
-    ring_downs: tuple[RingDown, ...]
-    time: tuple[Array, ...]
-    measured: tuple[Array, ...]
-    fitted: tuple[Array, ...]
-    status: str
-    notes: tuple[str, ...]
-    history: tuple[Step, ...]
-
-    @property
-    def residual(self) -> tuple[Array, ...]:
-        """Measured minus fitted block means of each release."""
-        return tuple(m - f for m, f in zip(self.measured, self.fitted, strict=True))
-
-
 def fit_decay(
     record: Record | Sequence[Record],
     *,
@@ -113,6 +38,7 @@ def fit_decay(
     stiffness: float | str | None = None,
     noise: str | None = None,
     restoring: Restoring = "linear",
+    candidates: str | tuple[str, ...] | None = None,
 ) -> DecayFit:
     r"""How much viscous and how much dry friction does a free decay show?
 
@@ -133,8 +59,11 @@ def fit_decay(
     Several releases are fitted together: they share frequency and friction, and narrow the static friction's bracket.
 
     A pendulum's spring is ``sin x``: with ``restoring="pendulum"`` its motion is integrated, and the intervals are
-    those of linear propagation with the noise of the residual. Another motion leaves a residual larger than the noise,
-    and the status says so: :func:`choose_motion` tells which it is, with the interval that counts the model's form.
+    those of linear propagation with the noise of the residual.
+
+    Another motion leaves a residual larger than the noise, and the status says so. With ``candidates="all"`` other
+    motions are fitted too (see :func:`choose_motion`), and beside each interval, which holds if this is the motion,
+    stands the one that holds whichever of those not rejected it is: ``damping_ratio_any``, ``dry_displacement_any``.
 
     The record is reduced to means over a fortieth of a period first, which costs 0.15 % of the accuracy and makes the
     time of a fit independent of the sampling rate. The model's means are exact.
@@ -152,6 +81,9 @@ def fit_decay(
         The noise's kind; told from the record when not given.
     restoring : {"linear", "pendulum"}
         The spring's law: x, or sin x of one release of an angle ``theta`` [rad].
+    candidates : "all" or tuple of str, optional
+        Other motions that a displacement may have followed, by their names in :func:`choose_motion`; none when left
+        out, which is quicker.
 
     Returns
     -------
@@ -162,8 +94,8 @@ def fit_decay(
     RecordError
         The channel is missing, broken or too short.
     EstimateError
-        No free decay (see :func:`find_releases`), fewer than two swings, a noise that the record does not have, or a
-        pendulum that is no single angle.
+        No free decay (see :func:`find_releases`), fewer than two swings, a noise that the record does not have, a
+        pendulum that is no single angle, or candidates of no known name or for a channel that is no displacement.
 
     Examples
     --------
@@ -175,6 +107,9 @@ def fit_decay(
     >>> decay = fit_decay(record, mass=1.0)
     >>> decay.damping_ratio.includes(2.0 / 2 / math.sqrt(1000)), decay.dry_force.includes(0.5)
     (True, True)
+    >>> found = fit_decay(record, candidates=("both", "quadratic"))
+    >>> found.damping_ratio_any.includes(found.damping_ratio.value)
+    True
     """
     from stickslip.fit.noise import KINDS
 
@@ -192,18 +127,22 @@ def fit_decay(
             "releases are fitted together by one channel",
             "choose channel=",
         )
-    known = _constants(mass, stiffness, ring_downs[0].channel)
+    others = named(candidates)
+    motions = tuple(motion_of(each, restoring=restoring, candidates=others) for each in ring_downs) if others else ()
+    known = constants(mass, stiffness, ring_downs[0].channel)
     history = tuple(step for each in records for step in each.history)
     notes = tuple(dict.fromkeys(note for each in found for note in each.notes))
     if restoring != "linear":
         from stickslip.fit.pendulum import fit_pendulum
 
-        return fit_pendulum(ring_downs, restoring=restoring, noise=noise, known=known, notes=notes, history=history)
+        return fit_pendulum(
+            ring_downs, restoring=restoring, noise=noise, motions=motions, known=known, notes=notes, history=history
+        )
     sources = [each for each, those in zip(records, found, strict=True) for _ in those.ring_downs]
     ring_downs = [_described(ring_down, each) for ring_down, each in zip(ring_downs, sources, strict=True)]
     releases = [_release(each, noise) for each in ring_downs]
     motion = _alone(releases[0]) if len(releases) == 1 and releases[0].noise.kind == "white" else _together(releases)
-    return _answer(ring_downs, releases, motion, known, notes, history)
+    return _answer(ring_downs, releases, motion, motions, known, notes, history)
 
 
 def _described(ring_down: RingDown, record: Record) -> RingDown:
@@ -298,28 +237,11 @@ def _mean(
     )
 
 
-def _constants(mass: float | str | None, stiffness: float | str | None, name: str) -> tuple[float | None, float | None]:
-    """Mass and stiffness as numbers, in the units of the channel."""
-    units = ("kg m^2", "N m/rad") if name == "theta" else ("kg", "N/m")
-    values = []
-    for word, given, unit in zip(("mass", "stiffness"), (mass, stiffness), units, strict=True):
-        value = None if given is None else parse_value(given, unit)
-        if value is not None and not (math.isfinite(value) and value > 0):
-            raise EstimateError(f"{word} = {given}", f"a {word} is positive", f"correct {word}=, or leave it out")
-        values.append(value)
-    return values[0], values[1]
-
-
-def spring_of(known: tuple[float | None, float | None], angular_frequency: float) -> float | None:
-    """The stiffness that is stated, or that of the stated mass; None where neither is."""
-    mass, stiffness = known
-    return stiffness if stiffness is not None or mass is None else mass * angular_frequency**2
-
-
 def _answer(
     ring_downs: list[RingDown],
     releases: list[Release],
     motion: _Motion,
+    motions: tuple[DecayMotion, ...],
     known: tuple[float | None, float | None],
     notes: tuple[str, ...],
     history: tuple[Step, ...],
@@ -330,7 +252,9 @@ def _answer(
     fitted = [_fitted(each.blocks, n, p) for each, n, p in zip(releases, half_cycles, motion.motions[0], strict=True)]
     cut = (CLIPPED,) if not all(each.sound.all() for each in ring_downs) else ()
     lost = (LOST,) if any(LOST in each.notes for each in ring_downs) else ()
-    worries = (*cut, *lost, *_misfit(releases, fitted))
+    choices = [each.choice for each in motions]
+    other = next((each.seen_beside("both", "static") for each in choices if each.seen_beside("both", "static")), "")
+    worries = (*cut, *lost, *_misfit(releases, fitted), *filter(None, [other]))
     status = "; ".join(worries) or "ok"
     many = ", ".join(map(str, half_cycles))
     checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)
@@ -343,12 +267,12 @@ def _answer(
         value, spread = float(factor * motion.values[index] + offset), float(factor * motion.spread[index])
         return Estimate(words, value, (low, high), spread, unit, method, status, checks)
 
-    dry = estimate(2, "dry friction displacement", length)
+    damping, dry = estimate(1, "damping ratio", "1"), estimate(2, "dry friction displacement", length)
     spring = spring_of(known, float(motion.values[0]))
     frequency = estimate(0, "natural frequency", "Hz", 1 / (2 * math.pi))
     step = Step("fit_decay", {"channel": name}, f"{many} half cycles of {frequency.value:.6g} Hz, noise {noise}")
     return DecayFit(
-        damping_ratio=estimate(1, "damping ratio", "1"),
+        damping_ratio=damping,
         dry_displacement=dry,
         frequency=frequency,
         bias=estimate(3, "rest position" if ring_downs[0].order == 0 else "sensor offset", unit),
@@ -356,6 +280,8 @@ def _answer(
         amplitude=estimate(4, "amplitude at release", length),
         static_displacement=_static(releases, motion, length),
         dry_force=None if spring is None else dry.scaled(spring, "N m" if name == "theta" else "N", "dry friction"),
+        damping_ratio_any=whichever(choices, damping, "damping_ratio") if choices else None,
+        dry_displacement_any=whichever(choices, dry, "dry_displacement") if choices else None,
         half_cycles=half_cycles,
         alternatives=motion.candidates,
         model="viscous and dry friction",
@@ -369,6 +295,7 @@ def _answer(
         status=status,
         notes=notes,
         history=(*history, step),
+        motions=motions,
     )
 
 

@@ -9,14 +9,15 @@ import numpy as np
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
+from stickslip.fit.answer import DecayFit, spring_of
 from stickslip.fit.candidates import Fitted
-from stickslip.fit.choice import COLOURED, Candidate
-from stickslip.fit.decay import DecayFit, spring_of
+from stickslip.fit.choice import COLOURED, Candidate, lack_of_fit
 from stickslip.fit.motions import Restoring, free_decay
-from stickslip.fit.which_motion import choice_of, told
+from stickslip.fit.which_motion import DecayMotion, choice_of, told, whichever
 from stickslip.identify.release import RingDown
 from stickslip.record.record import Step
 
+PLAIN = ("both", "static")
 SURE = 3.0  # standard deviations of the noise by which a bracket is widened
 
 
@@ -25,6 +26,7 @@ def fit_pendulum(
     *,
     restoring: Restoring,
     noise: str | None,
+    motions: tuple[DecayMotion, ...],
     known: tuple[float | None, float | None],
     notes: tuple[str, ...],
     history: tuple[Step, ...],
@@ -39,6 +41,8 @@ def fit_pendulum(
         The spring's law.
     noise : str or None
         No kind can be asked for: the residual tells.
+    motions : tuple of DecayMotion
+        Which motion it was, where other candidates were asked for.
     known : tuple of (float or None)
         Moment of inertia [kg m^2] and stiffness of the small swings [N m/rad], where stated.
     notes, history : tuple
@@ -56,11 +60,13 @@ def fit_pendulum(
     if noise is not None:
         raise EstimateError(f"noise = '{noise}'", "a pendulum's is told from its residual", "leave noise= out")
     ring_down = ring_downs[0]
-    choice, zero = choice_of(ring_down, restoring=restoring, candidates=("both", "static"))
-    chosen, status = choice.chosen, told(choice, ring_down)
+    choice, zero = choice_of(ring_down, restoring=restoring, candidates=PLAIN)
+    chosen = choice.chosen
+    status = told(ring_down, choice.seen_beside(*PLAIN) or lack_of_fit(chosen))
     fitted = chosen.fitted
     blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
     kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"
+    choices = [each.choice for each in motions]
 
     def estimate(parameter: str, name: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
         found = chosen.estimate(parameter, name=name, unit=unit, factor=factor)
@@ -70,12 +76,13 @@ def fit_pendulum(
             method=f"whole waveform, spring sin x, noise {kind}", checks=(f"{fitted.half_cycles} half cycles",),
         )  # fmt: skip
 
+    damping = estimate("damping_ratio", "damping ratio", "1")
     dry = estimate("dry_displacement", "dry friction displacement", "rad")
     frequency = estimate("angular_frequency", "natural frequency", "Hz", 1 / (2 * math.pi))
     spring = spring_of(known, fitted.value("angular_frequency"))
     done = f"{fitted.half_cycles} half cycles of {frequency.value:.6g} Hz, spring sin x, noise {kind}"
     return DecayFit(
-        damping_ratio=estimate("damping_ratio", "damping ratio", "1"),
+        damping_ratio=damping,
         dry_displacement=dry,
         frequency=frequency,
         bias=estimate("rest", "rest position", "rad"),
@@ -83,6 +90,8 @@ def fit_pendulum(
         amplitude=estimate("amplitude", "amplitude at release", "rad"),
         static_displacement=_static(chosen, ring_down),
         dry_force=None if spring is None else dry.scaled(spring, "N m", "dry friction"),
+        damping_ratio_any=whichever(choices, damping, "damping_ratio") if choices else None,
+        dry_displacement_any=whichever(choices, dry, "dry_displacement") if choices else None,
         half_cycles=(fitted.half_cycles,),
         alternatives=(((fitted.half_cycles,), 1.0),),
         model=model,
@@ -96,6 +105,7 @@ def fit_pendulum(
         status=status,
         notes=notes,
         history=(*history, Step("fit_decay", {"channel": ring_down.channel, "restoring": restoring}, done)),
+        motions=motions,
     )
 
 

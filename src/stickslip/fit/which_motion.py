@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
-from stickslip.fit.choice import Choice, choose
+from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.fit.choice import Choice, choose, interval_of, kept_by_all
 from stickslip.fit.motions import MOTIONS, RESTORING, Restoring
 from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.record.record import Record
@@ -111,6 +112,13 @@ def choose_motion(
     return replace(found, status=several if found.status == "ok" else f"{found.status}; {several}")
 
 
+def named(candidates: str | tuple[str, ...] | None) -> tuple[str, ...]:
+    """The names of the candidates asked for: all, some, or none."""
+    if candidates is None:
+        return ()
+    return tuple(MOTIONS) if candidates == "all" else (candidates,) if isinstance(candidates, str) else candidates
+
+
 def motion_of(
     ring_down: RingDown, *, restoring: Restoring = "linear", candidates: tuple[str, ...] = tuple(MOTIONS)
 ) -> DecayMotion:
@@ -201,11 +209,21 @@ def _unclipped(ring_down: RingDown) -> int:
     return int(cut[-1]) + 1 if len(cut) else 0
 
 
-def told(choice: Choice, ring_down: RingDown) -> str:
-    """The choice's status, and what was left out of the record."""
+def told(ring_down: RingDown, worry: str) -> str:
+    """What was left out of the record and what to beware of, or "ok"."""
     left_out = [CLIPPED] if _unclipped(ring_down) else []
     left_out += [LOST] if LOST in ring_down.notes else []
-    return "; ".join([*left_out, *([] if choice.status == "ok" else [choice.status])]) or "ok"
+    return "; ".join([*left_out, *([worry] if worry else [])]) or "ok"
+
+
+def whichever(choices: Sequence[Choice], estimate: Estimate, parameter: str) -> Estimate:
+    """An estimate with the interval that holds whichever of the candidates not rejected is the motion."""
+    (low, high), (lowest, highest) = estimate.interval, interval_of(choices, parameter)
+    ends = min(low, lowest), max(high, highest)
+    return replace(
+        estimate, name=f"{estimate.name}, whichever motion", interval=ends, sd=(ends[1] - ends[0]) / (2 * NORMAL_95),
+        method="all candidates not rejected", checks=(f"candidates: {', '.join(kept_by_all(choices))}",),
+    )  # fmt: skip
 
 
 def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
@@ -213,16 +231,9 @@ def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
     damping = chosen.estimate("damping_ratio", name="damping ratio")
     dry = chosen.estimate("dry_displacement", name="dry friction displacement", unit=unit)
     frequency = chosen.estimate("angular_frequency", name="natural frequency", unit="Hz", factor=1 / (2 * math.pi))
-    kept = ", ".join(each.name for each in choice.kept)
-
-    def any_motion(estimate: Estimate, parameter: str) -> Estimate:
-        return replace(
-            estimate, name=f"{estimate.name}, whichever motion", interval=choice.interval(parameter),
-            method="all candidates not rejected", checks=(f"candidates: {kept}",),
-        )  # fmt: skip
-
     return DecayMotion(
-        damping, dry, frequency, any_motion(damping, "damping_ratio"), any_motion(dry, "dry_displacement"),
-        choice.model, tuple((each.name, each.fitted.motion.words, each.verdict) for each in choice.candidates),
-        choice, told(choice, ring_down),
+        damping, dry, frequency, whichever((choice,), damping, "damping_ratio"),
+        whichever((choice,), dry, "dry_displacement"), choice.model,
+        tuple((each.name, each.fitted.motion.words, each.verdict) for each in choice.candidates),
+        choice, told(ring_down, "" if choice.status == "ok" else choice.status),
     )  # fmt: skip
