@@ -17,7 +17,7 @@ import scipy.io
 from click.testing import CliRunner, Result
 
 import stickslip as ss
-from stickslip.cli import main
+from stickslip.cli.program import main
 
 PROGRAM = Path(sys.executable).with_name("stickslip")
 FS = 500.0
@@ -339,9 +339,9 @@ def test_a_true_process_keeps_the_table_and_the_trouble_apart() -> None:
 
 WATCHED = """
 import sys
-from stickslip import cli
-cli.PATIENCE = 0.0
-cli.main()
+from stickslip.cli import program, progress
+progress.PATIENCE = 0.0
+program.main()
 """
 
 
@@ -380,7 +380,7 @@ def interrupted(*arguments):
     write(*arguments)
     os.kill(os.getpid(), signal.SIGINT)
 folder.write_figures = interrupted
-from stickslip.cli import main
+from stickslip.cli.program import main
 main()
 """
 
@@ -396,7 +396,8 @@ def test_an_interrupted_run_leaves_nothing_and_exits_130() -> None:
 
 
 def test_help_is_there_before_the_heavy_libraries_are() -> None:
-    code = "import sys; from stickslip.cli import main; main(['--help'], standalone_mode=False); print(*sys.modules)"
+    start = "import sys; from stickslip.cli.program import main"
+    code = f"{start}; main(['--help'], standalone_mode=False); print(*sys.modules)"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "analyze" in told.stdout
     loaded = set(told.stdout.split())

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import stickslip as ss
 from motions import free_decay
-from stickslip.cli import main
+from stickslip.cli.program import main
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 import stickslip as ss
-from stickslip.cli import main
+from stickslip.cli.program import main
 from stickslip.files.write import WRITERS
 from stickslip.reports import simulation
 

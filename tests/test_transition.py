@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 import stickslip as ss
-from stickslip.cli import main
+from stickslip.cli.program import main
 from stickslip.errors import EstimateError, RecordError
 from stickslip.identify.mechanism import UNTOLD
 

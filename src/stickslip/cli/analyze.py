@@ -1,0 +1,117 @@
+"""stickslip analyze"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.progress import progress
+from stickslip.cli.records import (
+    collected,
+    default_folder,
+    groups_of,
+    name_left_out,
+    name_of,
+    none_answers,
+    read,
+    require_fits,
+    rig_of,
+)
+from stickslip.cli.show import show
+
+if TYPE_CHECKING:
+    from stickslip import Comparison, Findings, RigSettings
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("250 g").')
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
+@click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
+@click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
+@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+@click.option(
+    "--normal",
+    multiple=True,
+    metavar='LOAD or "PATTERN=LOAD"',
+    help="Normal load in N, for all files or for those whose name fits. Repeatable.",
+)
+@click.option(
+    "--method",
+    type=click.Choice(["smoother", "five-point"]),
+    default="smoother",
+    show_default=True,
+    help="How displacement is differentiated.",
+)
+@result_options("FILE-stickslip")
+@reading_options
+def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: str, **options: Any) -> None:
+    """Find the friction in one record or several.
+
+    FILES that belong to one record are joined with +, as in x.mat+z.mat. A quoted pattern ("run_*.csv") stands for
+    all files that fit. Several records are compared, with the normal load too where it is known.
+
+    Results go into a folder: report.html to open in a browser, results.json, and the figures.
+
+    \b
+    stickslip analyze run.csv --channels "x=disp [mm]" --mass 3.08 --stiffness "1.19 N/mm"
+    stickslip analyze "run_*.csv" --config rig.toml --normal "*250g*=2.45" --normal "*450g*=4.41"
+    """
+    rig = rig_of(**options)
+    groups = [group for argument in files for group in groups_of(argument)]
+    require_fits(options["normal"], groups)
+    folder = output or default_folder(groups)
+    with progress(2 * len(groups) + 1) as tell:
+        results, refused = _answers(groups, rig, method, tell)
+        tell("drawing and writing", 2 * len(groups))
+        written = ss.publish(results, folder=folder) if output or not as_json else None
+    name_left_out(refused)
+    show(results, written, as_json=as_json)
+
+
+@click.command()
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("stickslip-demo"),
+    show_default=True,
+    metavar="DIR",
+    help="Folder for the results.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
+def demo(output: Path, as_json: bool) -> None:
+    """Analyse the bundled record of a simulated rig, with the true answers beside the estimates."""
+    with progress(3) as tell:
+        tell("reading the bundled record", 0)
+        record = ss.datasets.demo()
+        tell("analysing", 1)
+        constants = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
+        findings = ss.analyze(record, **constants)
+        tell("drawing and writing", 2)
+        written = ss.publish(findings, folder=output)
+    show(findings, written, as_json=as_json)
+
+
+def _answers(
+    groups: Sequence[Sequence[Path]], rig: RigSettings, method: str, tell: Callable[[str, int], None]
+) -> tuple[Findings | Comparison, list[ss.StickslipError]]:
+    """What the records answer, together; and why those that are left out do not."""
+    found: list[Findings] = []
+    refused: list[ss.StickslipError] = []
+    for number, group in enumerate(groups):
+        with collected(refused, group):
+            tell(f"reading {name_of(group)}", 2 * number)
+            record = read(group, rig)
+            tell(f"checking and analysing {name_of(group)}", 2 * number + 1)
+            found.append(ss.analyze(record, rig=rig, method=method))
+    if not found:
+        raise none_answers(refused)
+    results = ss.compare(found) if len(found) > 1 else found[0]
+    notes = (*results.notes, *(f"Left out: {error}" for error in refused))
+    return dataclasses.replace(results, notes=notes), refused

@@ -1,0 +1,81 @@
+"""stickslip decay"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.progress import progress
+from stickslip.cli.records import (
+    collected,
+    default_folder,
+    groups_of,
+    name_left_out,
+    name_of,
+    none_answers,
+    read,
+    rig_of,
+)
+from stickslip.cli.show import show
+
+if TYPE_CHECKING:
+    from stickslip import DecayFindings
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.")
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, for the friction force; of an angle in N m/rad.")
+@click.option(
+    "--method",
+    type=click.Choice(["all", "waveform", "thesis"]),
+    default="all",
+    show_default=True,
+    help="The whole waveform, the decrements of the extremes (the thesis's chapter 6), or both.",
+)
+@click.option(
+    "--restoring",
+    type=click.Choice(["linear", "pendulum"]),
+    default="linear",
+    show_default=True,
+    help="The spring's law; pendulum for an angle that swings far.",
+)
+@click.option("--channel", metavar="NAME", help="x, theta, v or a; the first of these that the file has unless given.")
+@result_options("FILE-stickslip")
+@reading_options
+def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options: Any) -> None:
+    """Tell viscous from dry friction by how a released mass dies away.
+
+    FILES hold free decays: displacement, angle, velocity or acceleration of something that was let go. Several
+    releases in one file are told apart. A quoted pattern ("release_*.csv") stands for all files that fit.
+
+    Results go into a folder: report.html to open in a browser, results.json, and the figures.
+
+    \b
+    stickslip decay release.csv --channels "x=disp [mm]" --stiffness "2.31 N/mm"
+    stickslip decay "release_*.csv" --method thesis --json
+    """
+    asked = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
+    rig = rig_of(**options)
+    groups = [group for argument in files for group in groups_of(argument)]
+    folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
+    found: list[DecayFindings] = []
+    refused: list[ss.StickslipError] = []
+    with progress(2 * len(groups) + 1) as tell:
+        for number, group in enumerate(groups):
+            with collected(refused, group):
+                tell(f"reading {name_of(group)}", 2 * number)
+                record = read(group, rig)
+                tell(f"fitting {name_of(group)}", 2 * number + 1)
+                stated = {key: asked[key] or getattr(rig, key) for key in ("mass", "stiffness")}
+                found.append(ss.analyze_decay(record, **{**asked, **stated}))
+        if not found:
+            raise none_answers(refused)
+        tell("drawing and writing", 2 * len(groups))
+        written = ss.publish(found, folder=folder) if output or not as_json else None
+    name_left_out(refused)
+    show(found, written, as_json=as_json)

@@ -1,0 +1,80 @@
+"""The options that several commands share, and how their words are read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+
+def pair(text: str, option: str) -> tuple[str, str]:
+    name, separator, value = text.partition("=")
+    if not separator or not name.strip() or not value.strip():
+        raise click.BadParameter(f"'{text}' is not NAME=VALUE", param_hint=option)
+    return name.strip(), value.strip()
+
+
+def frequency_range(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        low, high = (float(end) for end in text.split(":"))
+    except ValueError as error:
+        raise click.BadParameter(f"'{text}' is not LOW:HIGH in Hz", param_hint="--frequencies") from error
+    return low, high
+
+
+def reading_options(command: Callable[..., None]) -> Callable[..., None]:
+    """The options that say how a file is read."""
+    options = [
+        click.option(
+            "--channels",
+            multiple=True,
+            metavar='"NAME=COLUMN [UNIT]"',
+            help='What a column is: "x=qm [m]", "force=vir * 35.15 [N]". Repeatable.',
+        ),
+        click.option(
+            "--units",
+            multiple=True,
+            metavar='"COLUMN=UNIT"',
+            help="Unit of a column whose header states none. Repeatable.",
+        ),
+        click.option("--fs", metavar="HZ", help="Sampling rate, for a file that states none."),
+        click.option("--time", metavar="COLUMN", help="Column that holds the time, where its header does not say."),
+        click.option("--delimiter", metavar="SIGN", help="Delimiter of a text file, where it can not be told."),
+        click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file."),
+        click.option("--rows", metavar="FIRST:LAST", help="Rows to keep of each file."),
+        click.option(
+            "--repair",
+            metavar="LIST",
+            help="Repairs after reading, in this order, with commas: clock, gaps, missing, spikes, clipping, drift; "
+            "for one channel alone as in drift:x.",
+        ),
+        click.option(
+            "--config",
+            type=click.Path(path_type=Path),
+            metavar="RIG.TOML",
+            help="File of the rig's constants and channel map; options go before it.",
+        ),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def result_options(folder: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The options that say where the results go; `folder` is where they go unless it is said."""
+    output = click.option(
+        "--output",
+        type=click.Path(path_type=Path),
+        metavar="DIR",
+        help=f"Folder for the results; {folder} unless given.",
+    )
+    as_json = click.option(
+        "--json",
+        "as_json",
+        is_flag=True,
+        help="Print the results as JSON and nothing else; a folder is written only with --output.",
+    )
+    return lambda command: output(as_json(command))

@@ -1,0 +1,46 @@
+"""The program: its commands, and how an error ends it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.analyze import analyze, demo
+from stickslip.cli.decay import decay
+from stickslip.cli.exchange import check, convert, datasets
+from stickslip.cli.simulate import INTERRUPTED, simulate
+from stickslip.cli.wavelet import wavelet
+from stickslip.cli.words import spoken
+
+
+class _Commands(click.Group):
+    """Every error that stickslip raises on purpose ends as one sentence and its exit code."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("stickslip: interrupted; nothing was written.", err=True)
+            ctx.exit(INTERRUPTED)
+        except click.UsageError as error:
+            click.echo(f"stickslip: {error.format_message().rstrip('.')}; see {ctx.command_path} --help.", err=True)
+            ctx.exit(error.exit_code)
+        except ss.StickslipError as error:
+            click.echo(f"stickslip: {spoken(error)}", err=True)
+            ctx.exit(error.exit_code)
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(ss.__version__, prog_name="stickslip")
+def main() -> None:
+    """How much friction is in this record, did the contact stick, and how sure is that?
+
+    Exit codes: 0 done, 1 the data can not answer (and why), 2 wrong use. Of several files, those that can not answer
+    are named and left out; the exit code is 1 where none is left.
+    """
+
+
+for _command in (analyze, check, convert, datasets, decay, demo, simulate, wavelet):
+    main.add_command(_command)

@@ -1,0 +1,123 @@
+"""The records that the arguments of a command stand for."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import fnmatch
+import glob
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.options import pair
+from stickslip.cli.words import spoken
+
+if TYPE_CHECKING:
+    from stickslip import Record, RigSettings
+
+
+def rig_of(
+    *,
+    config: Path | None,
+    channels: Sequence[str],
+    units: Sequence[str],
+    repair: str | None,
+    normal: Sequence[str] = (),
+    **constants: str | None,
+) -> RigSettings:
+    """The settings of the file, with those of the command line in front."""
+    given: dict[str, Any] = {key: value for key, value in constants.items() if value is not None}
+    base = ss.read_rig(config).model_dump() if config else {}
+    for key, pairs in (("channels", channels), ("units", units)):
+        if pairs:
+            given[key] = {**base.get(key, {}), **dict(pair(text, f"--{key}") for text in pairs)}
+    if repair is not None:
+        given["repair"] = [word.strip() for word in repair.split(",") if word.strip()]
+    if normal:  # the first pattern that fits decides
+        loads = dict(pair(load, "--normal") if "=" in load else ("*", load) for load in normal)
+        given["normal"] = loads | {key: load for key, load in base.get("normal", {}).items() if key not in loads}
+    return ss.rig_settings({**base, **given}, source="the command line")
+
+
+def groups_of(argument: str) -> list[list[Path]]:
+    """The records that an argument stands for, each as its files: patterns filled in, parts joined by + paired."""
+    if Path(argument).is_dir():
+        raise click.BadParameter(
+            f"'{argument}' is a folder; name a file, or a pattern like '{Path(argument) / '*.csv'}'", param_hint="FILES"
+        )
+    if Path(argument).exists():
+        return [[Path(argument)]]
+    parts = []
+    for part in argument.split("+"):
+        fits = [Path(part)] if Path(part).exists() else sorted(Path(path) for path in glob.glob(part))
+        if not fits:
+            raise click.BadParameter(f"no file is called, or fits, '{part}'", param_hint="FILES")
+        parts.append(fits)
+    if len({len(fits) for fits in parts}) > 1:
+        counts = " and ".join(str(len(fits)) for fits in parts)
+        raise click.BadParameter(
+            f"the parts of '{argument}' fit {counts} files; each record needs one of each", param_hint="FILES"
+        )
+    return [list(files) for files in zip(*parts, strict=True)]
+
+
+def require_fits(normal: Sequence[str], groups: Sequence[Sequence[Path]]) -> None:
+    """Refuse a load stated for files that are not there: it is a typing error."""
+    names = [name for group in groups for name in (*(path.name for path in group), name_of(group))]
+    for load in normal:
+        pattern, separator, _ = load.partition("=")
+        if separator and not fnmatch.filter(names, pattern.strip()):
+            raise click.BadParameter(f"no file fits '{pattern.strip()}'", param_hint="--normal")
+
+
+def name_of(files: Sequence[Path]) -> str:
+    return " + ".join(path.name for path in files)
+
+
+def default_folder(groups: Sequence[Sequence[Path]]) -> Path:
+    return Path(f"{groups[0][0].stem}-stickslip") if len(groups) == 1 else Path("comparison-stickslip")
+
+
+def read(files: Sequence[Path], rig: RigSettings) -> Record:
+    paths: Any = files[0] if len(files) == 1 else list(files)
+    given = {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
+    record = ss.read_record(paths, rows=rig.row_range(), **given)
+    return ss.mend(_with_source(record, files), repairs=rig.repair)
+
+
+def _with_source(record: Record, files: Sequence[Path]) -> Record:
+    """The record with its files in the history; one that write_record kept comes back without."""
+    known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
+    if {path.name for path in files} <= known:
+        return record
+    sources = [{"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()} for path in files]
+    step = ss.Step("read_record", {"files": sources}, "a record as it was written")
+    return dataclasses.replace(record, history=(*record.history, step))
+
+
+@contextlib.contextmanager
+def collected(refused: list[ss.StickslipError], files: Sequence[Path]) -> Iterator[None]:
+    """Put what the data can not answer aside, with the file's name; what was asked wrongly ends all."""
+    try:
+        yield
+    except ss.ModelError:
+        raise
+    except ss.StickslipError as error:
+        known = any(path.name in str(error) for path in files)
+        value = error.value if known else f"{name_of(files)}: {error.value}"
+        refused.append(type(error)(value, error.rule, error.next_step))
+
+
+def none_answers(refused: Sequence[ss.StickslipError]) -> ss.StickslipError:
+    first, many = refused[0], f"none of {len(refused)} records answers; the first: " * (len(refused) > 1)
+    return type(first)(f"{many}{first.value}", first.rule, first.next_step)
+
+
+def name_left_out(refused: Iterable[ss.StickslipError]) -> None:
+    for error in refused:
+        click.echo(f"stickslip: left out: {spoken(error)}", err=True)

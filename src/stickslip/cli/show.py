@@ -1,0 +1,100 @@
+"""What a command prints: a table for people, JSON for machines."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.words import spoken
+
+if TYPE_CHECKING:
+    from stickslip import Comparison, DecayFindings, Findings, Outcome, TimeFrequency
+
+
+SHOWN_EVENTS = 12
+
+
+def show(
+    results: Findings | Comparison | TimeFrequency | list[DecayFindings], written: Path | None, *, as_json: bool
+) -> None:
+    if as_json:
+        told = {"records": [each.to_dict() for each in results]} if isinstance(results, list) else results.to_dict()
+        click.echo(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
+        return
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=False)
+    for part in results if isinstance(results, list) else (*getattr(results, "findings", ()), results):
+        _print_table(console, part)
+    if written is not None:
+        click.echo(f"Report: {written / 'report.html'}")
+
+
+def _print_table(console: Any, results: Findings | Comparison | TimeFrequency | DecayFindings) -> None:
+    from rich.markup import escape
+
+    summary = ss.summary(results)
+    console.print(f"\n[bold]{escape(summary.title)}[/bold]")
+    for sentence in (*summary.headline, *summary.cautions, *(f"- {fault}" for fault in summary.faults or ())):
+        console.print(escape(spoken(sentence)))
+    truth = summary.has_truth
+    headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")
+    rows = (
+        [line.name, line.value, line.interval, *([line.true or "-"] if truth else []), line.status]
+        for line in summary.lines
+    )
+    console.print(table(headings, rows))
+    if summary.verdicts:
+        console.print(table(("motion tried", "verdict"), summary.verdicts))
+    for note in summary.notes:
+        console.print(f"[dim]Note: {escape(spoken(note))}[/dim]")
+
+
+def show_run(result: Outcome, written: Path | None, *, as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps(result.to_dict(), indent=2, ensure_ascii=False, allow_nan=False))
+        return
+    from rich.console import Console
+    from rich.markup import escape
+
+    console = Console(highlight=False, soft_wrap=False)
+    console.print(f"\n[bold]{escape(result.case.name)}[/bold]  {escape(result.case.about)}")
+    for sentence in result.sentences:
+        console.print(escape(sentence))
+    console.print(table(("quantity", "value"), result.rows))
+    if result.known:
+        answers = [(name, str(pair["known"]), str(pair["found"])) for name, pair in result.known.items()]
+        console.print("\nKnown of this scenario, and what the engine finds:")
+        console.print(table(("answer", "known", "found"), answers))
+    count, events = result.run.event_counts().total(), list(itertools.islice(result.run.each_event(), SHOWN_EVENTS))
+    if events:
+        several = any(event.contact for event in events)
+        rows = [
+            (f"{event.time:.9g}", event.kind, *([str(event.contact + 1)] if several else []), event.mode)
+            for event in events
+        ]
+        headings = ("time [s]", "event", *(["contact"] if several else []), "mode that begins")
+        console.print("")
+        console.print(table(headings, rows))
+        if count > len(rows):
+            click.echo(f"... and {count - len(rows)} more{', in events.csv' if written is not None else ''}")
+    if written is not None:
+        click.echo(f"Results: {written}")
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Any:
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in headings:
+        table.add_column(heading, overflow="fold")
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    return table

@@ -1,0 +1,108 @@
+"""stickslip simulate"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.options import pair, result_options
+from stickslip.cli.progress import progress
+from stickslip.cli.show import show_run
+
+if TYPE_CHECKING:
+    from stickslip import Case
+
+
+INTERRUPTED = 130
+LIST_WIDTH = 100
+
+
+@click.command()
+@click.argument("case", required=False, metavar="[SCENARIO|FILE.toml]")
+@click.option("--list", "listed", is_flag=True, help="List the scenarios, with what is known of each.")
+@click.option("--duration", metavar="TIME", help="Time to simulate in s, or with its unit.")
+@click.option("--cycles", type=click.FloatRange(min=0, min_open=True), help="The same in periods of the drive.")
+@click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar='"NAME=VALUE"',
+    help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm", "law.stiffness=2 N/um". Repeatable.',
+)
+@click.option("--fs", metavar="HZ", help="Sampling rate of the record; fine enough for the motion unless given.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["csv", "h5", "parquet"]),
+    default="csv",
+    show_default=True,
+    help="Format of the record.",
+)
+@click.option("--animate", "animation", type=click.Choice(["gif", "mp4"]), help="Add a moving picture; mp4 by ffmpeg.")
+@result_options("NAME-stickslip")
+def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool, **options: Any) -> None:
+    """Simulate masses that rub, exactly, event by event.
+
+    What to simulate is a named scenario, or a TOML file of a system: masses, friction laws and a drive. Without
+    a name the scenarios are listed.
+
+    Results go into a folder: results.json, the events, the sampled record with friction, and the figures.
+
+    \b
+    stickslip simulate FD-4
+    stickslip simulate slider.toml --cycles 100 --set "kinetic=1.3 N" --animate gif
+
+    Ctrl-C while it runs keeps what was simulated until then, marked "interrupted", with exit code 130.
+    """
+    if case is None or listed:
+        _list_scenarios(as_json=as_json)
+        return
+    wanted = _case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
+    folder = output or (None if as_json else Path(f"{_fit_for_a_file(wanted.name)}-stickslip"))
+    if folder:
+        ss.require_output(wanted, folder=folder, **options)
+    with progress(4 if options["animation"] else 3) as tell:
+        tell("simulating", 0)
+        result = ss.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", share))
+        written = ss.publish_run(result, folder=folder, tell=tell, **options) if folder else None
+    show_run(result, written, as_json=as_json)
+    if result.run.status == "interrupted":
+        raise SystemExit(INTERRUPTED)
+
+
+def _case(name: str, *, duration: str | None, cycles: float | None, changes: Sequence[str], fs: str | None) -> Case:
+    """The scenario or the file of that name, with what the command line changes."""
+    case = ss.read_system(name) if name.endswith(".toml") or Path(name).is_file() else ss.scenario_case(name)
+    case = case.having(**dict(pair(change, "--set") for change in changes))
+    return case.lasting(duration=duration, cycles=cycles, fs=fs)
+
+
+def _fit_for_a_file(name: str) -> str:
+    return "".join(sign if sign.isalnum() or sign in "-_." else "-" for sign in name)
+
+
+def _list_scenarios(*, as_json: bool) -> None:
+    found = {name: ss.scenarios.get(name) for name in ss.scenarios.names()}
+    if as_json:
+        click.echo(json.dumps({name: each.about for name, each in found.items()}, indent=2, ensure_ascii=False))
+        return
+    cases = [(ss.scenario_case(name), ", ".join(each.known).replace("_", " ")) for name, each in found.items()]
+    for (about, parts, known), group in itertools.groupby(
+        cases, key=lambda each: (each[0].about, each[0].parts, each[1])
+    ):
+        click.echo(f"\n{about}\n  {parts}; known: {known}")
+        line = ""
+        for case, _ in group:
+            name = f'  "{case.name}"'
+            if len(line) + len(name) > LIST_WIDTH:
+                click.echo(line)
+                line = ""
+            line += name
+        click.echo(line)
+    click.echo(f'\n{len(found)} scenarios; run one with: stickslip simulate "NAME"')

@@ -1,0 +1,30 @@
+"""What a sentence says to a Python user, and how the command line says it."""
+
+from __future__ import annotations
+
+import re
+
+_REPAIRS = {
+    "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
+    "restore_clipped": "clipping", "remove_drift": "drift",
+}  # fmt: skip
+_SPOKEN = (
+    (r"\brecord\.check\(\)", "stickslip check"),
+    (r"\brecord\.rows\(\)", "--rows"),
+    (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
+    (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
+    (r"\b(channels|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness)=(?=\W|$)", r"--\1"),
+)
+
+
+def spoken(words: object) -> str:
+    """A sentence with the options of the command line for what it says of Python."""
+
+    def repair(call: re.Match[str]) -> str:
+        word = _REPAIRS.get(call[1])
+        return call[0] if word is None else f"--repair {word}" + (f":{call[2]}" if call[2] else "")
+
+    text = re.sub(r'\b(\w+)\(record(?:, "(\w+)")?\)', repair, str(words))
+    for said, option in _SPOKEN:
+        text = re.sub(said, option, text)
+    return text
