@@ -163,6 +163,10 @@ def test_options_change_the_run() -> None:
     assert ss.read_record("slider-stickslip/record.csv").fs == 2000
 
 
+def test_a_run_shorter_than_a_cycle_counts_the_part_that_it_is() -> None:
+    assert quantities(told("slider.toml", "--cycles", "0.25"))["cycles"] == pytest.approx(0.25)
+
+
 def test_without_a_name_the_scenarios_are_listed() -> None:
     result = run()
     assert result.exit_code == 0

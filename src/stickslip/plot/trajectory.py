@@ -80,19 +80,23 @@ def kinds_of(run: Trajectory, contact: int) -> list[str]:
     ]
 
 
-def cycle_of(run: Trajectory) -> float:
-    """The time after which the motion repeats, or could [s]: the drive's period, else that of the events themselves,
-    else the natural one; at most the whole run."""
+def period_of(run: Trajectory) -> float:
+    """The time after which the motion repeats, or would [s]: the drive's period, else that of the events themselves,
+    else the natural one; the whole run where there is none."""
     motion = run.table.motion
     if math.isfinite(motion.period):
-        return min(motion.period, run.duration)
+        return motion.period
     natural = 1 / run.system.frequency if run.system.frequency else run.duration
     if motion.tones:
-        return min(max(natural, *(2 * math.pi / tone[2] for tone in motion.tones)), run.duration)
+        return max(natural, *(2 * math.pi / tone[2] for tone in motion.tones))
     same = np.flatnonzero(run.modes == run.modes[-1])
     pulled = motion.rates and motion.knots is None  # by a belt or a ramp
-    found = float(run.starts[same[-1]] - run.starts[same[-2]]) if len(same) > 1 and pulled else natural
-    return min(found, run.duration)
+    return float(run.starts[same[-1]] - run.starts[same[-2]]) if len(same) > 1 and pulled else natural
+
+
+def cycle_of(run: Trajectory) -> float:
+    """What is shown as one cycle [s]: the motion's period, at most the whole run."""
+    return min(period_of(run), run.duration)
 
 
 def last_cycles(run: Trajectory, cycles: float) -> tuple[float, float]:

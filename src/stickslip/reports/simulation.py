@@ -18,7 +18,16 @@ from stickslip.laws.formula import Formula
 from stickslip.parameters import PARTS
 from stickslip.plot.figures import figures
 from stickslip.plot.style import prefixed
-from stickslip.plot.trajectory import contacts_of, cycle_of, kinds_of, last_cycles, numbered_words, pressed, sampled
+from stickslip.plot.trajectory import (
+    contacts_of,
+    cycle_of,
+    kinds_of,
+    last_cycles,
+    numbered_words,
+    period_of,
+    pressed,
+    sampled,
+)  # fmt: skip
 from stickslip.reports.folder import check_folder, results_folder, write_figures
 from stickslip.solve.automaton import Automaton
 from stickslip.solve.curved import CurvedTrajectory
@@ -250,12 +259,11 @@ def require_output(
 
 
 def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
-    cycle = cycle_of(run)
     first, last = last_cycles(run, 1)
     times = np.linspace(first, last, PEAKS)
     values = {
         "simulated time": (run.duration, "s"),
-        "cycles": (run.duration / cycle, "1"),
+        "cycles": (run.duration / period_of(run), "1"),
         "events": (float(np.count_nonzero(run.exits[:-1] >= 0)), "1"),
         **_shares(run),
     }
