@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.identify.fusion import Balance, fuse
+from stickslip.identify.mass import stiffness_per_mass
 from stickslip.identify.motion import is_measured, require_fit
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
@@ -20,6 +23,8 @@ from stickslip.signals.differentiate import (
     Filter,
     best_bandwidth,
     checked_bandwidth,
+    differentiate,
+    five_point_average,
     noise_along,
     total_sd,
 )
@@ -31,13 +36,20 @@ QUESTION = "the friction force"
 ENDS = ("ground", "base")
 FUSIONS = {"fusion": ("x", "v", "a", "load"), "motion": ("x", "v", "a"), "load": ("x", "load")}
 """Methods that know how the sensors lie, and the channels that each uses, where they are there."""
+THESIS = ("F", "F1", "F2")
+INSTEAD = {"load": "motion", "F2": "F1"}  # what answers where there is no load cell
+LOST = {
+    "a": "without an accelerometer: reversals are seen through the displacement alone",
+    "load": "without a load cell: the friction is only what is left of the motion",
+}
+SPAN = 24  # samples from an end within which averages and differences feel it
 
 
 def friction_force(
     record: Record,
     *,
-    mass: float | str,
-    stiffness: float | str,
+    mass: float | str | None = None,
+    stiffness: float | str | None = None,
     damping: float | str = 0.0,
     damper: str = "ground",
     method: str = "smoother",
@@ -74,13 +86,18 @@ def friction_force(
         Viscous damping c [N s/m].
     damper : {"ground", "base"}
         Where the damper's other end is fixed.
-    method : {"smoother", "five-point", "fusion", "motion", "load"}
+    method : {"smoother", "five-point", "fusion", "motion", "load", "F", "F1", "F2"}
         The first two: how derivatives are taken, see :func:`~stickslip.signals.differentiate.differentiate`. The
-        others put all sensors together by a Kalman smoother in which the friction wanders as much as the record
+        next three put all sensors together by a Kalman smoother in which the friction wanders as much as the record
         says, sample by sample, and in which the mounts swing whose resonance is stated (``with_details("a",
         mount=(125, 0.1))``, and of a load cell ``inertia`` and ``discharge``): "fusion" with x, v, a and load where
         measured, "motion" without the load cell, "load" with x and load alone. ``friction_sd`` is then that of the
-        smoother; it covers 94 % of the samples and more at two deviations, if the mounts are right.
+        smoother; it covers 94 % of the samples and more at two deviations, if the mounts are right. The last three
+        are the thesis's (section 2.4): "F" is ``k z - k x - m a`` as read, "F1" its five-point average (A.1), "F2" the
+        five-point average of the load cell less its flange's inertia (stated by ``with_details("load",
+        inertia=0.05)``), for which neither mass nor stiffness is needed. Their ``friction_sd`` is that of noise: the
+        swinging of mounts, 0.1 to 0.5 N on the thesis's rig, is not in it. A method that lacks a channel falls back,
+        and the history says on what, and what is lost.
     contact : {"ground", "base"}
         What the mass slides on. The force on the mass is the same; what it is held against (x, or x - z) is not, and
         the questions that follow are told by the history.
@@ -90,7 +107,8 @@ def friction_force(
     Returns
     -------
     Record
-        With ``friction`` [N], ``friction_sd`` [N], and ``v`` [m/s] and ``a`` [m/s^2] where they were not measured.
+        With ``friction`` [N], ``friction_sd`` [N], and ``v`` [m/s] and ``a`` [m/s^2] where they were not measured;
+        ``friction_per_mass`` and ``friction_per_mass_sd`` [m/s^2] where neither mass nor stiffness is known.
         ``friction_sd`` is the standard deviation of each value: each channel's noise (stated for the channel, or
         estimated, varying in time where it does) through the whole filter from that channel to the force, and the
         smoothing bias (what a second pass would change). Errors of m, k, c and sensitivities are not in it.
@@ -112,13 +130,22 @@ def friction_force(
     >>> bool(np.allclose(record["friction"][100:-100], 100 * x[100:-100], atol=1e-4))
     True
     """
-    rig = _Rig.stated({"mass": mass, "stiffness": stiffness, "damping": damping}, damper, contact)
-    record = _as_measured(record)
-    if method in FUSIONS:
-        return _fused(record, rig, method)
-    if method not in METHODS:
-        methods = ", ".join((*METHODS, *FUSIONS))
+    if method not in (*METHODS, *FUSIONS, *THESIS):
+        methods = ", ".join((*METHODS, *FUSIONS, *THESIS))
         raise EstimateError(f"method = '{method}'", f"the friction is found by one of {methods}", "choose one of them")
+    record = _as_measured(record)
+    asked, method = method, method if "load" in record else INSTEAD.get(method, method)
+    unknown = [name for name, value in (("mass", mass), ("stiffness", stiffness)) if value is None]
+    constants = {"mass": mass, "stiffness": stiffness, "damping": damping, **dict.fromkeys(unknown, 1.0)}
+    rig = _Rig.stated(constants, damper, contact)
+    if method == "F2":
+        return _felt(record, {**asdict(rig), **dict.fromkeys(unknown)})
+    if unknown:
+        return _completed(record, rig, unknown, method, bandwidth)
+    if method in FUSIONS:
+        return _fused(record, rig, method, asked)
+    if method in THESIS:
+        return _balanced(record, rig, method, asked)
     used = ["x", *(name for name in ("z", "v", "a", "force") if name in record)]
     record.require_clean(*used, question=QUESTION, samples=LEAST)
     require_fit(record, *({"force"} & set(record)), length="m", question=QUESTION)
@@ -145,17 +172,138 @@ def friction_force(
         {**asdict(rig), "method": method, "bandwidth": width if method == "smoother" else None},
         "; ".join(rig.words(record, method, width, one_filter)),
     )
-    made = _with_motion(record, derive)
-    made = made.with_channel("friction_sd", sd, unit="N", source="friction_force")
-    return made.with_channel(
-        "friction", force, unit="N", source="friction_force", noise=float(np.median(sd)), step=step
+    return _with_friction(_with_motion(record, derive), force, sd, step)
+
+
+def _balanced(record: Record, rig: _Rig, method: str, asked: str) -> Record:
+    """The thesis's F, or F1: the balance of the forces as read, or its five-point average."""
+    used = ["x", *(name for name in ("z", "v", "a", "force") if name in record)]
+    record.require_clean(*used, question=QUESTION, samples=LEAST)
+    require_fit(record, *({"force"} & set(record)), length="m", question=QUESTION)
+    record = without_delays(record, *used, question=QUESTION, samples=LEAST)
+    derive = Filter("five-point", record.fs, 0.0)
+    last = five_point_average if method == "F1" else np.asarray
+    force, variance = np.zeros(len(record)), np.zeros(len(record))
+    for name, terms in rig.balance(record).items():
+        noise = noise_along(record[name], record.fs, record.channels[name].noise)
+        force += last(derive.apply(record[name], terms))
+        variance += (_gain(len(record), derive, terms, last) * noise) ** 2
+    words = [
+        *_lacking(record, asked, ("a", "load") if asked != method else ("a",)),
+        *rig.words(record, "five-point", 0.0, False),
+        "averaged over five points" if method == "F1" else "as read",
+    ]
+    step = Step("friction_force", {**asdict(rig), "method": method}, "; ".join(words))
+    return _with_friction(_with_motion(record, derive), force, np.sqrt(variance), step)
+
+
+def _felt(record: Record, arguments: Mapping[str, Any]) -> Record:
+    """The thesis's F2: what the load cell reads, less the inertia of its flange, averaged over five points."""
+    inertia = record.channels["load"].inertia
+    source = next((name for name in ("a", "v", "x") if name in record), "") if inertia else ""
+    used = ["load", *([source] if source else [])]
+    record.require_clean(*used, question=QUESTION, samples=LEAST)
+    record = without_delays(record, *used, question=QUESTION, samples=LEAST)
+    derive = Filter("five-point", record.fs, 0.0)
+    terms = {"load": {0: 1.0}, **({source: {"avx".index(source): -inertia}} if source else {})}
+    force, variance = np.zeros(len(record)), np.zeros(len(record))
+    for name, orders in terms.items():
+        noise = noise_along(record[name], record.fs, record.channels[name].noise)
+        force += five_point_average(derive.apply(record[name], orders))
+        variance += (_gain(len(record), derive, orders, five_point_average) * noise) ** 2
+    words = ["the load cell, averaged over five points"]
+    if source:
+        words.append(f"less {inertia:g} kg times the acceleration from {source}")
+    elif inertia:
+        words.append(f"no motion: the inertia of {inertia:g} kg of its flange is left in")
+    step = Step("friction_force", {**arguments, "method": "F2"}, "; ".join(words))
+    return _with_friction(record, force, np.sqrt(variance), step)
+
+
+def _gain(size: int, derive: Filter, terms: Mapping[int, float], last: Callable[[Array], Array]) -> Array:
+    """Standard deviation of each of `size` values for white noise of unit standard deviation."""
+    rows = np.linalg.norm(last(derive.apply(np.eye(min(size, 2 * SPAN)), terms)), axis=1)
+    return rows if size <= len(rows) else np.insert(rows, SPAN, np.full(size - len(rows), rows[SPAN]))
+
+
+def _lacking(record: Record, asked: str, wanted: Sequence[str]) -> list[str]:
+    """What is lost for want of channels, for the history."""
+    return [f"{LOST[name]} ({asked} asked for)" for name in wanted if name in LOST and name not in record]
+
+
+def _with_friction(record: Record, force: Array, sd: Array, step: Step) -> Record:
+    made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
+    noise = float(np.median(sd))
+    return made.with_channel("friction", force, unit="N", source="friction_force", noise=noise, step=step)
+
+
+def _completed(record: Record, rig: _Rig, unknown: Sequence[str], method: str, bandwidth: float | str | None) -> Record:
+    """The friction force with the mass or the stiffness from the record; per mass, with neither."""
+    if rig.damping and len(unknown) == 2:
+        raise ModelError(
+            f"damping = {rig.damping:g} N s/m without mass and stiffness",
+            "of forces only ratios can be found where no mass and no stiffness is known",
+            "give the mass or the stiffness, or leave the damping out",
+        )
+    record.require_clean(*(name for name in ("x", "z", "a") if name in record or name == "x"), question=QUESTION)
+    punctual = without_delays(record, question=QUESTION, samples=LEAST)
+    found = stiffness_per_mass(punctual, contact=rig.contact)
+    if rig.damping:
+        across = -_stretch(punctual) if rig.damper == "base" else punctual["x"]
+        drag = rig.damping * differentiate(across, record.fs).values
+        for _ in range(2):
+            moving = rig.stiffness / found.value if "mass" in unknown else rig.mass
+            found = stiffness_per_mass(punctual, resisting=drag / moving, contact=rig.contact)
+    if found.value <= 0:
+        raise EstimateError(
+            f"k/m = {found.value:.3g} 1/s^2 where it slides",
+            "a spring pulls back: no mass or stiffness can be found with a sensor of the wrong sign",
+            "correct the signs of x, z and a, or give mass and stiffness",
+        )
+    ends = {"damper": rig.damper, "contact": rig.contact}
+    if len(unknown) == 2:
+        return _per_mass(record, found, method=method, bandwidth=bandwidth, **ends)
+    moving = rig.stiffness / found.value if "mass" in unknown else rig.mass
+    made = friction_force(
+        record, mass=moving, stiffness=found.value * moving, damping=rig.damping, method=method, bandwidth=bandwidth,
+        **ends,
+    )  # fmt: skip
+    unsure = made["a"] if "mass" in unknown else found.value * _stretch(made)
+    sd = np.hypot(made["friction_sd"], moving * found.sd / found.value * np.abs(unsure))
+    step = replace(made.history[-1], outcome=f"{_ratio(found)}; {made.history[-1].outcome}")
+    return replace(_with_friction(made, made["friction"], sd, step), history=(*made.history[:-1], step))
+
+
+def _per_mass(record: Record, found: Estimate, *, method: str, **rig: Any) -> Record:
+    """The friction per mass, where neither mass nor stiffness is known."""
+    method = "motion" if method in FUSIONS else method  # a force says nothing of a motion whose mass is not known
+    made = friction_force(record, mass=1.0, stiffness=found.value, method=method, **rig)
+    last = made.history[-1]
+    words = "neither mass nor stiffness is known: the friction per mass is all that can be said"
+    step = Step(
+        "friction_force",
+        {**last.arguments, "mass": None, "stiffness": None},
+        f"{words}; {_ratio(found)}; {last.outcome}",
     )
+    sd = np.hypot(made["friction_sd"], found.sd * np.abs(_stretch(made)))
+    kept = {name: made[name] for name in made if name not in ("friction", "friction_sd")}
+    bare = replace(made, samples=kept, channels={name: made.channels[name] for name in kept}, history=made.history[:-1])
+    bare = bare.with_channel("friction_per_mass_sd", sd, unit="m/s^2", source="friction_force")
+    return bare.with_channel("friction_per_mass", made["friction"], unit="m/s^2", source="friction_force", step=step)
 
 
-def _fused(record: Record, rig: _Rig, method: str) -> Record:
+def _stretch(record: Record) -> Array:
+    """Of the spring between mass and base [m]."""
+    return record["z"] - record["x"] if "z" in record else -record["x"]
+
+
+def _ratio(found: Estimate) -> str:
+    return f"k/m = {found.value:.5g} +- {NORMAL_95 * found.sd:.2g} 1/s^2 from how it slides"
+
+
+def _fused(record: Record, rig: _Rig, method: str, asked: str) -> Record:
     """The friction force by a smoother that knows the sensors."""
-    needed = ["x", "load"] if method == "load" else ["x"]
-    record.require(*needed, question=QUESTION)
+    record.require("x", question=QUESTION)
     sensors = [name for name in FUSIONS[method] if name in record]
     used = [*sensors, *(name for name in ("z", "force") if name in record)]
     record.require_clean(*used, question=QUESTION, samples=LEAST)
@@ -163,17 +311,20 @@ def _fused(record: Record, rig: _Rig, method: str) -> Record:
     record = without_delays(record, *used, question=QUESTION, samples=LEAST)
     found = fuse(record, Balance(rig.mass, rig.stiffness, rig.damping, rig.damper), sensors)
     swinging = [f"{name} on a mount of {mount[0]:g} Hz" for name in sensors if (mount := record.channels[name].mount)]
-    words = f"{', '.join(sensors)} together by a Kalman smoother; {', '.join(swinging) or 'no mounts stated'}"
-    step = Step("friction_force", {**asdict(rig), "method": method}, f"{words}; contact against the {rig.contact}")
+    words = [
+        *_lacking(record, asked, FUSIONS[asked]),
+        f"{', '.join(sensors)} together by a Kalman smoother",
+        ", ".join(swinging) or "no mounts stated",
+        f"contact against the {rig.contact}",
+    ]
+    step = Step("friction_force", {**asdict(rig), "method": method}, "; ".join(words))
     made = record
     if "v" not in record:
         noise = float(np.median(found.velocity_sd))
         made = made.with_channel("v", found.velocity, unit="m/s", source="friction_force", noise=noise)
     if "a" not in record:
         made = made.with_channel("a", found.acceleration, unit="m/s^2", source="friction_force")
-    made = made.with_channel("friction_sd", found.friction_sd, unit="N", source="friction_force")
-    noise = float(np.median(found.friction_sd))
-    return made.with_channel("friction", found.friction, unit="N", source="friction_force", noise=noise, step=step)
+    return _with_friction(made, found.friction, found.friction_sd, step)
 
 
 @dataclass(frozen=True)
@@ -185,7 +336,7 @@ class _Rig:
     contact: str
 
     @classmethod
-    def stated(cls, constants: Mapping[str, float | str], damper: str, contact: str) -> _Rig:
+    def stated(cls, constants: Mapping[str, Any], damper: str, contact: str) -> _Rig:
         units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
         values = {name: parse_value(constants[name], unit) for name, unit in units.items()}
         for name, value in values.items():
