@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         mend as mend,
     )
     from stickslip.config import RigSettings as RigSettings, read_rig as read_rig, rig_settings as rig_settings
+    from stickslip.decay_comparison import DecayComparison as DecayComparison, compare_decays as compare_decays
     from stickslip.decays import DecayFindings as DecayFindings, analyze_decay as analyze_decay
     from stickslip.errors import (
         EstimateError as EstimateError,
@@ -193,6 +194,7 @@ _ROOMS = {
     "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",
     "extreme_decay": "identify.envelope", "hilbert_decay": "identify.envelope", "EnvelopeDecay": "identify.envelope",
     "analyze_decay": "decays", "DecayFindings": "decays",
+    "compare_decays": "decay_comparison", "DecayComparison": "decay_comparison",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
     "analyze": "analysis", "compare": "analysis", "mend": "analysis", "Findings": "analysis", "Comparison": "analysis",
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",

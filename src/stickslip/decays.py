@@ -16,7 +16,7 @@ from stickslip.fit.decay import fit_decay
 from stickslip.fit.motions import Restoring
 from stickslip.fit.which_motion import DecayMotion, choose_motion
 from stickslip.identify.decrement import Decrement, decrement
-from stickslip.identify.envelope import EnvelopeDecay, hilbert_decay, linear_decrement, log_decrement
+from stickslip.identify.envelope import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
 from stickslip.identify.release import Releases, find_releases
 from stickslip.record.record import Record
 from stickslip.units import parse_value
@@ -28,8 +28,10 @@ Answer = TypeVar("Answer")
 
 METHODS = ("thesis", "waveform", "all")
 OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
-    "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, "Hilbert envelope": hilbert_decay,
+    "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, "extremes alone": extreme_decay,
+    "Hilbert envelope": hilbert_decay,
 }  # fmt: skip
+FOR_PENDULUMS = {"extremes alone": functools.partial(extreme_decay, restoring="pendulum")}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,9 +75,8 @@ class DecayFindings(Result):
 
     @property
     def best(self) -> DecayFit | Decrement | DecayMotion:
-        """The surest answer: of the whole waveform where there is one; of a pendulum's, where it is said to be one."""
-        swings = self.motion if self.settings.get("restoring") == "pendulum" else None
-        found = next((each for each in (swings, self.waveform, self.thesis, self.motion) if each is not None), None)
+        """The surest answer: of the whole waveform where there is one."""
+        found = next((each for each in (self.waveform, self.thesis, self.motion) if each is not None), None)
         assert found is not None
         return found
 
@@ -213,7 +214,8 @@ def analyze_decay(
     mass, stiffness : float or str, optional
         Mass [kg] or stiffness [N/m] (of an angle: kg m^2, N m/rad), for the dry friction as a force.
     restoring : {"linear", "pendulum"}
-        The spring's law: x, or sin x of a pendulum's angle; then the answer is that of :func:`choose_motion`.
+        The spring's law: x, or sin x of a pendulum's angle. The decrements hold for x alone: a pendulum's extremes are
+        read by :func:`extreme_decay`.
 
     Returns
     -------
@@ -237,12 +239,18 @@ def analyze_decay(
     """
     if method not in METHODS:
         raise EstimateError(f"method = '{method}'", f"it is {', '.join(METHODS)}", "choose one of them")
+    if restoring == "pendulum" and method == "thesis":
+        raise EstimateError(
+            "method = 'thesis' of a pendulum",
+            "the decrements of the extremes hold for a linear spring",
+            "choose method = 'waveform', or ask extreme_decay(record)",
+        )
     faults = tuple(record.check())
     releases = find_releases(record, channel=channel)
     used = releases.ring_downs[0].channel
     units = ("kg m^2", "N m/rad") if used == "theta" else ("kg", "N/m")
     stated = {"mass": mass, "stiffness": stiffness}
-    constants = {
+    constants: dict[str, Any] = {
         name: parse_value(value, unit)
         for (name, value), unit in zip(stated.items(), units, strict=True)
         if value is not None
@@ -263,16 +271,17 @@ def analyze_decay(
 
     waveform = thesis = motion = None
     if method != "thesis":
-        waveform = ask("The whole waveform", lambda: fit_decay(record, channel=used))
+        waveform = ask("The whole waveform", lambda: fit_decay(record, channel=used, restoring=restoring, **constants))
         if releases.ring_downs[0].order == 0:
             motion = ask("Which motion", lambda: choose_motion(record, channel=used, restoring=restoring))
-    if method != "waveform":
+    if method != "waveform" and restoring == "linear":
         thesis = ask("The decrements", lambda: decrement(record, channel=used))
     if waveform is None and thesis is None and motion is None:
         raise refusals[0]
+    ways = {} if method != "all" or releases.ring_downs[0].order else OLDER if restoring == "linear" else FOR_PENDULUMS
     older = {
         name: found
-        for name, way in (OLDER if method == "all" and releases.ring_downs[0].order == 0 else {}).items()
+        for name, way in ways.items()
         if (found := ask(name.capitalize(), functools.partial(way, record, channel=used))) is not None
     }
     return DecayFindings(

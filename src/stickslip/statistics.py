@@ -7,14 +7,15 @@ and the variance of a mean is the spectrum of the series at frequency zero. That
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate
+from stickslip.estimate import NORMAL_95, Estimate
 
 Array = NDArray[np.float64]
 
@@ -191,6 +192,51 @@ def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, chec
         name, present.mean(), sd=sd, unit=unit, method=method, quantile=student(freedom), status=status,
         checks=(check, *checks),
     )  # fmt: skip
+
+
+def disagreement(estimates: Sequence[Estimate]) -> float:
+    """How far estimates of one quantity differ, over what their own standard deviations allow: 1 where they agree."""
+    values, sds = _values(estimates)
+    weights = 1 / sds**2
+    mean = float(weights @ values / weights.sum())
+    return math.sqrt(float(weights @ (values - mean) ** 2) / (len(values) - 1))
+
+
+def weighted_mean(estimates: Sequence[Estimate], *, of: str, status: str = "ok") -> Estimate:
+    """One answer of several estimates of one quantity: their mean by weight, its interval wider where they disagree.
+
+    Parameters
+    ----------
+    estimates : sequence of Estimate
+        One or more, of the same unit; the first gives the name.
+    of : str
+        What each is of, in the plural ("releases").
+    status : str
+        The answer's.
+
+    Examples
+    --------
+    >>> each = [Estimate.normal("friction", value, sd=0.02, unit="N", method="") for value in (1.00, 1.02, 1.01)]
+    >>> print(weighted_mean(each, of="releases"))
+    friction 1.01 N (95 %: 0.99 to 1.03)
+    """
+    first = estimates[0]
+    if len(estimates) == 1:
+        return replace(first, status=status)
+    values, sds = _values(estimates)
+    weights, excess = 1 / sds**2, disagreement(estimates)
+    mean = float(weights @ values / weights.sum())
+    quantile = student(len(values) - 1) if excess > 1 else NORMAL_95
+    return Estimate.normal(
+        first.name, mean, sd=max(1.0, excess) / math.sqrt(float(weights.sum())), unit=first.unit,
+        method=f"weighted mean of {len(values)} {of}", quantile=quantile, status=status,
+        checks=(f"they differ by {excess:.2g} times what their own intervals allow",),
+    )  # fmt: skip
+
+
+def _values(estimates: Sequence[Estimate]) -> tuple[Array, Array]:
+    values, sds = (np.array([getattr(each, key) for each in estimates]) for key in ("value", "sd"))
+    return values, np.maximum(sds, 1e-12 * max(1e-300, float(np.abs(values).max())))
 
 
 def least_squares(design: ArrayLike, data: ArrayLike) -> LeastSquares:

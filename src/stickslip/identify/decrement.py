@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.estimate import Estimate, Result
 from stickslip.identify import extremes as ex
 from stickslip.identify.release import RingDown, find_releases
 from stickslip.record.record import Record
-from stickslip.statistics import student
+from stickslip.statistics import student, weighted_mean
 
 Array = NDArray[np.float64]
 
@@ -436,26 +436,10 @@ def _together(parts: Sequence[Decrement], notes: tuple[str, ...], refused: Seque
     surest = min(parts, key=lambda part: part.damping_ratio.sd)
     status = "; ".join(notes) or "ok"
     ratio, dry, frequency, bias = (
-        _weighted([getattr(part, name) for part in parts], status)
+        weighted_mean([getattr(part, name) for part in parts], of="releases", status=status)
         for name in ("damping_ratio", "dry_displacement", "frequency", "bias")
     )
     return replace(
         surest, damping_ratio=ratio, dry_displacement=dry, frequency=frequency, bias=bias, model=_model(ratio, dry),
         parts=tuple(parts), status=status,
-    )  # fmt: skip
-
-
-def _weighted(estimates: Sequence[Estimate], status: str) -> Estimate:
-    first = estimates[0]
-    if len(estimates) == 1:
-        return replace(first, status=status)
-    values, sds = (np.array([getattr(each, key) for each in estimates]) for key in ("value", "sd"))
-    weights = 1 / np.maximum(sds, 1e-12 * max(1e-300, float(np.abs(values).max()))) ** 2
-    mean = float(weights @ values / weights.sum())
-    excess = math.sqrt(float(weights @ (values - mean) ** 2) / (len(values) - 1))
-    quantile = student(len(values) - 1) if excess > 1 else NORMAL_95
-    return Estimate.normal(
-        first.name, mean, sd=max(1.0, excess) / math.sqrt(float(weights.sum())), unit=first.unit,
-        method=f"weighted mean of {len(values)} releases", quantile=quantile, status=status,
-        checks=(f"they differ by {excess:.2g} times what their own intervals allow",),
     )  # fmt: skip

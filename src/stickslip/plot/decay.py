@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from stickslip.decay_comparison import DecayComparison
     from stickslip.decays import DecayFindings
     from stickslip.identify.decrement import Decrement
     from stickslip.identify.release import RingDown
@@ -183,6 +184,60 @@ def plot_bounds(found: Decrement) -> Figure:
     axes[1].set_xlabel("half cycles m between the two differences")
     figure.align_ylabels(list(axes))
     return figure
+
+
+@styled
+def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio", ax: Axes | None = None) -> Axes:
+    """A quantity of each record with its 95 % interval, and the band that holds for all.
+
+    Parameters
+    ----------
+    comparison : DecayComparison
+        What :func:`~stickslip.compare_decays` returned.
+    quantity : {"damping_ratio", "dry_displacement", "frequency"}
+        Which.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+    """
+    each = [getattr(findings.best, quantity) for findings in comparison.findings]
+    names = [
+        findings.name if len(findings.name) < 44 else f"{findings.name[:41]}..." for findings in comparison.findings
+    ]
+    values, ends = np.array([one.value for one in each]), np.array([one.interval for one in each])
+    ax, places = axes_of(ax, height=1.3 + 0.32 * len(names)), np.arange(len(names))
+    factor, unit = prefixed(ends, each[0].unit)
+    for shared in (one for one in comparison.estimates if one.name == each[0].name):
+        low, high = (factor * end for end in shared.interval)
+        ax.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0, label="all records, 95 %")
+        ax.axvline(factor * shared.value, color=ORANGE, linewidth=1.0)
+    ax.errorbar(
+        factor * values, places, xerr=factor * np.abs(ends - values[:, None]).T, fmt="o", color=BLUE, capsize=3,
+        markersize=4.5, label="each record, 95 %",
+    )  # fmt: skip
+    ax.set_yticks(places, names)
+    ax.set_ylim(len(names) - 0.4, -0.6)
+    ax.set_xlabel(axis_label(each[0].name, unit))
+    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    return ax
+
+
+def plates_together(comparison: DecayComparison) -> list[Plate]:
+    """The figures of several decays."""
+    words = (
+        "The records differ by more than their own intervals allow: something changed between them that no single one "
+        "shows. The band holds their scatter."
+        if comparison.apart
+        else "The band is what all records give together; each by itself agrees with it."
+    )
+    shown = (("damping_ratio", "Damping ratio of each record"), ("dry_displacement", "Dry friction of each record"))
+    return [
+        plate(quantity.replace("_", "-"), plot_records(comparison, quantity=quantity), title, words)
+        for quantity, title in shown
+    ]
 
 
 def plates_of(findings: DecayFindings) -> list[Plate]:

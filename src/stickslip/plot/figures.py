@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from stickslip.analysis import Comparison, Findings
+from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.contact import plot_displacement_loop, plot_sticks, plot_velocity_loop
 from stickslip.plot.decay import plates_of as decay_plates
+from stickslip.plot.decay import plates_together as together_plates
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
@@ -18,14 +20,16 @@ if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory
 
 
-def figures(result: Findings | Comparison | DecayFindings | TimeFrequency | Trajectory) -> tuple[Plate, ...]:
+def figures(
+    result: Findings | Comparison | DecayFindings | DecayComparison | TimeFrequency | Trajectory,
+) -> tuple[Plate, ...]:
     """The figures that show a result, in reading order.
 
     Parameters
     ----------
-    result : Findings, Comparison, DecayFindings, TimeFrequency or Trajectory
-        What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`time_frequency` or :func:`simulate`
-        returned.
+    result : Findings, Comparison, DecayFindings, DecayComparison, TimeFrequency or Trajectory
+        What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`compare_decays`, :func:`time_frequency` or
+        :func:`simulate` returned.
 
     Returns
     -------
@@ -46,6 +50,8 @@ def figures(result: Findings | Comparison | DecayFindings | TimeFrequency | Traj
         return tuple(_of_findings(result))
     if isinstance(result, DecayFindings):
         return tuple(decay_plates(result))
+    if isinstance(result, DecayComparison):
+        return tuple(together_plates(result))
     if isinstance(result, TimeFrequency):
         from stickslip.plot.wavelet import plates_of as plates_of_map
 

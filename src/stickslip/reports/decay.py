@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.estimate import Estimate
 from stickslip.reports.words import interval_of, number, value_of
 
 LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
+BOTH = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
 METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
 
 
-def headline(findings: DecayFindings) -> list[str]:
+def headline(result: DecayFindings | DecayComparison) -> list[str]:
     """What was found, in a few sentences."""
-    return list(_sentences(findings))
+    return list(_together(result) if isinstance(result, DecayComparison) else _sentences(result))
 
 
 def settings(findings: DecayFindings) -> dict[str, str]:
@@ -39,6 +41,8 @@ def _sentences(findings: DecayFindings) -> Iterator[str]:
     ratio, dry = best.damping_ratio, best.dry_displacement
     if "no friction" in best.model:
         yield "Neither viscous nor dry friction can be told from zero."
+    elif _doubted(findings):
+        yield f"Read as {_model(findings)}, which the record speaks against, it shows {_both(ratio, dry)}."
     else:
         yield f"The motion dies away by {_model(findings)}: {_both(ratio, dry)}."
     force = findings.dry_force
@@ -54,7 +58,16 @@ def _sentences(findings: DecayFindings) -> Iterator[str]:
 def _model(findings: DecayFindings) -> str:
     if findings.best is findings.motion:
         return next(words for name, words, _ in findings.motion.candidates if name == findings.motion.model)
-    return f"{findings.best.model.removesuffix(' friction')} friction"
+    model = findings.best.model
+    return model if "friction" in model else f"{model} friction"
+
+
+def _doubted(findings: DecayFindings) -> bool:
+    """Whether the record speaks against the motion that the best answer is of."""
+    if findings.motion is None:
+        return False
+    names = (findings.motion.model,) if findings.best is findings.motion else BOTH
+    return not any(each.kept for each in findings.motion.choice.candidates if each.name in names)
 
 
 def _chosen(findings: DecayFindings) -> Iterator[str]:
@@ -129,3 +142,29 @@ def _compared(findings: DecayFindings) -> Iterator[str]:
         )
     else:
         yield "The decrements of the extremes agree within their intervals."
+
+
+def _together(comparison: DecayComparison) -> Iterator[str]:
+    many = len(comparison.findings)
+    found = {each.name: each for each in comparison.estimates}
+    ratio, dry = found.get("damping ratio"), found.get("dry friction displacement")
+    if comparison.apart:
+        gaps = ", ".join(f"{name} by {gap:.{1 if gap < 10 else 0}f} times" for name, gap in comparison.apart.items())
+        yield f"The {many} records are not alike: they differ in {gaps} what their own intervals allow."
+        way = "Their means, with intervals that hold the scatter between them, are"
+    else:
+        yield f"The {many} records agree within their own intervals."
+        way = "Fitted at once they give" if comparison.joint else "Their means are"
+    if ratio is not None and dry is not None:
+        yield f"{way} {_both(ratio, dry)}."
+    if comparison.dry_force is not None:
+        force = comparison.dry_force
+        yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
+    static = found.get("static friction displacement")
+    if static is not None:
+        alone = [each.waveform.static_displacement for each in comparison.findings if each.waveform is not None]
+        least = min(alone, key=lambda each: each.interval[1] - each.interval[0])
+        yield (
+            f"The static friction displacement lies within {_reach(static).removeprefix('within ')}; the surest record "
+            f"alone leaves {interval_of(least)}."
+        )

@@ -12,6 +12,7 @@ from typing import Any
 
 from stickslip import __version__
 from stickslip.analysis import Comparison, Findings
+from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.errors import ModelError, RecordError
 from stickslip.plot.plate import Plate
@@ -23,7 +24,9 @@ NUMBERS = "results.json"
 
 
 def publish(
-    results: Findings | Comparison | TimeFrequency | DecayFindings | Sequence[DecayFindings], *, folder: str | Path
+    results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | Sequence[DecayFindings],
+    *,
+    folder: str | Path,
 ) -> Path:
     """Write ``report.html``, ``results.json`` and the figures as SVG and PNG into a folder.
 
@@ -32,8 +35,9 @@ def publish(
 
     Parameters
     ----------
-    results : Findings, Comparison, TimeFrequency, DecayFindings or a sequence of these
-        What :func:`analyze`, :func:`compare`, :func:`time_frequency` or :func:`analyze_decay` returned.
+    results : Findings, Comparison, TimeFrequency, DecayFindings or DecayComparison
+        What :func:`analyze`, :func:`compare`, :func:`time_frequency`, :func:`analyze_decay` or
+        :func:`compare_decays` returned.
     folder : path
         The folder to make.
 
@@ -69,7 +73,9 @@ def publish(
     return folder
 
 
-def as_data(results: Findings | Comparison | TimeFrequency | DecayFindings | Sequence[DecayFindings]) -> dict[str, Any]:
+def as_data(
+    results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | Sequence[DecayFindings],
+) -> dict[str, Any]:
     """Plain data for JSON of one result, or of several by record."""
     return {"records": [each.to_dict() for each in results]} if isinstance(results, Sequence) else results.to_dict()
 

@@ -10,6 +10,7 @@ from typing import Any, cast
 
 from stickslip import __version__
 from stickslip.analysis import Comparison, Findings
+from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.estimate import Estimate
 from stickslip.files.write import whole
@@ -42,6 +43,7 @@ def report(
     | Estimate
     | Sequence[Estimate]
     | DecayFindings
+    | DecayComparison
     | Sequence[DecayFindings],
     record: Record | None,
     path: str | Path,
@@ -50,7 +52,7 @@ def report(
 
     Parameters
     ----------
-    results : Findings, Comparison, TimeFrequency, DecayFindings, Estimate, or a sequence of the last two
+    results : Findings, Comparison, TimeFrequency, DecayFindings, DecayComparison, Estimate, or a sequence of estimates
         What was found.
     record : Record or None
         Where plain estimates were found: its faults, channels and history are told. Findings bring their own.
@@ -89,6 +91,7 @@ def sections_of(
     | Estimate
     | Sequence[Estimate]
     | DecayFindings
+    | DecayComparison
     | Sequence[DecayFindings],
     record: Record | None = None,
 ) -> list[Section]:
@@ -96,8 +99,8 @@ def sections_of(
     decays = [results] if isinstance(results, DecayFindings) else results if isinstance(results, Sequence) else []
     if decays and all(isinstance(each, DecayFindings) for each in decays):
         return [Section(summary(each), figures(each)) for each in decays if isinstance(each, DecayFindings)]
-    if isinstance(results, Comparison):
-        parts: list[Findings | Comparison] = [results, *results.findings]
+    if isinstance(results, Comparison | DecayComparison):
+        parts: list[Findings | Comparison | DecayFindings | DecayComparison] = [results, *results.findings]
         return [Section(summary(part), figures(part)) for part in parts]
     if isinstance(results, Findings | TimeFrequency):
         return [Section(summary(results), figures(results))]

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from stickslip.analysis import Comparison, Findings, record_name
+from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
@@ -92,7 +93,7 @@ class Summary:
 
 
 def summary(
-    results: Findings | DecayFindings | Comparison | TimeFrequency | Estimate | Sequence[Estimate],
+    results: Findings | DecayFindings | Comparison | DecayComparison | TimeFrequency | Estimate | Sequence[Estimate],
     *,
     record: Record | None = None,
 ) -> Summary:
@@ -100,7 +101,7 @@ def summary(
 
     Parameters
     ----------
-    results : Findings, DecayFindings, Comparison, TimeFrequency, Estimate or sequence of Estimate
+    results : Findings, DecayFindings, Comparison, DecayComparison, TimeFrequency, Estimate or sequence of Estimate
         What was found.
     record : Record, optional
         Where plain estimates were found; Findings bring their own.
@@ -122,6 +123,8 @@ def summary(
     """
     if isinstance(results, Comparison):
         return _of_comparison(results)
+    if isinstance(results, DecayComparison):
+        return _of_decays(results)
     if isinstance(results, Findings | DecayFindings):
         return _of_findings(results)
     if isinstance(results, TimeFrequency):
@@ -168,6 +171,17 @@ def _of_comparison(comparison: Comparison) -> Summary:
             lines.append(_line(findings.level, true, name=f"{findings.level.name}, {findings.name}"))
     title = f"{len(comparison.findings)} records compared"
     return Summary(title, headline(comparison), lines=lines, notes=comparison.notes)
+
+
+def _of_decays(comparison: DecayComparison) -> Summary:
+    lines = [_line(estimate) for estimate in comparison.estimates]
+    for findings in comparison.findings:
+        own = (findings.best.damping_ratio, findings.best.dry_displacement, findings.best.frequency)
+        lines += [_line(each, findings.true_value(each), name=f"{each.name}, {findings.name}") for each in own]
+    title = f"{len(comparison.findings)} records together"
+    return Summary(
+        title, decay.headline(comparison), doubts(comparison.estimates), lines=lines, notes=comparison.notes
+    )  # fmt: skip
 
 
 def _of_estimates(estimates: list[Estimate], record: Record | None) -> Summary:
