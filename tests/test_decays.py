@@ -42,7 +42,7 @@ def test_the_command_answers_and_leaves_a_page(release, method):
     page = (folder / "report.html").read_text("utf-8")
     assert "Measured and identified" in page
     told = json.loads((folder / "results.json").read_text("utf-8"))
-    estimates = {each["name"]: each for each in told["records"][0]["estimates"]}
+    estimates = {each["name"]: each for each in told["estimates"]}
     low, high = estimates["damping ratio"]["interval"]
     assert low < 0.0316 < high
     low, high = estimates["dry friction force"]["interval"]
@@ -55,7 +55,7 @@ def test_the_command_answers_and_leaves_a_page(release, method):
 
 def test_json_alone_writes_nothing(release):
     answer = run(release, *READ, "--json", "--method", "thesis")
-    told = json.loads(answer.output)["records"][0]
+    told = json.loads(answer.output)
     assert told["releases"][0]["stopped"]
     bounds = told["decrements"]["bounds"]
     assert len(bounds["m"]) == len(bounds["rate_worst"])
@@ -74,6 +74,36 @@ def test_several_files_share_a_page_and_the_faulty_one_is_named(release):
     assert answer.exit_code == 0, answer.output
     assert "left out: forced.csv" in answer.output
     assert (release.parent / "decays-stickslip" / "report.html").is_file()
+
+
+def test_several_releases_of_one_rig_are_fitted_together(release):
+    again, fs, _ = free_decay(amplitude=4.4, dry=0.1)
+    noisy = again + 5e-3 * np.random.default_rng(6).standard_normal(len(again)) + 0.7
+    columns = np.column_stack([np.arange(len(again)) / fs, noisy])
+    np.savetxt("again.csv", columns, delimiter=",", header="t [s],pos [mm]", comments="", fmt="%.6f")
+    answer = run(release, "again.csv", *READ, "--method", "waveform", "--stiffness", "2 N/mm", "--output", "out")
+    assert answer.exit_code == 0, answer.output
+    said = " ".join(answer.output.split())
+    assert "The 2 records agree within their own intervals." in said
+    assert "damping ratio, again.csv" in said
+    told = json.loads((release.parent / "out" / "results.json").read_text("utf-8"))
+    assert told["comparison"]["joint"]
+    estimates = {each["name"]: each for each in told["comparison"]["estimates"]}
+    for name, true in (("damping ratio", 0.0316), ("dry friction force", 0.2)):
+        low, high = estimates[name]["interval"]
+        assert low < true < high
+    assert [each["name"] for each in told["records"]] == ["release.csv", "again.csv"]
+
+
+def test_every_file_that_can_not_answer_has_its_reason(release):
+    t = np.arange(1000) / 100
+    for name, values in (("forced.csv", np.sin(6 * t)), ("creeping.csv", np.exp(-t))):
+        np.savetxt(name, np.column_stack([t, values]), delimiter=",", header="t [s],pos [mm]", comments="", fmt="%f")
+    answer = run("forced.csv", "creeping.csv", *READ)
+    assert answer.exit_code == 1
+    assert "forced.csv: 20 swings shrink" in answer.output
+    assert "creeping.csv: the motion turns 0 times" in answer.output
+    assert "none of 2 records answers" in answer.output
 
 
 @pytest.mark.parametrize(

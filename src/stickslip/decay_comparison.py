@@ -11,7 +11,9 @@ from stickslip.analysis import plain
 from stickslip.decays import DecayFindings
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit.decay import DecayFit, fit_decay
+from stickslip.fit.answer import DecayFit
+from stickslip.fit.decay import fit_decay
+from stickslip.fit.which_motion import whichever
 from stickslip.statistics import disagreement, weighted_mean
 
 SHARED = ("damping_ratio", "dry_displacement", "frequency")
@@ -54,7 +56,9 @@ class DecayComparison(Result):
         force = () if self.dry_force is None else (self.dry_force,)
         if self.joint is None:
             return (*force, *self.means)
-        return (*force, *(getattr(self.joint, name) for name in (*SHARED, "static_displacement")))
+        either = (self.joint.damping_ratio_any, self.joint.dry_displacement_any)
+        shared = (getattr(self.joint, name) for name in (*SHARED, "static_displacement"))
+        return (*force, *shared, *(each for each in either if each is not None))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: what holds for all, and each record's own."""
@@ -116,7 +120,7 @@ def compare_decays(findings: Sequence[DecayFindings]) -> DecayComparison:
         notes.append(f"The records are not fitted together: {said}.")
     elif not apart and all(each.waveform is not None for each in findings):
         try:
-            joint = fit_decay([each.record for each in findings], **asked)
+            joint = _whichever(fit_decay([each.record for each in findings], **asked), findings)
         except StickslipError as error:
             notes.append(f"All records at once: {error}")
     status = f"the records differ in {' and '.join(apart)}" if apart else "ok"
@@ -125,6 +129,15 @@ def compare_decays(findings: Sequence[DecayFindings]) -> DecayComparison:
     force = None if mixed or dry is None else findings[0].as_force(dry, "dry friction force")
     force = force if joint is None or joint.dry_force is None else replace(joint.dry_force, name="dry friction force")
     return DecayComparison(tuple(findings), joint, apart, means, force, tuple(notes))
+
+
+def _whichever(joint: DecayFit, findings: Sequence[DecayFindings]) -> DecayFit:
+    """The joint fit with the intervals that hold whichever motion no record speaks against."""
+    choices = [each.motion.choice for each in findings if each.motion is not None]
+    if len(choices) < len(findings):
+        return joint
+    either = {f"{name}_any": whichever(choices, getattr(joint, name), name) for name in SHARED[:2]}
+    return replace(joint, **either)  # type: ignore[arg-type]
 
 
 def _shared(findings: Sequence[DecayFindings]) -> list[list[Estimate]]:

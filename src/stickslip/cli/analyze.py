@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -13,20 +11,15 @@ import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
-    collected,
+    answers,
     default_folder,
     groups_of,
     name_left_out,
-    name_of,
-    none_answers,
-    read,
     require_fits,
     rig_of,
+    with_left_out,
 )
 from stickslip.cli.show import show
-
-if TYPE_CHECKING:
-    from stickslip import Comparison, Findings, RigSettings
 
 
 @click.command()
@@ -68,7 +61,8 @@ def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: 
     require_fits(options["normal"], groups)
     folder = output or default_folder(groups)
     with progress(2 * len(groups) + 1) as tell:
-        results, refused = _answers(groups, rig, method, tell)
+        found, refused = answers(groups, rig, lambda record: ss.analyze(record, rig=rig, method=method), tell)
+        results = with_left_out(ss.compare(found) if len(found) > 1 else found[0], refused)
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
@@ -96,22 +90,3 @@ def demo(output: Path, as_json: bool) -> None:
         tell("drawing and writing", 2)
         written = ss.publish(findings, folder=output)
     show(findings, written, as_json=as_json)
-
-
-def _answers(
-    groups: Sequence[Sequence[Path]], rig: RigSettings, method: str, tell: Callable[[str, int], None]
-) -> tuple[Findings | Comparison, list[ss.StickslipError]]:
-    """What the records answer, together; and why those that are left out do not."""
-    found: list[Findings] = []
-    refused: list[ss.StickslipError] = []
-    for number, group in enumerate(groups):
-        with collected(refused, group):
-            tell(f"reading {name_of(group)}", 2 * number)
-            record = read(group, rig)
-            tell(f"checking and analysing {name_of(group)}", 2 * number + 1)
-            found.append(ss.analyze(record, rig=rig, method=method))
-    if not found:
-        raise none_answers(refused)
-    results = ss.compare(found) if len(found) > 1 else found[0]
-    notes = (*results.notes, *(f"Left out: {error}" for error in refused))
-    return dataclasses.replace(results, notes=notes), refused

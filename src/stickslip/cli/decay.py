@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -11,19 +11,14 @@ import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
-    collected,
+    answers,
     default_folder,
     groups_of,
     name_left_out,
-    name_of,
-    none_answers,
-    read,
     rig_of,
+    with_left_out,
 )
 from stickslip.cli.show import show
-
-if TYPE_CHECKING:
-    from stickslip import DecayFindings
 
 
 @click.command()
@@ -51,7 +46,8 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options:
     """Tell viscous from dry friction by how a released mass dies away.
 
     FILES hold free decays: displacement, angle, velocity or acceleration of something that was let go. Several
-    releases in one file are told apart. A quoted pattern ("release_*.csv") stands for all files that fit.
+    releases in one file are told apart. A quoted pattern ("release_*.csv") stands for all files that fit. Several
+    files of one oscillator are fitted together too, where they are alike.
 
     Results go into a folder: report.html to open in a browser, results.json, and the figures.
 
@@ -63,19 +59,11 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options:
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
-    found: list[DecayFindings] = []
-    refused: list[ss.StickslipError] = []
+    asked |= {key: asked[key] or getattr(rig, key) for key in ("mass", "stiffness")}
     with progress(2 * len(groups) + 1) as tell:
-        for number, group in enumerate(groups):
-            with collected(refused, group):
-                tell(f"reading {name_of(group)}", 2 * number)
-                record = read(group, rig)
-                tell(f"fitting {name_of(group)}", 2 * number + 1)
-                stated = {key: asked[key] or getattr(rig, key) for key in ("mass", "stiffness")}
-                found.append(ss.analyze_decay(record, **{**asked, **stated}))
-        if not found:
-            raise none_answers(refused)
+        found, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
         tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(found, folder=folder) if output or not as_json else None
+        results = with_left_out(ss.compare_decays(found) if len(found) > 1 else found[0], refused)
+        written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
-    show(found, written, as_json=as_json)
+    show(results, written, as_json=as_json)

@@ -7,9 +7,9 @@ import dataclasses
 import fnmatch
 import glob
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -18,7 +18,10 @@ from stickslip.cli.options import pair
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip import Record, RigSettings
+    from stickslip import Comparison, DecayComparison, DecayFindings, Findings, Record, RigSettings
+
+Answer = TypeVar("Answer")
+Result = TypeVar("Result", "Findings | Comparison", "DecayFindings | DecayComparison")
 
 
 def rig_of(
@@ -113,9 +116,35 @@ def collected(refused: list[ss.StickslipError], files: Sequence[Path]) -> Iterat
         refused.append(type(error)(value, error.rule, error.next_step))
 
 
-def none_answers(refused: Sequence[ss.StickslipError]) -> ss.StickslipError:
-    first, many = refused[0], f"none of {len(refused)} records answers; the first: " * (len(refused) > 1)
-    return type(first)(f"{many}{first.value}", first.rule, first.next_step)
+def answers(
+    groups: Sequence[Sequence[Path]],
+    rig: RigSettings,
+    ask: Callable[[Record], Answer],
+    tell: Callable[[str, int], None],
+) -> tuple[list[Answer], list[ss.StickslipError]]:
+    """What each record answers, and why those that are left out do not; the last word where none does."""
+    found: list[Answer] = []
+    refused: list[ss.StickslipError] = []
+    for number, group in enumerate(groups):
+        with collected(refused, group):
+            tell(f"reading {name_of(group)}", 2 * number)
+            record = read(group, rig)
+            tell(f"checking and analysing {name_of(group)}", 2 * number + 1)
+            found.append(ask(record))
+    if found:
+        return found, refused
+    if len(refused) == 1:
+        raise refused[0]
+    name_left_out(refused)
+    raise type(refused[0])(
+        f"none of {len(refused)} records answers", "each has its own reason, told above", "mend them, or give others"
+    )
+
+
+def with_left_out(results: Result, refused: Sequence[ss.StickslipError]) -> Result:
+    """The results, with a note for each record that is not among them."""
+    notes = (*results.notes, *(f"Left out: {error}" for error in refused))
+    return dataclasses.replace(results, notes=notes)
 
 
 def name_left_out(refused: Iterable[ss.StickslipError]) -> None:

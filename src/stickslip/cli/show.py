@@ -14,29 +14,33 @@ import stickslip as ss
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip import Comparison, DecayFindings, Findings, Outcome, TimeFrequency
+    from stickslip import Comparison, DecayComparison, DecayFindings, Findings, Outcome, TimeFrequency
 
 
 SHOWN_EVENTS = 12
 
 
 def show(
-    results: Findings | Comparison | TimeFrequency | list[DecayFindings], written: Path | None, *, as_json: bool
+    results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison,
+    written: Path | None,
+    *,
+    as_json: bool,
 ) -> None:
     if as_json:
-        told = {"records": [each.to_dict() for each in results]} if isinstance(results, list) else results.to_dict()
-        click.echo(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
+        click.echo(json.dumps(results.to_dict(), indent=2, ensure_ascii=False, allow_nan=False))
         return
     from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=False)
-    for part in results if isinstance(results, list) else (*getattr(results, "findings", ()), results):
+    for part in (*getattr(results, "findings", ()), results):
         _print_table(console, part)
     if written is not None:
         click.echo(f"Report: {written / 'report.html'}")
 
 
-def _print_table(console: Any, results: Findings | Comparison | TimeFrequency | DecayFindings) -> None:
+def _print_table(
+    console: Any, results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison
+) -> None:
     from rich.markup import escape
 
     summary = ss.summary(results)

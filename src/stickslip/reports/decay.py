@@ -160,6 +160,9 @@ def _together(comparison: DecayComparison) -> Iterator[str]:
     if comparison.dry_force is not None:
         force = comparison.dry_force
         yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
+    either = found.get("dry friction displacement, whichever motion")
+    if either is not None:
+        yield f"Whichever motion it was, the dry friction displacement is {_reach(either)}."
     static = found.get("static friction displacement")
     if static is not None:
         alone = [each.waveform.static_displacement for each in comparison.findings if each.waveform is not None]

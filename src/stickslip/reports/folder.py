@@ -24,7 +24,7 @@ NUMBERS = "results.json"
 
 
 def publish(
-    results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | Sequence[DecayFindings],
+    results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison,
     *,
     folder: str | Path,
 ) -> Path:
@@ -64,20 +64,13 @@ def publish(
     folder = Path(folder)
     check_folder(folder)
     sections = sections_of(results)
-    with results_folder(folder, as_data(results)) as draft:
+    with results_folder(folder, results.to_dict()) as draft:
         (draft / "report.html").write_text(render(sections), encoding="utf-8")
         (draft / "figures").mkdir()
         for number, section in enumerate(sections):
             prefix = f"{number}-{_fit_for_a_file(section.words.title)}-" if len(sections) > 1 else ""
             write_figures(draft / "figures", prefix, section.plates)
     return folder
-
-
-def as_data(
-    results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | Sequence[DecayFindings],
-) -> dict[str, Any]:
-    """Plain data for JSON of one result, or of several by record."""
-    return {"records": [each.to_dict() for each in results]} if isinstance(results, Sequence) else results.to_dict()
 
 
 @contextmanager

@@ -37,14 +37,7 @@ class Section:
 
 
 def report(
-    results: Findings
-    | Comparison
-    | TimeFrequency
-    | Estimate
-    | Sequence[Estimate]
-    | DecayFindings
-    | DecayComparison
-    | Sequence[DecayFindings],
+    results: Findings | Comparison | TimeFrequency | Estimate | Sequence[Estimate] | DecayFindings | DecayComparison,
     record: Record | None,
     path: str | Path,
 ) -> Path:
@@ -85,24 +78,14 @@ def report(
 
 
 def sections_of(
-    results: Findings
-    | Comparison
-    | TimeFrequency
-    | Estimate
-    | Sequence[Estimate]
-    | DecayFindings
-    | DecayComparison
-    | Sequence[DecayFindings],
+    results: Findings | Comparison | TimeFrequency | Estimate | Sequence[Estimate] | DecayFindings | DecayComparison,
     record: Record | None = None,
 ) -> list[Section]:
     """The sections of the page, with their figures drawn."""
-    decays = [results] if isinstance(results, DecayFindings) else results if isinstance(results, Sequence) else []
-    if decays and all(isinstance(each, DecayFindings) for each in decays):
-        return [Section(summary(each), figures(each)) for each in decays if isinstance(each, DecayFindings)]
     if isinstance(results, Comparison | DecayComparison):
         parts: list[Findings | Comparison | DecayFindings | DecayComparison] = [results, *results.findings]
         return [Section(summary(part), figures(part)) for part in parts]
-    if isinstance(results, Findings | TimeFrequency):
+    if isinstance(results, Findings | DecayFindings | TimeFrequency):
         return [Section(summary(results), figures(results))]
     return [Section(summary(cast(Sequence[Estimate], results), record=record))]
 
