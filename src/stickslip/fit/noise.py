@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.fit.counts import add_counts
+from stickslip.fit.drift import restricted
 from stickslip.fit.likelihood import Objective, solve
 from stickslip.fit.search import Blocks
 from stickslip.fit.waveform import normal_equations, sample_motion
@@ -172,16 +173,11 @@ def drift(blocks: Blocks, n: int, p: Array) -> tuple[float, Array, float]:
     """Corner [Hz] of the drift, the power at each cosine, and what it gains over white noise, by REML."""
     left, jacobian = _transformed(blocks, n, p)
     tones = frequencies(blocks)
-    freedom = len(tones) - 6
+    work = np.empty((3, 6, 6))
 
     def judged(corner: float) -> tuple[float, float]:
-        power = 1 + corner / tones
-        weighted = jacobian / power
-        curvature, slope = weighted @ jacobian.T, weighted @ left
-        squares = float(left @ (left / power) - slope @ solve(curvature, slope)) / freedom
-        scale = np.sqrt(np.diag(curvature))
-        determinant = np.linalg.slogdet(curvature / np.outer(scale, scale))[1] + 2 * np.log(scale).sum()
-        return freedom * math.log(squares) + float(np.log(power).sum() + determinant), squares
+        cost, squares = restricted(left, jacobian, tones, corner, work)
+        return float(cost), float(squares)
 
     corners = np.geomspace(0.1 * tones[1], 2 * tones[-1], CORNERS)
     costs = [judged(each)[0] for each in corners]

@@ -7,6 +7,7 @@ import math
 from stickslip.compiled import FAST, compiled
 from stickslip.fit.profile import solve
 from stickslip.fit.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, REST, normal_equations
+from stickslip.signals.turns import turning_points
 
 BLOCKS = 40  # a period; the variance of the answer rises by 0.3 % of itself
 FIRST_SWINGS = 0.25  # of the range: what counts as a swing before the noise is averaged
@@ -34,34 +35,6 @@ def roughness(values):
         fourth = values[j] - 4.0 * values[j + 1] + 6.0 * values[j + 2] - 4.0 * values[j + 3] + values[j + 4]
         total += fourth * fourth
     return math.sqrt(total / (70.0 * max(values.shape[0] - 4, 1)))
-
-
-@compiled(**FAST)
-def turning_points(values, swing, rows):
-    """Rows of the alternating extremes that lie at least `swing` apart, and how many there are.
-
-    The first is the extreme that the record begins at or comes to first.
-    """
-    count, low, high, sign = 0, 0, 0, 0
-    for j in range(values.shape[0]):
-        if sign >= 0 and values[j] > values[high]:
-            high = j
-        if sign <= 0 and values[j] < values[low]:
-            low = j
-        if sign >= 0 and values[high] - values[j] > swing:
-            found, sign, low = high, -1, j
-        elif sign <= 0 and values[j] - values[low] > swing:
-            found, sign, high = low, 1, j
-        else:
-            continue
-        if count == rows.shape[0]:
-            return count
-        rows[count] = found
-        count += 1
-    if sign != 0 and count < rows.shape[0]:
-        rows[count] = high if sign == 1 else low
-        count += 1
-    return count
 
 
 @compiled(**FAST)

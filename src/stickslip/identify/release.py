@@ -31,6 +31,7 @@ PACE = (0.7, 1.4)  # a half cycle over the one before; a pendulum from near the 
 GROWN = 1.05  # a swing over the one before from which it is not the same decay
 UNEVEN = 0.015  # change of the half cycles over the decay, beyond which the spring is not linear
 RISEN = 1.01  # a swing over the one before that may be a rise
+FEW = 5_000  # samples that show whether values repeat
 EVEN = 0.5  # of the median gap between levels: less is no digitiser's
 STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 LOST = "an extreme was lost, and what lies beyond it is left out"
@@ -201,11 +202,12 @@ def find_releases(record: Record, *, channel: str | None = None) -> Releases:
     """
     record, name = _prepared(record, channel)
     values = record[name]
-    noise, step = _noise(record, name), _step(values)
+    grid = quantisation_step(values)
+    noise, step = _noise(record, name, grid), _step(values, grid)
     swings = _Swings.of(values, noise, step, record.fs)
     runs = _runs(swings, values)
     unsound = np.zeros(len(values), dtype=bool)
-    for first, last in clipped(values, plateaus=name != "x"):
+    for first, last in clipped(values, plateaus=name != "x", step=grid):
         unsound[first : last + 1] = True
     found = tuple(
         _ring_down(record, name, swings, run, (noise, step), unsound, _bounds(swings, runs, number, len(values)))
@@ -242,22 +244,23 @@ def _prepared(record: Record, channel: str | None) -> tuple[Record, str]:
     return record, name
 
 
-def _noise(record: Record, name: str) -> float:
+def _noise(record: Record, name: str, grid: float | None = None) -> float:
     known = record.channels[name].noise
-    return known if known is not None else noise_level(record[name], record.fs)
+    return known if known is not None else noise_level(record[name], record.fs, step=grid)
 
 
-def _step(values: Array) -> float:
+def _step(values: Array, grid: float) -> float:
     """Step of the digitiser; where its levels were rounded to be written, their median gap.
 
     A motion without noise that came to rest has few levels too, but they lie at all distances.
     """
-    step, levels = quantisation_step(values), np.unique(values)
-    if step == 0 and 2 < len(levels) < len(values) / 6:
+    few = values[:: 1 + len(values) // FEW]
+    levels = np.unique(values) if grid == 0 and len(np.unique(few)) < 0.9 * len(few) else few[:0]
+    if 2 < len(levels) < len(values) / 6:
         gaps = np.diff(levels)
         least, usual = np.quantile(gaps, [0.1, 0.5])
         return float(usual) if least > EVEN * usual else 0.0
-    return step
+    return grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,12 +300,15 @@ class _Swings:
 
     @classmethod
     def _within(cls, values: Array, block: int, seen: float) -> _Swings:
+        from stickslip.signals.turns import crossings, turning_points
+
         count = len(values) // block
         means = values[: count * block].reshape(count, block).mean(axis=1)
-        turns = turning_points(means, seen)
-        levels = means[turns]
-        crossings = [_crossings(means, first, last) for first, last in pairwise(turns)]
-        quarter, middle, three = np.array(crossings).T if crossings else np.zeros((3, 0))
+        turns = np.empty(count, dtype=np.intp)
+        turns = turns[: turning_points(means, seen, turns)]
+        levels, places = means[turns], np.empty((max(0, len(turns) - 1), 3))
+        crossings(means, turns, places)
+        quarter, middle, three = places.T
 
         def rows(at: Array) -> Array:
             return (at + 0.5) * block - 0.5
@@ -318,51 +324,6 @@ class _Run:
     end: int
     inside: bool  # it follows on swings that keep pace with it: no release begins it
     parted: bool = False  # an extreme was lost before or after it
-
-
-def turning_points(values: Array, least: float) -> Rows:
-    """Rows where `values` turn back by `least` or more, alternately up and down, with the first and last extreme.
-
-    Examples
-    --------
-    >>> turning_points(np.array([0.0, 1.0, 0.9, 2.0, -1.0, 0.5]), 0.5).tolist()
-    [0, 3, 4, 5]
-    """
-    turns: list[int] = []
-    low = high = 0
-    direction = 0
-    listed = values.tolist()
-    for row, value in enumerate(listed):
-        if direction >= 0:
-            if value >= listed[high]:
-                high = row
-            elif listed[high] - value >= least:
-                turns.append(high)
-                direction, low = -1, row
-                continue
-        if direction <= 0:
-            if value <= listed[low]:
-                low = row
-            elif value - listed[low] >= least:
-                turns.append(low)
-                direction, high = 1, row
-    if turns:
-        turns.append(high if direction > 0 else low)
-    return np.array(turns, dtype=np.intp)
-
-
-def _crossings(values: Array, first: int, last: int) -> list[float]:
-    """Where a swing passes a quarter, half and three quarters of its way; the last time before it is through."""
-    way = (values[first : last + 1] - values[first]) / (values[last] - values[first])
-    through = int(np.argmax(way >= 0.75))
-    places = []
-    for share in (0.25, 0.5, 0.75):
-        before = np.flatnonzero(way[: through + 1] < share)
-        row = int(before[-1]) if len(before) else 0
-        after = min(row + 1, len(way) - 1)
-        rise = way[after] - way[row]
-        places.append(first + row + (float((share - way[row]) / rise) if rise > 0 else 0.0))
-    return places
 
 
 def _weighted_median(values: Array, weights: Array) -> float:
@@ -470,6 +431,8 @@ def _ring_down(
     unsound: NDArray[np.bool_],
     bounds: tuple[int, int],
 ) -> RingDown:
+    from stickslip.signals.turns import extreme
+
     values, (noise, step) = record[name], noise_step
     middles, levels = swings.middles[run.first : run.end], swings.levels[run.first : run.end + 1]
     gaps = np.diff(middles)
@@ -485,7 +448,8 @@ def _ring_down(
     tail = _reach(values[end : bounds[1]], near) if stopped else len(values) - end
     first, last = max(0, start + 1 - hold), end + tail
     tops = levels[1:-1] > levels[:-2]
-    inner = [_extreme(values, a, b, bool(top)) for (a, b), top in zip(pairwise(middles), tops, strict=True)]
+    sides = np.where(tops, 1.0, -1.0)
+    inner = [extreme(values, round(a), round(b), side) for (a, b), side in zip(pairwise(middles), sides, strict=True)]
     turns = [*([start] if held or run.inside else []), *inner, *([end] if stop <= len(values) - 1 - half / 8 else [])]
     rows = np.array(turns, dtype=np.intp)
     sound = ~unsound[rows]
@@ -521,14 +485,6 @@ def _flat_start(values: Array, half: float, noise: float) -> bool:
         return False
     doubt = 2 * noise * 14 / (2 * abs(bend) * count**1.5)  # standard deviations of the slope at a parabola's end
     return bool(-slope / (2 * bend) > -1 - min(doubt, 0.05 * half))
-
-
-def _extreme(values: Array, first: float, last: float, top: bool) -> int:
-    """Row of the extreme between two middles, of running means over a sixth of the half cycle."""
-    part = values[round(first) : round(last) + 1]
-    width = max(1, len(part) // 6) | 1
-    smooth = np.convolve(np.pad(part, width // 2, mode="edge"), np.full(width, 1 / width), mode="valid")
-    return round(first) + int(np.argmax(smooth) if top else np.argmin(smooth))
 
 
 def _notes(levels: Array, sound: NDArray[np.bool_], order: int, run: _Run, noise: float) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ Mask = NDArray[np.bool_]
 Runs = tuple[tuple[int, int], ...]
 
 EXACT = 1e-9  # relative to the range: equal but for the rounding of a unit's factor
+MANY = 20_000  # samples that show a level of noise, or a grid
 CUBIC = np.array([1, -4, 6, -4, 1]) / 6  # a sample minus the cubic through its four neighbours
 CUBIC_GAIN = float(np.sqrt(np.sum(CUBIC**2)))
 ENOUGH = 400  # plateaus looked at: more of them make a verdict no surer
@@ -53,20 +54,20 @@ def held_over(values: Array, lost: Mask) -> Array:
 
 def quantum(values: Array) -> float:
     """Step between the sensor's levels, or 0 where the samples lie on no common grid."""
-    few = values[:: 1 + len(values) // 20_000]
-    step = _grid(few)
+    few = values[:: 1 + len(values) // MANY]
+    levels = np.unique(few)
+    step = _grid(levels)
     # samples off any grid in part are so in all; a grid seen in part must hold in all, or be looked for there
-    if len(few) == len(values) or (step == 0 and len(np.unique(few)) >= 3):
+    if len(few) == len(values) or (step == 0 and len(levels) >= 3):
         return step
     if step > 0:
         multiples = (values - values[0]) / step
         if float(np.max(np.abs(multiples - np.round(multiples)))) < 0.02:
             return step
-    return _grid(values)
+    return _grid(np.unique(values))
 
 
-def _grid(values: Array) -> float:
-    levels = np.unique(values)
+def _grid(levels: Array) -> float:
     if len(levels) < 3:
         return 0.0
     gaps = np.diff(levels)
@@ -83,7 +84,7 @@ def roughness(values: Array) -> float:
     if len(values) < 8:
         return 0.0
     rest = np.convolve(values, CUBIC, "valid")
-    return float(1.4826 * np.median(np.abs(rest)) / CUBIC_GAIN)
+    return float(1.4826 * np.median(np.abs(rest[:: 1 + len(rest) // MANY])) / CUBIC_GAIN)
 
 
 def spikes(values: Array) -> Runs:
@@ -178,7 +179,7 @@ def _turns(values: Array) -> float:
     return float(np.mean(steps[1:] * steps[:-1] < 0)) if len(steps) > 4 else 0.0
 
 
-def clipped(values: Array, *, plateaus: bool = False) -> Runs:
+def clipped(values: Array, *, plateaus: bool = False, step: float | None = None) -> Runs:
     """Runs at an extreme level that the signal would have passed had the instrument let it.
 
     A cut top is entered and left with a slope, so that parabolas through the samples before and after it rise above
@@ -191,11 +192,13 @@ def clipped(values: Array, *, plateaus: bool = False) -> Runs:
     plateaus : bool
         Whether the channel may have plateaus with sharp corners by nature (a force that saturates, a velocity
         that sticks): then both parabolas must also have the same top, in the middle of the run.
+    step : float, optional
+        Step between the sensor's levels where it is known already, 0 for none.
     """
     span = float(np.ptp(values))
     if len(values) < 16 or span == 0:
         return ()
-    noise, step = roughness(values), quantum(values)
+    noise, step = roughness(values), quantum(values) if step is None else step
     top, bottom = (_clipped_top(side, noise, step, plateaus) for side in (values, -values))
     # an instrument that cuts one end off cuts the other too: there, less evidence is enough
     if top.any() != bottom.any():
@@ -215,9 +218,10 @@ def _clipped_top(values: Array, noise: float, step: float, plateaus: bool, stric
     else:
         spread = float(np.hypot(noise, step / np.sqrt(12)))
         level = float(np.median(values[values >= top - 6 * spread]))
-        calm = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="edge"), 5), axis=1)
+        high = np.pad(values > level - 3 * spread, 2, mode="edge").astype(np.int8)
+        calm = high[:-4] + high[1:-3] + high[2:-2] + high[3:-1] + high[4:] > 2  # the median of five
         # here the noise goes on at the top, as it does on a plateau: only twin parabolas tell
-        mask, slack, plateaus = calm > level - 3 * spread, 3 * spread, True
+        mask, slack, plateaus = calm, 3 * spread, True
     held = [run for run in runs_of(mask) if run[1] - run[0] >= 2]
     cut = _were_cut(values, held, level, slack, plateaus, strictness)
     return mask if cut else np.zeros(len(values), dtype=bool)

@@ -19,7 +19,7 @@ SPAN = 5  # blocks over which a varying level is averaged
 LEVELLED = 0.9  # the next order's answer over this one's when the motion no longer shows
 
 
-def noise_level(values: ArrayLike, fs: float) -> float:
+def noise_level(values: ArrayLike, fs: float, *, step: float | None = None) -> float:
     """How large is the broadband noise of a channel?
 
     The differences of order k of white noise of standard deviation s have the variance ``s^2 C(2k, k)``, while a
@@ -36,6 +36,8 @@ def noise_level(values: ArrayLike, fs: float) -> float:
     fs : float
         Sampling rate [Hz]. White noise up to fs/2 is assumed; noise that was filtered before sampling is rated by what
         is left of it near fs/2.
+    step : float, optional
+        That of the digitiser where it is known already, 0 for none.
 
     Returns
     -------
@@ -55,7 +57,8 @@ def noise_level(values: ArrayLike, fs: float) -> float:
     True
     """
     samples = checked_samples(values, fs, least=2 * BLOCK)
-    return max(_levelled(samples)[0], quantisation_step(samples) / math.sqrt(12))
+    step = quantisation_step(samples) if step is None else step
+    return max(_levelled(samples)[0], step / math.sqrt(12))
 
 
 def local_noise(values: ArrayLike, fs: float) -> Array:
