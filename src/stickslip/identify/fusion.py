@@ -133,11 +133,15 @@ def _smoothed(record: Record, balance: Balance, sensors: Sequence[str], push: Ar
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A record in parts of which the contact holds; elsewhere the friction may do as it likes."""
+    """A record in parts of which the contact holds; elsewhere the friction may do as it likes.
+
+    Within the step in which the contact takes hold or lets go the friction bends: such a step is taken in halves, each
+    with its own change of the friction.
+    """
 
     model: _Model
     sensed: Sensed
-    holds: NDArray[np.intp]
+    regime: NDArray[np.intp]  # 0: slides, 1: holds, 2: half a step beside a stick
     unknown: Array
 
     @classmethod
@@ -151,12 +155,18 @@ class Held:
         push = _push(record, balance)
         model = _Model.of([record.channels[name] for name in sensors], balance)
         sensed = Sensed.of(record, sensors, push, model, balance.stiffness)
-        unknown = np.where(holds, (CALM * level) ** 2, level**2)
-        return cls(model, sensed, holds.astype(np.intp), unknown)
+        bends = ~holds & (np.append(holds[1:], False) | np.append(False, holds[:-1]))
+        rows = np.repeat(np.arange(len(holds)), 1 + bends)
+        second = np.append(False, rows[1:] == rows[:-1])
+        readings = np.where(second[:, None], np.nan, sensed.readings[rows])
+        halved = np.interp(rows + second / 2, np.arange(len(holds)), sensed.push)
+        unknown = np.where(holds, (CALM * level) ** 2, level**2)[rows]
+        return cls(model, replace(sensed, readings=readings, push=halved), (holds + 2 * bends)[rows], unknown)
 
     def log_likelihood(self, stiffness: float, damping: float) -> float:
         """Of all readings, were the contact so stiff [N/m] and damped [N s/m]."""
-        motion, seen = _steps([self.model, self.model.held(stiffness, damping)], self.holds, self.sensed)
+        models = [self.model, self.model.held(stiffness, damping), replace(self.model, share=0.5)]
+        motion, seen = _steps(models, self.regime, self.sensed)
         return log_likelihood(motion, seen, unknown=self.unknown)
 
 
@@ -177,6 +187,7 @@ class _Model:
     rows: Array
     direct: Array
     scales: Array  # (sensors, states): what a mount's state may be, in units of its sensor's range
+    share: float = 1.0  # of a sample that a step takes
 
     @classmethod
     def of(cls, channels: Sequence[Channel], balance: Balance) -> _Model:
@@ -213,10 +224,10 @@ class _Model:
         return replace(self, flow=flow, push=push)
 
     def step(self, length: float) -> tuple[Array, Array, Array, Array]:
-        """Over one sample: T, r, and what the push does at its start and by its change, both linear in between."""
+        """Over one step: T, r, and what the push does at its start and by its change, both linear in between."""
         from scipy.linalg import expm
 
-        size = len(self.push)
+        length, size = self.share * length, len(self.push)
         wide = np.zeros((size + 4, size + 4))
         wide[:size, :size], wide[:size, size], wide[size, size + 1] = self.flow, self.push, 1 / length
         wide[:size, size + 2] = np.eye(size)[2] / length
@@ -225,7 +236,7 @@ class _Model:
 
     def start(self, step: float, readings: Array, noise: float, force: float) -> tuple[Array, Array]:
         """The state before the first reading, as good as unknown, and its variances."""
-        ranges = np.ptp(readings, axis=0)
+        ranges = np.nanmax(readings, axis=0) - np.nanmin(readings, axis=0)
         start, doubt = np.zeros(len(self.push)), (ranges @ self.scales) ** 2
         start[0] = readings[0, 0]
         doubt[:3] = ranges[0] ** 2 + noise, (ranges[0] / step / 10) ** 2, (10 * force) ** 2
