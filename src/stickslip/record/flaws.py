@@ -18,6 +18,7 @@ EXACT = 1e-9  # relative to the range: equal but for the rounding of a unit's fa
 MANY = 20_000  # samples that show a level of noise, or a grid
 CUBIC = np.array([1, -4, 6, -4, 1]) / 6  # a sample minus the cubic through its four neighbours
 CUBIC_GAIN = float(np.sqrt(np.sum(CUBIC**2)))
+MOVED = 3e-5  # of the range: noise that is smaller may leave equal samples equal
 ENOUGH = 400  # plateaus looked at: more of them make a verdict no surer
 SHORTEST_TREND = 64  # samples from which a slow trend can be told from the motion
 TRAVEL = 12.0  # rise in amplitudes from which a trend is travel: eight steps of a pulled block rise by 19
@@ -205,6 +206,21 @@ def clipped(values: Array, *, plateaus: bool = False, step: float | None = None)
         end = -values if top.any() else values
         return runs_of(top | bottom | _clipped_top(end, noise, step, plateaus, strictness=0.4))
     return runs_of(top | bottom)
+
+
+def saturated(values: Array, shortest: int = 5) -> Mask:
+    """Samples at an extreme that is held to the last digit, though noise moves the sensor's other samples.
+
+    So a limit shows even in a force that has plateaus by nature, which are as noisy as the rest.
+    """
+    mask = np.zeros(len(values), dtype=bool)
+    span = float(np.ptp(values)) if len(values) else 0.0
+    for end in (np.max(values), np.min(values)) if span > 0 else ():
+        at = np.abs(values - end) <= EXACT * span
+        if any(last - first + 1 >= shortest for first, last in runs_of(at)):
+            mask |= at
+    rest = values[~mask]
+    return mask if mask.any() and len(rest) > shortest and roughness(rest) > MOVED * span else np.zeros_like(mask)
 
 
 def _clipped_top(values: Array, noise: float, step: float, plateaus: bool, strictness: float = 1.0) -> Mask:

@@ -33,6 +33,8 @@ class Motion:
         State before the first reading.
     doubt : ndarray (n,)
         Its variances.
+    drift : ndarray (n,)
+        Variance by which each state strays in a step beside what the unknown does; zeros where left out.
     """
 
     transition: Array
@@ -41,6 +43,7 @@ class Motion:
     noise: Array
     start: Array
     doubt: Array
+    drift: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,15 +143,16 @@ def _filtered(motion: Motion, seen: Seen, unknown: Array) -> tuple[tuple[Array, 
         np.zeros((count, sensors)), np.zeros((count, sensors)),
     )  # fmt: skip
     tables = (motion.transition, motion.spread, motion.readings, seen.regime)
+    drift = np.zeros(size) if motion.drift is None else motion.drift
     likelihood = _forward(
-        tables, motion.noise, seen.readings, seen.inputs, unknown, motion.start.copy(), np.diag(motion.doubt), kept,
-        np.empty((size, size)), np.empty(size),
+        tables, motion.noise, drift, seen.readings, seen.inputs, unknown, motion.start.copy(), np.diag(motion.doubt),
+        kept, np.empty((size, size)), np.empty(size),
     )  # fmt: skip
     return kept, float(likelihood)
 
 
 @compiled(**FAST)
-def _forward(tables, noise, readings, inputs, unknown, a, p, kept, square, line):
+def _forward(tables, noise, drift, readings, inputs, unknown, a, p, kept, square, line):
     """The filter from state a and covariance p: the log likelihood; `kept` takes what the way back needs."""
     transitions, spreads_, forms, regime = tables
     ahead, doubts, gains, surprises, spreads = kept
@@ -202,6 +206,7 @@ def _forward(tables, noise, readings, inputs, unknown, a, p, kept, square, line)
                     total += square[i, k] * transition[j, k]
                 p[i, j] = total
                 p[j, i] = total
+            p[i, i] += drift[i]
     return total_likelihood
 
 
