@@ -45,6 +45,14 @@ if TYPE_CHECKING:
         linear_decrement as linear_decrement,
         log_decrement as log_decrement,
     )
+    from stickslip.identify.compare_force import (
+        ForceBand as ForceBand,
+        ForceComparison as ForceComparison,
+        compare_force as compare_force,
+    )
+    from stickslip.identify.impact import ImpactTest as ImpactTest, impact_test as impact_test
+    from stickslip.identify.mounts import Resonance as Resonance
+    from stickslip.plot.force import plot_force_comparison as plot_force_comparison
     from stickslip.identify.contact import (
         contact_damping as contact_damping,
         contact_stiffness as contact_stiffness,
@@ -184,6 +192,10 @@ _ROOMS = {
     "find_microslips": "identify.microslip", "mechanism": "identify.mechanism", "Mechanism": "identify.mechanism",
     "time_frequency": "timefrequency", "TimeFrequency": "timefrequency",
     "inverse_wavelet": "signals.wavelet", "plot_wavelet": "plot.wavelet",
+    "compare_force": "identify.compare_force", "ForceComparison": "identify.compare_force",
+    "ForceBand": "identify.compare_force", "Resonance": "identify.mounts",
+    "impact_test": "identify.impact", "ImpactTest": "identify.impact",
+    "plot_force_comparison": "plot.force",
     "contact_stiffness": "identify.contact", "contact_damping": "identify.contact",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",

@@ -423,3 +423,12 @@ def _with_motion(record: Record, derive: Filter) -> Record:
             values = derive.apply(record[origin], {times: 1.0})
             made = made.with_channel(name, values, unit=unit, source="friction_force", noise=level)
     return made
+
+
+def told_rig(record: Record, **given: Any) -> dict[str, Any]:
+    """The rig's constants for :func:`friction_force`: as given, or as the record's last balance was told."""
+    last = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
+    names = ("mass", "stiffness", "damping", "damper", "contact")
+    told = {name: step.get(name) for step in last for name in names}
+    known = {**told, **{name: value for name, value in given.items() if value is not None}}
+    return {name: value for name, value in known.items() if value is not None}

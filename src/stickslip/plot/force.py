@@ -1,0 +1,102 @@
+"""The friction felt and the friction computed, over time and over frequency."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stickslip.plot.style import BLUE, FAINT, GREEN, INK, ORANGE, SHADE, WIDTH, Array, axis_label, prefixed, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from stickslip.identify.compare_force import ForceComparison
+
+CYCLES = 3.0  # of the lowest line that are drawn
+
+
+@styled
+def plot_force_comparison(comparison: ForceComparison) -> Figure:
+    """Where do the load cell and the motion tell the same friction?
+
+    Above both forces over a few cycles; below their size and that of their difference in each band; then their ratio,
+    with the tolerance shaded, the frequency up to which they agree, and the mounts that were found.
+
+    Parameters
+    ----------
+    comparison : ForceComparison
+        From :func:`~stickslip.compare_force`.
+
+    Returns
+    -------
+    Figure
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(
+    ...     mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(1.1e-3, frequency=8.7)
+    ... )
+    >>> record = ss.Rig().measure(ss.simulate(slider, duration=4), fs=2000, rng=1, start=2)
+    >>> len(plot_force_comparison(ss.compare_force(record, mass=2.42, stiffness=2310)).axes)
+    3
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, 6.6), layout="constrained")
+    above, middle, below = figure.subplots(3, 1)
+    _over_time(comparison, above)
+    _sizes(comparison, middle)
+    _ratio(comparison, below)
+    below.sharex(middle)
+    return figure
+
+
+def _over_time(comparison: ForceComparison, ax: Axes) -> None:
+    shown = comparison.time - comparison.time[0] < CYCLES / comparison.bands[0].low
+    factor, unit = prefixed(comparison.direct, "N")
+    for values, colour, label in (
+        (comparison.indirect, ORANGE, "from the motion"),
+        (comparison.direct, BLUE, "load cell"),
+    ):
+        ax.plot(comparison.time[shown], factor * values[shown], color=colour, linewidth=1.0, label=label)
+    ax.set(xlabel="time [s]", ylabel=axis_label("friction", unit))
+    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+
+
+def _middle(comparison: ForceComparison) -> Array:
+    return np.array([band.centre for band in comparison.bands])
+
+
+def _sizes(comparison: ForceComparison, ax: Axes) -> None:
+    for name, colour in (("direct", BLUE), ("indirect", ORANGE), ("difference", INK)):
+        sizes = [getattr(band, name) for band in comparison.bands]
+        ax.loglog(_middle(comparison), sizes, "o-", color=colour, markersize=3, linewidth=1.0, label=name)
+    ax.set(ylabel="rms in the band [N]")
+    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+
+
+def _ratio(comparison: ForceComparison, ax: Axes) -> None:
+    frequency, tolerance = _middle(comparison), comparison.tolerance
+    heard = np.array([band.verdict != "noise" for band in comparison.bands])
+    gain, sd = (np.array([getattr(band, name) for band in comparison.bands]) for name in ("gain", "gain_sd"))
+    ax.axhspan(1 - tolerance, 1 + tolerance, color=SHADE, alpha=0.5, linewidth=0)
+    ax.errorbar(
+        frequency[heard], gain[heard], yerr=2 * sd[heard], fmt="o-", color=INK, markersize=3, linewidth=1.0,
+        label="from the motion over load cell",
+    )  # fmt: skip
+    coherence = [band.coherence for band in comparison.bands]
+    ax.plot(frequency, coherence, color=GREEN, linewidth=1.0, label="coherence")
+    ax.plot(frequency, [b.significant for b in comparison.bands], ":", color=GREEN, linewidth=1.0, label="by chance")
+    ax.axvline(max(comparison.agree_up_to.value, frequency[0]), color=BLUE, linewidth=1.0)
+    for each in comparison.resonances:
+        ax.axvline(each.frequency.value, color=FAINT, linewidth=1.0, linestyle="--")
+        ax.annotate(
+            f"{each.name}\n{each.frequency.value:.0f} Hz", (each.frequency.value, 0.97), ha="right", va="top",
+            xycoords=("data", "axes fraction"), fontsize=7,
+        )  # fmt: skip
+    top = max(2.0, 1.1 * float(gain[heard].max(initial=0.0)))
+    ax.set(xscale="log", ylim=(0, min(top, 10.0)), xlabel="frequency [Hz]", ylabel="ratio, coherence")
+    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
