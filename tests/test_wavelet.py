@@ -41,8 +41,9 @@ def plain(values: np.ndarray, fs: float, scales: np.ndarray, normalisation: str)
 
 @pytest.mark.parametrize("normalisation", ["energy", "amplitude"])
 @pytest.mark.parametrize(("precision", "right"), [("double", 1e-9), ("single", 1e-5)])
-def test_the_fast_transform_is_the_transform(normalisation: str, precision: str, right: float) -> None:
-    values, scales = RNG.normal(size=30011), CENTRE / (2 * np.pi * np.geomspace(2.0, 200.0, 57))
+@pytest.mark.parametrize("size", [30011, 50021, 90107], ids=["plain", "interpolated", "in blocks"])
+def test_the_fast_transform_is_the_transform(normalisation: str, precision: str, right: float, size: int) -> None:
+    values, scales = RNG.normal(size=size), CENTRE / (2 * np.pi * np.geomspace(1.0, 200.0, 57))
     found = transform(values, 1000.0, scales, centre=CENTRE, normalisation=normalisation, precision=precision)
     assert worst(found, plain(values, 1000.0, scales, normalisation)) < right
 

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.signals.upsample import LEAD, MOST_PHASES, SHIFT, TAIL, TILE, WIDEST, upsampled
+
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating]
 
 REACH = {"double": 7.0, "single": 5.2}  # standard deviations of the Gaussian kept: exp(-7^2 / 2) = 2e-11
 ACCURACY = {"double": 2e-11, "single": 1e-6}  # of the interpolation, where the row's spectrum is highest
-SPARE = 1.35  # samples per unit of bandwidth that a row is interpolated from
-MOST_PHASES = 64  # samples made of one
-FEWEST = 64  # samples that are interpolated from
 SHORT = 1 << 15  # samples, below which a whole transform costs less than the weights of an interpolation
-GROUP = 32  # outputs of one product of matrices, or more: fewer are slower than their inputs are copied
-AT_ONCE = 1 << 16  # outputs in the processor's cache
+BLOCK = 1 << 14  # samples of one transform of many, which the processor's cache holds
+MARGIN = 1 << 10  # of them at either end that a wavelet of the neighbours may reach
+MOST_IN_BLOCKS = 32  # values made of one sample there
+FEWEST_BLOCKS = 4
 
 
 def normalised_gain(scale: float, normalisation: str) -> float:
@@ -33,127 +35,107 @@ def ridge_centre(centre: float, normalisation: str) -> float:
     return centre if normalisation == "amplitude" else (centre + math.sqrt(centre**2 + 2)) / 2
 
 
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """Spectra of a signal's blocks, which overlap by twice the margin; or that of the whole, as one block without."""
+
+    spectra: Complex
+    length: int
+    margin: int
+    most_phases: int
+
+    def phases(self, width: float, precision: str) -> int:
+        """The most values that one sample of a band so wide (standard deviation, in bins) can make."""
+        phases = 1
+        while phases < self.most_phases and _half(width, self.length // (2 * phases), precision) < WIDEST:
+            phases *= 2
+        return phases
+
+
 def transform(
     values: Array, fs: float, scales: Array, *, centre: float, normalisation: str, precision: str = "double"
-) -> NDArray[np.complexfloating]:
+) -> Complex:
     """W(a, b) of each scale (rows) at each sample (columns); the values are zero before and after."""
-    from scipy.fft import rfft
-
     out = np.empty((len(scales), len(values)), dtype=np.complex128 if precision == "double" else np.complex64)
-    reach, count = REACH[precision], len(values)
-    pad = math.ceil(reach * float(scales.max()) * fs)  # no wavelet reaches round the end
-    size = _length(count + pad)
-    spectrum = rfft(values.astype(out.real.dtype, copy=False), size)
-    for row, scale in zip(out, scales.tolist(), strict=True):
-        width = size / (2 * math.pi * scale * fs)  # standard deviation of the row's spectrum, in bins
-        band = _band(spectrum, size, centre * width, width, reach, normalised_gain(scale, normalisation))
-        _fill(row, band, size, width, centre * width, precision)
+    signal = values.astype(out.real.dtype, copy=False)
+    reached = REACH[precision] * scales * fs  # samples on either side
+    many = _blocks(signal) if len(signal) > FEWEST_BLOCKS * BLOCK else None
+    whole = None
+    for row, scale, reach in zip(out, scales.tolist(), reached.tolist(), strict=True):
+        blocks = many
+        if many is None or reach + TAIL * many.phases(_width(many, scale * fs), precision) > MARGIN:
+            blocks = whole = whole or _whole(signal, math.ceil(reached.max()))
+        assert blocks is not None
+        _fill(row, blocks, _width(blocks, scale * fs), centre, normalised_gain(scale, normalisation), precision)
     return out
 
 
-def _length(least: int) -> int:
-    """A length that the transform is fast for, divisible by the numbers of phases."""
-    from scipy.fft import next_fast_len
+def _blocks(signal: Array) -> _Blocks:
+    from scipy.fft import rfft
 
-    phases = MOST_PHASES if least > SHORT else 1
-    return int(next_fast_len(-(-least // phases))) * phases
+    step = BLOCK - 2 * MARGIN
+    count = -(-len(signal) // step)
+    padded = np.zeros(count * step + 2 * MARGIN, dtype=signal.dtype)
+    padded[MARGIN : MARGIN + len(signal)] = signal
+    cut = np.lib.stride_tricks.sliding_window_view(padded, BLOCK)[::step]
+    return _Blocks(rfft(cut, axis=1), BLOCK, MARGIN, MOST_IN_BLOCKS)
 
 
-def _band(
-    spectrum: NDArray[np.complexfloating], size: int, middle: float, width: float, reach: float, gain: float
-) -> tuple[int, NDArray[np.complexfloating]]:
-    """First bin (negative ones are negative frequencies) and the row's spectrum from there on."""
+def _whole(signal: Array, pad: int) -> _Blocks:
+    """`pad`: no wavelet reaches round the end."""
+    from scipy.fft import next_fast_len, rfft
+
+    least = len(signal) + pad
+    unit = MOST_PHASES * TILE if least > SHORT else 1
+    size = int(next_fast_len(-(-least // unit))) * unit
+    return _Blocks(rfft(signal, size)[None], size, 0, MOST_PHASES if least > SHORT else 1)
+
+
+def _width(blocks: _Blocks, samples: float) -> float:
+    """Standard deviation of a row's spectrum, in bins, where the scale has so many samples."""
+    return blocks.length / (2 * math.pi * samples)
+
+
+def _half(width: float, short: int, precision: str) -> float:
+    """Half the width [rad a sample] of a row's spectrum that is kept, in a transform so short."""
+    return 2 * math.pi * REACH[precision] * width / short + SHIFT
+
+
+def _fill(row: Complex, blocks: _Blocks, width: float, centre: float, gain: float, precision: str) -> None:
+    from scipy.fft import ifft
+
+    phases = blocks.phases(width, precision)
+    short, margin = blocks.length // phases, blocks.margin // phases
+    turns = round(centre * width * TILE / short) if phases > 1 else 0
+    first, part = _band(blocks, centre * width, width, REACH[precision], gain / phases)
+    folded = np.zeros((len(part), short), dtype=part.dtype)
+    start = (first - turns * short // TILE) % short
+    head = min(part.shape[1], short - start)
+    folded[:, start : start + head] = part[:, :head]
+    folded[:, : part.shape[1] - head] += part[:, head:]
+    samples = ifft(folded, axis=1, overwrite_x=True)
+    kept = samples[:, margin : short - margin].reshape(-1)
+    if phases == 1:
+        row[:] = kept[: len(row)]
+        return
+    before = samples[0].take(np.arange(margin - LEAD, margin), mode="wrap")
+    after = samples[-1].take(np.arange(short - margin, short - margin + TAIL), mode="wrap")
+    half = _half(width, short, precision)
+    upsampled(
+        np.concatenate([before, kept, after]), row, phases,
+        turns=turns, half=half, reach=REACH[precision], accuracy=ACCURACY[precision],
+    )  # fmt: skip
+
+
+def _band(blocks: _Blocks, middle: float, width: float, reach: float, gain: float) -> tuple[int, Complex]:
+    """First bin (negative ones are negative frequencies) and the blocks' spectra of the row from there on."""
+    size, spectra = blocks.length, blocks.spectra
     first = max(math.ceil(middle - reach * width), -((size - 1) // 2))
     last = min(math.floor(middle + reach * width), size // 2)
     bins = np.arange(first, last + 1)
-    window = gain * np.exp(-0.5 * ((bins - middle) / width) ** 2)
-    kept = window.astype(spectrum.real.dtype)
-    part = np.empty(len(bins), dtype=spectrum.dtype)
-    below = max(0, -first)
-    part[below:] = spectrum[max(first, 0) : last + 1] * kept[below:]
-    part[:below] = np.conj(spectrum[1 : below + 1][::-1][: len(part[:below])]) * kept[:below]
+    window = (gain * np.exp(-0.5 * ((bins - middle) / width) ** 2)).astype(spectra.real.dtype)
+    part = np.empty((len(spectra), len(bins)), dtype=spectra.dtype)
+    below = min(max(0, -first), len(bins))
+    np.multiply(spectra[:, max(first, 0) : last + 1], window[below:], out=part[:, below:])
+    np.multiply(np.conj(spectra[:, 1 : -first + 1][:, ::-1][:, :below]), window[:below], out=part[:, :below])
     return first, part
-
-
-def _fill(
-    row: NDArray[np.complexfloating],
-    band: tuple[int, NDArray[np.complexfloating]],
-    size: int,
-    width: float,
-    middle: float,
-    precision: str,
-) -> None:
-    from scipy.fft import ifft
-
-    first, part = band
-    reach = REACH[precision]
-    phases = 1
-    while (
-        size > SHORT
-        and phases < MOST_PHASES
-        and size % (2 * phases) == 0
-        and size // (2 * phases) >= max(FEWEST, SPARE * 2 * reach * width)
-    ):
-        phases *= 2
-    short = size // phases
-    folded = np.zeros(short, dtype=part.dtype)
-    start = first % short
-    head = min(len(part), short - start)
-    folded[start : start + head] = part[:head]
-    folded[: len(part) - head] += part[head:]
-    samples = ifft(folded, overwrite_x=True)
-    samples *= 1 / phases
-    if phases == 1:
-        row[:] = samples[: len(row)]
-    else:
-        _interpolate(row, samples, phases, 2 * math.pi * width / short, 2 * math.pi * middle / short, precision)
-
-
-def _interpolate(
-    row: NDArray[np.complexfloating],
-    samples: NDArray[np.complexfloating],
-    phases: int,
-    width: float,
-    middle: float,
-    precision: str,
-) -> None:
-    """`phases` values for each sample: each a weighted sum of its neighbours, all of them as a product of matrices."""
-    weights = _weights(width, REACH[precision], ACCURACY[precision], phases)
-    taps = len(weights)
-    before = taps // 2 - 1
-    apart = np.arange(phases) / phases - (np.arange(taps) - before)[:, None]
-    turned = weights * np.exp(1j * middle * apart)
-    group = max(1, GROUP // phases)
-    matrix = np.zeros((taps + group - 1, group * phases), dtype=row.dtype)
-    for number in range(group):
-        matrix[number : number + taps, number * phases : (number + 1) * phases] = turned
-    block = group * phases
-    blocks = -(-len(row) // block)
-    around = np.take(samples, np.arange(-before, blocks * group + taps), mode="wrap")
-    windows = np.lib.stride_tricks.sliding_window_view(around, taps + group - 1)[::group]
-    whole, step = len(row) // block, max(1, AT_ONCE // block)
-    shaped = row[: whole * block].reshape(whole, block)
-    for begin in range(0, whole, step):
-        end = min(begin + step, whole)
-        np.matmul(np.ascontiguousarray(windows[begin:end]), matrix, out=shaped[begin:end])
-    if whole < blocks:
-        row[whole * block :] = (windows[whole] @ matrix)[: len(row) - whole * block]
-
-
-def _weights(width: float, reach: float, accuracy: float, phases: int) -> Array:
-    """Weights of the neighbours, shape (neighbours, phases), best in the mean over a Gaussian spectrum about zero."""
-    angles = np.linspace(0, reach * width, 160)
-    height = np.exp(-0.5 * (angles / width) ** 2)
-    height = np.concatenate([height, height])[:, None]
-
-    def waves(places: Array) -> Array:
-        turn = np.outer(angles, places)
-        return np.asarray(np.vstack([np.cos(turn), np.sin(turn)]) * height)
-
-    target = waves(np.arange(phases) / phases)
-    for taps in range(6, 33, 2):
-        design = waves(np.arange(taps, dtype=float) - (taps // 2 - 1))
-        weights = np.linalg.lstsq(design, target, rcond=1e-15)[0]
-        if np.abs(design @ weights - target).max() < accuracy:
-            break
-    return np.asarray(weights)
