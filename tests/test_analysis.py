@@ -11,9 +11,12 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.analysis import Comparison, Findings, analyze, compare, mend, record_name
+from stickslip.analysis import analyze
+from stickslip.comparison import Comparison, compare
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, ModelError
+from stickslip.findings import Findings, record_name
+from stickslip.mending import mend
 
 FS = 500.0
 TIME = np.arange(5000) / FS

@@ -13,13 +13,8 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from stickslip import datasets as datasets
-    from stickslip.analysis import (
-        Comparison as Comparison,
-        Findings as Findings,
-        analyze as analyze,
-        compare as compare,
-        mend as mend,
-    )
+    from stickslip.analysis import analyze as analyze
+    from stickslip.comparison import Comparison as Comparison, compare as compare
     from stickslip.config import RigSettings as RigSettings, read_rig as read_rig, rig_settings as rig_settings
     from stickslip.decay_comparison import DecayComparison as DecayComparison, compare_decays as compare_decays
     from stickslip.decays import DecayFindings as DecayFindings, analyze_decay as analyze_decay
@@ -34,6 +29,7 @@ if TYPE_CHECKING:
     from stickslip.estimate import Estimate as Estimate
     from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
     from stickslip.files.write import write_record as write_record
+    from stickslip.findings import Findings as Findings
     from stickslip.fit.answer import DecayFit as DecayFit
     from stickslip.fit.decay import fit_decay as fit_decay
     from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
@@ -66,6 +62,7 @@ if TYPE_CHECKING:
         find_releases as find_releases,
     )
     from stickslip.identify.sticks import find_sticks as find_sticks
+    from stickslip.mending import mend as mend
     from stickslip.plot.figures import figures as figures
     from stickslip.record.channels import Channel as Channel
     from stickslip.record.check import Fault as Fault
@@ -208,7 +205,8 @@ _ROOMS = {
     "analyze_decay": "decays", "DecayFindings": "decays",
     "compare_decays": "decay_comparison", "DecayComparison": "decay_comparison",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
-    "analyze": "analysis", "compare": "analysis", "mend": "analysis", "Findings": "analysis", "Comparison": "analysis",
+    "analyze": "analysis", "compare": "comparison", "Comparison": "comparison",
+    "Findings": "findings", "mend": "mending",
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",
     "Tabulated": "laws.tabulated", "StateVariable": "laws.state_variable", "InertialContact": "laws.inertial",
     "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load", "RoughSurface": "laws.rough",

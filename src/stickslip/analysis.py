@@ -1,155 +1,31 @@
-"""Which questions are asked of a record, in which order; and records side by side."""
+"""Which questions are asked of a record, in which order."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, ModelError, StickslipError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.findings import Findings, record_name
 from stickslip.identify.force import friction_force
-from stickslip.identify.loops import Loops, friction_loops
+from stickslip.identify.loops import friction_loops
 from stickslip.identify.motion import is_measured, slid_on
-from stickslip.identify.regression import Regression, regress_friction
-from stickslip.identify.sticks import Sticks, find_sticks
+from stickslip.identify.regression import regress_friction
+from stickslip.identify.sticks import find_sticks
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
-from stickslip.signals.repair import (
-    fill_gaps,
-    fill_missing,
-    remove_drift,
-    remove_spikes,
-    repair_clock,
-    restore_clipped,
-)
-from stickslip.statistics import student
 
 if TYPE_CHECKING:
-    from stickslip.record.check import Fault
+    pass
 
 Answer = TypeVar("Answer")
 
 USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
 CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Findings(Result):
-    """What a record says about its friction.
-
-    Attributes
-    ----------
-    name : str
-        The record's name: its file, or what the caller called it.
-    record : Record
-        The record, with the channel ``friction`` where it could be found.
-    faults : tuple of Fault
-        What the check-up found in the record as it was given.
-    loops, sticks, regression, asymmetric : Loops, Sticks, Regression, Regression or None
-        The answers to the questions that could be asked; `asymmetric` lets both directions differ.
-    normal : float or None
-        Normal load [N] on the contact, where stated or measured.
-    notes : tuple of str
-        What could not be asked, and why; what was assumed.
-    settings : mapping
-        The constants and choices that the answers rest on.
-    """
-
-    name: str
-    record: Record
-    faults: tuple[Fault, ...] = ()
-    loops: Loops | None = None
-    sticks: Sticks | None = None
-    regression: Regression | None = None
-    asymmetric: Regression | None = None
-    normal: float | None = None
-    notes: tuple[str, ...] = ()
-    settings: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def level(self) -> Estimate | None:
-        """The sliding friction: from the loops, or the Coulomb term of the regression."""
-        if self.loops is not None:
-            return self.loops.level
-        return self.regression.coulomb if self.regression is not None else None
-
-    @property
-    def coefficient(self) -> Estimate | None:
-        """Sliding friction over the normal load, where both are known."""
-        if self.level is None or self.normal is None or self.level.unit != "N":
-            return None
-        return self.level.scaled(1 / self.normal, "1", "friction coefficient")
-
-    @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """Every number found, in the order of asking."""
-        level = [self.coefficient] if self.coefficient is not None else []
-        answers = (self.loops, self.regression, self.asymmetric, self.sticks)
-        found = [*level, *(estimate for answer in answers if answer is not None for estimate in answer.estimates)]
-        first: dict[str, Estimate] = {}
-        for estimate in found:
-            first.setdefault(estimate.name, estimate)
-        return tuple(first.values())
-
-    def true_value(self, estimate: Estimate) -> float | None:
-        """The true value of what was estimated, where the record is simulated and tells it."""
-        true = self.record.truth.get(estimate.name)
-        return None if true is None else float(true)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON: settings, estimates, faults, notes and history."""
-        told = {
-            "name": self.name,
-            "settings": dict(self.settings),
-            "normal_load": self.normal,
-            "estimates": [estimate.to_dict() for estimate in self.estimates],
-            "regression_residual": None if self.regression is None else self.regression.residual,
-            "truth": dict(self.record.truth),
-            "faults": [str(fault) for fault in self.faults],
-            "notes": list(self.notes),
-            "history": [step.to_dict() for step in self.record.history],
-        }
-        return {key: plain(value) for key, value in told.items()}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Result):
-    """Several records side by side.
-
-    Attributes
-    ----------
-    findings : tuple of Findings
-        One per record.
-    coefficient : Estimate or None
-        Slope of the line through the origin: friction over normal load.
-    line : tuple of Estimate or None
-        Slope and friction at no load of a straight line, where three loads or more allow it.
-    notes : tuple of str
-        What could not be compared, and why.
-    """
-
-    findings: tuple[Findings, ...]
-    coefficient: Estimate | None = None
-    line: tuple[Estimate, Estimate] | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """The fitted coefficient, and the line where there is one."""
-        return (*([self.coefficient] if self.coefficient is not None else []), *(self.line or ()))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {
-            "comparison": {"estimates": [e.to_dict() for e in self.estimates], "notes": list(self.notes)},
-            "records": [findings.to_dict() for findings in self.findings],
-        }
 
 
 def analyze(
@@ -230,139 +106,6 @@ def analyze(
         normal=_normal_load(record, rig, name, asked.notes), notes=tuple(asked.notes),
         settings={**_balanced(whole), "contact": contact},
     )  # fmt: skip
-
-
-def mend(record: Record, *, repairs: Sequence[str]) -> Record:
-    """The record after repairs, made in the order given and each logged in its history.
-
-    Parameters
-    ----------
-    record : Record
-        As read.
-    repairs : sequence of str
-        ``clock`` (:func:`repair_clock`), ``gaps`` (:func:`fill_gaps`), ``missing`` (:func:`fill_missing`), ``spikes``
-        (:func:`remove_spikes`), ``clipping`` (:func:`restore_clipped`), ``drift`` (:func:`remove_drift`). The last
-        four take a channel, as in ``drift:x``; without one they mend the channels in which the check-up finds
-        that fault.
-
-    Returns
-    -------
-    Record
-
-    Raises
-    ------
-    RecordError
-        A repair that can not be made.
-    ModelError
-        A repair that is not known.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> wave = np.sin(0.2 * np.arange(400))
-    >>> wave[100:103] = np.nan
-    >>> mended = mend(Record.of({"x": wave}, fs=100.0), repairs=["missing"])
-    >>> bool(np.isfinite(mended["x"]).all()), mended.history[-1].action
-    (True, 'fill_missing')
-    """
-    from stickslip.config import rig_settings
-
-    for repair in rig_settings({"repair": list(repairs)}, source="the call").repair:
-        word, _, channel = repair.partition(":")
-        if word in _WHOLE:
-            record = _WHOLE[word](record)
-            continue
-        kind, function = _PER_CHANNEL[word]
-        found = [fault.channel for fault in record.check() if fault.kind == kind and fault.channel is not None]
-        for name in [channel] if channel else dict.fromkeys(found):
-            record = function(record, name)
-    return record
-
-
-_WHOLE: dict[str, Callable[[Record], Record]] = {"clock": repair_clock, "gaps": fill_gaps}
-_PER_CHANNEL: dict[str, tuple[str, Callable[[Record, str], Record]]] = {
-    "missing": ("missing", fill_missing),
-    "spikes": ("spike", remove_spikes),
-    "clipping": ("clipped", restore_clipped),
-    "drift": ("drift", remove_drift),
-}
-
-
-def compare(findings: Sequence[Findings]) -> Comparison:
-    """Friction of several records side by side, and against the normal load where it is known.
-
-    The coefficient is the slope of ``f = mu N`` by least squares; with three loads or more a line ``f = mu N + f0`` is
-    fitted beside it. Their intervals are Student's t on the scatter about the line, or what the records' own intervals
-    allow where that is wider.
-
-    Parameters
-    ----------
-    findings : sequence of Findings
-        Two or more.
-
-    Returns
-    -------
-    Comparison
-
-    Raises
-    ------
-    EstimateError
-        Fewer than two records.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> rng, time = np.random.default_rng(1), np.arange(4000) / 500
-    >>> def slide(load):
-    ...     friction = 0.3 * load * np.sign(np.cos(2 * np.pi * time)) + rng.normal(0, 0.01, time.size)
-    ...     x = np.sin(2 * np.pi * time) / (2 * np.pi)
-    ...     return Record.of({"x": x, "friction": friction, "normal": np.full(time.size, load)}, fs=500)
-    >>> round(compare([analyze(slide(load)) for load in (2.0, 4.0, 8.0)]).coefficient.value, 2)
-    0.3
-    """
-    if len(findings) < 2:
-        raise EstimateError(f"{len(findings)} record", "a comparison needs two or more", "give several files")
-    known = [f for f in findings if f.normal is not None and f.level is not None and f.level.unit == "N"]
-    left_out = {
-        "The normal load of {} is not known; state it to fit the coefficient.": [f for f in findings if not f.normal],
-        "No friction level was found for {}.": [f for f in findings if f.level is None],
-        "The friction of {} is a torque: it is not set against a normal load.": [
-            f for f in findings if f.level is not None and f.level.unit != "N"
-        ],
-    }
-    notes = [words.format(", ".join(f.name for f in those)) for words, those in left_out.items() if those]
-    if len(known) < 2:
-        return Comparison(tuple(findings), notes=tuple(notes))
-    loads = np.array([f.normal for f in known], dtype=float)
-    levels, sds = (np.array([getattr(f.level, key) for f in known]) for key in ("value", "sd"))
-    over = f"over {len(known)} records"
-    (slope,) = _line(loads[:, None], levels, sds)
-    scatter = math.sqrt(float(np.sum((levels - slope["value"] * loads) ** 2)) / (len(known) - 1))
-    coefficient = Estimate.normal(
-        "friction coefficient", **slope, unit="1", method=f"slope through the origin {over}",
-        checks=(f"scatter about the line {scatter:.3g} N",),
-    )  # fmt: skip
-    line = None
-    if len(np.unique(loads)) >= 3:
-        slope, offset = _line(np.column_stack([loads, np.ones_like(loads)]), levels, sds)
-        line = (
-            Estimate.normal("slope of the line", **slope, unit="1", method=f"straight line {over}"),
-            Estimate.normal("friction at no load", **offset, unit="N", method=f"straight line {over}"),
-        )
-        if not line[1].includes(0.0):
-            coefficient = replace(coefficient, status="the line misses the origin: see friction at no load")
-    else:
-        notes.append("Fewer than three loads: whether the line passes through the origin can not be told.")
-    return Comparison(tuple(findings), coefficient, line, tuple(notes))
-
-
-def record_name(record: Record) -> str:
-    """The names of the files that the record was last read from; of the first record, where two were joined."""
-    own = (step.arguments for step in record.history if step.arguments.get("record") != "b")
-    reads = [arguments["files"] for arguments in own if arguments.get("files")]
-    if reads:
-        return " + ".join(file["name"] for file in reads[-1])
-    return "simulated record" if record.truth else "record"
 
 
 @dataclass(frozen=True)
@@ -470,30 +213,3 @@ def _normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) 
         notes.append("The channel normal tells no load: it holds " + ("zeros." if len(finite) else "no numbers."))
     loads = (rig.normal_load(part) for part in [*name.split(" + "), name])
     return next((load for load in loads if load is not None), None)
-
-
-def _line(design: NDArray[np.float64], levels: NDArray[np.float64], sds: NDArray[np.float64]) -> list[dict[str, float]]:
-    """Coefficients by least squares; each varies as the scatter about the line says, or as `sds` do if that is more."""
-    free = len(levels) - design.shape[1]
-    inverse = np.linalg.pinv(design)
-    found = inverse @ levels
-    scatter = np.sqrt(np.sum((levels - design @ found) ** 2) / free * np.sum(inverse**2, axis=1))
-    # a record of one cycle has no sd of its own: the scatter alone speaks for it
-    own = np.sqrt(inverse**2 @ np.where(np.isfinite(sds), sds, 0.0) ** 2)
-    sd = np.maximum(scatter, own * NORMAL_95 / student(free))
-    return [{"value": v, "sd": s, "quantile": student(free)} for v, s in zip(found, sd, strict=True)]
-
-
-def plain(value: Any) -> Any:
-    """Plain JSON data of anything that settings, truth or history may hold; a number not finite becomes None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, (bool, int, str)) else str(value)

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from stickslip.analysis import plain, record_name
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Estimate, Result
+from stickslip.findings import plain, record_name
 from stickslip.fit.answer import DecayFit
 from stickslip.fit.decay import fit_decay
 from stickslip.fit.motions import Restoring

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.analysis import Findings
+    from stickslip.findings import Findings
 
 MOST_CYCLES = 30
 POINTS_A_CYCLE = 300

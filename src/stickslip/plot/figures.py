@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from stickslip.analysis import Comparison, Findings
 from stickslip.decay_comparison import DecayComparison
+from stickslip.comparison import Comparison
 from stickslip.decays import DecayFindings
+from stickslip.findings import Findings
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.contact import plot_displacement_loop, plot_sticks, plot_velocity_loop
 from stickslip.plot.decay import plates_of as decay_plates

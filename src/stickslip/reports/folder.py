@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from stickslip import __version__
-from stickslip.analysis import Comparison, Findings
 from stickslip.decay_comparison import DecayComparison
+from stickslip.comparison import Comparison
 from stickslip.decays import DecayFindings
 from stickslip.errors import ModelError, RecordError
+from stickslip.findings import Findings
 from stickslip.plot.plate import Plate
 from stickslip.reports.page import render, sections_of
 from stickslip.timefrequency import TimeFrequency

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, cast
 
 from stickslip import __version__
-from stickslip.analysis import Comparison, Findings
 from stickslip.decay_comparison import DecayComparison
+from stickslip.comparison import Comparison
 from stickslip.decays import DecayFindings
 from stickslip.estimate import Estimate
 from stickslip.files.write import whole
+from stickslip.findings import Findings
 from stickslip.plot import style
 from stickslip.plot.figures import figures
 from stickslip.plot.plate import Plate

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from stickslip.analysis import Comparison, Findings, record_name
 from stickslip.decay_comparison import DecayComparison
+from stickslip.comparison import Comparison
 from stickslip.decays import DecayFindings
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
+from stickslip.findings import Findings, record_name
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record, Step
 from stickslip.reports import decay

@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stickslip.analysis import Comparison, Findings
+from stickslip.comparison import Comparison
 from stickslip.decays import DecayFindings
 from stickslip.estimate import NORMAL_95, Estimate, decimals
+from stickslip.findings import Findings
 from stickslip.plot.style import prefixed
 from stickslip.timefrequency import TimeFrequency
 
