@@ -49,12 +49,15 @@ if TYPE_CHECKING:
     from stickslip.identify.impact import ImpactTest as ImpactTest, impact_test as impact_test
     from stickslip.identify.mounts import Resonance as Resonance
     from stickslip.plot.force import plot_force_comparison as plot_force_comparison
+    from stickslip.identify.breakaway import Breakaway as Breakaway, breakaway as breakaway
     from stickslip.identify.contact import (
         contact_damping as contact_damping,
         contact_stiffness as contact_stiffness,
     )
     from stickslip.identify.force import friction_force as friction_force
     from stickslip.identify.loops import friction_loops as friction_loops
+    from stickslip.identify.presliding import Presliding as Presliding, presliding as presliding
+    from stickslip.identify.pull import Pull as Pull, pulled_slider as pulled_slider
     from stickslip.identify.regression import regress_friction as regress_friction
     from stickslip.identify.release import (
         Releases as Releases,
@@ -194,6 +197,9 @@ _ROOMS = {
     "impact_test": "identify.impact", "ImpactTest": "identify.impact",
     "plot_force_comparison": "plot.force",
     "contact_stiffness": "identify.contact", "contact_damping": "identify.contact",
+    "breakaway": "identify.breakaway", "Breakaway": "identify.breakaway",
+    "presliding": "identify.presliding", "Presliding": "identify.presliding",
+    "pulled_slider": "identify.pull", "Pull": "identify.pull",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",
     "decrement": "identify.decrement", "Decrement": "identify.decrement", "Bounds": "identify.decrement",

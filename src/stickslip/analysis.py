@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.findings import Findings, record_name
+from stickslip.identify.breakaway import breakaway
 from stickslip.identify.force import friction_force
 from stickslip.identify.loops import friction_loops
 from stickslip.identify.motion import is_measured, slid_on
+from stickslip.identify.presliding import presliding
+from stickslip.identify.pull import pulled_slider
 from stickslip.identify.regression import regress_friction
 from stickslip.identify.sticks import find_sticks
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
-
-if TYPE_CHECKING:
-    pass
 
 Answer = TypeVar("Answer")
 
@@ -42,8 +43,10 @@ def analyze(
     """Ask a record every question about friction that its channels allow.
 
     In this order: the check-up; the friction force (as measured, or from the force balance
-    ``f = k z - k x - c v - m a``); the friction loops; sticks and slips; the regression of an applied force on
-    acceleration, velocity and direction. A question that can not be answered becomes a note, not an error.
+    ``f = k z - k x - c v - m a``); the friction loops; sticks and slips; the breakaway, and what the contact does
+    before; the regression of an applied force on acceleration, velocity and direction; of a force without any motion,
+    how a slider moves that is pulled through a spring. A question that can not be answered becomes a note, not an
+    error.
 
     Parameters
     ----------
@@ -88,24 +91,71 @@ def analyze(
     known = [each for each in USED if each in record]
     whole = asked.ask("Stated delays", lambda: without_delays(record, *known)) if known else record
     whole = _with_friction(whole or record, rig, method, asked)
-    contact = slid_on(whole, rig.contact if "contact" in rig.model_fields_set else None)
-    loops = sticks = regression = asymmetric = None
-    if "friction" in whole and _moves(whole):
-        loops = asked.ask("Friction loops", lambda: friction_loops(whole, contact=contact))
-    if _moves(whole):
-        sticks = asked.ask("Sticks and slips", lambda: find_sticks(whole, contact=contact))
-    if _moves(whole) and "force" in whole:
-        regression = asked.ask("Regression", lambda: regress_friction(whole))
-        if regression is not None:
-            asymmetric = asked.ask("Asymmetric regression", lambda: regress_friction(whole, symmetric=False))
+    slid = slid_on(whole, rig.contact if "contact" in rig.model_fields_set else None)
+    answers: dict[str, Any] = {}
+    for each in QUESTIONS:
+        if each.fits(whole) and (not each.follows or answers.get(each.follows) is not None):
+            answers[each.key] = asked.ask(each.name, partial(each.ask, whole, slid))
     name = record_name(record)
-    if all(answer is None for answer in (loops, sticks, regression)):
+    if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
     return Findings(
-        name, whole, faults, loops, sticks, regression, asymmetric,
-        normal=_normal_load(record, rig, name, asked.notes), notes=tuple(asked.notes),
-        settings={**_balanced(whole), "contact": contact},
+        name, whole, faults, **answers, normal=_normal_load(record, rig, name, asked.notes), notes=tuple(asked.notes),
+        settings={**_balanced(whole), "contact": slid},
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Question:
+    """One of the questions.
+
+    Attributes
+    ----------
+    key : str
+        The attribute of :class:`Findings` that holds the answer.
+    name : str
+        In words.
+    needs : tuple of tuple of str
+        Channels: one of each group.
+    ask : callable
+        Answers it, given the record and what the mass slides on.
+    without : tuple of str
+        Channels with which it is not asked: others answer it better.
+    follows : str
+        The question that must have been answered before, where there is one.
+    """
+
+    key: str
+    name: str
+    needs: tuple[tuple[str, ...], ...]
+    ask: Callable[[Record, str], Any]
+    without: tuple[str, ...] = ()
+    follows: str = ""
+
+    def fits(self, record: Record) -> bool:
+        """Whether the record has the channels."""
+        return all(any(name in record for name in group) for group in self.needs) and not any(
+            name in record for name in self.without
+        )
+
+
+MOTION = ("x", "v", "theta")
+FORCE = ("load", "force", "friction")
+QUESTIONS = (
+    Question("loops", "Friction loops", (("friction",), MOTION), lambda r, on: friction_loops(r, contact=on)),
+    Question("sticks", "Sticks and slips", (MOTION,), lambda r, on: find_sticks(r, contact=on)),
+    Question("breakaway", "Breakaway", (("friction",), MOTION), lambda r, on: breakaway(r, contact=on)),
+    Question("presliding", "Presliding", (("friction",), MOTION), lambda r, on: presliding(r, contact=on)),
+    Question("regression", "Regression", (("force",), MOTION), lambda r, on: regress_friction(r)),
+    Question(
+        "asymmetric", "Regression of each direction", (("force",), MOTION),
+        lambda r, on: regress_friction(r, symmetric=False), follows="regression",
+    ),
+    Question(
+        "pull", "Pulled slider", (FORCE,),
+        lambda r, on: pulled_slider(r, channel=next(name for name in FORCE if name in r)), without=(*MOTION, "a"),
+    ),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -161,7 +211,7 @@ def _with_friction(record: Record, rig: RigSettings, method: str, asked: _Asked)
             return balanced
     if "friction" in record:
         return record
-    if "load" in record and "force" not in record:
+    if "load" in record and "force" not in record and any(name in record for name in MOTION):
         asked.notes.append(
             "The load cell's reading is taken as the friction force; inertia between both is part of it."
         )
@@ -170,7 +220,7 @@ def _with_friction(record: Record, rig: RigSettings, method: str, asked: _Asked)
             "friction", record["load"], unit=record.channels["load"].unit, source="load", step=step
         )
     lacking = _lacking(record, rig)
-    if lacking and "force" not in record:
+    if lacking and "force" not in record and "load" not in record:
         asked.notes.append(
             f"Friction force: without a measured friction or load it needs {' and '.join(lacking)}, not given."
         )
@@ -195,10 +245,6 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
         "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
         'name the columns, as in channels={"x": "COLUMN [mm]"}',
     )
-
-
-def _moves(record: Record) -> bool:
-    return any(name in record for name in ("x", "v", "theta"))
 
 
 def _normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> float | None:

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.estimate import Estimate, Result
+from stickslip.identify.breakaway import Breakaway
 from stickslip.identify.loops import Loops
+from stickslip.identify.presliding import Presliding
+from stickslip.identify.pull import Pull
 from stickslip.identify.regression import Regression
 from stickslip.identify.sticks import Sticks
 from stickslip.record.record import Record
@@ -31,8 +34,10 @@ class Findings(Result):
         The record, with the channel ``friction`` where it could be found.
     faults : tuple of Fault
         What the check-up found in the record as it was given.
-    loops, sticks, regression, asymmetric : Loops, Sticks, Regression, Regression or None
+    loops, regression, asymmetric, sticks : Loops, Regression, Regression, Sticks or None
         The answers to the questions that could be asked; `asymmetric` lets both directions differ.
+    breakaway, presliding, pull : Breakaway, Presliding, Pull or None
+        How it begins to slip, what it does before, and of a force alone how a pulled slider moves.
     normal : float or None
         Normal load [N] on the contact, where stated or measured.
     notes : tuple of str
@@ -45,9 +50,12 @@ class Findings(Result):
     record: Record
     faults: tuple[Fault, ...] = ()
     loops: Loops | None = None
-    sticks: Sticks | None = None
     regression: Regression | None = None
     asymmetric: Regression | None = None
+    sticks: Sticks | None = None
+    breakaway: Breakaway | None = None
+    presliding: Presliding | None = None
+    pull: Pull | None = None
     normal: float | None = None
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -70,8 +78,8 @@ class Findings(Result):
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number found, in the order of asking."""
         level = [self.coefficient] if self.coefficient is not None else []
-        answers = (self.loops, self.regression, self.asymmetric, self.sticks)
-        found = [*level, *(estimate for answer in answers if answer is not None for estimate in answer.estimates)]
+        answers = (value for value in vars(self).values() if isinstance(value, Result))
+        found = [*level, *(estimate for answer in answers for estimate in answer.estimates)]
         first: dict[str, Estimate] = {}
         for estimate in found:
             first.setdefault(estimate.name, estimate)

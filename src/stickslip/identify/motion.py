@@ -350,7 +350,8 @@ def _aperiodic(motion: Motion, repeated: float) -> Cycles:
     )  # fmt: skip
     status = (
         f"the motion is not periodic ({100 * max(0.0, repeated):.0f} % of its variance repeats): "
-        f"{len(edges) - 1} cycles from one onset of motion, at {_definite(motion):.3g} {motion.unit}/s, to the next"
+        f"{len(edges) - 1} cycles from one onset of motion, at {definite_speed(motion):.3g} {motion.unit}/s, "
+        "to the next"
     )
     return Cycles(edges, average, _typical_peak(motion.velocity, edges), status, turns)
 
@@ -366,20 +367,20 @@ def _repeated(cycles: Cycles, displacement: Array) -> float:
 
 def _onsets(motion: Motion, sign: float) -> Array:
     """Where motion to that side begins after motion to the other."""
-    moving = np.flatnonzero(np.abs(motion.velocity) > _definite(motion))
+    moving = np.flatnonzero(np.abs(motion.velocity) > definite_speed(motion))
     signs = sign * np.sign(motion.velocity[moving])
     return moving[1:][(signs[1:] > 0) & (signs[:-1] < 0)].astype(float)
 
 
 def _departures(motion: Motion) -> Array:
     """Where motion begins after rest."""
-    speed, definite = np.abs(motion.velocity), _definite(motion)
+    speed, definite = np.abs(motion.velocity), definite_speed(motion)
     state = np.flatnonzero((speed > definite) | (speed < definite * CREEP / TURNED))
     fast = speed[state] > definite
     return state[1:][fast[1:] & ~fast[:-1]].astype(float)
 
 
-def _definite(motion: Motion) -> float:
+def definite_speed(motion: Motion) -> float:
     """Speed above which the contact moves without a doubt."""
     return max(TURNED * float(np.quantile(np.abs(motion.velocity), 0.99)), AUDIBLE * motion.noise)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from stickslip.decay_comparison import DecayComparison
 from stickslip.comparison import Comparison
+from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.findings import Findings
 from stickslip.plot.comparison import plot_levels, plot_load_dependence

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from stickslip import __version__
-from stickslip.decay_comparison import DecayComparison
 from stickslip.comparison import Comparison
+from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.errors import ModelError, RecordError
 from stickslip.findings import Findings

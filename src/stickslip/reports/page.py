@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from stickslip import __version__
-from stickslip.decay_comparison import DecayComparison
 from stickslip.comparison import Comparison
+from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.estimate import Estimate
 from stickslip.files.write import whole

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from stickslip.decay_comparison import DecayComparison
 from stickslip.comparison import Comparison
+from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate

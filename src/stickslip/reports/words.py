@@ -11,6 +11,9 @@ from stickslip.comparison import Comparison
 from stickslip.decays import DecayFindings
 from stickslip.estimate import NORMAL_95, Estimate, decimals
 from stickslip.findings import Findings
+from stickslip.identify.breakaway import Breakaway
+from stickslip.identify.presliding import Presliding
+from stickslip.identify.pull import Pull
 from stickslip.plot.style import prefixed
 from stickslip.timefrequency import TimeFrequency
 
@@ -121,6 +124,12 @@ def _of_findings(findings: Findings) -> Iterator[str]:
         yield from _of_directions(apart.viscous_forward, apart.viscous_back, "in viscous friction")
     if findings.sticks is not None:
         yield from _of_sticks(findings)
+    if findings.breakaway is not None:
+        yield from _of_breakaway(findings.breakaway)
+    if findings.presliding is not None:
+        yield from _of_presliding(findings.presliding)
+    if findings.pull is not None:
+        yield from _of_pull(findings.pull)
 
 
 def _of_directions(forward: Estimate | None, back: Estimate | None, what: str = "") -> Iterator[str]:
@@ -169,6 +178,49 @@ def _of_sticks(findings: Findings) -> Iterator[str]:
     low, high = sticks.share.interval
     share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
     yield f"It sticks {share} of the time{stops}."
+
+
+def _of_breakaway(found: Breakaway) -> Iterator[str]:
+    ratio = found.ratio
+    low, high = ratio.interval
+    more = "more" if low > 1 else "less" if high < 1 else "as much, as far as can be told,"
+    sides = " and ".join(f"{value_of(each)} {each.name.split()[-1]}" for each in (found.forward, found.back) if each)
+    than = "than" if low > 1 or high < 1 else "as"
+    yield (
+        f"Just before it slips it bears {sides}: {more} {than} while it slides ({value_of(ratio)} times, 95 % sure: "
+        f"{interval_of(ratio)})."
+    )
+    rings = [each for each in (found.ringing_forward, found.ringing_back) if each is not None]
+    if rings:
+        yield f"After slip begins it rings at {' and '.join(f'{value_of(e)} {e.name.split()[-1]}' for e in rings)}."
+
+
+def _of_presliding(found: Presliding) -> Iterator[str]:
+    if found.verdict == "gives way" and found.stiffness is not None:
+        gap = found.backlash
+        play = f", with {value_of(gap)} of play" if gap is not None and gap.interval[0] > 0 else ""
+        yield (
+            f"Before it slips the contact gives way, with a stiffness of {value_of(found.stiffness)} "
+            f"(95 % sure: {interval_of(found.stiffness)}){play}."
+        )
+    elif found.verdict == "rigid":
+        yield f"Before it slips the contact is rigid as far as the record can tell: {found.evidence}."
+    else:
+        yield f"Whether the contact gives way before it slips can not be told: {found.evidence}."
+
+
+def _of_pull(found: Pull) -> Iterator[str]:
+    if found.regime == "stick-slip":
+        yield (
+            f"The slider sticks and slips {value_of(found.frequency)}: while it sticks the force rises by "
+            f"{value_of(found.loading_rate)} (95 % sure: {interval_of(found.loading_rate)}), to "
+            f"{value_of(found.breakaway)}, and falls by {value_of(found.drop)} in a slip."
+        )
+    else:
+        yield (
+            f"The slider does not stick: it swings about its steady sliding at {value_of(found.frequency)}, as its own "
+            f"inertia lets it (the force rises for {value_of(found.rise_over_fall)} times as long as it falls)."
+        )
 
 
 def _of_comparison(comparison: Comparison) -> Iterator[str]:

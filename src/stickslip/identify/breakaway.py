@@ -1,0 +1,243 @@
+"""How large is the friction just before a contact slips, against the friction while it slides?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate, Result
+from stickslip.identify.motion import forcing_frequency, is_measured
+from stickslip.identify.strokes import FAST, Stroke, find_strokes
+from stickslip.record.record import Record
+from stickslip.statistics import mean_of_cycles
+
+Array = NDArray[np.float64]
+
+QUESTION = "the friction at breakaway"
+SIDES = ((1, "forward"), (-1, "back"))
+TRAVEL = 0.05  # of a stroke: how far the start of a slip is followed
+BEFORE = 5  # a stick's last fifth tells what it bears at its end
+MOST = 400  # strokes looked at, evenly chosen: their mean is known well enough
+LEAST = 8  # samples in which a stick's end and a slip's start can be told
+RING = 16  # samples in which a ring can be told
+SLOW = 8  # degree of the polynomial that is not the ring
+SOON = 4  # after slip begins: a quarter of the stroke
+LOUD = 0.03  # of the sliding friction: a ring of a smaller amplitude is none
+STEADY = 0.3  # of the sliding friction: one that swings by more is no friction to be quoted
+QUARTILE = 0.6744897501960817  # of the normal distribution
+ALIKE = 0.25  # of the frequency by which rings of one contact differ
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Breakaway(Result):
+    """The friction at which a contact breaks away.
+
+    Attributes
+    ----------
+    forward, back : Estimate or None
+        Static friction: what the contact bears just before it slips, in either direction.
+    ratio : Estimate
+        That over the sliding friction of the same stroke, of both directions.
+    ringing_forward, ringing_back : Estimate or None
+        Frequency [Hz] at which the friction swings after slip has begun, where it was measured and does by
+        3 % of its level or more.
+    swing_forward, swing_back : Estimate or None
+        How much the friction swings about its level while it slides, over that level; a friction that is steady enough
+        to be called one does so by less than 30 %.
+    count : int
+        Strokes looked at.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    forward: Estimate | None
+    back: Estimate | None
+    ratio: Estimate
+    ringing_forward: Estimate | None
+    ringing_back: Estimate | None
+    swing_forward: Estimate | None
+    swing_back: Estimate | None
+    count: int
+    status: str
+
+
+def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
+    r"""How large is the friction just before the contact slips, against the friction while it slides?
+
+    A mass at rest has no inertia force: the contact bears exactly what pulls, :math:`p = k (z - x) + c\,\dot z + P`
+    (the second term for a damper on the base), which is known without any differentiation. When the slip begins is
+    found from its first travel, :math:`m\ddot x = p - f` with f constant so early, by least squares over the instant
+    and f; the pull can not be less than f then. Static friction is the pull at that instant, from a line through the
+    stick's last fifth. Of a friction that was measured, and not balanced, it is the largest value before the contact
+    moves; of a contact that gives way before it slips, the first peak once friction is near its level, which the
+    ring that follows raises.
+
+    Parameters
+    ----------
+    record : Record
+        With ``friction`` and ``x`` (or ``theta``, or ``v``), as for :func:`friction_loops`.
+    contact : {"ground", "base"}, optional
+        What the mass slides on; as :func:`friction_force` was told, or the ground, when not given.
+
+    Returns
+    -------
+    Breakaway
+
+    Raises
+    ------
+    RecordError
+        A channel is missing, broken or too short, or the units of friction and motion do not belong together.
+    EstimateError
+        No motion, or no stroke in which the contact turns round and slides.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(3.0, 1200, law=ss.Coulomb(1.0, static=1.3), drive=ss.HarmonicBase(3e-3, frequency=1.0))
+    >>> record = ss.simulate(slider, cycles=12).record(fs=500)
+    >>> found = breakaway(ss.friction_force(record.rows(1000, 6000), mass=3.0, stiffness=1200))
+    >>> bool(abs(found.ratio.value - 1.3) < 0.03)
+    True
+    """
+    strokes = find_strokes(record, contact=contact, question=QUESTION)
+    pull, rig = _pull(record)
+    chosen = strokes.strokes[:: max(1, len(strokes.strokes) // MOST)]
+    borne = [(each, _borne(each, pull, rig, record.fs)) for each in chosen]
+    found = [(each, friction) for each, friction in borne if friction is not None]
+    if not found:
+        raise EstimateError(
+            f"the first travel of none of {len(chosen)} slips can be followed",
+            "the start of a slip takes 4 samples at least",
+            "sample faster, or give a longer record",
+        )
+    rested = sum(each.rests for each, _ in found)
+    method = "pull at the start of the slip" if pull is not None and 2 * rested > len(found) else "peak before the slip"
+    level = [
+        mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=f"{method}, mean of strokes")
+        if (values := [friction for each, friction in found if each.way == way])
+        else None
+        for way, side in SIDES
+    ]
+    ratio = mean_of_cycles(
+        "static over sliding friction", [friction / each.level for each, friction in found], unit="1",
+        method=f"{method} over the median of the stroke, mean of strokes",
+    )  # fmt: skip
+    measured = [each for each, _ in found if is_measured(record, "friction")]  # a balance rings by its own smoothing
+    rings = [_ringing([each for each in measured if each.way == way], side, record.fs) for way, side in SIDES]
+    swings = [_swing([each for each, _ in found if each.way == way], side) for way, side in SIDES]
+    gives = "the contact gives way before it slips: the first peak holds the ring that follows"
+    status = "ok" if 2 * rested > len(found) else gives
+    flagged = [replace(each, status=status) if each is not None and each.status == "ok" else each for each in level]
+    return Breakaway(
+        flagged[0], flagged[1], replace(ratio, status=status) if ratio.status == "ok" else ratio, rings[0], rings[1],
+        swings[0], swings[1], len(found), status,
+    )  # fmt: skip
+
+
+def _pull(record: Record) -> tuple[Array | None, Mapping[str, Any]]:
+    """What pulls at the mass while it rests, where friction came from a balance whose constants are known."""
+    told = [step.arguments for step in record.history if step.action == "friction_force"]
+    made = record.channels["friction"].source == "friction_force"
+    if not (made and told and told[-1].get("mass") and told[-1].get("contact") == "ground"):
+        return None, {}
+    rig = told[-1]
+    pull = -rig["stiffness"] * record["x"]
+    if "z" in record:
+        moved = rig["damping"] * record.fs * np.gradient(record["z"]) if rig["damper"] == "base" else 0.0
+        pull = pull + rig["stiffness"] * record["z"] + moved
+    return (pull + record["force"] if "force" in record else pull), rig
+
+
+def _borne(stroke: Stroke, pull: Array | None, rig: Mapping[str, Any], fs: float) -> float | None:
+    """What the contact bears just before it slips."""
+    if pull is None or not stroke.rests:
+        return float(stroke.friction[stroke.slip])
+    if stroke.slip < LEAST:
+        return None
+    first = stroke.slip // 2
+    way = stroke.displacement - np.median(stroke.displacement[first : stroke.slip + 1])
+    last = int(np.argmax(way > TRAVEL * np.ptp(way))) + 1
+    if last - first < LEAST:
+        return None
+    force = stroke.way * pull[stroke.first + first : stroke.first + last]
+    begins = _start(way[first:last], force, rig["mass"], fs)
+    if begins is None:
+        return None
+    rows = np.arange(max(0, int(begins) - max(4, (first + int(begins)) // BEFORE)), int(begins) + 1)
+    line = np.polyfit(rows - begins, force[rows], 1) if len(rows) > 1 else force[rows]
+    return float(line[-1])
+
+
+def _start(travel: Array, pull: Array, mass: float, fs: float) -> float | None:
+    """When, in samples, a slip begins of which the first travel is known."""
+    costs = {}
+    for begin in range(1, len(travel) - 3):
+        free = np.zeros((2, len(travel)))  # travel that the pull alone, and a force of 1 N, would make
+        free[0, begin:], free[1, begin:] = _twice(pull[begin:]), _twice(np.ones(len(travel) - begin))
+        free /= mass * fs**2
+        design = np.column_stack([np.ones(len(travel)), -free[1] / free[1, -1]])
+        answer = np.linalg.lstsq(design, travel - free[0], rcond=None)[0]
+        if pull[begin] >= answer[1] / free[1, -1]:
+            costs[begin] = float(np.sum((design @ answer - travel + free[0]) ** 2))
+    if not costs:
+        return None
+    best = min(costs, key=lambda begin: costs[begin])
+    low, middle, high = (costs.get(best + side, np.inf) for side in (-1, 0, 1))
+    curved = low - 2 * middle + high
+    return best + (low - high) / (2 * curved) if np.isfinite(curved) and curved > 0 else float(best)
+
+
+def _twice(values: Array) -> Array:
+    """The integral of the integral, by trapezoids of one sample."""
+    for _ in range(2):
+        values = np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2)])
+    return values
+
+
+def _swing(strokes: Sequence[Stroke], side: str) -> Estimate | None:
+    """Median deviation of the friction from its median while it slides, as a normal law's standard deviation."""
+    if not strokes:
+        return None
+    shares = []
+    for stroke in strokes:
+        fast = np.gradient(stroke.displacement)[stroke.slip :]
+        friction = stroke.friction[stroke.slip :][fast > FAST * fast.max()]
+        shares.append(float(np.median(np.abs(friction - np.median(friction)))) / QUARTILE / stroke.level)
+    found = mean_of_cycles(
+        f"swing of the friction while sliding {side}", shares, unit="1", method="median deviation from the median"
+    )
+    swings = f"the friction swings by {100 * found.value:.0f} % of its level while it slides: a vibration of the rig"
+    return found if found.value < STEADY else replace(found, status=f"{swings} or a faulty record, no steady friction")
+
+
+def _ringing(strokes: Sequence[Stroke], side: str, fs: float) -> Estimate | None:
+    """How fast the friction swings after slip has begun, where it does, and in most strokes alike."""
+    lines = np.array([line for stroke in strokes if (line := _line(stroke, fs))]).reshape(-1, 2)
+    if not len(lines):
+        return None
+    alike = np.abs(lines[:, 0] / np.median(lines[:, 0]) - 1) < ALIKE
+    loud = float(np.median(lines[:, 1]))
+    if loud < LOUD or 2 * alike.sum() <= len(strokes):
+        return None
+    return mean_of_cycles(
+        f"ringing after slip begins, {side}", lines[alike, 0], unit="Hz", method="strongest line after each breakaway",
+        checks=(f"in {alike.sum()} of {len(strokes)} strokes", f"amplitude {100 * loud:.0f} % of the sliding friction"),
+    )  # fmt: skip
+
+
+def _line(stroke: Stroke, fs: float) -> tuple[float, float] | None:
+    """Frequency and amplitude, over the sliding friction, of the strongest line soon after the breakaway."""
+    after = stroke.friction[stroke.slip : stroke.slip + (len(stroke.friction) - stroke.slip) // SOON]
+    if len(after) < RING:
+        return None
+    rows = np.linspace(-1, 1, len(after))
+    swings = after - np.polynomial.Polynomial.fit(rows, after, SLOW)(rows)
+    frequency = forcing_frequency(swings, fs).value
+    phase = 2 * np.pi * frequency / fs * np.arange(len(after))
+    wave = np.column_stack([np.cos(phase), np.sin(phase)])
+    return frequency, float(np.linalg.norm(np.linalg.lstsq(wave, swings, rcond=None)[0])) / stroke.level

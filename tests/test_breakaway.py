@@ -1,0 +1,153 @@
+"""The friction at breakaway, what a contact does before it slips, and a slider pulled through a spring."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.errors import EstimateError, RecordError
+
+MASS, STIFFNESS, FS = 3.08, 1191.0, 500.0
+
+
+def driven(law: ss.Coulomb | ss.CompliantContact, *, noise: float = 2e-6, fs: float = FS) -> ss.Record:
+    """A shaken mass that stops twice a cycle, its displacements with noise, its friction balanced from them."""
+    slider = ss.Oscillator(MASS, STIFFNESS, law=law, drive=ss.HarmonicBase(3e-3, frequency=1.0))
+    run = ss.simulate(slider, cycles=20).record(fs=fs).between(2.0, 20.0)
+    rng = np.random.default_rng(3)
+    noisy = {name: run[name] + rng.normal(0, noise, len(run)) for name in "xz"}
+    return ss.friction_force(ss.Record.of(noisy, fs=fs), mass=MASS, stiffness=STIFFNESS)
+
+
+@pytest.mark.parametrize("static", [1.0, 1.1, 1.3])
+def test_static_friction_is_found_whether_it_is_higher_or_not(static: float) -> None:
+    found = ss.breakaway(driven(ss.Coulomb(1.0, static=static)))
+    assert found.forward is not None
+    assert found.back is not None
+    for each in (found.forward, found.back, found.ratio):
+        assert each.value == pytest.approx(static, rel=0.03)
+    assert found.ringing_forward is None
+    assert found.status == "ok"
+
+
+def test_breakaway_does_not_hang_on_units_of_motion_or_on_its_sign() -> None:
+    record = driven(ss.Coulomb(1.0, static=1.2))
+    turned = ss.Record.of({name: -record[name] for name in "xz"}, fs=FS)
+    turned = ss.friction_force(turned, mass=MASS, stiffness=STIFFNESS)
+    there, here = ss.breakaway(turned), ss.breakaway(record)
+    assert there.forward is not None
+    assert here.back is not None
+    assert there.forward.value == pytest.approx(here.back.value, rel=1e-6)
+    heavy = ss.Record.of({name: record[name] for name in "xz"}, fs=FS)
+    heavy = ss.friction_force(heavy, mass=10 * MASS, stiffness=10 * STIFFNESS)
+    assert ss.breakaway(heavy).ratio.value == pytest.approx(here.ratio.value, rel=1e-6)
+
+
+@pytest.mark.parametrize("stiffness", [2e4, 2e5])
+def test_a_contact_that_gives_way_is_told_with_its_stiffness(stiffness: float) -> None:
+    found = ss.presliding(driven(ss.CompliantContact(1.0, stiffness=stiffness, damping=20), noise=2e-7))
+    assert found.verdict == "gives way"
+    assert found.stiffness is not None
+    assert found.stiffness.value == pytest.approx(stiffness, rel=0.15)  # low: smoothing blurs the friction alone
+    assert found.backlash is not None
+    assert abs(found.backlash.value) < 0.1 / stiffness * 2
+
+
+def test_a_rigid_contact_is_called_rigid() -> None:
+    found = ss.presliding(driven(ss.Coulomb(1.0)))
+    assert found.verdict == "rigid"
+    assert found.stiffness is None
+    assert "would be felt" in found.evidence
+
+
+def test_a_mass_that_moves_against_its_load_leaves_it_open() -> None:
+    record = driven(ss.Coulomb(1.0))
+    moved = record["x"] - 3e-5 * record["friction"]  # the sensor's foot gives way, not the contact
+    told = ss.presliding(ss.Record.of({"x": moved, "friction": record["friction"]}, fs=FS))
+    assert told.verdict == "can not be told"
+    assert "against its load" in told.status
+
+
+def test_play_is_measured() -> None:
+    time = np.arange(8000) / 1000
+    x = 4e-3 * np.sin(2 * np.pi * time)
+    friction, spring, play = np.zeros(time.size), 0.0, 0.0
+    for row in range(1, time.size):  # a gap of 1 mm before a spring of 5000 N/m that slips at 2 N
+        way = x[row] - x[row - 1]
+        if 0 < abs(play + way) < 0.5e-3 and spring == 0:
+            play += way
+            continue
+        before = spring
+        spring = float(np.clip(spring + 5000 * way, -2, 2))
+        if before * spring < 0:
+            spring, play = 0.0, -0.5e-3 * np.sign(way)
+        friction[row] = spring
+    record = ss.Record.of({"x": x, "friction": friction}, fs=1000)
+    found = ss.presliding(record)
+    assert found.backlash is not None
+    assert found.backlash.value == pytest.approx(1e-3, rel=0.1)
+    assert found.stiffness is not None
+    assert found.stiffness.value == pytest.approx(5000, rel=0.05)
+
+
+def test_ringing_after_each_breakaway_is_named() -> None:
+    time = np.arange(12000) / 1000
+    v = np.cos(2 * np.pi * 0.5 * time)
+    since = np.mod(time + 0.5, 1.0)  # the velocity changes its sign at 0.5 s, 1.5 s ...
+    way = np.sign(v)
+    friction = way * (2 + 0.6 * np.exp(-since / 0.1) * np.cos(2 * np.pi * 47 * since))
+    friction += np.random.default_rng(0).normal(0, 0.005, time.size)
+    found = ss.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": friction}, fs=1000))
+    for each in (found.ringing_forward, found.ringing_back):
+        assert each is not None
+        assert each.value == pytest.approx(47, rel=0.03)
+
+
+def test_a_friction_that_swings_all_the_while_is_flagged() -> None:
+    time = np.arange(12000) / 1000
+    v = np.cos(np.pi * time)
+    shaken = np.sign(v) * (2 + 1.5 * np.sin(2 * np.pi * 23 * time) * (v < 0))
+    found = ss.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": shaken}, fs=1000))
+    assert found.swing_forward is not None
+    assert found.swing_forward.status == "ok" or "cycles" in found.swing_forward.status
+    assert found.swing_back is not None
+    assert "no steady friction" in found.swing_back.status
+
+
+def test_strokes_are_needed() -> None:
+    time = np.arange(4000) / 1000
+    record = ss.Record.of({"x": time, "friction": np.ones(4000)}, fs=1000)
+    with pytest.raises(EstimateError, match=r"cycle|stroke"):
+        ss.breakaway(record)
+    with pytest.raises(RecordError, match="friction"):
+        ss.presliding(ss.Record.of({"x": np.sin(time)}, fs=1000))
+
+
+def sawtooth(rate: float, *, period: float = 0.5, noise: float = 1e-3, fs: float = 1000) -> ss.Record:
+    time = np.arange(int(20 * fs)) / fs
+    force = 0.3 + rate * np.mod(time, period) + np.random.default_rng(1).normal(0, noise, time.size)
+    return ss.Record.of({"load": force}, fs=fs)
+
+
+@pytest.mark.parametrize("rate", [0.1, 3.0])
+def test_a_pulled_slider_is_loaded_at_the_rate_of_its_spring(rate: float) -> None:
+    found = ss.pulled_slider(sawtooth(rate, noise=1e-3 * rate))
+    assert found.regime == "stick-slip"
+    assert found.loading_rate.value == pytest.approx(rate, rel=0.02)
+    assert found.frequency.value == pytest.approx(2.0, rel=0.01)
+    assert found.drop.value == pytest.approx(0.5 * rate, rel=0.1)
+
+
+def test_a_slider_that_swings_is_not_called_stick_slip() -> None:
+    time = np.arange(20000) / 1000
+    wave = 1 + 0.1 * np.sin(2 * np.pi * 3 * time) + np.random.default_rng(2).normal(0, 1e-3, time.size)
+    found = ss.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
+    assert found.regime == "inertial"
+    assert found.rise_over_fall.value == pytest.approx(1.0, abs=0.1)
+    assert "does not stick" in found.loading_rate.status
+
+
+def test_a_force_that_does_not_drop_tells_nothing_of_slips() -> None:
+    with pytest.raises(EstimateError, match="three slips"):
+        ss.pulled_slider(ss.Record.of({"load": np.linspace(0, 1, 5000)}, fs=1000))

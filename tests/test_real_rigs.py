@@ -1,0 +1,104 @@
+"""Real forced rigs, measured by other people, through the public questions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import stickslip as ss
+
+Sets = Callable[[str], Path]
+WEIGHT = 0.0307 * 9.81  # of the paper slider [N]
+SOUND = ("0.5Hz35lbtension", "0.5Hz36lbtension1amplitude", "0.5Hz80lbtension", "1Hz35lbtension", "1Hz80lbtension")
+FAULTY = "0.5Hz0lbtension0.5amplitude"
+
+
+def frame(dataset: Sets, weight: str) -> ss.Findings:
+    """The shaken frame: M 3.0799 kg, C 0.669 N s/m, K 1191 N/m (Marino and Cicirello 2023)."""
+    files = [dataset("frame_base_excited") / f"s_b_{weight}_{side}.mat" for side in "xy"]
+    record = ss.read_record(files, channels={"x": "x [mm]", "z": "y [mm]"})
+    return ss.analyze(record, mass=3.0799, stiffness=1191, damping=0.669, damper="base")
+
+
+def brake(dataset: Sets, name: str) -> ss.Record:
+    channels = {"x": "#2 [in]", "friction": "c3 [kip]", "v": "#4 [in/s]"}
+    return ss.read_record(dataset("band_brake_damper") / f"{name}.json", channels=channels, time="#1")
+
+
+@pytest.mark.parametrize(("weight", "friction"), [("250g", 0.682), ("450g", 1.318)])
+def test_the_frame_sticks_and_slips_in_each_cycle(dataset: Sets, weight: str, friction: float) -> None:
+    found = frame(dataset, weight)
+    assert found.loops is not None
+    assert found.loops.level.value == pytest.approx(friction, rel=0.04)
+    assert found.sticks is not None
+    assert found.sticks.per_cycle.value == pytest.approx(2.0, abs=0.01)
+    # forward and back apart, the friction just before breakaway is that of sliding, or a little more
+    assert found.breakaway is not None
+    assert found.breakaway.status == "ok"
+    assert 0.95 < found.breakaway.ratio.interval[0] < found.breakaway.ratio.value < 1.15
+    for side, level in ((found.breakaway.forward, found.loops.forward), (found.breakaway.back, found.loops.back)):
+        assert side is not None
+        assert side.value == pytest.approx(level.value, rel=0.2)
+
+
+@pytest.mark.parametrize(("weight", "least"), [("250g", 2e-6), ("450g", 3e-5)])
+def test_the_frame_moves_against_its_load_so_compliance_is_not_told(dataset: Sets, weight: str, least: float) -> None:
+    """While it sticks it creeps some micrometres the wrong way, and more under more load: no contact does so."""
+    found = frame(dataset, weight).presliding
+    assert found is not None
+    assert found.verdict == "can not be told"
+    assert "against its load" in found.evidence
+    assert found.compliance_forward.interval[1] < 0
+    assert -found.compliance_forward.value > least
+
+
+@pytest.mark.parametrize("name", SOUND)
+def test_the_band_brake_gives_way_with_play_before_it_slips(dataset: Sets, name: str) -> None:
+    found = ss.analyze(brake(dataset, name))
+    assert found.presliding is not None
+    assert found.presliding.verdict == "gives way"
+    assert found.presliding.stiffness is not None
+    assert 2e6 < found.presliding.stiffness.value < 5e6  # read off the loops: 1 to 4 kip over 0.1 to 0.15 inch
+    assert found.presliding.backlash is not None
+    assert found.presliding.backlash.value == pytest.approx(0.0032, abs=0.0009)  # one device, whatever its tension
+    assert found.loops is not None
+    for level in (found.loops.forward, found.loops.back):
+        assert 0.8 < level.value / 4448.2216 < 4.4  # kip
+
+
+def test_the_band_brake_rings_after_slip_begins(dataset: Sets) -> None:
+    found = ss.breakaway(brake(dataset, "0.5Hz35lbtension"))
+    assert found.ringing_forward is not None
+    assert 41 < found.ringing_forward.value < 50
+    assert found.ringing_back is not None
+    assert 50 < found.ringing_back.value < 58
+    assert found.ratio.value > 1.2  # the first peak, ring included
+    assert "gives way" in found.status
+
+
+def test_the_faulty_file_is_flagged_and_the_others_are_not(dataset: Sets) -> None:
+    for name in (*SOUND, "0.5Hz20lbtension", "1Hz20lbtension", FAULTY):
+        found = ss.breakaway(brake(dataset, name))
+        flagged = [each for each in found.estimates if "no steady friction" in each.status]
+        assert bool(flagged) == (name == FAULTY), name
+
+
+@pytest.mark.parametrize(("name", "slope", "tolerance"), [("v42", 0.0234, 0.08), ("v1100", 0.614, 0.07)])
+def test_paper_on_paper_is_loaded_at_the_rate_of_the_spring(
+    dataset: Sets, name: str, slope: float, tolerance: float
+) -> None:
+    """k V / (m g), published; two of three records stick, as the paper says (Colas et al. 2019)."""
+    path = dataset("paper_stick_slip") / f"k168Nm_{name}.mat"
+    found = ss.analyze(ss.read_record(path, channels={"load": f"Fnorm * {WEIGHT} [N]"})).pull
+    assert found is not None
+    assert found.loading_rate.value / WEIGHT == pytest.approx(slope, rel=tolerance)
+    assert found.regime == "stick-slip"
+    assert found.status == "ok"
+
+
+def test_paper_on_paper_swings_when_it_is_pulled_fast(dataset: Sets) -> None:
+    path = dataset("paper_stick_slip") / "k168Nm_v4300.mat"
+    found = ss.pulled_slider(ss.read_record(path, channels={"load": f"Fnorm * {WEIGHT} [N]"}))
+    assert found.regime == "inertial"
