@@ -64,6 +64,7 @@ if TYPE_CHECKING:
         RingDown as RingDown,
         find_releases as find_releases,
     )
+    from stickslip.identify.sensor_delay import SensorDelay as SensorDelay, sensor_delay as sensor_delay
     from stickslip.identify.sticks import find_sticks as find_sticks
     from stickslip.mending import mend as mend
     from stickslip.plot.figures import figures as figures
@@ -202,6 +203,7 @@ _ROOMS = {
     "pulled_slider": "identify.pull", "Pull": "identify.pull",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
     "regress_friction": "identify.regression",
+    "sensor_delay": "identify.sensor_delay", "SensorDelay": "identify.sensor_delay",
     "decrement": "identify.decrement", "Decrement": "identify.decrement", "Bounds": "identify.decrement",
     "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
     "fit_decay": "fit.decay", "DecayFit": "fit.answer",

@@ -1,0 +1,326 @@
+"""Two sensors of one motion: the delay between them, and the mount of the second, by the phases of all lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.signals.derivative_spectra import derivative_spectra, window
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+BLOCK = 1 << 16  # samples under one window of a long record
+HIGHEST = 0.4  # of the sampling rate, up to which lines are used
+CLEAR = 20.0  # power of a line over its noise, of which noise alone has 1
+TELLING = 0.999  # of what all lines tell of a mount: the rest is left out
+NEAR = 64  # lines over which the noise around a line is averaged
+FARTHEST = 0.25  # s: longer delays are not looked for
+TRIED = 5  # delays from which a fit begins, of two kinds
+ROUNDS = 4  # in which the windows are moved to the delay and the noise is found anew
+CHANCE = 3.0  # deviations by which noise alone may leave more than its power
+SAME = 6.0  # deviations of a misfit by which another delay's may be worse and still not be told from the best
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two sensors of one motion u, each about its mean.
+
+    Attributes
+    ----------
+    first, second : ndarray (n,)
+        Samples; the second follows the derivative of `order` of the first.
+    fs : float
+        Sampling rate [Hz].
+    noise : tuple of float
+        Standard deviation of each one's noise in a sample.
+    order : int
+        0, 1 or 2.
+    """
+
+    first: Array
+    second: Array
+    fs: float
+    noise: tuple[float, float]
+    order: int
+
+    def stretches(self, delay: float, room: int = 0) -> list[Lines]:
+        """All of it, one window each, with the first later by `delay` [s]; `room` samples at both ends are left out."""
+        whole = round(delay * self.fs)
+        begin, end = max(room, whole), len(self.second) - max(room, -whole)
+        blocks = max(1, (end - begin) // BLOCK)
+        step = (end - begin) // blocks
+        count = step - step % (1 << max(0, step.bit_length() - 8))  # few prime factors: fast to transform
+        return [self._lines(begin + j * step, count, delay, whole) for j in range(blocks)]
+
+    def _lines(self, begin: int, count: int, delay: float, whole: int) -> Lines:
+        before, shift = self.first[begin - whole : begin - whole + count], delay - whole / self.fs
+        first = derivative_spectra(before, fs=self.fs, orders=[self.order], shift=shift)[0]
+        second = derivative_spectra(self.second[begin : begin + count], fs=self.fs, orders=[0, 1, 2])
+        turn = np.asarray(2 * math.pi * np.fft.rfftfreq(count, 1 / self.fs), dtype=np.float64)
+        flat = window(count)
+        noise = [self.noise[0] ** 2 * turn ** (2 * self.order), np.full_like(turn, self.noise[1] ** 2)]
+        return Lines(turn, first, second, float(np.sum(flat**2)) * np.array(noise), np.fft.rfft(flat))
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Spectral lines of a pair, the first as late as the second.
+
+    Attributes
+    ----------
+    turn : ndarray (n,)
+        w [1/s].
+    first : ndarray (n,)
+        Derivative of the first.
+    second : ndarray (3, n)
+        The second with its first two derivatives.
+    noise : ndarray (2, n)
+        Power of the noise in the first one's derivative and in the second.
+    constant : ndarray (n,)
+        What the window makes of an offset.
+    """
+
+    turn: Array
+    first: Complex
+    second: Complex
+    noise: Array
+    constant: Complex
+
+    @property
+    def clear(self) -> NDArray[np.bool_]:
+        """Lines above the noise in either sensor, whatever the phase between them: the choice favours no delay."""
+        loud = np.any(np.abs([self.first, self.second[0]]) ** 2 > CLEAR * self.noise, axis=0)
+        inside = np.arange(len(self.turn)) < 2 * HIGHEST * len(self.turn)
+        return np.asarray(loud & inside & (self.turn > 0))
+
+    @property
+    def information(self) -> Array:
+        """Power of a line over its noise, as far as both sensors show it."""
+        powers = np.abs([self.first, self.second[0]]) ** 2 / self.noise
+        return np.asarray(np.prod(powers, axis=0) / np.sum(powers, axis=0))
+
+    @property
+    def rate(self) -> float:
+        """Of the lines' phases with the delay [1/s]."""
+        return float(np.sqrt(np.average(self.turn**2, weights=self.information)))
+
+    @property
+    def gain(self) -> float:
+        """Of the second over the first, without delay."""
+        weight = self.information / np.abs(self.first) ** 2
+        return float(np.sum(weight * (self.first.conj() * self.second[0]).real) / np.sum(self.information))
+
+    def chosen(self, which: NDArray[np.bool_]) -> Lines:
+        """Some of the lines."""
+        return Lines(
+            self.turn[which], self.first[which], self.second[:, which], self.noise[:, which], self.constant[which]
+        )
+
+    def without_offset(self, gain: float) -> Lines:
+        """The second less its offset, which is all that the relation leaves at frequency zero."""
+        offset = (self.second[0, 0] - gain * self.first[0]).real / self.constant[0].real
+        return replace(self, second=self.second - offset * np.outer([1, 0, 0], self.constant))
+
+    def residual(self, theta: Array) -> Complex:
+        """Of the relation, over its standard deviation; theta is (delay [s], gain, 2 zeta/w_m [s], 1/w_m^2 [s^2])."""
+        delay, gain, damped, squared = theta
+        left = self.second[0] + damped * self.second[1] + squared * self.second[2]
+        factor = 1 + 1j * damped * self.turn - squared * self.turn**2
+        spread = np.abs(factor) ** 2 * self.noise[1] + gain**2 * self.noise[0]
+        return np.asarray((left - gain * np.exp(-1j * self.turn * delay) * self.first) / np.sqrt(spread))
+
+    def weighed(self, theta: Array) -> Lines:
+        """The same with the noise that is found around each line, between the clear ones."""
+        from scipy.ndimage import uniform_filter1d
+
+        some = self.turn > 0
+        power, between = np.zeros(len(some)), some & ~self.clear
+        power[some] = np.abs(self.chosen(some).residual(theta)) ** 2
+        if between.sum() < NEAR:
+            between = some
+        share = uniform_filter1d(between.astype(float), NEAR, mode="constant")
+        near = uniform_filter1d(power * between, NEAR, mode="constant") / np.maximum(share, 1 / NEAR)
+        return replace(self, noise=self.noise * np.where(share > 0.25, near, power[between].mean()))
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """A delay between two sensors, and what was fitted with it.
+
+    Attributes
+    ----------
+    theta : ndarray (4,)
+        Delay [s] of the second behind the first, gain, 2 zeta/w_m [s] and 1/w_m^2 [s^2] of the second one's mount.
+    covariance : ndarray (4, 4)
+        Of theta; zero where it was held.
+    misfit : float
+        Sum of squares of the residual over its deviation, real and imaginary parts apart.
+    lines : Lines
+        Those used.
+    """
+
+    theta: Array
+    covariance: Array
+    misfit: float
+    lines: Lines
+
+    @property
+    def delay(self) -> float:
+        """Of the second behind the first [s]."""
+        return float(self.theta[0])
+
+    @property
+    def unexplained(self) -> float:
+        """Power of the residual at the lines over that of the noise between them."""
+        return self.misfit / max(1, 2 * len(self.lines.turn) - 4)
+
+    @property
+    def widening(self) -> float:
+        """Factor on the variances: one, unless more is left than chance lets noise leave."""
+        return self.unexplained if self.unexplained > 1 + CHANCE / math.sqrt(len(self.lines.turn)) else 1.0
+
+    def sd(self, slope: Sequence[float]) -> float:
+        """Standard deviation of what changes with theta by `slope`."""
+        return math.sqrt(float(np.dot(slope, self.covariance @ slope)) * self.widening)
+
+
+def align(
+    pairs: Sequence[Pair],
+    delay: float,
+    *,
+    mount: tuple[float, float] | None = None,
+    free: bool = False,
+    room: int = 0,
+    rounds: int = ROUNDS,
+) -> Alignment:
+    """The delay under which two sensors' readings are most likely, from near a first guess on.
+
+    Parameters
+    ----------
+    pairs : sequence of Pair
+        Runs of the same two sensors.
+    delay : float
+        First guess [s], good to half a cycle of the fastest lines.
+    mount : tuple of (float, float), optional
+        Resonance [Hz] and damping ratio of the second one's mount; rigid where left out.
+    free : bool
+        Whether the mount is fitted.
+    room : int
+        Samples at both ends that are left out.
+    rounds : int
+        Of fitting; in one or two all noise is taken for white.
+
+    Returns
+    -------
+    Alignment
+
+    Raises
+    ------
+    EstimateError
+        No line stands above the noise.
+    """
+    from scipy.optimize import least_squares
+
+    minimise: Any = least_squares
+    theta = np.array([0.0, math.nan, *_terms(mount)])
+    used = [0, 1, 2, 3] if free else [0, 1]
+    for done in range(rounds):
+        parts = [part for pair in pairs for part in pair.stretches(delay, room)]
+        if not done:
+            theta[1] = told(parts).gain or 1.0
+        parts = [part.without_offset(theta[1]) for part in parts]
+        lines = told([part.weighed(theta) for part in parts] if done and rounds > 2 else parts)
+        unit = 1 / lines.rate
+        scale = np.array([unit, abs(theta[1]), unit, unit**2])[used]
+
+        def residuals(values: Array, lines: Lines = lines, scale: Array = scale) -> Array:
+            tried = theta.copy()
+            tried[used] = values * scale
+            found = lines.residual(tried) * math.sqrt(2)  # real and imaginary part have half of the power each
+            return np.concatenate([found.real, found.imag])
+
+        answer = minimise(residuals, theta[used] / scale, method="lm")
+        theta[used] = answer.x * scale
+        delay, theta[0] = float(np.clip(delay + theta[0], -FARTHEST, FARTHEST)), 0.0
+    covariance = np.zeros((4, 4))
+    covariance[np.ix_(used, used)] = np.linalg.pinv(answer.jac.T @ answer.jac) * np.outer(scale, scale)
+    square = window(1 << 12) ** 2
+    overlap = float(np.mean(square**2) / np.mean(square) ** 2)  # neighbouring lines share some noise
+    return Alignment(np.array([delay, *theta[1:]]), covariance * overlap, float(2 * answer.cost), lines)
+
+
+def _terms(mount: tuple[float, float] | None) -> tuple[float, float]:
+    """2 zeta/w_m and 1/w_m^2 of a mount's frequency [Hz] and damping ratio."""
+    if mount is None:
+        return 0.0, 0.0
+    turn = 2 * math.pi * mount[0]
+    return 2 * mount[1] / turn, 1 / turn**2
+
+
+def told(parts: Sequence[Lines]) -> Lines:
+    """The clear lines of all stretches that tell something of a delay or a mount."""
+    clear = [each.chosen(each.clear) for each in parts]
+    lines = Lines(*(np.concatenate([getattr(each, field.name) for each in clear], axis=-1) for field in fields(Lines)))
+    if len(lines.turn) < 2:
+        raise EstimateError(
+            "no line of the spectra stands above the noise of either channel",
+            "a delay between sensors needs a motion that both see",
+            "record a livelier motion",
+        )
+    telling = lines.information * lines.turn**4
+    ordered = np.sort(telling)
+    least = ordered[np.searchsorted(np.cumsum(ordered), (1 - TELLING) * ordered.sum())]
+    return lines.chosen(telling >= least)
+
+
+def likely_delays(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> list[Alignment]:
+    """Every delay that explains the pairs as well as any, the shortest first.
+
+    Parameters
+    ----------
+    pairs : sequence of Pair
+        Runs of the same two sensors.
+    mount : tuple of (float, float) or None
+        Of the second sensor, where known; else it is fitted.
+
+    Returns
+    -------
+    list of Alignment
+        Quick ones, all of the same samples.
+    """
+    tried = sorted({delay for pair in pairs for delay in _peaks(pair)}, key=abs)
+    room = math.ceil(abs(tried[-1]) * max(pair.fs for pair in pairs)) + 2
+    fits = [align(pairs, delay, mount=mount, free=mount is None, room=room, rounds=2) for delay in tried]
+    best = min(fits, key=lambda fit: fit.misfit)
+    limit = best.misfit + SAME * math.sqrt(4 * len(best.lines.turn)) * best.widening
+    alike: list[Alignment] = []
+    for fit in sorted((fit for fit in fits if fit.misfit <= limit), key=lambda fit: abs(fit.delay)):
+        if all(abs(fit.delay - other.delay) > 0.5 / pairs[0].fs for other in alike):
+            alike.append(fit)
+    return alike
+
+
+def _peaks(pair: Pair) -> list[float]:
+    """Delays [s], to a sample, at which a pair correlates most, fast lines first: the highest and the nearest."""
+    skip = max(0, (len(pair.first) - BLOCK) // 2)
+    rows = slice(skip, len(pair.first) - skip)
+    part = replace(pair, first=pair.first[rows], second=pair.second[rows]).stretches(0.0)[0]
+    lines, step = told([part]), float(part.turn[1])
+    count = round(2 * math.pi * pair.fs / step)
+    spectrum = np.zeros(count // 2 + 1, dtype=complex)
+    across = lines.first.conj() * lines.second[0]
+    spectrum[np.round(lines.turn / step).astype(int)] = lines.information * lines.turn**2 * across / np.abs(across)
+    reach = min(round(FARTHEST * pair.fs), count // 4)
+    lags = np.arange(-reach, reach + 1)
+    height = np.abs(np.fft.irfft(spectrum, count))[lags]
+    inner = height[1:-1]
+    peaks = 1 + np.flatnonzero((inner >= height[:-2]) & (inner > height[2:]) & (inner > height.max() / 2))
+    chosen = {*peaks[np.argsort(-height[peaks])][:TRIED], *peaks[np.argsort(np.abs(lags[peaks]))][:TRIED]}
+    return [float(lags[i]) / pair.fs for i in chosen] or [0.0]

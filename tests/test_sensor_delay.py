@@ -1,0 +1,214 @@
+"""The delay between two sensors: at its bound, without bias between samples, and with intervals that hold."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import stickslip as ss
+from stickslip.errors import EstimateError, RecordError
+from stickslip.signals.derivative_spectra import derivative_spectra, window
+
+Array = NDArray[np.float64]
+FS = 1000.0
+T = np.arange(6000) / FS
+RATE, DECAY, SIZE = 30.91, 0.025, 8e-3  # 1/s, 1/s, m: the air track's free vibration
+NOISE = {"x": 2e-6, "a": 0.04}
+
+
+def ring_down(delay: float, seed: int, mount: tuple[float, float] | None = None) -> ss.Record:
+    """x and a of a free vibration, x later by `delay` than a, which may stand on a mount."""
+    pole = complex(-DECAY, RATE)
+    response = 1.0 + 0j
+    if mount:
+        w = 2 * math.pi * mount[0]
+        response = w * w / (pole**2 + 2 * mount[1] * w * pole + w * w)
+    rng = np.random.default_rng(seed)
+    x = (SIZE * np.exp(pole * (T - delay))).real + NOISE["x"] * rng.standard_normal(T.size)
+    a = (SIZE * pole**2 * response * np.exp(pole * T)).real + NOISE["a"] * rng.standard_normal(T.size)
+    return ss.Record.of({"x": x, "a": a + 0.3}, fs=FS)
+
+
+def bound() -> float:
+    """Cramer-Rao, of a motion that neither channel knows: var(d) = (s_a^2 + w^4 s_x^2) / sum of (da/dt)^2."""
+    slope = (SIZE * complex(-DECAY, RATE) ** 3 * np.exp(complex(-DECAY, RATE) * T)).real
+    return math.sqrt((NOISE["a"] ** 2 + RATE**4 * NOISE["x"] ** 2) / np.sum(slope**2))
+
+
+@pytest.mark.parametrize(("order", "channel"), [(0, "x"), (1, "v"), (2, "a")])
+@pytest.mark.parametrize("shift", [0.0, 0.37e-3])
+def test_the_spectrum_of_a_derivative_is_that_of_the_measured_one(order: int, channel: str, shift: float) -> None:
+    """Of a chirp that begins and ends anyhow, against its derivative in closed form."""
+
+    def motion(times: Array) -> dict[str, Array]:
+        phase, rate = 20 * times + 15 * times**2, 20 + 30 * times
+        return {
+            "x": np.sin(phase), "v": rate * np.cos(phase), "a": 30 * np.cos(phase) - rate**2 * np.sin(phase),
+        }  # fmt: skip
+
+    found = derivative_spectra(motion(T)["x"], fs=FS, orders=[order], shift=shift)[0]
+    true = np.fft.rfft(window(T.size) * motion(T - shift)[channel])
+    assert np.abs(found - true).max() < 1e-6 * np.abs(true).max()
+
+
+@pytest.mark.parametrize("part", [0.0, 0.25, 0.5, 0.75])
+@pytest.mark.parametrize("whole", [1, -7])
+def test_no_lag_between_samples_is_favoured(part: float, whole: int) -> None:
+    delay = (whole + part) / FS
+    found = [ss.sensor_delay(ring_down(delay, seed)).delay for seed in range(8)]
+    errors = np.array([estimate.value + delay for estimate in found])
+    assert abs(errors.mean()) < 3.5 * bound() / math.sqrt(len(errors))
+    assert found[0].sd < 1.1 * bound()
+
+
+def test_it_reaches_its_bound_and_the_interval_holds() -> None:
+    found = [ss.sensor_delay(ring_down(1.2585e-3, seed)).delay for seed in range(100, 140)]
+    errors = np.array([estimate.value + 1.2585e-3 for estimate in found])
+    assert np.sqrt(np.mean(errors**2)) < 1.1 * bound() * (1 + 2 / math.sqrt(2 * len(errors)))
+    assert np.mean([estimate.sd for estimate in found]) < 1.1 * bound()
+    assert np.mean([estimate.includes(-1.2585e-3) for estimate in found]) > 0.86  # of 40; 95 % less three deviations
+
+
+def test_the_least_residual_is_drawn_half_way_between_samples() -> None:
+    errors = [ss.sensor_delay(ring_down(5.1 / FS, seed), method="residual").delay.value + 5.1 / FS for seed in range(4)]
+    assert max(errors) < -0.05 / FS  # the phase is 1e-6 s off
+    assert "interpolation" in ss.sensor_delay(ring_down(5.1 / FS, 1), method="residual").status
+
+
+def test_a_stated_mount_is_held_and_a_hidden_one_is_said() -> None:
+    record = ring_down(1.2585e-3, 3, mount=(125.0, 0.1))
+    blind = ss.sensor_delay(record)
+    assert blind.delay.value + 1.2585e-3 == pytest.approx(2 * 0.1 / (2 * math.pi * 125), rel=0.02)
+    assert "mount of a delays" in blind.status
+    told = ss.sensor_delay(record.with_details("a", mount=(125.0, 0.1)))
+    assert abs(told.delay.value + 1.2585e-3) < 4 * bound()
+    assert told.mount_frequency is None
+    assert "held at 125 Hz" in told.delay.checks[0]
+
+
+def test_a_whole_cycle_more_is_named() -> None:
+    found = ss.sensor_delay(ring_down(1.2585e-3, 3))
+    assert "repeats itself" in found.status
+    assert any(abs(other + 1.2585e-3 - 2 * math.pi / RATE) < 2e-3 for other in found.others)
+
+
+def test_a_sensor_of_the_wrong_sign_is_found() -> None:
+    record = ring_down(1.2585e-3, 3)
+    turned = record.with_channel("a", -record["a"], unit="m/s^2")
+    found = ss.sensor_delay(turned)
+    assert found.gain.value == pytest.approx(-1, abs=1e-3)
+    assert "wrong sign" in found.status
+
+
+FRICTION = ((11.1, 2e-3, 1.1), (8.7, 1.1e-3, 1.1), (0.0, 8e-3, 0.0))
+LAG = 0.0389 / 30.91
+
+
+@cache
+def moved(frequency: float, amplitude: float, kinetic: float) -> ss.Trajectory:
+    contact = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9) if kinetic else ss.Coulomb(0.0)
+    drive = ss.HarmonicBase(amplitude, frequency=frequency) if frequency else ss.Release()
+    slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.1196, law=contact, drive=drive)
+    return ss.simulate(slider, duration=10.0, start={} if frequency else {"x": amplitude})
+
+
+@cache
+def measured(frequency: float, amplitude: float, kinetic: float, seed: int = 1) -> ss.Record:
+    run = moved(frequency, amplitude, kinetic)
+    return ss.Rig().measure(run, fs=4000, rng=seed, start=4.0 if frequency else 0.1)
+
+
+def test_runs_with_friction_tell_the_mount_and_the_delay() -> None:
+    found = ss.sensor_delay(measured(*FRICTION[0]))
+    assert found.mount_frequency is not None
+    assert found.mount_damping is not None
+    assert found.mount_frequency.includes(125)
+    assert found.mount_damping.includes(0.1)
+    assert found.delay.includes(-LAG)
+    assert found.mount_frequency.sd < 2.0
+
+
+def test_several_runs_are_answered_together() -> None:
+    runs = [measured(*each) for each in FRICTION]
+    alone, joint = ss.sensor_delay(runs[0]), ss.sensor_delay(runs)
+    assert joint.status == "ok"  # no delay of whole cycles fits all of them
+    assert joint.delay.sd < alone.delay.sd
+    assert abs(joint.delay.value + LAG) < 3 * joint.delay.sd
+    assert joint.mount_frequency is not None
+
+
+def test_what_is_found_is_used() -> None:
+    """The whole way: the delay and the mount found in one run, stated for another, and the friction of that."""
+    runs = [measured(*each) for each in FRICTION]
+    found = ss.sensor_delay([runs[0], runs[2]])
+    assert found.mount_frequency is not None
+    assert found.mount_damping is not None
+    record = runs[1].with_details("a", mount=(found.mount_frequency.value, found.mount_damping.value))
+    for channel in ("x", "z"):
+        record = record.with_details(channel, delay=-found.delay.value)
+    force = ss.friction_force(record, mass=2.42, stiffness=2310, damping=0.1196, method="motion")
+    true = moved(*FRICTION[1]).sample(4.0 + force.time, ("friction",))[0][0]
+    assert np.sqrt(np.mean((force["friction"] - true)[400:-400] ** 2)) < 0.03
+    late = runs[1].with_details("a", mount=(found.mount_frequency.value, found.mount_damping.value))
+    raw = ss.friction_force(late, mass=2.42, stiffness=2310, damping=0.1196, method="motion")
+    true = moved(*FRICTION[1]).sample(4.0 + raw.time, ("friction",))[0][0]
+    assert np.sqrt(np.mean((raw["friction"] - true)[400:-400] ** 2)) > 0.05
+
+
+def test_noise_that_is_not_white_widens_the_interval() -> None:
+    rng = np.random.default_rng(1)
+    record = ring_down(1.2585e-3, 3)
+    slow = np.fft.rfft(rng.standard_normal(T.size))
+    slow *= 10 / np.maximum(np.fft.rfftfreq(T.size, 1 / FS), 0.5)
+    louder = record.with_channel("a", record["a"] + 0.04 * np.fft.irfft(slow, T.size), unit="m/s^2", noise=0.04)
+    found = ss.sensor_delay(louder).delay
+    assert 1.5 < found.sd / bound() < 4  # (1 + (10/5)^2)^(1/2) = 2.2 at the line
+    assert found.includes(-1.2585e-3)
+
+
+def test_a_long_record_in_blocks_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    record = ring_down(1.2585e-3, 3)
+    whole = ss.sensor_delay(record).delay
+    monkeypatch.setattr("stickslip.signals.alignment.BLOCK", 2000)
+    parts = ss.sensor_delay(record).delay
+    assert abs(parts.value - whole.value) < 2 * bound()
+    assert parts.sd == pytest.approx(whole.sd, rel=0.15)
+
+
+def test_channels_that_do_not_follow_one_motion_are_told() -> None:
+    rng = np.random.default_rng(2)
+    record = ss.Record.of({"x": np.sin(30 * T), "a": np.sin(47 * T) + 0.01 * rng.standard_normal(T.size)}, fs=FS)
+    with pytest.raises(EstimateError, match="does not follow"):
+        ss.sensor_delay(record)
+    other = ring_down(0.0, 1)
+    other = other.with_channel("a", other["a"] + 0.5 * np.sin(40 * T), unit="m/s^2")
+    assert "more than noise" in ss.sensor_delay(other).status
+
+
+@pytest.mark.parametrize(
+    ("channels", "match"), [(("x", "load"), "one motion"), (("a", "x"), "turn them round"), (("x", "x"), "one motion")]
+)
+def test_what_can_not_be_compared_is_refused(channels: tuple[str, str], match: str) -> None:
+    record = ring_down(0.0, 1)
+    record = record.with_channel("load", record["a"], unit="N")
+    with pytest.raises(EstimateError, match=match):
+        ss.sensor_delay(record, channels=channels)
+
+
+def test_what_can_not_be_answered_is_refused() -> None:
+    rng = np.random.default_rng(1)
+    silent = ss.Record.of({"x": rng.standard_normal(6000), "a": rng.standard_normal(6000)}, fs=FS)
+    with pytest.raises(EstimateError, match="no line"):
+        ss.sensor_delay(silent)
+    with pytest.raises(EstimateError, match="does not change"):
+        ss.sensor_delay(ss.Record.of({"x": np.zeros(6000), "a": rng.standard_normal(6000)}, fs=FS))
+    with pytest.raises(EstimateError, match="magic"):
+        ss.sensor_delay(silent, method="magic")
+    with pytest.raises(EstimateError, match="no record"):
+        ss.sensor_delay([])
+    with pytest.raises(RecordError, match="missing"):
+        ss.sensor_delay(ss.Record.of({"x": T}, fs=FS))
