@@ -189,7 +189,9 @@ def _restored(record: Record, name: str) -> Array:
 def _is_firm(free: Alignment, held: Alignment) -> bool:
     """Whether the record tells the mount."""
     gain, damped, squared = free.theta[1:]
-    damps = damped > -CHANCE * free.sd([0, 0, 1, 0])
+    wide, steps = CHANCE * free.sd([0, 0, 1, 0]), np.diff(free.lines.turn)
+    narrowest = 2 * squared * float(np.min(steps[steps > 0], initial=math.inf))  # else a disturbance of one line
+    damps = damped > -wide and damped + wide > narrowest
     moves = abs(gain) > FAINT * free.sd([0, 1, 0, 0])  # else what rings is not what moves
     better = (held.misfit - free.misfit) / free.widening
     return bool(squared > 0 and damps and moves and free.sd([0, 0, 0, 1]) < 2 * FIRM * squared and better > NEEDED)
