@@ -178,3 +178,43 @@ def test_the_pendulums(dataset):
         (found,) = find_releases(mended).ring_downs
         assert found.frequency == pytest.approx(frequency, rel=0.01)
         assert found.stopped
+
+
+@pytest.mark.parametrize("height", [8.0, 1.0, 30.0])
+def test_a_spike_is_refused_with_what_takes_it_out(height):
+    values, fs, _ = free_decay()
+    values = values + 1e-3 * np.random.default_rng(1).standard_normal(len(values))
+    spiked = values.copy()
+    spiked[355] += height
+    with pytest.raises(ss.RecordError, match=r"spikes \(row 355\).*remove_spikes"):
+        find_releases(of(spiked, fs))
+    assert ss.fit_decay(ss.remove_spikes(of(spiked, fs), "x")).damping_ratio.value == pytest.approx(0.0316, abs=1e-3)
+
+
+@pytest.mark.parametrize("moment", [55, 90, 160, 215])
+def test_a_motion_that_is_caught_and_held_ends_there(moment):
+    """A hand catches it mid-swing, holds it and lets it go again: both are read, and neither as it is not."""
+    values, fs, _ = free_decay()
+    begin = int(np.flatnonzero(values != values[0])[0])
+    caught = values[: begin + moment]
+    hold = np.full(300, caught[-1])
+    again, _, _ = free_decay(amplitude=caught[-1])
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(caught) + 300 + len(again))
+    record = of(np.concatenate([caught, hold, again]) + noise, fs)
+    found = find_releases(record)
+    assert found.ring_downs[-1].stopped
+    assert not any(each.stopped for each in found.ring_downs[:-1])
+    decay = ss.fit_decay(record)
+    assert decay.damping_ratio.value == pytest.approx(0.0316, abs=max(1e-3, 4 * decay.damping_ratio.sd))
+    assert decay.dry_displacement.value == pytest.approx(0.02, abs=1e-3)
+
+
+def test_drift_that_spoils_the_decrements_is_told():
+    values, fs, _ = free_decay()
+    values = values + 1e-3 * np.random.default_rng(1).standard_normal(len(values))
+    drifting = values + 0.002 * np.arange(len(values)) / fs  # 1.4 % of the first amplitude in all
+    assert "the rest position drifts" in ss.decrement(of(drifting, fs)).status
+    assert "drift" in ss.fit_decay(of(drifting, fs)).status
+    for zeta in (0.0177, 0.0316, 0.15, 0.25):
+        steady, fs, _ = free_decay(damping_ratio=zeta, dry=0.03, amplitude=1.0)
+        assert "drifts" not in find_releases(of(steady, fs)).status

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 LOCATIONS = ("fit", "sample")
 NEEDED = {"immune": 4, "plain": 3}  # extremes
 SMEARED = 0.3  # samples by which the instant of an acceleration's jump is not known
+GAINS = -0.002  # damping ratio below which a motion is no free decay
 MOST = 60  # extremes, after which pairs are no longer tried one by one
 
 
@@ -247,6 +248,12 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
     damping_ratio = Estimate.normal(
         "damping ratio", found[0], sd=spread[0], unit="1", method=of_m, status=status, checks=quoted[0]
     )
+    if damping_ratio.value < GAINS and damping_ratio.interval[1] < 0:
+        raise EstimateError(
+            f"the damping ratio would be {damping_ratio.value:.2g}",
+            "a free decay loses energy",
+            "something caught or drove the mass: cut the record with record.between(first, last)",
+        )
     dry_displacement = Estimate.normal(
         "dry friction displacement", found[1], sd=spread[1], unit=length, status=status, checks=quoted[1],
         method=f"equation {'6.9' if form == 'immune' else '6.6'}, mean of the last {last}",
@@ -370,11 +377,9 @@ def _frequency(times: Array, values: Array, ring_down: RingDown) -> tuple[Estima
     sd = max(left, 0.1 / ring_down.fs) / math.sqrt(len(at) * spread)
     notes: tuple[str, ...] = ()
     if not ring_down.isochronous:
-        gaps = np.diff(when)
-        quarter = max(1, len(gaps) // 4)
-        change = 100 * (float(gaps[:quarter].mean() / gaps[-2 * quarter :].mean()) - 1)
-        longer = "longer" if change > 0 else "shorter"
-        notes = (f"the first cycles are {abs(change):.2g} % {longer} than the last: the spring is not linear",)
+        longer = "longer" if ring_down.unevenness > 0 else "shorter"
+        change = 100 * abs(ring_down.unevenness)
+        notes = (f"the first cycles are {change:.2g} % {longer} than the middle ones: the spring is not linear",)
     method = f"straight line through {len(times)} turns"
     return Estimate.normal(
         "frequency", 1 / (2 * half), sd=sd / (2 * half**2), unit="Hz", method=method, quantile=student(freedom),

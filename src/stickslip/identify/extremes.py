@@ -245,6 +245,7 @@ def _evenly_spaced(turns: Array, ring_down: RingDown) -> Array:
     number = np.arange(len(turns))
     weights = np.abs(ring_down.samples[ring_down.turns] - ring_down.rest)
     weights[[0, -1]] *= 1e-3  # release and stop are known less well than turns
+    weights[~ring_down.sound] *= 1e-3
     first = 0 if ring_down.isochronous else len(turns) // 2
     line = np.polyfit(number[first:], turns[first:], 1, w=weights[first:])
     return np.concatenate([turns[:first], np.polyval(line, number[first:])])

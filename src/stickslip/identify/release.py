@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
-from stickslip.record.flaws import clipped
+from stickslip.record.check import in_words
+from stickslip.record.flaws import clipped, spikes
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 from stickslip.signals.noise import noise_level, quantisation_step
@@ -33,8 +34,14 @@ UNEVEN = 0.015  # change of the half cycles over the decay, beyond which the spr
 RISEN = 1.01  # a swing over the one before that may be a rise
 FEW = 5_000  # samples that show whether values repeat
 EVEN = 0.5  # of the median gap between levels: less is no digitiser's
+DRIFTS = 0.003  # of the first swing: a rise of the rest position that matters
+CUT_SHORT = 0.08  # less than the half period that the swing before tells: a last swing that was cut off
+STEEPNESS = 1.1  # three standard deviations of a half period told by steepness, times the swing over the least seen
+HELD = 1.5  # times the last turn of another release: friction does not hold a mass there
+STANDS_OFF = 0.02  # of the record's range: a spike that may be taken for an extreme
 STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 LOST = "an extreme was lost, and what lies beyond it is left out"
+CAUGHT = "the motion was caught before it died away"
 CLIPPED = "clipped swings are left out"
 
 
@@ -102,13 +109,21 @@ class RingDown:
         return "; ".join(self.notes) or "ok"
 
     @property
-    def isochronous(self) -> bool:
-        """Whether the half cycles are as long after the middle as at the beginning: the spring is linear."""
-        gaps = np.diff(self.turns[1:-1] if len(self.turns) > 6 else self.turns)
+    def unevenness(self) -> float:
+        """By what part the first half cycles are longer than the middle ones; 0 where that is within their error."""
+        turns = self.turns[self.sound]
+        gaps = np.diff(turns[1:-1] if len(turns) > 6 else turns)
         some = max(1, len(gaps) // 8)
         middle = gaps[len(gaps) // 2 :][: 2 * some]  # the last turns are too lopsided for their instants to be told
+        if len(gaps) < 4:
+            return 0.0
         early, late = float(gaps[:some].mean()), float(middle.mean())
-        return len(gaps) < 4 or abs(early / late - 1) < max(UNEVEN, 4 / (some * early))
+        return early / late - 1 if abs(early / late - 1) >= max(UNEVEN, 4 / (some * early)) else 0.0
+
+    @property
+    def isochronous(self) -> bool:
+        """Whether the half cycles are as long after the middle as at the beginning: the spring is linear."""
+        return self.unevenness == 0
 
     @property
     def time(self) -> Array:
@@ -186,7 +201,7 @@ def find_releases(record: Record, *, channel: str | None = None) -> Releases:
     Raises
     ------
     RecordError
-        No such channel, a value that is no number, a broken clock, or fewer than 24 samples.
+        No such channel, a value that is no number, a broken clock, spikes, or fewer than 24 samples.
     EstimateError
         No free decay: nothing moves, nothing swings back (overdamped), the oscillation grows, stays or beats, or
         something drives it.
@@ -202,10 +217,11 @@ def find_releases(record: Record, *, channel: str | None = None) -> Releases:
     """
     record, name = _prepared(record, channel)
     values = record[name]
+    _refuse_spikes(values, name)
     grid = quantisation_step(values)
     noise, step = _noise(record, name, grid), _step(values, grid)
     swings = _Swings.of(values, noise, step, record.fs)
-    runs = _runs(swings, values)
+    runs = _runs(swings, ORDERS[name])
     unsound = np.zeros(len(values), dtype=bool)
     for first, last in clipped(values, plateaus=name != "x", step=grid):
         unsound[first : last + 1] = True
@@ -213,8 +229,31 @@ def find_releases(record: Record, *, channel: str | None = None) -> Releases:
         _ring_down(record, name, swings, run, (noise, step), unsound, _bounds(swings, runs, number, len(values)))
         for number, run in enumerate(runs)
     )
-    many = (f"{len(found)} releases in one record, each on its own",) if len(found) > 1 else ()
-    return Releases(found, (*many, *dict.fromkeys(note for each in found for note in each.notes)))
+    kept = _as_let_go(found)
+    many = (f"{len(kept)} releases in one record, each on its own",) if len(kept) > 1 else ()
+    less = len(found) - len(kept)
+    lost = (f"{less} short motion{'s' * (less > 1)} that something caught left out",) if less else ()
+    return Releases(kept, (*many, *lost, *dict.fromkeys(note for each in kept for note in each.notes)))
+
+
+def _as_let_go(found: tuple[RingDown, ...]) -> tuple[RingDown, ...]:
+    """The releases, each up to where something caught it: friction holds no mass where another release went on."""
+    longest = max(found, key=lambda each: len(each.turns))
+    if longest.order > 0 or not longest.stopped:
+        return found
+    turned = abs(float(longest.samples[longest.turns[-2]]) - longest.rest)
+    kept = []
+    for each in found:
+        stayed = abs(float(each.samples[each.turns[-1]]) - longest.rest)
+        if each.stopped and stayed > HELD * turned + SEEN * each.noise:
+            last = int(each.turns[-2])
+            each = replace(
+                each, samples=each.samples[: last + 1], stop=each.first + last / each.fs, stopped=False,
+                turns=each.turns[:-1], sound=each.sound[:-1], notes=(*each.notes, CAUGHT),
+            )  # fmt: skip
+        if len(each.turns) >= 4 or each is longest:
+            kept.append(each)
+    return tuple(kept)
 
 
 def _prepared(record: Record, channel: str | None) -> tuple[Record, str]:
@@ -242,6 +281,22 @@ def _prepared(record: Record, channel: str | None) -> tuple[Record, str]:
                     "give a record with the drive at rest, or ask friction_loops(record)",
                 )
     return record, name
+
+
+def _refuse_spikes(values: Array, name: str) -> None:
+    """Refuse spikes that would be taken for turning points."""
+    least = STANDS_OFF * float(np.ptp(values)) if name != "a" else math.inf  # an acceleration jumps at every turn
+    off = np.abs(values[1:-1] - (values[2:] + values[:-2]) / 2)
+    least = max(least / 2, 8 * float(np.median(off)))
+    if not np.any(off > least):
+        return
+    high = [(first, last) for first, last in spikes(values) if np.max(off[max(0, first - 1) : last]) > least]
+    if high:
+        raise RecordError(
+            f"channel {name} has spikes ({in_words(high)})",
+            "a free decay would take them for extremes",
+            f'replace them with remove_spikes(record, "{name}")',
+        )
 
 
 def _noise(record: Record, name: str, grid: float | None = None) -> float:
@@ -334,7 +389,7 @@ def _weighted_median(values: Array, weights: Array) -> float:
     return float(values[order][np.searchsorted(total, total[-1] / 2)])
 
 
-def _runs(swings: _Swings, values: Array) -> list[_Run]:
+def _runs(swings: _Swings, order: int) -> list[_Run]:
     """First swing, and the one after the last, of each free decay."""
     if len(swings.middles) < 2:
         raise EstimateError(
@@ -349,6 +404,8 @@ def _runs(swings: _Swings, values: Array) -> list[_Run]:
         _refuse_growth(sizes, grown, swings)
         starts = [0, *(int(i) + 1 for i in np.flatnonzero(grown)), len(sizes)]
         runs += [_Run(first + a, first + b, a > 0) for a, b in pairwise(starts) if b - a >= 2]
+    if order == 0:  # the last swing of a velocity or an acceleration ends in a jump of its own
+        runs = [run for run in (_uncut(run, swings) for run in runs) if run.end - run.first >= 2]
     if not runs:
         raise EstimateError(
             "no two swings keep pace and shrink",
@@ -357,6 +414,13 @@ def _runs(swings: _Swings, values: Array) -> list[_Run]:
         )
     least = max(0.05 * max(float(swings.sizes[run.first]) for run in runs), 3 * swings.seen)
     return _mended([run for run in runs if swings.sizes[run.first] > least] or runs, swings)
+
+
+def _uncut(run: _Run, swings: _Swings) -> _Run:
+    """The run without a last swing that was cut short, by a hand or the record's end: it is steeper at its middle."""
+    last = run.end - 1
+    doubt = max(CUT_SHORT, STEEPNESS * swings.seen / float(swings.sizes[last]))
+    return replace(run, end=last) if swings.halves[last] < (1 - doubt) * swings.halves[last - 1] else run
 
 
 def _mended(runs: list[_Run], swings: _Swings) -> list[_Run]:
@@ -441,19 +505,23 @@ def _ring_down(
     rest = _centre(levels)
     near = max(SEEN * noise, 1.5 * step, 0.02 * abs(levels[0] - rest))
     held = not run.inside and (release >= 0 or (release > -0.25 * half and _flat_start(values, half, noise)))
-    stopped = stop + half <= bounds[1] - 1
+    ends = stop + half <= bounds[1] - 1 or bounds[1] < len(values)
     start = max(0, round(release))
     end = min(round(stop), len(values) - 1)
-    hold = _reach(values[bounds[0] : start + 1][::-1], near) if held else 1
-    tail = _reach(values[end : bounds[1]], near) if stopped else len(values) - end
-    first, last = max(0, start + 1 - hold), end + tail
+    hold = _reach(values[min(bounds[0], start) : start + 1][::-1], near) if held else 1
+    tail = _reach(values[end : max(bounds[1], end + 1)], near) if ends else len(values) - end
+    stopped = ends and (ORDERS[name] > 0 or tail >= half / 2)
+    first, last = max(0, start + 1 - hold), end + (tail if stopped or not ends else 1)
     tops = levels[1:-1] > levels[:-2]
     sides = np.where(tops, 1.0, -1.0)
     inner = [extreme(values, round(a), round(b), side) for (a, b), side in zip(pairwise(middles), sides, strict=True)]
     turns = [*([start] if held or run.inside else []), *inner, *([end] if stop <= len(values) - 1 - half / 8 else [])]
-    rows = np.array(turns, dtype=np.intp)
+    rows = np.array([row for row in turns if first <= row < last], dtype=np.intp)
     sound = ~unsound[rows]
-    notes = _notes(values[rows], sound, ORDERS[name], run, noise)
+    notes = (
+        *_notes(values[rows], sound, ORDERS[name], run, noise),
+        *([CAUGHT] if ends and not stopped and not run.parted else []),
+    )
     return RingDown(
         name, ORDERS[name], record.channels[name].unit, record.fs, record.start + first / record.fs,
         values[first:last], record.start + start / record.fs, record.start + end / record.fs, bool(held),
@@ -470,10 +538,10 @@ def _centre(levels: Array) -> float:
 
 
 def _reach(values: Array, near: float) -> int:
-    """For how many rows `values` stay near the first few."""
+    """For how many rows `values` stay near the first few, itself one of them."""
     level = float(np.median(values[: max(1, min(8, len(values)))]))
-    away = np.flatnonzero(np.abs(values - level) > near)
-    return int(away[0]) if len(away) else len(values)
+    away = np.flatnonzero(np.abs(values[1:] - level) > near)
+    return 1 + int(away[0]) if len(away) else len(values)
 
 
 def _flat_start(values: Array, half: float, noise: float) -> bool:
@@ -496,7 +564,9 @@ def _notes(levels: Array, sound: NDArray[np.bool_], order: int, run: _Run, noise
         pairs = (between[:-1] + between[1:]) / 2
         along = np.linspace(-0.5, 0.5, len(pairs))
         rise = float(along @ pairs / (along @ along))
-        if abs(rise) > max(0.03 * abs(levels[0] - levels[1]), 4 * noise):
+        swing = abs(levels[0] - levels[1])
+        fall = 1 - abs(levels[1] - levels[2]) / swing
+        if abs(rise) > max(max(DRIFTS, fall**3 / 4) * swing, 4 * noise):  # uneven swings leave a trend of their own
             notes.append(f"the rest position drifts by {rise:.2g}: see remove_drift(record)")
     if run.parted:
         notes.append(LOST)
