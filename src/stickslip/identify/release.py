@@ -290,7 +290,7 @@ def _refuse_spikes(values: Array, name: str) -> None:
     least = max(least / 2, 8 * float(np.median(off)))
     if not np.any(off > least):
         return
-    high = [(first, last) for first, last in spikes(values) if np.max(off[max(0, first - 1) : last]) > least]
+    high = tuple(run for run in spikes(values) if np.max(off[max(0, run[0] - 1) : run[1]]) > least)
     if high:
         raise RecordError(
             f"channel {name} has spikes ({in_words(high)})",
