@@ -2,43 +2,14 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import stickslip as ss
+from rigs import CASES, RIG, SETTLED, measured, motion, told
 from stickslip.errors import EstimateError
 from stickslip.signals.kalman import Motion, Seen, smooth_motion
-
-CASES = {5.61: (0.6e-3, 1.05), 8.7: (1.1e-3, 1.1), 11.1: (2e-3, 1.1), 2.5: (0.65e-3, 1.1)}
-RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
-LAG = 0.0389 / 30.91
-SETTLED = 8.0  # s
-
-
-@cache
-def measured(frequency: float, rough: float = 0.0, seconds: float = 1.0) -> tuple[ss.Record, NDArray[np.float64]]:
-    """A record of the thesis's rig, and the true friction."""
-    amplitude, kinetic = CASES[frequency]
-    law: Any = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9)
-    if rough:
-        law = ss.RoughSurface(law, share=rough, length=2e-4, span=2e-3, seed=4)
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
-    run = ss.simulate(slider, duration=SETTLED + seconds)
-    record = ss.Rig().measure(run, fs=4000, rng=7, start=SETTLED)
-    return record, run.sample(np.minimum(SETTLED + record.time, run.duration), ("friction",))[0][0]
-
-
-def told(record: ss.Record, wrong: bool = False) -> ss.Record:
-    """The record with what its user knows of the sensors: rightly, or 2 %, 30 % and 20 us off."""
-    for name in ("x", "z"):
-        record = record.with_details(name, delay=LAG + 20e-6 * wrong)
-    record = record.with_details("a", mount=(127.5, 0.13) if wrong else (125.0, 0.1))
-    cell = {"mount": (255.0, 0.065), "inertia": 0.055} if wrong else {"mount": (250.0, 0.05), "inertia": 0.05}
-    return record.with_details("load", discharge=50.0, **cell)
 
 
 def error(record: ss.Record, truth: NDArray[np.float64], method: str) -> tuple[float, float]:
@@ -68,22 +39,15 @@ def test_motion_sensors_alone_come_near() -> None:
 def test_the_velocity_is_as_sure_as_it_says(frequency: float) -> None:
     record, _ = measured(frequency)
     found = ss.friction_force(told(record), method="fusion", **RIG)
-    amplitude, kinetic = CASES[frequency]
-    law = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9)
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
-    run = ss.simulate(slider, duration=SETTLED + 1.0)
-    true = run.sample(SETTLED + found.time[200:-200], ("v",))[0][0]
+    true = motion(frequency).sample(SETTLED + found.time[200:-200], ("v",))[0][0]
     share = np.mean(np.abs(found["v"][200:-200] - true) < 2 * found["v_sd"][200:-200])
     assert 0.87 < share < 0.98  # one second: the error in the base's motion is common to many samples
 
 
 @pytest.mark.parametrize(("channel", "limit"), [("load", 1.0), ("load", 0.7), ("load", 0.2), ("a", 0.5)])
 def test_a_sensor_at_the_end_of_its_range_is_left_out_there(channel: str, limit: float) -> None:
-    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
-    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    run = ss.simulate(ss.Oscillator(law=law, drive=drive, **RIG), duration=SETTLED + 1.0)
     rig = ss.Rig().having(channel, limit=limit)
-    record = told(rig.measure(run, fs=4000, rng=7, start=SETTLED))
+    record = told(rig.measure(motion(2.5), fs=4000, rng=7, start=SETTLED))
     assert error(record, measured(2.5)[1], "fusion")[0] < 0.026
     said = ss.friction_force(record, method="fusion", **RIG).history[-1].outcome
     assert f"{channel} is at the end of its range" in said

@@ -162,7 +162,7 @@ def with_velocity(record: Record, channel: str, question: str) -> Record:
 
 def _sticks(record: Record, question: str) -> Sticks:
     try:
-        sticks = find_sticks(record)
+        sticks = find_sticks(record, method="speed")  # windows are as wide as it says
     except EstimateError as error:
         raise EstimateError(f"no transition: {error.value}", error.rule, error.next_step) from error
     if not any(event.kind == "stick" and event.whole for event in sticks.events):

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.identify.force import FUSIONS
+from stickslip.identify.holds import Hold, Trace, find_holds
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
@@ -18,6 +22,7 @@ from stickslip.identify.motion import (
     contact_motion,
     find_cycles,
     motion_channels,
+    slid_on,
     stretches,
 )
 from stickslip.record.record import Record
@@ -27,8 +32,10 @@ from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
+METHODS = ("fusion", "speed")
 SLIPPED = 3.0  # times the threshold: a motion that never gets there is creep or noise within a stick
 DWELL = 2.5  # times the duration of a passage through zero, from which on it is a stick
+SHORT = 8.0  # samples of a hold below which others are likely missed
 FASTEST = 3  # samples: nothing shorter is told from a reversal
 
 
@@ -41,17 +48,22 @@ class StickEvent:
     time : float
         When it begins [s].
     kind : str
-        "stick" or "slip".
+        "stick", "slip", "microslip" (within the stick before it), or "microstick" (the contact holds while the motion
+        only reverses: too short for a stick).
     duration : float
-        How long it lasts [s].
+        How long it lasts [s]; a stick with the micro-slips in it.
     whole : bool
         False where the record begins or ends within it.
+    time_sd, duration_sd : float
+        Standard deviations of both [s].
     """
 
     time: float
     kind: str
     duration: float
     whole: bool = True
+    time_sd: float = math.nan
+    duration_sd: float = math.nan
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,24 +79,36 @@ class Sticks(Result):
         linearly too, so that the low end errs to the low side). `sd` is that of a normal law as wide as the interval.
     per_cycle : Estimate
         Stops per cycle.
+    microslips : Estimate or None
+        Micro-slips per stick; None where they can not be seen.
+    kind : str
+        "double stick-slip" where most sticks hold a micro-slip, "stick-slip", or "sliding" where nothing sticks.
     events : tuple of StickEvent
-        Sticks and slips in turn.
+        Sticks and slips in turn, each stick followed by the micro-slips within it.
     threshold : float
         Speed [m/s or rad/s] below which the contact may stick.
     noise : float
         Standard deviation of the velocity's noise [m/s or rad/s].
     frequency : Estimate
         Cycles per second [Hz].
+    method : str
+        "fusion": onsets from the friction of all sensors together, to a part of a sample; or "speed".
+    lost : tuple of str
+        What could not be told, and why.
     status : str
         "ok", or in words what to beware of.
     """
 
     share: Estimate
     per_cycle: Estimate
+    microslips: Estimate | None
+    kind: str
     events: tuple[StickEvent, ...]
     threshold: float
     noise: float
     frequency: Estimate
+    method: str
+    lost: tuple[str, ...]
     status: str
 
 
@@ -94,8 +118,17 @@ def find_sticks(
     contact: str | None = None,
     threshold: float | str | None = None,
     frequency: float | str | None = None,
+    method: str | None = None,
 ) -> Sticks:
     """When does the contact stick, for what share of the time, how often per cycle?
+
+    By "fusion" a stick begins where the velocity turns and the friction leaves its sliding value, and ends where the
+    friction, carried on with the contact's spring, reaches it again (see
+    :func:`~stickslip.identify.holds.find_holds`); where the mass gives way a little and holds again, it is a micro-slip
+    within the stick. On a rig like the thesis's (4 kHz) sticks begin within 0.015 ms and slips within 0.03 ms, by
+    motion sensors alone within 0.1 ms and 0.2 ms; an error of a sensor's lag is not in that.
+
+    By "speed" alone:
 
     The contact may stick where its speed is below a threshold: five standard deviations of the velocity's noise, or 4
     % of the typical peak speed where that is larger, for below that creep and presliding of a compliant contact are
@@ -107,7 +140,9 @@ def find_sticks(
     Parameters
     ----------
     record : Record
-        With ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base. Stated delays are taken out first.
+        With ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base. Stated delays are taken out first. Onsets
+        to a part of a sample, and micro-slips, need ``friction_force(record, ..., method="fusion")`` before, or
+        "motion".
     contact : {"ground", "base"}, optional
         What the mass slides on, the speed being that against it; as :func:`friction_force` was told, or the ground,
         when not given.
@@ -115,10 +150,13 @@ def find_sticks(
         Speed [m/s or rad/s] below which the contact may stick; found from the record when not given.
     frequency : float or str, optional
         Forcing frequency [Hz]; found from the record when not given.
+    method : {"fusion", "speed"}, optional
+        By fusion where the record's friction allows it, when not given.
 
     Returns
     -------
     Sticks
+        Where the method falls back, `lost` says what is lost by it.
 
     Raises
     ------
@@ -138,9 +176,48 @@ def find_sticks(
     (0.3, 2)
     """
     question = "sticks and slips"
+    if method not in (None, *METHODS):
+        raise EstimateError(f"method = '{method}'", f"it is one of {', '.join(METHODS)}", "choose one of them")
     record = without_delays(record, *motion_channels(record, contact), question=question)
     motion = contact_motion(record, contact=contact, question=question)
+    holds, lost = ((), ()) if method == "speed" else _fused_holds(record, contact)
+    if holds:
+        noise = float(np.median(record["v_sd"])) if "v_sd" in record else motion.noise
+        motion = replace(motion, velocity=record["v"], noise=noise, bandwidth=record.fs / 2)
     cycles = find_cycles(record, motion, frequency=frequency)
+    limit, rule = _threshold(motion, cycles, threshold)
+    stuck, certain = _stuck(motion, limit)
+    noisy, status = AUDIBLE * motion.noise, cycles.status
+    if limit < noisy:
+        status = f"the threshold is within the velocity's noise ({_words(noisy, motion)} is five deviations)"
+    stated = f"the velocity's noise is {_words(motion.noise, motion)}", *_sensitivity(motion, cycles, limit)
+    share, events = _share(stuck, certain, cycles, rule, stated), _events(stuck, certain, motion)
+    if holds:
+        events = _events_of(holds, stuck, motion, SLIPPED * limit)
+        share = _share_of(events, cycles, motion)
+    sticks = [event for event in events if event.kind == "stick"]
+    microslips = _microslips(events) if holds and any(event.whole for event in sticks) else None
+    double = microslips is not None and microslips.value > 0.5
+    per_cycle = mean_of_cycles(
+        "stops per cycle", _counted(sticks, cycles, motion), unit="1", method=f"sticks begun in each cycle; {rule}"
+    )
+    return Sticks(
+        share=share,
+        per_cycle=per_cycle,
+        microslips=microslips,
+        kind="double stick-slip" if double else "stick-slip" if sticks else "sliding",
+        events=events,
+        threshold=limit,
+        noise=motion.noise,
+        frequency=cycles.frequency,
+        method="fusion" if holds else "speed",
+        lost=lost,
+        status=status,
+    )
+
+
+def _threshold(motion: Motion, cycles: Cycles, threshold: float | str | None) -> tuple[float, str]:
+    """Speed below which the contact may stick, and the rule in words."""
     noisy, creep = AUDIBLE * motion.noise, CREEP * cycles.peak
     limit = max(noisy, creep) if threshold is None else parse_value(threshold, f"{motion.unit}/s")
     if not 0 < limit < cycles.peak and threshold is not None:
@@ -155,28 +232,8 @@ def find_sticks(
             "slips are told from sticks where they are three times as fast as the threshold",
             "give a record with less noise or more motion",
         )
-    stuck, certain = _stuck(motion, limit)
     told = "five deviations of its noise" if noisy >= creep else f"{100 * CREEP:g} % of its peak, to pass over creep"
-    rule = f"time with the speed below {_words(limit, motion)} ({'given' if threshold is not None else told})"
-    stated = (
-        f"the velocity's noise is {_words(motion.noise, motion)}",
-        *_sensitivity(motion, cycles, limit),
-    )
-    status = cycles.status
-    if limit < noisy:
-        status = f"the threshold is within the velocity's noise ({_words(noisy, motion)} is five deviations)"
-    per_cycle = mean_of_cycles(
-        "stops per cycle", _counted(stuck, cycles), unit="1", method=f"sticks begun in each cycle; {rule}"
-    )
-    return Sticks(
-        share=_share(stuck, certain, cycles, rule, stated),
-        per_cycle=per_cycle,
-        events=_events(stuck, motion),
-        threshold=limit,
-        noise=motion.noise,
-        frequency=cycles.frequency,
-        status=status,
-    )
+    return limit, f"time with the speed below {_words(limit, motion)} ({'given' if threshold is not None else told})"
 
 
 def _words(speed: float, motion: Motion) -> str:
@@ -242,23 +299,131 @@ def _per_cycle(stuck: NDArray[np.bool_], cycles: Cycles) -> Array:
     return np.asarray(np.diff(at) / np.diff(cycles.edges))
 
 
-def _counted(stuck: NDArray[np.bool_], cycles: Cycles) -> Array:
-    begins, ends = stretches(stuck)
-    middle = (begins + ends) / 2
-    counts, _ = np.histogram(middle, cycles.edges)
+def _counted(sticks: Sequence[StickEvent], cycles: Cycles, motion: Motion) -> Array:
+    middle = np.array([event.time + event.duration / 2 for event in sticks])
+    counts, _ = np.histogram((middle - motion.start) * motion.fs, cycles.edges)
     return counts.astype(float)
 
 
-def _events(stuck: NDArray[np.bool_], motion: Motion) -> tuple[StickEvent, ...]:
+def _events(stuck: NDArray[np.bool_], certain: NDArray[np.bool_], motion: Motion) -> tuple[StickEvent, ...]:
+    """Sticks and slips by speed; a stick begins between where the speed is low and where it would reach zero."""
     turns = np.flatnonzero(np.diff(stuck)) + 1
-    begins = np.concatenate([[0], turns])
-    ends = np.concatenate([turns, [len(stuck)]])
+    edges = np.concatenate([[0], turns, [len(stuck)]])
+    sure, ends = stretches(certain & stuck)
+    sds = np.zeros(len(edges))
+    for j, turn in enumerate(turns, start=1):
+        near = sure if stuck[turn] else ends  # a stick begins, or ends
+        apart = float(np.min(np.abs(near - turn))) if len(near) else 0.0
+        sds[j] = math.hypot(apart, motion.blur) / math.sqrt(3) / motion.fs
     return tuple(
         StickEvent(
             float(motion.start + first / motion.fs),
             "stick" if stuck[first] else "slip",
             float((last - first) / motion.fs),
-            whole=bool(first > 0 and last < len(stuck)),
+            bool(first > 0 and last < len(stuck)),
+            float(begin_sd),
+            math.hypot(begin_sd, end_sd),
         )
-        for first, last in zip(begins, ends, strict=True)
+        for first, last, begin_sd, end_sd in zip(edges[:-1], edges[1:], sds[:-1], sds[1:], strict=True)
     )
+
+
+# ---- from the holds of the contact
+
+
+def _fused_holds(record: Record, contact: str | None) -> tuple[tuple[Hold, ...], tuple[str, ...]]:
+    """The holds of a contact whose friction was found by all sensors together; and what is lost where it was not."""
+    told = [step for step in record.history if step.action == "friction_force"]
+    unseen = "onsets are told to the threshold only and micro-slips not at all"
+    if "friction" not in record or not told or told[-1].arguments.get("method") not in FUSIONS:
+        return (), (f'{unseen}: for them call friction_force(record, ..., method="fusion") first',)
+    if slid_on(record, contact) == "base":
+        return (), (
+            f"{unseen}: the contact is on the moving base, and the sensors together tell what rubs on the ground",
+        )
+    holds = find_holds(Trace.of(record))
+    if not holds:
+        return (), (
+            f"{unseen}: the contact's holds are shorter than four samples at {record.fs:g} Hz, or there are none",
+        )
+    cell = "load" in record and told[-1].arguments["method"] != "motion"
+    lost = [] if cell else ["without a load cell onsets are three to ten times less sure"]
+    shortest = record.fs * min(hold.end - hold.begin for hold in holds)
+    if shortest < SHORT:
+        lost.append(f"holds last {shortest:.0f} samples at {record.fs:g} Hz, and shorter ones are missed")
+    lost += [said for said in told[-1].outcome.split("; ") if "left to the others" in said]
+    return holds, tuple(lost)
+
+
+def _events_of(
+    holds: tuple[Hold, ...], stuck: NDArray[np.bool_], motion: Motion, fast: float
+) -> tuple[StickEvent, ...]:
+    """Sticks, the micro-slips within them, short holds and slips, in turn; a slip is micro where it never gets fast."""
+
+    def rows(begin: float, end: float) -> slice:
+        return slice(max(0, math.ceil((begin - motion.start) * motion.fs)), math.ceil((end - motion.start) * motion.fs))
+
+    spells: list[list[Hold]] = [[holds[0]]]
+    for hold in holds[1:]:
+        between = np.abs(motion.velocity[rows(spells[-1][-1].end, hold.begin)])
+        if between.max(initial=0.0) < fast:
+            spells[-1].append(hold)
+        else:
+            spells.append([hold])
+    first, last = motion.start, motion.start + len(stuck) / motion.fs
+    begins, ends = (motion.start + each / motion.fs for each in stretches(stuck))
+    unseen = motion.blur / motion.fs
+    edges = [  # a stick that the record cuts has no hold of its own
+        [Hold(begin, end, unseen, unseen)]
+        for begin, end in zip(begins, ends, strict=True)
+        if not any(spell[0].begin < end and begin < spell[-1].end for spell in spells)
+    ]
+    found: list[StickEvent] = []
+    free = Hold(first, first, 0.0, 0.0)
+    for spell in sorted(spells + edges, key=lambda each: each[0].begin):
+        found += _slip(free, spell[0], first, last)
+        begin, end = spell[0], spell[-1]
+        kind = "stick" if stuck[rows(begin.begin, end.end)].any() else "microstick"
+        whole = begin.begin > first and end.end < last
+        found.append(_event(kind, (begin.begin, begin.begin_sd), (end.end, end.end_sd), whole))
+        found += [
+            _event("microslip", (one.end, one.end_sd), (next_.begin, next_.begin_sd), True)
+            for one, next_ in pairwise(spell)
+        ]
+        free = end
+    return (*found, *_slip(free, Hold(last, last, 0.0, 0.0), first, last))
+
+
+def _slip(before: Hold, after: Hold, first: float, last: float) -> list[StickEvent]:
+    if after.begin <= before.end:
+        return []
+    whole = before.end > first and after.begin < last
+    return [_event("slip", (before.end, before.end_sd), (after.begin, after.begin_sd), whole)]
+
+
+def _event(kind: str, begin: tuple[float, float], end: tuple[float, float], whole: bool) -> StickEvent:
+    return StickEvent(
+        float(begin[0]), kind, float(end[0] - begin[0]), bool(whole), float(begin[1]), math.hypot(begin[1], end[1])
+    )
+
+
+def _share_of(events: tuple[StickEvent, ...], cycles: Cycles, motion: Motion) -> Estimate:
+    """Share of each cycle's time in sticks."""
+    sticks = [event for event in events if event.kind == "stick"]
+    begins = motion.fs * np.array([event.time - motion.start for event in sticks])
+    lengths = motion.fs * np.array([event.duration for event in sticks])
+    knots = np.column_stack([begins, begins + lengths]).ravel()
+    total = np.column_stack([np.cumsum(lengths) - lengths, np.cumsum(lengths)]).ravel()
+    share = np.diff(np.interp(cycles.edges, [0.0, *knots], [0.0, *total])) / np.diff(cycles.edges)
+    return mean_of_cycles(
+        "stuck share of the time", share, unit="1",
+        method="mean of cycles; a stick lasts from where the velocity turns to where the friction reaches its limit",
+    )  # fmt: skip
+
+
+def _microslips(events: tuple[StickEvent, ...]) -> Estimate:
+    """How many lie in each whole stick."""
+    slips = np.array([event.time for event in events if event.kind == "microslip"])
+    sticks = [event for event in events if event.kind == "stick" and event.whole]
+    counts = [float(np.sum((each.time < slips) & (slips < each.time + each.duration))) for each in sticks]
+    return mean_of_cycles("micro-slips per stick", counts, unit="1", method="turns of the velocity within a stick")
