@@ -98,18 +98,21 @@ def test_a_larger_candidate_never_leaves_more() -> None:
                 assert fitted.cost <= other.cost * (1 + 1e-6)
 
 
-def test_the_same_answer_in_other_units() -> None:
+@pytest.mark.parametrize("length", [1e-9, 1e3])
+def test_the_same_answer_in_other_units(length: float) -> None:
     times = np.arange(480) / FS
     values = np.zeros(len(PARAMETERS))
     values[:6], values[NUMBERS["exponent"]] = [W, 0.02, 0.02, 0.0, 1.0, 0.3], 0.5
     x = free_decay(times, values)[0] + 1e-3 * np.random.default_rng(2).standard_normal(times.size)
     metres = choose(times, x, fs=FS, start=values[:6])
-    scale = np.array([0.1, 1.0, 1e-3, 1e-3, 1e-3, 10.0])
-    slow = choose(10 * times, 1e-3 * x, fs=FS / 10, start=scale * values[:6])
+    scale = np.array([0.1, 1.0, length, length, length, 10.0])
+    slow = choose(10 * times, length * x, fs=FS / 10, start=scale * values[:6])
     assert slow.model == metres.model == "both"
     assert slow.chosen.fitted.value("dry_displacement") == pytest.approx(
-        1e-3 * metres.chosen.fitted.value("dry_displacement"), rel=1e-5
+        length * metres.chosen.fitted.value("dry_displacement"), rel=1e-5
     )
+    for parameter, unit in (("damping_ratio", 1.0), ("dry_displacement", length)):
+        assert slow.interval(parameter) == pytest.approx([unit * end for end in metres.interval(parameter)], rel=1e-4)
     assert [each.kept for each in slow.candidates] == [each.kept for each in metres.candidates]
 
 

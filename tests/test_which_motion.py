@@ -87,11 +87,21 @@ def test_a_real_pendulum(dataset: Callable[[str], Path]) -> None:
     assert "no candidate fits" in found.status
 
 
-@pytest.mark.parametrize(("step", "noise"), [(5e-3, 1e-4), (5e-3, 2e-3)])
-def test_a_coarse_encoder_feigns_no_friction(step: float, noise: float) -> None:
-    """A long row of equal readings at rest is one reading: its error does not average out."""
+@pytest.mark.parametrize("length", [1e-9, 1.0])
+def test_a_motion_without_noise_is_the_simplest_that_makes_it(length: float) -> None:
+    """What is left is rounding, whose colour says nothing."""
+    x = length * free_decay(TIMES, [2 * np.pi, 0.02, 0.02, 0.013, 1.0, 0.27, 0, 0, 0, 0, 0.5, 0])[0]
+    found = ss.choose_motion(ss.Record.of({"x": x}, fs=200))
+    assert (found.model, found.status) == ("both", "ok")
+    assert ss.fit_decay(ss.Record.of({"x": x}, fs=200)).noise == "white"
+
+
+@pytest.mark.parametrize(("step", "noise"), [(5e-3, 1e-4), (5e-3, 2.5e-4), (5e-3, 2e-3)])
+@pytest.mark.parametrize("counts", [False, True])
+def test_a_coarse_encoder_feigns_no_friction(step: float, noise: float, counts: bool) -> None:
+    """Readings of one level at rest are one reading: its error does not average out."""
     given = [2 * np.pi, 0.02, 0.02, 0.013, 1.0, 0.27, 0, 0, 0, 0, 0.5, 0]
     x = free_decay(TIMES, given)[0] + noise * np.random.default_rng(1).standard_normal(TIMES.size)
-    found = ss.choose_motion(ss.Record.of({"x": step * np.round(x / step)}, fs=200))
+    found = ss.choose_motion(ss.Record.of({"x": np.round(x / step) * (1 if counts else step)}, fs=200))
     assert (found.model, found.status) == ("both", "ok")
-    assert found.dry_displacement_any.includes(0.02)
+    assert found.dry_displacement_any.includes(0.02 / (step if counts else 1))

@@ -18,6 +18,7 @@ FIRST = 4.0  # periods fitted first; then twice as many, till the end: the phase
 LEAST = 24  # blocks of a fit
 HOPELESS = 4.0  # times what viscous damping with dry friction leaves
 EVALUATIONS = 60  # of one search
+PRECISION = 1e-7  # of the range: no record is better, no residual below it says anything
 CONVERGED = 1e-8  # relative change of the sum of squares, and of the parameters
 LOWEST = {"damping_ratio": 0.0, "dry_displacement": 0.0, "quadratic": 0.0, "rise": 0.0, "micro_slip": 0.0}
 SHAPES = {
@@ -56,6 +57,11 @@ class BlockMeans:
     weights: Array
     fs: float
     restoring: Restoring = "linear"
+
+    @property
+    def floor(self) -> float:
+        """What rounding may leave of a motion that is fitted exactly."""
+        return PRECISION * float(np.ptp(self.values))
 
     @cached_property
     def spread(self) -> Array:
@@ -242,18 +248,19 @@ def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int |
 
     parameters = start.copy()
     columns = [NUMBERS[name] for name in motion.free]
-    low, high = _bounds(motion, first_speed(start))
+    units = _units(start)[columns]
+    low, high = (ends / units for ends in _bounds(motion, first_speed(start)))
     last: dict[bytes, tuple[Array, Array, int]] = {}
 
     def at(free: Array) -> tuple[Array, Array, int]:
         key = free.tobytes()
         if key not in last:
             trial = parameters.copy()
-            trial[columns] = free
+            trial[columns] = units * free
             x, jacobian, begun = blocks.motion(trial, free=motion.free, half_cycles=half_cycles)
             if len(last) > 1:
                 last.pop(next(iter(last)))
-            last[key] = blocks.weighted(blocks.values - x), blocks.weighted(jacobian), begun
+            last[key] = blocks.weighted(blocks.values - x), blocks.weighted(units * jacobian), begun
         return last[key]
 
     def residual_at(free: Array) -> Array:
@@ -263,12 +270,23 @@ def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int |
         return -at(free)[1]
 
     found = least_squares(
-        residual_at, np.clip(parameters[columns], low, high), jac=slope_at,
+        residual_at, np.clip(parameters[columns] / units, low, high), jac=slope_at,
         bounds=(low, high), x_scale="jac", xtol=CONVERGED, ftol=CONVERGED, gtol=None, max_nfev=EVALUATIONS,
     )  # fmt: skip
-    parameters[columns] = found.x
+    parameters[columns] = units * found.x
     residual, jacobian, begun = at(found.x)
-    return Fitted(motion, parameters, begun, half_cycles is not None, residual, jacobian, blocks)
+    return Fitted(motion, parameters, begun, half_cycles is not None, residual, jacobian / units, blocks)
+
+
+def _units(start: Array) -> Array:
+    """What each parameter is measured in, so that the steps of a search do not depend on the record's units."""
+    w, length, exponent = start[0], abs(start[NUMBERS["amplitude"]]), start[NUMBERS["exponent"]]
+    measures = {
+        "angular_frequency": w, "dry_displacement": length, "rest": length, "amplitude": length, "release": 1 / w,
+        "quadratic": 1 / length, "stribeck_speed": w * length, "micro_slip": length**-exponent,
+        "curvature": length**-2,
+    }  # fmt: skip
+    return np.array([measures.get(name, 1.0) for name in PARAMETERS])
 
 
 def _bounds(motion: Motion, speed: float) -> tuple[Array, Array]:

@@ -55,22 +55,26 @@ class Noise:
         Of the candidate that leaves least.
     terms : int
         Parameters that it freed.
+    floor : float
+        Below which a residual is rounding.
     """
 
     residual: Array
     terms: int
+    floor: float
 
     @cached_property
     def whiteness(self) -> float:
         """p-value of its being white."""
-        return white_noise_test(self.residual)
+        return _whiteness(self.residual, self.floor)
 
     def along(self, row: Array) -> tuple[float, float]:
         """Standard deviation of the noise's product with a row, and its degrees of freedom."""
         count = len(self.residual)
         freedom = max(1, count - self.terms)
         if self.whiteness >= COLOURED:
-            return math.sqrt(float(self.residual @ self.residual) / freedom * float(row @ row)), float(freedom)
+            variance = max(float(self.residual @ self.residual) / freedom, self.floor**2)
+            return math.sqrt(variance * float(row @ row)), float(freedom)
         sd, effective = mean_uncertainty(count * row * self.residual)
         return sd * math.sqrt(count / freedom), effective
 
@@ -109,7 +113,7 @@ class Candidate:
     @cached_property
     def whiteness(self) -> float:
         """p-value of its residual being white."""
-        return white_noise_test(self.fitted.residual)
+        return _whiteness(self.fitted.residual, self.noise.floor)
 
     @property
     def verdict(self) -> str:
@@ -288,7 +292,7 @@ def choose(
     blocks = BlockMeans(instants, data, each, independent, fs, restoring)
     fits = fit_candidates(candidates, blocks, np.asarray(start, float))
     best = min(fits.values(), key=lambda fitted: fitted.cost)
-    noise = Noise(best.residual, best.jacobian.shape[1])
+    noise = Noise(best.residual, best.jacobian.shape[1], blocks.floor)
     tried = tuple(_tested(fitted, noise, best) for name, fitted in fits.items() if name in candidates)
     return _chosen(tried)
 
@@ -375,6 +379,11 @@ def white_noise_test(residual: ArrayLike) -> float:
     distance = max(float((steps / last - share).max()), float((share - (steps - 1) / last).max()))
     root = math.sqrt(last)
     return float(kolmogorov((root + 0.12 + 0.11 / root) * distance))
+
+
+def _whiteness(residual: Array, floor: float) -> float:
+    """p-value of a residual's being white; rounding is not asked."""
+    return 1.0 if float(residual @ residual) <= floor**2 * len(residual) else white_noise_test(residual)
 
 
 def _tested(fitted: Fitted, noise: Noise, best: Fitted) -> Candidate:

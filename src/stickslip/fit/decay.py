@@ -192,7 +192,7 @@ class _Motion:
 
 
 def _alone(release: Release) -> _Motion:
-    from stickslip.fit.search import Search, weights
+    from stickslip.fit.search import Search, variance, weights
     from stickslip.fit.waveform import sample_motion
 
     blocks, fits = release.blocks, release.fits
@@ -201,7 +201,7 @@ def _alone(release: Release) -> _Motion:
     ends = Search().intervals(blocks, fits)
     values, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
     sample_motion(best[3:], int(best[0]), *blocks.data[1:], values, jacobian, np.empty((3, 7, 6)))
-    covariance = best[1] / blocks.freedom * np.linalg.pinv(jacobian @ jacobian.T)
+    covariance = np.asarray(variance(fits, blocks) * np.linalg.pinv(jacobian @ jacobian.T), dtype=np.float64)
     return _mean(fits[:, 3:], share, covariance, ends, [(int(n),) for n in fits[:, 0]], [(row[3:],) for row in fits])
 
 

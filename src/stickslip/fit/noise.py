@@ -19,7 +19,7 @@ from stickslip.errors import EstimateError
 from stickslip.fit.counts import add_counts
 from stickslip.fit.drift import restricted
 from stickslip.fit.likelihood import Objective, solve
-from stickslip.fit.search import Blocks
+from stickslip.fit.search import Blocks, variance
 from stickslip.fit.waveform import normal_equations, sample_motion
 
 Array = NDArray[np.float64]
@@ -29,6 +29,7 @@ FINEST = 0.02  # of the step: less noise than this is not told from it
 CORNERS = 30  # trial corners of the drift's spectrum
 GAINED = 2.7  # minus twice the log likelihood that drift must gain before it is believed
 COARSE = 0.7  # of the step: noise, the counts' own included, below which counts are not a sum of white noises
+PRECISION = 1e-7  # of the range: a residual below it is rounding, and of no colour
 SHORT = 24  # blocks in which drift is not told from the motion
 KINDS = ("white", "quantised", "coloured")
 
@@ -73,12 +74,11 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
             "noise = 'quantised'", "no step of a digitiser is seen in the samples", "leave noise= out, or choose white"
         )
     row = fits[np.argmin(fits[:, 1])]
-    variance = max(row[1] / blocks.freedom, 1e-300)
-    level = math.sqrt(variance * blocks.size)
+    least = variance(fits, blocks)
+    level = math.sqrt(least * blocks.size)
     if kind == "quantised" or (kind is None and step > 0 and level < COARSE * step):
-        least = max(level, 0.3 * step)
         return Noise(
-            "quantised", least, f"counts of {step:.3g}",
+            "quantised", max(level, 0.3 * step), f"counts of {step:.3g}",
             lambda n: quantised(samples, n, step, blocks.dt, blocks.order),
         )  # fmt: skip
     if kind == "coloured" and len(blocks.means) <= SHORT:
@@ -87,7 +87,8 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
             f"drift is told from {SHORT + 1} on",
             "leave noise= out",
         )
-    if kind != "white" and len(blocks.means) > SHORT:
+    rounded = kind is None and level <= PRECISION * float(np.ptp(blocks.means))
+    if kind != "white" and len(blocks.means) > SHORT and not rounded:
         corner, power, gain = drift(blocks, int(row[0]), row[3:])
         if kind == "coloured" or gain > GAINED:
             smooth = _refined(blocks, int(row[0]), row[3:], power)
@@ -95,7 +96,7 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
             white = math.sqrt(float(power[-1]) / (1 + corner / frequencies(blocks)[-1]) * blocks.size)
             words = f"white, and drift that outweighs it below {corner:.3g} Hz"
             return Noise("coloured", white, words, lambda n: coloured(blocks, n, power))
-    return Noise("white", level, "white", lambda n: white_noise(blocks, n, variance))
+    return Noise("white", level, "white", lambda n: white_noise(blocks, n, least))
 
 
 def _refined(blocks: Blocks, n: int, p: Array, power: Array) -> Array:

@@ -13,6 +13,7 @@ from stickslip.statistics import student
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-9  # of the range
 CANDIDATES = 40  # numbers of half cycles kept
 
 
@@ -71,13 +72,17 @@ class Search:
 
     def intervals(self, blocks: Blocks, fits: Array) -> Array:
         """Ends (6, 2) of the 95 % profile likelihood of each parameter, the noise's level unknown."""
-        level = fits[:, 1].min() * (1 + student(blocks.freedom) ** 2 / blocks.freedom)
+        level = fits[:, 1].min() + variance(fits, blocks) * student(blocks.freedom) ** 2
         intervals(fits, len(fits), level, *blocks.data, self.ends, self.work)
         return self.ends
 
 
+def variance(fits: Array, blocks: Blocks) -> float:
+    """Of a block's noise, that of rounding at least."""
+    return max(float(fits[:, 1].min()) / blocks.freedom, (ROUNDING * float(np.ptp(blocks.means))) ** 2)
+
+
 def weights(fits: Array, blocks: Blocks) -> Array:
     """Likelihood of each number of half cycles, summing to one."""
-    best = fits[:, 1].min()
-    share = np.exp(-0.5 * (fits[:, 1] / best - 1) * blocks.freedom) if best > 0 else 1.0 * (fits[:, 1] == best)
+    share = np.exp(-0.5 * (fits[:, 1] - fits[:, 1].min()) / variance(fits, blocks))
     return np.asarray(share / share.sum())

@@ -18,8 +18,8 @@ from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
 
-BLOCKS = 40  # a period
 SWING = 2.5  # rad, above which a pendulum lingers near its top and its phase can not be held
+COARSE = 0.5  # of a digitiser's step: less noise than this, the counts' own included, does not blur it
 TAIL = 2.0  # periods at rest that are kept
 
 
@@ -153,6 +153,8 @@ def choice_of(
             "the choice among motions is made on a displacement",
             "record or integrate the displacement, or use fit_decay(record)",
         )
+    from stickslip.fit.start import BLOCKS
+
     rows, start = _begin(ring_down, restoring)
     size = max(1, int(2 * math.pi / start[0] * ring_down.fs / BLOCKS))
     count = (rows.stop - rows.start) // size
@@ -161,16 +163,23 @@ def choice_of(
     choice = choose(
         times.reshape(count, size).mean(axis=1), samples.reshape(count, size).mean(axis=1), fs=ring_down.fs,
         start=start, counts=np.full(count, float(size)), restoring=restoring, candidates=candidates,
-        weights=(1 / _run_lengths(samples)).reshape(count, size).sum(axis=1),
+        weights=(1 / _alike(ring_down)[rows.start : rows.start + count * size]).reshape(count, size).sum(axis=1),
     )  # fmt: skip
     return choice, ring_down.first + rows.start / ring_down.fs
 
 
-def _run_lengths(samples: Array) -> Array:
-    """How many equal readings stand in a row at each sample: of a coarse digitiser they are one reading, not many."""
-    begins = np.flatnonzero(np.diff(samples, prepend=np.nan))
-    lengths = np.diff(np.append(begins, len(samples)))
-    return np.repeat(lengths, lengths).astype(float)
+def _alike(ring_down: RingDown) -> Array:
+    """How many samples are one reading, at each sample: equal ones in a row; of a coarse digitiser all those at rest.
+
+    Its error does not average out where the mass rests.
+    """
+    begins = np.flatnonzero(np.diff(ring_down.samples, prepend=np.nan))
+    lengths = np.diff(np.append(begins, len(ring_down.samples)))
+    alike = np.repeat(lengths, lengths).astype(float)
+    if ring_down.noise < COARSE * ring_down.step:
+        for rest in (ring_down.hold, ring_down.tail):
+            alike[rest] = max(1, len(alike[rest]))
+    return alike
 
 
 def _begin(ring_down: RingDown, restoring: Restoring) -> tuple[slice, Array]:
