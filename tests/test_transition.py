@@ -172,6 +172,23 @@ def test_everything_at_once() -> None:
     assert "the contact rings at 45" in sentences
 
 
+def test_a_record_in_parts_is_mapped_whole_and_its_begin_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stickslip.timefrequency.LONG", 8000)
+    record = noisy("two", 40)
+    parts = [record.rows(first, min(first + 6000, len(record))) for first in range(0, len(record), 6000)]
+    whole, found = (ss.time_frequency(each, frequencies=(5, 1000)) for each in (record, iter(parts)))
+    inner = slice(150, 850)  # the mean taken off is that of the first part: the ends feel it
+    apart = np.abs(found.wavelets - whole.wavelets).values[:, inner]
+    assert apart.max() < 1e-5 * float(whole.wavelets.max())
+    assert found.mechanism.name == whole.mechanism.name == "double stick-slip"
+    assert "first 1.5 s" in found.notes[0]
+    assert "first 2 s" in whole.notes[0]
+    assert len(ss.figures(found)[0].figure.axes) == 2  # the map and its bar; the signal is there no more
+    assert len(ss.figures(whole)[0].figure.axes) == 3
+    with pytest.raises(RecordError, match="no part"):
+        ss.time_frequency(iter(()))
+
+
 def test_a_channel_that_is_no_acceleration_is_mapped_alone() -> None:
     record = ss.Record.of({"x": np.sin(2 * np.pi * 40 * np.arange(8000) / 1000)}, fs=1000.0)
     found = ss.time_frequency(record)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stickslip.errors import EstimateError
+from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Result
 from stickslip.findings import record_name
 from stickslip.identify.mechanism import UNTOLD, Mechanism, mechanism_of
@@ -39,7 +40,7 @@ class TimeFrequency(Result):
     name : str
         The record's name.
     record : Record
-        The record.
+        The record; of one that came in parts, its begin.
     channel : str
         The channel that was looked at.
     wavelets : xarray.DataArray
@@ -99,7 +100,7 @@ class TimeFrequency(Result):
 
 
 def time_frequency(
-    record: Record,
+    source: Record | Iterable[Record],
     *,
     channel: str | None = None,
     frequencies: ArrayLike | None = None,
@@ -112,8 +113,8 @@ def time_frequency(
 
     Parameters
     ----------
-    record : Record
-        At one rate.
+    source : Record or iterable of Record
+        At one rate; or the parts of a long one in order, as :func:`read_blocks` yields them, to be held one at a time.
     channel : str, optional
         Which channel; the first of a, sound, force, load, friction, v, x, or any other, when not given. The sticks are
         asked of an acceleration.
@@ -129,11 +130,13 @@ def time_frequency(
     Returns
     -------
     TimeFrequency
+        Of more than 400,000 samples the map keeps the largest moduli of each stretch of time, and the first 400,000
+        alone are asked about spikes and sticks.
 
     Raises
     ------
     RecordError
-        As :func:`wavelet_map`.
+        As :func:`wavelet_map`; or no part at all.
 
     Examples
     --------
@@ -144,17 +147,39 @@ def time_frequency(
     >>> found.mechanism.name, found.microslips.kind
     ('double stick-slip', 'double stick-slip')
     """
-    name = chosen_channel(record, channel)
+    parts = iter([source] if isinstance(source, Record) else source)
+    first, second = next(parts, None), next(parts, None)
+    if first is None:
+        raise RecordError("no part at all", f"{QUESTION} needs one at least", "check the file")
+    name = chosen_channel(first, channel)
     options: dict[str, Any] = {
         "frequencies": frequencies, "wavelet_frequency": wavelet_frequency, "normalisation": normalisation,
     }  # fmt: skip
-    if len(record) > LONG:
-        wavelets = wavelet_overview(record, name, **options)
-        notes = ["The record is long: of the map the largest moduli of each stretch of time are kept, without ridges."]
-        return TimeFrequency(record_name(record), record, name, wavelets, notes=tuple(notes))
-    wavelets = wavelet_map(record, name, **options)
-    found: dict[str, Any] = {"ridges": find_ridges(wavelets)[:5], "spikes": find_spikes(record, name)}
-    notes = []
+    if second is None and len(first) <= LONG:
+        wavelets = wavelet_map(first, name, **options)
+        found, notes = _spikes_and_sticks(first, name, mass, stiffness)
+        ridges = tuple(find_ridges(wavelets)[:5])
+        return TimeFrequency(record_name(first), first, name, wavelets, ridges, **found, notes=tuple(notes))
+    wavelets = wavelet_overview(
+        itertools.chain([first], () if second is None else (second,), parts), name, **options
+    )  # fmt: skip
+    begin = first.rows(0, min(LONG, len(first)))
+    found, notes = _spikes_and_sticks(begin, name, mass, stiffness)
+    long = (
+        "The record is long: of the map the largest moduli of each stretch of time are kept, without ridges; spikes "
+        f"and sticks are those of its first {begin.duration:.4g} s."
+    )
+    return TimeFrequency(
+        record_name(first), first if second is None else begin, name, wavelets, **found, notes=(long, *notes)
+    )  # fmt: skip
+
+
+def _spikes_and_sticks(
+    record: Record, name: str, mass: float | str | None, stiffness: float | str | None
+) -> tuple[dict[str, Any], list[str]]:
+    """What is asked beside the map, and why some of it has no answer."""
+    found: dict[str, Any] = {"spikes": find_spikes(record, name)}
+    notes: list[str] = []
 
     def asked(what: str, question: Callable[[], Answer]) -> Answer | None:
         try:
@@ -163,20 +188,18 @@ def time_frequency(
             notes.append(f"{what}: {error}")
             return None
 
-    if record.channels[name].unit == "m/s^2":
-        ringing = asked("Sticks", lambda: find_ringing(record, name, question=QUESTION))
-        if ringing is None:
-            found["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=notes[-1].partition(": ")[2])
-        else:
-            found["ringing"] = ringing
-            found["mechanism"] = mechanism_of(ringing)
-            found["transition"] = asked(
-                "Transition", lambda: transition_of(ringing, record, name, mass, stiffness)
-            )  # fmt: skip
-            found["microslips"] = asked("Micro-slips", lambda: microslips_of(ringing))
-    else:
+    if record.channels[name].unit != "m/s^2":
         notes.append(f"Channel {name} is no acceleration: what the sticks tell was not asked.")
-    return TimeFrequency(record_name(record), record, name, wavelets, **found, notes=tuple(notes))
+        return found, notes
+    ringing = asked("Sticks", lambda: find_ringing(record, name, question=QUESTION))
+    if ringing is None:
+        found["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=notes[-1].partition(": ")[2])
+        return found, notes
+    found["ringing"] = ringing
+    found["mechanism"] = mechanism_of(ringing)
+    found["transition"] = asked("Transition", lambda: transition_of(ringing, record, name, mass, stiffness))
+    found["microslips"] = asked("Micro-slips", lambda: microslips_of(ringing))
+    return found, notes
 
 
 def chosen_channel(record: Record, channel: str | None) -> str:

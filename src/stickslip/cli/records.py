@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import fnmatch
+import functools
 import glob
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -87,10 +88,25 @@ def default_folder(groups: Sequence[Sequence[Path]]) -> Path:
 
 
 def read(files: Sequence[Path], rig: RigSettings) -> Record:
-    paths: Any = files[0] if len(files) == 1 else list(files)
-    given = {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
-    record = ss.read_record(paths, rows=rig.row_range(), **given)
+    record = ss.read_record(_paths(files), rows=rig.row_range(), **_told(rig))
     return ss.mend(_with_source(record, files), repairs=rig.repair)
+
+
+def read_parts(files: Sequence[Path], rig: RigSettings) -> Iterator[Record]:
+    """The record in parts that fit into memory; whole where rows of it or repairs are asked for."""
+    if rig.rows or rig.repair:
+        yield read(files, rig)
+        return
+    for part in ss.read_blocks(_paths(files), **_told(rig)):
+        yield _with_source(part, files)
+
+
+def _paths(files: Sequence[Path]) -> Any:
+    return files[0] if len(files) == 1 else list(files)
+
+
+def _told(rig: RigSettings) -> dict[str, Any]:
+    return {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
 
 
 def _with_source(record: Record, files: Sequence[Path]) -> Record:
@@ -98,9 +114,15 @@ def _with_source(record: Record, files: Sequence[Path]) -> Record:
     known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
     if {path.name for path in files} <= known:
         return record
-    sources = [{"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()} for path in files]
+    sources = [{"name": path.name, "sha256": _checksum(path)} for path in files]
     step = ss.Step("read_record", {"files": sources}, "a record as it was written")
     return dataclasses.replace(record, history=(*record.history, step))
+
+
+@functools.cache
+def _checksum(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @contextlib.contextmanager

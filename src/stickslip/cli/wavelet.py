@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import stickslip as ss
 from stickslip.cli.options import frequency_range, reading_options, result_options
 from stickslip.cli.progress import progress
-from stickslip.cli.records import groups_of, name_of, read, rig_of
+from stickslip.cli.records import groups_of, name_of, read_parts, rig_of
 from stickslip.cli.show import show
+
+if TYPE_CHECKING:
+    from stickslip import Record
 
 
 @click.command()
@@ -42,11 +46,17 @@ def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | No
     folder = output or (None if as_json else Path(f"{groups[0][0].stem}-wavelet"))
     with progress(3) as tell:
         tell(f"reading {name_of(groups[0])}", 0)
-        record = read(groups[0], rig)
-        tell("mapping", 1)
+        parts = _told_of(read_parts(groups[0], rig), tell)
         for name in ("mass", "stiffness"):
             asked[name] = asked[name] if asked[name] is not None else getattr(rig, name)
-        found = ss.time_frequency(record, frequencies=frequency_range(frequencies), **asked)
+        found = ss.time_frequency(parts, frequencies=frequency_range(frequencies), **asked)
         tell("drawing and writing", 2)
         written = ss.publish(found, folder=folder) if folder else None
     show(found, written, as_json=as_json)
+
+
+def _told_of(parts: Iterator[Record], tell: Callable[[str, float], None]) -> Iterator[Record]:
+    """The parts of a record, with a word on how far the map is."""
+    for part in parts:
+        tell(f"mapping, {part.start + part.duration:.0f} s", 1)
+        yield part

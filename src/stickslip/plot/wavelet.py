@@ -136,11 +136,12 @@ def plot_stick(found: TimeFrequency) -> Figure:
 
 def plates_of(found: TimeFrequency) -> list[Plate]:
     """The figures of a channel over time and frequency."""
-    record = found.record
+    reached = found.record.start + found.record.duration >= float(found.wavelets.time.max())
+    record = found.record if reached else None  # one that came in parts is there no more
     words = (
-        "Above: the signal. Below: how strong each frequency is at each time, in decibel below the strongest; bright "
-        "is strong. Hatched: an end of the record is felt there. A band that runs along is a vibration; an upright "
-        "spike is a jump or a kink."
+        f"{'Above: the signal. Below: how' if reached else 'How'} strong each frequency is at each time, in decibel "
+        "below the strongest; bright is strong. Hatched: an end of the record is felt there. A band that runs along is "
+        "a vibration; an upright spike is a jump or a kink."
     )
     plates = [plate("map", plot_wavelet(found.wavelets, record=record), "Time and frequency", words)]
     if found.ringing is not None:
