@@ -57,6 +57,11 @@ if TYPE_CHECKING:
     from stickslip.identify.force import friction_force as friction_force
     from stickslip.identify.loops import friction_loops as friction_loops
     from stickslip.identify.presliding import Presliding as Presliding, presliding as presliding
+    from stickslip.identify.parts import (
+        Stretch as Stretch,
+        join_sticks as join_sticks,
+        overlapping as overlapping,
+    )
     from stickslip.identify.pull import Pull as Pull, pulled_slider as pulled_slider
     from stickslip.identify.regression import regress_friction as regress_friction
     from stickslip.identify.release import (
@@ -65,7 +70,11 @@ if TYPE_CHECKING:
         find_releases as find_releases,
     )
     from stickslip.identify.sensor_delay import SensorDelay as SensorDelay, sensor_delay as sensor_delay
-    from stickslip.identify.sticks import find_sticks as find_sticks
+    from stickslip.identify.sticks import (
+        StickEvent as StickEvent,
+        Sticks as Sticks,
+        find_sticks as find_sticks,
+    )
     from stickslip.mending import mend as mend
     from stickslip.plot.figures import figures as figures
     from stickslip.record.channels import Channel as Channel
@@ -202,6 +211,8 @@ _ROOMS = {
     "presliding": "identify.presliding", "Presliding": "identify.presliding",
     "pulled_slider": "identify.pull", "Pull": "identify.pull",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
+    "StickEvent": "identify.sticks", "Sticks": "identify.sticks", "Stretch": "identify.parts",
+    "overlapping": "identify.parts", "join_sticks": "identify.parts",
     "regress_friction": "identify.regression",
     "sensor_delay": "identify.sensor_delay", "SensorDelay": "identify.sensor_delay",
     "decrement": "identify.decrement", "Decrement": "identify.decrement", "Bounds": "identify.decrement",

@@ -1,0 +1,70 @@
+"""An hour of four channels at 4 kHz through the friction and the sticks: time and memory.
+
+``python benchmarks/hour.py [--minutes 60]``: the thesis's rig in stick-slip at 2.5 Hz, the same minute again and again
+with new noise, never more than a stretch of it in memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+import stickslip as ss
+from stickslip.identify.parts import join_sticks, overlapping
+
+RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
+LAG = 0.0389 / 30.91
+FS, PART = 4000, 60.0
+
+
+def parts(minutes: int) -> Iterator[ss.Record]:
+    """Minute after minute: whole cycles, so that each goes on where the one before ended."""
+    contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    slider = ss.Oscillator(law=contact, drive=ss.HarmonicBase(0.65e-3, frequency=2.5), **RIG)
+    run = ss.simulate(slider, duration=8.0 + PART + 0.01)
+    quiet = ss.Rig()
+    for name in ("x", "z", "a", "load"):
+        quiet = quiet.having(name, white=0.0, step=0.0)
+    minute = quiet.measure(run, fs=FS, start=8.0).rows(0, round(PART * FS))
+    noise = {"x": 1e-6, "z": 1e-6, "a": 0.04, "load": 0.002}
+    steps = {"x": 2.5e-6, "z": 2.5e-6, "load": 0.0002 * 4.448}
+    rng = np.random.default_rng(1)
+    for number in range(minutes):
+        noisy = {name: minute[name] + noise[name] * rng.standard_normal(len(minute)) for name in minute}
+        counted = {n: np.round(v / steps[n]) * steps[n] if n in steps else v for n, v in noisy.items()}
+        record = replace(minute, samples=counted, start=number * PART, truth={})
+        for name in ("x", "z"):
+            record = record.with_details(name, delay=LAG)
+        record = record.with_details("a", mount=(125.0, 0.1))
+        yield record.with_details("load", mount=(250.0, 0.05), inertia=0.05, discharge=50.0)
+
+
+def main() -> None:
+    """Go through it and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--minutes", type=int, default=60)
+    minutes = parser.parse_args().minutes
+    began, used = time.perf_counter(), time.process_time()
+    found = []
+    for stretch in overlapping(parts(minutes)):
+        record = ss.friction_force(stretch.record, method="fusion", **RIG)
+        found.append((replace(stretch, record=record.rows(0, 1)), ss.find_sticks(record)))
+        print(f"\r{stretch.last:6.0f} of {60 * minutes} s", end="", file=sys.stderr)
+    sticks = join_sticks(found)
+    kinds = [event.kind for event in sticks.events]
+    print(sticks)
+    print({kind: kinds.count(kind) for kind in sorted(set(kinds))}, sticks.kind, sticks.status, sticks.lost)
+    print(
+        f"{time.perf_counter() - began:.0f} s, {time.process_time() - used:.0f} s of the processor, the rig's with it"
+    )
+    print(f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GB at most")
+
+
+if __name__ == "__main__":
+    main()
