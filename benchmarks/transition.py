@@ -54,7 +54,7 @@ def noisy(clean: ss.Record, level: float, seed: int) -> ss.Record:
 
 
 def true_slips(run: ss.Trajectory, begin: float, end: float) -> np.ndarray:
-    """Times at which the contact slips from one stop of its stick to the next: those of less than a tenth of a cycle."""
+    """Times at which the contact slips within a stick: it holds again before a tenth of a cycle is over."""
     slips = [event.time for event in run.events if event.kind == "slip"]
     sticks = [event.time for event in run.events if event.kind == "microstick"]
     return np.array([
