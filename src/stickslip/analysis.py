@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, TypeVar
-
-import numpy as np
+from typing import Any
 
 from stickslip.config import RigSettings
-from stickslip.errors import EstimateError, ModelError, StickslipError
+from stickslip.errors import EstimateError, StickslipError
 from stickslip.findings import Findings, record_name
 from stickslip.identify.breakaway import breakaway
-from stickslip.identify.force import friction_force
+from stickslip.identify.contact import contact_damping, contact_stiffness
+from stickslip.identify.force import FUSIONS
 from stickslip.identify.loops import friction_loops
 from stickslip.identify.motion import is_measured, slid_on
 from stickslip.identify.presliding import presliding
 from stickslip.identify.pull import pulled_slider
 from stickslip.identify.regression import regress_friction
 from stickslip.identify.sticks import find_sticks
-from stickslip.record.record import Record, Step
-from stickslip.signals.delay import without_delays
+from stickslip.preparation import CONSTANTS, MOTION, Asked, normal_load, ready
+from stickslip.record.record import Record
 
-Answer = TypeVar("Answer")
-
-USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
-CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
+STRETCH = 1 << 15  # samples in which the contact is fitted
 
 
 def analyze(
@@ -38,15 +34,16 @@ def analyze(
     damping: float | str | None = None,
     damper: str | None = None,
     contact: str | None = None,
-    method: str = "smoother",
+    method: str = "auto",
 ) -> Findings:
     """Ask a record every question about friction that its channels allow.
 
-    In this order: the check-up; the friction force (as measured, or from the force balance
-    ``f = k z - k x - c v - m a``); the friction loops; sticks and slips; the breakaway, and what the contact does
-    before; the regression of an applied force on acceleration, velocity and direction; of a force without any motion,
-    how a slider moves that is pulled through a spring. A question that can not be answered becomes a note, not an
-    error.
+    In this order: the check-up; the delay between displacement and acceleration, where none is stated; the friction
+    force (as measured, or from the force balance ``f = k z - k x - c v - m a``, compared with the load cell's where
+    there is one); the friction loops; sticks and slips; the breakaway, and what the contact does before; the contact's
+    stiffness and damping, where all sensors are put together; the regression of an applied force on acceleration,
+    velocity and direction; of a force without any motion, how a slider moves that is pulled through a spring. A
+    question that can not be answered becomes a note, not an error.
 
     Parameters
     ----------
@@ -59,8 +56,10 @@ def analyze(
         Oscillating mass [kg], spring [N/m], viscous damping [N s/m]; or text with a unit ("250 g").
     damper, contact : {"ground", "base"}, optional
         What the damper ends on, and what the mass slides on; the ground unless stated.
-    method : {"smoother", "five-point"}
-        How displacement is differentiated.
+    method : str
+        How the friction is found: one of :func:`friction_force`'s, or "auto": all sensors together where there is an
+        accelerometer or a load cell beside x, else the displacement differentiated by a smoother. The notes say which,
+        and why.
 
     Returns
     -------
@@ -86,22 +85,22 @@ def analyze(
     """
     given = {"mass": mass, "stiffness": stiffness, "damping": damping, "damper": damper, "contact": contact}
     rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
-    asked = _Asked([], [])
-    faults = tuple(record.check())
-    known = [each for each in USED if each in record]
-    whole = asked.ask("Stated delays", lambda: without_delays(record, *known)) if known else record
-    whole = _with_friction(whole or record, rig, method, asked)
+    asked, name, faults = Asked([], []), record_name(record), tuple(record.check())
+    made = ready(record, rig, method, asked)
+    whole = made.record
     slid = slid_on(whole, rig.contact if "contact" in rig.model_fields_set else None)
     answers: dict[str, Any] = {}
     for each in QUESTIONS:
-        if each.fits(whole) and (not each.follows or answers.get(each.follows) is not None):
+        led = not each.follows or answers.get(each.follows) is not None
+        if led and answers.get(each.unless) is None and each.fits(whole):
             answers[each.key] = asked.ask(each.name, partial(each.ask, whole, slid))
-    name = record_name(record)
+    _doubt(answers, made.doubt)
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
     return Findings(
-        name, whole, faults, **answers, normal=_normal_load(record, rig, name, asked.notes), notes=tuple(asked.notes),
-        settings={**_balanced(whole), "contact": slid},
+        name, whole, faults, **answers, delay=made.delay, comparison=made.comparison,
+        normal=normal_load(record, rig, name, asked.notes), notes=tuple(asked.notes),
+        settings={**_told(whole), "contact": slid},
     )  # fmt: skip
 
 
@@ -123,6 +122,10 @@ class Question:
         Channels with which it is not asked: others answer it better.
     follows : str
         The question that must have been answered before, where there is one.
+    unless : str
+        The question whose answer makes this one idle.
+    fused : bool
+        Whether the friction must come from all sensors together.
     """
 
     key: str
@@ -131,21 +134,35 @@ class Question:
     ask: Callable[[Record, str], Any]
     without: tuple[str, ...] = ()
     follows: str = ""
+    unless: str = ""
+    fused: bool = False
 
     def fits(self, record: Record) -> bool:
         """Whether the record has the channels."""
-        return all(any(name in record for name in group) for group in self.needs) and not any(
-            name in record for name in self.without
+        return (
+            all(any(name in record for name in group) for group in self.needs)
+            and not any(name in record for name in self.without)
+            and (not self.fused or _told(record).get("differentiation") in FUSIONS)
         )
 
 
-MOTION = ("x", "v", "theta")
 FORCE = ("load", "force", "friction")
 QUESTIONS = (
     Question("loops", "Friction loops", (("friction",), MOTION), lambda r, on: friction_loops(r, contact=on)),
     Question("sticks", "Sticks and slips", (MOTION,), lambda r, on: find_sticks(r, contact=on)),
     Question("breakaway", "Breakaway", (("friction",), MOTION), lambda r, on: breakaway(r, contact=on)),
-    Question("presliding", "Presliding", (("friction",), MOTION), lambda r, on: presliding(r, contact=on)),
+    Question(
+        "stiffness", "Contact stiffness", (("friction",), ("x",)), lambda r, on: contact_stiffness(_stretch(r)),
+        fused=True,
+    ),
+    Question(
+        "contact_damping", "Contact damping", (("friction",), ("x",)), lambda r, on: contact_damping(_stretch(r)),
+        follows="stiffness", fused=True,
+    ),
+    Question(
+        "presliding", "Presliding", (("friction",), MOTION), lambda r, on: presliding(r, contact=on),
+        unless="stiffness",
+    ),
     Question("regression", "Regression", (("force",), MOTION), lambda r, on: regress_friction(r)),
     Question(
         "asymmetric", "Regression of each direction", (("force",), MOTION),
@@ -158,82 +175,32 @@ QUESTIONS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """What came of the questions so far: notes in words, and the errors behind those that failed."""
-
-    notes: list[str]
-    refusals: list[StickslipError]
-
-    def ask(self, question: str, answer: Callable[[], Answer]) -> Answer | None:
-        try:
-            return answer()
-        except ModelError:
-            raise
-        except StickslipError as error:
-            self.notes.append(f"{question}: {error}")
-            self.refusals.append(error)
-            return None
-
-
 def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
     from stickslip.config import rig_settings
 
     return rig_settings({**(rig.model_dump(exclude_unset=True) if rig is not None else {}), **given}, source="the call")
 
 
-def _balanced(record: Record) -> dict[str, Any]:
+def _doubt(answers: dict[str, Any], reason: str) -> None:
+    """Flag what rests on sensors that are not known."""
+    for key in ("stiffness", "contact_damping"):
+        found = answers.get(key)
+        if reason and found is not None and found.status == "ok":
+            answers[key] = replace(found, status=reason)
+
+
+def _stretch(record: Record) -> Record:
+    """The middle of a long record: enough to fit a contact by its likelihood."""
+    first = max(0, (len(record) - STRETCH) // 2)
+    return record.rows(first, first + STRETCH) if first else record
+
+
+def _told(record: Record) -> dict[str, Any]:
     """The constants and the method behind the friction force, where it comes from a balance of forces."""
     if "friction" not in record or is_measured(record, "friction"):
         return {}
     told = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
     return {key.replace("method", "differentiation"): made[key] for made in told for key in (*CONSTANTS, "method")}
-
-
-def _with_friction(record: Record, rig: RigSettings, method: str, asked: _Asked) -> Record:
-    """The record with its friction force, where there is a way to it."""
-    if is_measured(record, "friction"):
-        unused = [key for key in CONSTANTS if key in rig.model_fields_set and getattr(rig, key) is not None]
-        if unused:
-            asked.notes.append(f"The friction was measured: {' and '.join(unused)} as stated {_are(unused)} not used.")
-        return record
-    if "x" in record and rig.mass is not None and rig.stiffness is not None:
-        balanced = asked.ask(
-            "Friction force",
-            lambda: friction_force(
-                record, mass=rig.mass or 0.0, stiffness=rig.stiffness or 0.0, damping=rig.damping or 0.0,
-                damper=rig.damper, contact=rig.contact, method=method,
-            ),
-        )  # fmt: skip
-        if balanced is not None and rig.damping is None:
-            asked.notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
-        if balanced is not None:
-            return balanced
-    if "friction" in record:
-        return record
-    if "load" in record and "force" not in record and any(name in record for name in MOTION):
-        asked.notes.append(
-            "The load cell's reading is taken as the friction force; inertia between both is part of it."
-        )
-        step = Step("analyze", {"friction": "load"}, "the load cell's reading taken as the friction force")
-        return record.with_channel(
-            "friction", record["load"], unit=record.channels["load"].unit, source="load", step=step
-        )
-    lacking = _lacking(record, rig)
-    if lacking and "force" not in record and "load" not in record:
-        asked.notes.append(
-            f"Friction force: without a measured friction or load it needs {' and '.join(lacking)}, not given."
-        )
-    return record
-
-
-def _are(words: Sequence[str]) -> str:
-    return "is" if len(words) == 1 else "are"
-
-
-def _lacking(record: Record, rig: RigSettings) -> list[str]:
-    missing = [key for key in ("mass", "stiffness") if getattr(rig, key) is None]
-    return missing if "x" in record else ["a displacement x", *missing]
 
 
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:
@@ -245,17 +212,3 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
         "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
         'name the columns, as in channels={"x": "COLUMN [mm]"}',
     )
-
-
-def _normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> float | None:
-    """The normal load as measured, by its magnitude, or as stated for the file."""
-    if "normal" in record:
-        finite = record["normal"][np.isfinite(record["normal"])]
-        mean = float(finite.mean()) if len(finite) else 0.0
-        if mean < 0:
-            notes.append(f"The normal load reads {mean:.4g} N: its magnitude is taken.")
-        if mean:
-            return abs(mean)
-        notes.append("The channel normal tells no load: it holds " + ("zeros." if len(finite) else "no numbers."))
-    loads = (rig.normal_load(part) for part in [*name.split(" + "), name])
-    return next((load for load in loads if load is not None), None)

@@ -32,6 +32,32 @@ def _one_or_many(value: object) -> object:
     return value if isinstance(value, Mapping) else {"*": value}
 
 
+class SensorSettings(BaseModel):
+    """What is known of one sensor; see :class:`Channel`.
+
+    Attributes
+    ----------
+    delay : float
+        Time [s] by which it is late.
+    noise : float or None
+        Standard deviation of its noise, in the SI unit of its channel.
+    mount : (float, float) or None
+        Resonance [Hz] and damping ratio of what it stands on.
+    inertia : float
+        Mass [kg] between the contact and a load cell.
+    discharge : float or None
+        Time constant [s] with which a piezoelectric sensor forgets.
+    """
+
+    model_config = STRICT
+
+    delay: Annotated[float, quantity("s")] = 0.0
+    noise: Annotated[float, Field(ge=0)] | None = None
+    mount: tuple[Annotated[float, quantity("Hz"), Field(gt=0)], Annotated[float, Field(ge=0)]] | None = None
+    inertia: Annotated[float, quantity("kg"), Field(ge=0)] = 0.0
+    discharge: Annotated[float, quantity("s"), Field(gt=0)] | None = None
+
+
 class RigSettings(BaseModel):
     """What is known of a rig before any record is read; every entry may be left out.
 
@@ -49,6 +75,8 @@ class RigSettings(BaseModel):
         Sampling rate [Hz], for a file that states none.
     units : dict of str to str
         Unit of a column, where its header states none.
+    sensors : dict of str to SensorSettings
+        What is known of the sensor of a channel: its lag, its noise, the mount that it stands on.
     normal : dict of str to float
         Normal load [N] by file name or pattern ("*250g*"); a single number holds for every file.
     repair : tuple of str
@@ -78,6 +106,7 @@ class RigSettings(BaseModel):
     channels: dict[str, str] = Field(default_factory=dict)
     fs: Annotated[float, quantity("Hz"), Field(gt=0)] | None = None
     units: dict[str, str] = Field(default_factory=dict)
+    sensors: dict[str, SensorSettings] = Field(default_factory=dict)
     normal: Annotated[dict[str, Annotated[float, quantity("N"), Field(gt=0)]], BeforeValidator(_one_or_many)] = Field(
         default_factory=dict
     )
@@ -142,6 +171,8 @@ def read_rig(path: str | Path) -> RigSettings:
             damper = "base"
             [channels]
             x = "x [mm]"
+            [sensors.a]
+            mount = ["125 Hz", 0.1]   # what it stands on: resonance and damping ratio
             [normal]
             "*250g*" = "2.45 N"
 

@@ -11,10 +11,12 @@ import numpy as np
 
 from stickslip.estimate import Estimate, Result
 from stickslip.identify.breakaway import Breakaway
+from stickslip.identify.compare_force import ForceComparison
 from stickslip.identify.loops import Loops
 from stickslip.identify.presliding import Presliding
 from stickslip.identify.pull import Pull
 from stickslip.identify.regression import Regression
+from stickslip.identify.sensor_delay import SensorDelay
 from stickslip.identify.sticks import Sticks
 from stickslip.record.record import Record
 
@@ -38,6 +40,12 @@ class Findings(Result):
         The answers to the questions that could be asked; `asymmetric` lets both directions differ.
     breakaway, presliding, pull : Breakaway, Presliding, Pull or None
         How it begins to slip, what it does before, and of a force alone how a pulled slider moves.
+    stiffness, contact_damping : Estimate or None
+        Of the contact while it holds, from all sensors together.
+    delay : SensorDelay or None
+        Of the accelerometer behind the displacement.
+    comparison : ForceComparison or None
+        The friction felt by the load cell against the friction computed from the motion.
     normal : float or None
         Normal load [N] on the contact, where stated or measured.
     notes : tuple of str
@@ -56,6 +64,10 @@ class Findings(Result):
     breakaway: Breakaway | None = None
     presliding: Presliding | None = None
     pull: Pull | None = None
+    stiffness: Estimate | None = None
+    contact_damping: Estimate | None = None
+    delay: SensorDelay | None = None
+    comparison: ForceComparison | None = None
     normal: float | None = None
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -78,8 +90,11 @@ class Findings(Result):
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number found, in the order of asking."""
         level = [self.coefficient] if self.coefficient is not None else []
-        answers = (value for value in vars(self).values() if isinstance(value, Result))
-        found = [*level, *(estimate for answer in answers for estimate in answer.estimates)]
+        found = list(level)
+        for answer in vars(self).values():
+            found += (
+                answer.estimates if isinstance(answer, Result) else [answer] if isinstance(answer, Estimate) else []
+            )
         first: dict[str, Estimate] = {}
         for estimate in found:
             first.setdefault(estimate.name, estimate)

@@ -37,10 +37,10 @@ from stickslip.cli.show import show
 )
 @click.option(
     "--method",
-    type=click.Choice(["smoother", "five-point"]),
-    default="smoother",
+    type=click.Choice(["auto", "fusion", "motion", "load", "smoother", "five-point", "F", "F1", "F2"]),
+    default="auto",
     show_default=True,
-    help="How displacement is differentiated.",
+    help="How the friction is found: by all sensors together (fusion), by some, or by derivatives; auto says why.",
 )
 @result_options("FILE-stickslip")
 @reading_options

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
+from stickslip.identify.force import FUSIONS
 from stickslip.identify.motion import forcing_frequency, is_measured
 from stickslip.identify.strokes import FAST, Stroke, find_strokes
 from stickslip.record.record import Record
+from stickslip.signals.noise import noise_level
 from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]
@@ -73,9 +75,10 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     (the second term for a damper on the base), which is known without any differentiation. When the slip begins is
     found from its first travel, :math:`m\ddot x = p - f` with f constant so early, by least squares over the instant
     and f; the pull can not be less than f then. Static friction is the pull at that instant, from a line through the
-    stick's last fifth. Of a friction that was measured, and not balanced, it is the largest value before the contact
-    moves; of a contact that gives way before it slips, the first peak once friction is near its level, which the
-    ring that follows raises.
+    stick's last fifth. Of a friction that was measured, or found by all sensors together, it is the largest value
+    before the contact moves, which noise makes too large by two of its deviations at most: the interval's low end goes
+    as far down. Of a contact that gives way before it slips it is the first peak once friction is near its level, which
+    the ring that follows raises.
 
     Parameters
     ----------
@@ -106,8 +109,9 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     """
     strokes = find_strokes(record, contact=contact, question=QUESTION)
     pull, rig = _pull(record)
+    fs = record.fs
     chosen = strokes.strokes[:: max(1, len(strokes.strokes) // MOST)]
-    borne = [(each, _borne(each, pull, rig, record.fs)) for each in chosen]
+    borne = [(each, _borne(each, pull, rig, fs)) for each in chosen]
     found = [(each, friction) for each, friction in borne if friction is not None]
     if not found:
         raise EstimateError(
@@ -115,10 +119,14 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
             "the start of a slip takes 4 samples at least",
             "sample faster, or give a longer record",
         )
+    above = 0.0 if pull is not None else 2 * (record.channels["friction"].noise or noise_level(record["friction"], fs))
     rested = sum(each.rests for each, _ in found)
     method = "pull at the start of the slip" if pull is not None and 2 * rested > len(found) else "peak before the slip"
     level = [
-        mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=f"{method}, mean of strokes")
+        _lowered(
+            mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=f"{method}, mean of strokes"),
+            above,
+        )
         if (values := [friction for each, friction in found if each.way == way])
         else None
         for way, side in SIDES
@@ -127,8 +135,9 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
         "static over sliding friction", [friction / each.level for each, friction in found], unit="1",
         method=f"{method} over the median of the stroke, mean of strokes",
     )  # fmt: skip
+    ratio = _lowered(ratio, above / float(np.median([each.level for each, _ in found])))
     measured = [each for each, _ in found if is_measured(record, "friction")]  # a balance rings by its own smoothing
-    rings = [_ringing([each for each in measured if each.way == way], side, record.fs) for way, side in SIDES]
+    rings = [_ringing([each for each in measured if each.way == way], side, fs) for way, side in SIDES]
     swings = [_swing([each for each, _ in found if each.way == way], side) for way, side in SIDES]
     gives = "the contact gives way before it slips: the first peak holds the ring that follows"
     status = "ok" if 2 * rested > len(found) else gives
@@ -139,11 +148,19 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     )  # fmt: skip
 
 
+def _lowered(estimate: Estimate, above: float) -> Estimate:
+    """The estimate, its interval down to where noise may have lifted it from."""
+    low, high = estimate.interval
+    return replace(estimate, interval=(low - above, high), sd=float(np.hypot(estimate.sd, above / 2)))
+
+
 def _pull(record: Record) -> tuple[Array | None, Mapping[str, Any]]:
-    """What pulls at the mass while it rests, where friction came from a balance whose constants are known."""
+    """What pulls at the mass while it rests, where friction came from a balance, and no better than that."""
     told = [step.arguments for step in record.history if step.action == "friction_force"]
     made = record.channels["friction"].source == "friction_force"
     if not (made and told and told[-1].get("mass") and told[-1].get("contact") == "ground"):
+        return None, {}
+    if told[-1]["method"] in FUSIONS:
         return None, {}
     rig = told[-1]
     pull = -rig["stiffness"] * record["x"]

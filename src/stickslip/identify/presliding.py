@@ -57,6 +57,12 @@ class Presliding(Result):
     evidence: str
     status: str
 
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Stiffness and play of a contact that gives way; else the compliances that leave it open."""
+        given = (self.stiffness, self.stiffness_forward, self.stiffness_back, self.backlash)
+        return tuple(each for each in given if each is not None) or (self.compliance_forward, self.compliance_back)
+
 
 def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     r"""Does the contact give way before it slips, how stiffly, and with how much play?
@@ -112,10 +118,12 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
         _inverse(each, f"presliding stiffness {side}") if gives else None
         for each, (_, side) in zip(found, SIDES, strict=True)
     ]
+    status = "ok" if verdict != "can not be told" and "times as much" not in evidence else evidence
+    if _rings(strokes.strokes):
+        status = "the contact rings while friction builds up, so that a line says little: see contact_stiffness(record)"
     return Presliding(
         _inverse(_both(found), "presliding stiffness") if gives else None,
-        sides[0], sides[1], _backlash(strokes) if gives else None, found[0], found[1], verdict, evidence,
-        "ok" if verdict != "can not be told" and "times as much" not in evidence else evidence,
+        sides[0], sides[1], _backlash(strokes) if gives else None, found[0], found[1], verdict, evidence, status,
     )  # fmt: skip
 
 
@@ -127,6 +135,14 @@ def _branch(stroke: Stroke, low: float, high: float) -> tuple[float, float] | No
         return None
     slope, offset = np.polyfit(friction[inside], stroke.displacement[: stroke.slip + 1][inside], 1)
     return float(offset), float(slope)
+
+
+def _rings(strokes: Sequence[Stroke]) -> bool:
+    """Whether the friction passes half of its level more than once before it slips, in most strokes."""
+    passes = [
+        np.count_nonzero(np.diff(stroke.friction[: stroke.slip + 1] > stroke.level / 2)) > 1 for stroke in strokes
+    ]
+    return bool(2 * sum(passes) > len(passes))
 
 
 def _compliance(strokes: Sequence[Stroke], name: str, unit: str) -> Estimate:

@@ -19,6 +19,7 @@ from stickslip.timefrequency import TimeFrequency
 
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
+ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
 FIGURES = 5  # significant figures at most: what is surer than that still reads well
 TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
 
@@ -126,6 +127,8 @@ def _of_findings(findings: Findings) -> Iterator[str]:
         yield from _of_sticks(findings)
     if findings.breakaway is not None:
         yield from _of_breakaway(findings.breakaway)
+    if findings.stiffness is not None:
+        yield _of_contact(findings.stiffness, findings.contact_damping)
     if findings.presliding is not None:
         yield from _of_presliding(findings.presliding)
     if findings.pull is not None:
@@ -183,16 +186,23 @@ def _of_sticks(findings: Findings) -> Iterator[str]:
 def _of_breakaway(found: Breakaway) -> Iterator[str]:
     ratio = found.ratio
     low, high = ratio.interval
-    more = "more" if low > 1 else "less" if high < 1 else "as much, as far as can be told,"
+    more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
     sides = " and ".join(f"{value_of(each)} {each.name.split()[-1]}" for each in (found.forward, found.back) if each)
-    than = "than" if low > 1 or high < 1 else "as"
     yield (
-        f"Just before it slips it bears {sides}: {more} {than} while it slides ({value_of(ratio)} times, 95 % sure: "
+        f"Just before it slips it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 % sure: "
         f"{interval_of(ratio)})."
     )
     rings = [each for each in (found.ringing_forward, found.ringing_back) if each is not None]
     if rings:
         yield f"After slip begins it rings at {' and '.join(f'{value_of(e)} {e.name.split()[-1]}' for e in rings)}."
+
+
+def _of_contact(stiffness: Estimate, damping: Estimate | None) -> str:
+    damped = f" and a damping of {value_of(damping)}" if damping is not None else ""
+    return (
+        f"While it holds the contact has a stiffness of {value_of(stiffness)} (95 % sure: {interval_of(stiffness)})"
+        f"{damped}."
+    )
 
 
 def _of_presliding(found: Presliding) -> Iterator[str]:

@@ -1,0 +1,209 @@
+"""A record made ready for the questions: sensors, delays, and its friction by the way that its channels allow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from stickslip.config import RigSettings
+from stickslip.errors import ModelError, StickslipError
+from stickslip.identify.compare_force import ForceComparison, compare_force
+from stickslip.identify.force import friction_force
+from stickslip.identify.motion import is_measured
+from stickslip.identify.sensor_delay import SensorDelay, sensor_delay
+from stickslip.record.record import Record, Step
+from stickslip.signals.delay import without_delays
+
+Answer = TypeVar("Answer")
+
+MOTION = ("x", "v", "theta")
+USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
+CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
+STRETCH = 1 << 16  # samples from the middle in which a delay is looked for
+SURE = 3.0  # standard deviations from which a delay is taken out
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What came of the questions so far: notes in words, and the errors behind those that failed."""
+
+    notes: list[str]
+    refusals: list[StickslipError]
+
+    def ask(self, question: str, answer: Callable[[], Answer]) -> Answer | None:
+        """The answer; where the record can not give one, None and a note."""
+        try:
+            return answer()
+        except ModelError:
+            raise
+        except StickslipError as error:
+            self.notes.append(f"{question}: {error}")
+            self.refusals.append(error)
+            return None
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A record with its friction, and what was found on the way.
+
+    Attributes
+    ----------
+    record : Record
+        Delays taken out; with ``friction`` where there is a way to it.
+    delay : SensorDelay or None
+        Of the accelerometer behind the displacement, where it was looked for.
+    comparison : ForceComparison or None
+        The friction felt against the friction computed, where there are both.
+    doubt : str
+        What is not known of the sensors that a contact's stiffness hangs on.
+    """
+
+    record: Record
+    delay: SensorDelay | None
+    comparison: ForceComparison | None
+    doubt: str = ""
+
+
+def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
+    """The record with its sensors stated, without its delays, with its friction."""
+    for name, told in rig.sensors.items():
+        if name in record:
+            record = record.with_details(name, **told.model_dump(exclude_unset=True))
+        else:
+            asked.notes.append(f"A sensor {name} is described, but the record has no such channel.")
+    record, delay = _aligned(record, asked)
+    known = [name for name in USED if name in record]
+    whole = (asked.ask("Stated delays", lambda: without_delays(record, *known)) if known else None) or record
+    comparison = None
+    if is_measured(whole, "friction"):
+        _tell_unused(rig, asked)
+    elif "x" in whole and rig.mass is not None and rig.stiffness is not None:
+        if {"a", "load"} <= set(whole):
+            comparison = asked.ask("Force comparison", lambda: compare_force(whole, **_constants(rig)))
+            whole = _with_mounts(whole, comparison, asked)
+        whole = _balanced(whole, rig, method, asked)
+    if "friction" not in whole:
+        whole = _by_load(whole, rig, asked)
+    return Ready(whole, delay, comparison, _doubt(whole, delay))
+
+
+def _constants(rig: RigSettings) -> dict[str, Any]:
+    return {
+        "mass": rig.mass, "stiffness": rig.stiffness, "damping": rig.damping or 0.0, "damper": rig.damper
+    }  # fmt: skip
+
+
+def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
+    """The record with the delay of displacement against acceleration stated, where it was not."""
+    if not {"x", "a"} <= set(record) or any(record.channels[name].delay for name in ("x", "z", "a") if name in record):
+        return record, None
+    first = max(0, (len(record) - STRETCH) // 2)
+    found = asked.ask("Sensor delay", lambda: sensor_delay(record.rows(first, first + STRETCH)))
+    if found is None:
+        return record, None
+    if found.gain.value < 0:
+        asked.notes.append(
+            "The accelerometer runs against the displacement: one of the two has the wrong sign. Turn it round, as in "
+            'channels={"a": "-COLUMN [m/s^2]"}.'
+        )
+        return record, found
+    late = -found.delay.value
+    if abs(late) < SURE * found.delay.sd:
+        return record, found
+    for name in ("x", "z"):
+        if name in record:
+            record = record.with_details(name, delay=late)
+    with_base = " and z, a sensor of its kind," if "z" in record else ""
+    asked.notes.append(
+        f"x{with_base} comes {1e3 * late:.3g} ms after a, by the phase of their lines: taken out. State what is known "
+        "of the sensors' delays to have that taken instead."
+    )
+    return record, found
+
+
+def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Asked) -> Record:
+    """The record with the mounts stated that the comparison of forces shows, where they were not."""
+    for each in comparison.resonances if comparison is not None else ():
+        name = "a" if "accelerometer" in each.name else "load"
+        if "mount" in each.name and record.channels[name].mount is None:
+            record = record.with_details(name, mount=(each.frequency.value, each.damping.value))
+            asked.notes.append(f"The {each.name} is taken to ring at {each.frequency.value:.4g} Hz: {each.evidence}.")
+    return record
+
+
+def _doubt(record: Record, delay: SensorDelay | None) -> str:
+    """What is not known of the sensors of a friction force that was put together from all of them."""
+    unknown = [
+        f"the mount of {name}" for name in ("a", "load") if name in record and record.channels[name].mount is None
+    ]
+    if delay is not None:
+        unknown.append("the delay of x, found in this record,")
+    return f"{' and '.join(unknown)} is not stated: it may be wrong by some per cent" if unknown else ""
+
+
+def _tell_unused(rig: RigSettings, asked: Asked) -> None:
+    unused = [key for key in CONSTANTS if key in rig.model_fields_set and getattr(rig, key) is not None]
+    if unused:
+        verb = "is" if len(unused) == 1 else "are"
+        asked.notes.append(f"The friction was measured: {' and '.join(unused)} as stated {verb} not used.")
+
+
+def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
+    """By which method the friction is found, and why."""
+    helps = [name for name in ("a", "load") if name in record]
+    if helps and rig.contact == "ground":
+        return "fusion", f"{' and '.join(helps)} beside x: all sensors together by a Kalman smoother"
+    why = "the contact is on the moving base" if helps else "there is neither an accelerometer nor a load cell"
+    return "smoother", f"{why}: the displacement differentiated by a smoother"
+
+
+def _balanced(record: Record, rig: RigSettings, method: str, asked: Asked) -> Record:
+    """The record with its friction by the balance of forces."""
+    why = "as asked"
+    if method == "auto":
+        method, why = chosen_method(record, rig)
+    found = asked.ask(
+        "Friction force", lambda: friction_force(record, contact=rig.contact, method=method, **_constants(rig))
+    )
+    if found is None:
+        return record
+    asked.notes.append(f"Friction force: by the method {method}; {why}.")
+    if rig.damping is None:
+        asked.notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
+    return found
+
+
+def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
+    """The record with what its load cell reads as its friction, or with a note of what is lacking."""
+    moves = any(name in record for name in MOTION)
+    if "load" in record and "force" not in record and moves:
+        asked.notes.append(
+            "The load cell's reading is taken as the friction force; inertia between both is part of it."
+        )
+        step = Step("analyze", {"friction": "load"}, "the load cell's reading taken as the friction force")
+        unit = record.channels["load"].unit
+        return record.with_channel("friction", record["load"], unit=unit, source="load", step=step)
+    lacking = [key for key in ("mass", "stiffness") if getattr(rig, key) is None]
+    lacking = lacking if "x" in record else ["a displacement x", *lacking]
+    if lacking and "force" not in record and (moves or "load" not in record):
+        asked.notes.append(
+            f"Friction force: without a measured friction or load it needs {' and '.join(lacking)}, not given."
+        )
+    return record
+
+
+def normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> float | None:
+    """The normal load as measured, by its magnitude, or as stated for the file."""
+    if "normal" in record:
+        finite = record["normal"][np.isfinite(record["normal"])]
+        mean = float(finite.mean()) if len(finite) else 0.0
+        if mean < 0:
+            notes.append(f"The normal load reads {mean:.4g} N: its magnitude is taken.")
+        if mean:
+            return abs(mean)
+        notes.append("The channel normal tells no load: it holds " + ("zeros." if len(finite) else "no numbers."))
+    loads = (rig.normal_load(part) for part in [*name.split(" + "), name])
+    return next((load for load in loads if load is not None), None)

@@ -1,0 +1,91 @@
+"""The whole analysis on the virtual rig, from its file to the truth."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import stickslip as ss
+from stickslip.cli.program import main
+
+TRUE = {"sliding friction": 1.1, "contact stiffness": 192000.0, "contact damping": 23.9}
+KNOWN = """
+mass = 2.42
+stiffness = "2.31 N/mm"
+damping = 0.0
+[sensors.x]
+delay = "1.2585 ms"
+[sensors.z]
+delay = "1.2585 ms"
+[sensors.a]
+mount = ["125 Hz", 0.1]
+[sensors.load]
+mount = ["250 Hz", 0.05]
+inertia = "50 g"
+discharge = "50 s"
+"""
+COLUMNS = ("x=plate [mm]", "z=base [mm]", "a=acc [g]", "load=cell [N]")
+
+
+@pytest.fixture(scope="module")
+def readings() -> ss.Record:
+    """What the air-track rig reads of five seconds of stick-slip at 2.5 Hz."""
+    contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    slider = ss.Oscillator(2.42, 2310, law=contact, drive=ss.HarmonicBase(0.65e-3, frequency=2.5))
+    return ss.Rig().measure(ss.simulate(slider, cycles=15), fs=4000, rng=1, start=0.8)
+
+
+def written(readings: ss.Record, path: Path, **turned: float) -> Path:
+    """Its file in the units of its instruments, some columns turned round."""
+    scale = {"x": 1e3, "z": 1e3, "a": 1 / 9.80665, "load": 1.0}
+    columns = [np.arange(len(readings)) / readings.fs]
+    columns += [scale[name] * turned.get(name, 1.0) * readings[name] for name in scale]
+    header = "t [s],plate [mm],base [mm],acc [g],cell [N]"
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.9g")
+    return path
+
+
+def told(path: Path, *arguments: str) -> dict[str, dict[str, object]]:
+    """The estimates by name, and the notes, that `stickslip analyze` prints."""
+    channels = [part for column in COLUMNS for part in ("--channels", column)]
+    run = CliRunner().invoke(main, ["analyze", str(path), *channels, "--json", *arguments], catch_exceptions=False)
+    assert run.exit_code == 0, run.output
+    found = json.loads(run.stdout)
+    return {each["name"]: each for each in found["estimates"]} | {"notes": {"all": " ".join(found["notes"])}}
+
+
+def test_the_command_line_tells_the_truth_of_a_rig_whose_sensors_are_known(readings: ss.Record, tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text(KNOWN)
+    found = told(written(readings, tmp_path / "run.csv"), "--config", str(tmp_path / "rig.toml"))
+    for name, within in (("sliding friction", 0.0005), ("contact stiffness", 0.001), ("contact damping", 0.03)):
+        assert found[name]["value"] == pytest.approx(TRUE[name], rel=within), name
+        assert found[name]["status"] == "ok", name
+    low, high = found["contact stiffness"]["interval"]  # type: ignore[misc]
+    assert low - 100 < TRUE["contact stiffness"] < high + 100
+    assert found["stops per cycle"]["value"] == pytest.approx(2, abs=0.1)
+    assert found["static over sliding friction"]["value"] == pytest.approx(1.0, abs=0.02)
+    assert "by the method fusion" in str(found["notes"]["all"])
+
+
+def test_what_is_not_known_of_the_sensors_is_found_or_said(readings: ss.Record, tmp_path: Path) -> None:
+    found = told(written(readings, tmp_path / "run.csv"), "--mass", "2.42", "--stiffness", "2310")
+    assert found["sliding friction"]["value"] == pytest.approx(1.1, rel=0.005)
+    assert found["contact stiffness"]["value"] == pytest.approx(192000, rel=0.06)
+    assert "is not stated" in str(found["contact stiffness"]["status"])
+    low, high = found["delay of a behind x"]["interval"]  # type: ignore[misc]
+    assert low < -0.0389 / 30.91 < high
+    assert "comes 1." in str(found["notes"]["all"])
+
+
+def test_without_accelerometer_or_load_cell_it_falls_back_and_says_so(readings: ss.Record) -> None:
+    record = ss.Record.of({name: readings[name] for name in "xz"}, fs=readings.fs)
+    found = ss.analyze(record, mass=2.42, stiffness=2310)
+    assert found.settings["differentiation"] == "smoother"
+    assert found.stiffness is None
+    assert any("neither an accelerometer nor a load cell" in note for note in found.notes)
+    assert found.level is not None
+    assert found.level.value == pytest.approx(1.1, rel=0.05)
