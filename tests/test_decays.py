@@ -205,3 +205,40 @@ def test_every_release_is_drawn():
     found = ss.analyze_decay(ss.Record.of({"x": twice}, fs=fs), method="waveform")
     assert len(found.releases.ring_downs) == 2
     assert [plate.name for plate in ss.figures(found)] == ["decay", "identified", "identified-2"]
+
+
+def analyzed(values, fs, *, method="waveform", noise=1e-3):
+    values = values + noise * np.random.default_rng(1).standard_normal(len(values))
+    return ss.analyze_decay(ss.Record.of({"x": values}, fs=fs), method=method)
+
+
+def test_what_can_not_be_told_from_zero_is_said_so():
+    values, fs, _ = free_decay(dry=0.0)
+    told = " ".join(ss.summary(analyzed(values, fs)).headline)
+    assert "dies away by viscous friction: a damping ratio of" in told
+    assert "That there is dry friction too can not be told" in told
+    values, fs, _ = free_decay(damping_ratio=0.0)
+    told = " ".join(ss.summary(analyzed(values, fs)).headline)
+    assert "dies away by dry friction: a dry friction displacement of" in told
+
+
+def test_a_second_mode_and_a_drift_are_named():
+    t = np.arange(1500) / 100
+    decay = np.exp(-0.2 * t) * np.cos(2 * np.pi * t)
+    told = " ".join(ss.summary(analyzed(decay + 0.05 * np.exp(-0.1 * t) * np.cos(2 * np.pi * 2.7 * t), 100)).headline)
+    assert "leaves over swings at 2.7" in told
+    assert "another mode" in told
+    values, fs, _ = free_decay()
+    told = " ".join(ss.summary(analyzed(values + 0.004 * np.arange(len(values)) / fs, fs)).headline)
+    assert "the rest position drifts" in told
+    assert "leaves over" not in " ".join(ss.summary(analyzed(values, fs)).headline)
+
+
+def test_every_release_of_a_record_counts_for_the_interval_of_any_motion():
+    """A short first release alone tells little of which motion it was; all together tell it as well as the long one."""
+    long, fs, _ = free_decay()
+    short = long[: np.flatnonzero(long != long[0])[0] + 160]
+    both = analyzed(np.concatenate([short, np.full(250, short[-1]), free_decay(amplitude=short[-1])[0]]), fs)
+    assert len(both.waveform.motions) == 2
+    assert both.whichever[1].includes(0.02)
+    assert np.ptp(both.whichever[1].interval) < 0.5 * np.ptp(both.motion.dry_displacement_any.interval)

@@ -133,9 +133,10 @@ def compare_decays(findings: Sequence[DecayFindings]) -> DecayComparison:
 
 def _whichever(joint: DecayFit, findings: Sequence[DecayFindings]) -> DecayFit:
     """The joint fit with the intervals that hold whichever motion no record speaks against."""
-    choices = [each.motion.choice for each in findings if each.motion is not None]
-    if len(choices) < len(findings):
+    motions = [() if each.waveform is None else each.waveform.motions for each in findings]
+    if not all(motions):
         return joint
+    choices = [motion.choice for each in motions for motion in each]
     either = {f"{name}_any": whichever(choices, getattr(joint, name), name) for name in SHARED[:2]}
     return replace(joint, **either)  # type: ignore[arg-type]
 

@@ -89,6 +89,13 @@ class DecayFindings(Result):
         return self.releases.ring_downs[0].rest if told is None else told
 
     @property
+    def whichever(self) -> tuple[Estimate, ...]:
+        """Damping ratio and dry friction with the intervals that hold whichever motion not rejected it was, if any."""
+        fit = self.waveform if self.waveform is not None and self.waveform.motions else self.motion
+        both = () if fit is None else (fit.damping_ratio_any, fit.dry_displacement_any)
+        return tuple(each for each in both if each is not None)
+
+    @property
     def viscous_residual(self) -> float | None:
         """What viscous damping alone leaves of the motion, over what it leaves together with dry friction (RMS)."""
         fits = {} if self.motion is None else {each.name: each.fitted for each in self.motion.choice.candidates}
@@ -119,7 +126,7 @@ class DecayFindings(Result):
             found += self.motion.estimates
         elif self.waveform is not None:
             found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
-            found += [] if self.motion is None else [self.motion.damping_ratio_any, self.motion.dry_displacement_any]
+            found += [] if self.waveform.motions else self.whichever
         if self.thesis is not None:
             also = ", by decrements" if self.best is not self.thesis else ""
             found += [replace(each, name=f"{each.name}{also}") for each in self.thesis.estimates]
@@ -245,9 +252,9 @@ def analyze_decay(
             "the decrements of the extremes hold for a linear spring",
             "choose method = 'waveform', or ask extreme_decay(record)",
         )
-    faults = tuple(record.check())
     releases = find_releases(record, channel=channel)
     used = releases.ring_downs[0].channel
+    faults = tuple(each for each in record.check() if (each.kind, each.channel) != ("drift", used))  # a hold is none
     units = ("kg m^2", "N m/rad") if used == "theta" else ("kg", "N/m")
     stated = {"mass": mass, "stiffness": stiffness}
     constants: dict[str, Any] = {
@@ -271,8 +278,13 @@ def analyze_decay(
 
     waveform = thesis = motion = None
     if method != "thesis":
-        waveform = ask("The whole waveform", lambda: fit_decay(record, channel=used, restoring=restoring, **constants))
+        fit = functools.partial(fit_decay, record, channel=used, restoring=restoring, **constants)
         if releases.ring_downs[0].order == 0:
+            waveform = ask("Which motion", lambda: fit(candidates="all"))
+        waveform = waveform or ask("The whole waveform", fit)
+        if waveform is not None and waveform.motions:
+            motion = waveform.motions[0]
+        elif releases.ring_downs[0].order == 0:
             motion = ask("Which motion", lambda: choose_motion(record, channel=used, restoring=restoring))
     if method != "waveform" and restoring == "linear":
         thesis = ask("The decrements", lambda: decrement(record, channel=used))

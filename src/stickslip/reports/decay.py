@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.estimate import Estimate
 from stickslip.reports.words import interval_of, number, value_of
 
+MOST = 0.5  # of the power of what is left over
+OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
 LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
 BOTH = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
 METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
@@ -37,18 +41,23 @@ def settings(findings: DecayFindings) -> dict[str, str]:
 
 
 def _sentences(findings: DecayFindings) -> Iterator[str]:
-    best = findings.best
-    ratio, dry = best.damping_ratio, best.dry_displacement
-    if "no friction" in best.model:
-        yield "Neither viscous nor dry friction can be told from zero."
-    elif _doubted(findings):
+    ratio, dry = findings.best.damping_ratio, findings.best.dry_displacement
+    viscous, rubs = ratio.interval[0] > 0, dry.interval[0] > 0
+    if viscous and rubs and _doubted(findings):
         yield f"Read as {_model(findings)}, which the record speaks against, it shows {_both(ratio, dry)}."
-    else:
+    elif viscous and rubs:
         yield f"The motion dies away by {_model(findings)}: {_both(ratio, dry)}."
+    elif viscous:
+        yield f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(dry, 'dry friction')}"
+    elif rubs:
+        yield f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
+    else:
+        yield "Neither viscous nor dry friction can be told from zero."
+    yield from _left_over(findings)
     force = findings.dry_force
     if force is not None:
         yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
-    elif dry.interval[0] > 0:
+    elif rubs:
         yield "The dry friction force is that displacement times the spring's stiffness; state stiffness= or mass=."
     yield from _motion(findings)
     yield from _chosen(findings)
@@ -84,7 +93,7 @@ def _chosen(findings: DecayFindings) -> Iterator[str]:
     more = findings.viscous_residual
     if more is not None and more > LEAVES_MORE:
         yield f"Viscous damping alone leaves {more:.3g} times the residual that it leaves together with dry friction."
-    dry = motion.dry_displacement_any
+    dry = findings.whichever[1]
     force = findings.as_force(dry, "")
     also = f", its force {_reach(force)}" if force is not None else ""
     which = "Whichever of them it is" if kept else "By all that leave at most twice the least residual"
@@ -104,10 +113,37 @@ def verdicts(findings: DecayFindings) -> list[tuple[str, str]]:
 
 
 def _both(ratio: Estimate, dry: Estimate) -> str:
-    return (
-        f"a damping ratio of {value_of(ratio)} (95 % sure: {interval_of(ratio)}) and a dry friction displacement of "
-        f"{value_of(dry)} (95 % sure: {interval_of(dry)})"
-    )
+    return f"{_told(ratio)} and {_told(dry)}"
+
+
+def _told(estimate: Estimate) -> str:
+    return f"a {estimate.name} of {value_of(estimate)} (95 % sure: {interval_of(estimate)})"
+
+
+def _hidden(estimate: Estimate, words: str) -> str:
+    least = value_of(estimate, max(0.0, estimate.interval[1]))
+    return f"That there is {words} too can not be told: a {estimate.name} below {least} would not be seen."
+
+
+def _left_over(findings: DecayFindings) -> Iterator[str]:
+    """Where the fit leaves more than noise: whether that drifts, or swings at a frequency of its own."""
+    fit = findings.waveform
+    if fit is None or "residual" not in fit.status:
+        return
+    time, left = max(zip(fit.time, fit.residual, strict=True), key=lambda each: float(np.std(each[1])))
+    power = np.abs(np.fft.rfft((left - left.mean()) * np.hanning(len(left)))) ** 2
+    frequency = np.fft.rfftfreq(len(left), float(time[1] - time[0]))
+    own, total = fit.frequency.value, float(power.sum())
+    near = slice(max(0, int(np.argmax(power)) - 2), int(np.argmax(power)) + 3)
+    line = float(power[near].sum())
+    at = float(power[near] @ frequency[near]) / line
+    if float(power[frequency < own / 3].sum()) > MOST * total:
+        yield "Most of what the fit leaves over is slower than the oscillation: the rest position drifts."
+    elif line > MOST * total and abs(at / own - round(at / own)) > OTHER:
+        yield (
+            f"Most of what the fit leaves over swings at {number(at, frequency[1] / 10, 'Hz')}: another mode of "
+            "the rig, or something that drives it; hold it still, or filter it out."
+        )
 
 
 def _motion(findings: DecayFindings) -> Iterator[str]:
