@@ -284,12 +284,12 @@ def analyze_decay(
         waveform = waveform or ask("The whole waveform", fit)
         if waveform is not None and waveform.motions:
             motion = waveform.motions[0]
-        elif releases.ring_downs[0].order == 0:
+        elif waveform is None and releases.ring_downs[0].order == 0:
             motion = ask("Which motion", lambda: choose_motion(record, channel=used, restoring=restoring))
     if method != "waveform" and restoring == "linear":
         thesis = ask("The decrements", lambda: decrement(record, channel=used))
     if waveform is None and thesis is None and motion is None:
-        raise refusals[0]
+        raise refusals[-1]
     ways = {} if method != "all" or releases.ring_downs[0].order else OLDER if restoring == "linear" else FOR_PENDULUMS
     older = {
         name: found

@@ -519,7 +519,7 @@ def _ring_down(
     rows = np.array([row for row in turns if first <= row < last], dtype=np.intp)
     sound = ~unsound[rows]
     notes = (
-        *_notes(values[rows], sound, ORDERS[name], run, noise),
+        *_notes(values[rows], sound, ORDERS[name], run, noise, record.channels[name].unit),
         *([CAUGHT] if ends and not stopped and not run.parted else []),
     )
     return RingDown(
@@ -555,7 +555,7 @@ def _flat_start(values: Array, half: float, noise: float) -> bool:
     return bool(-slope / (2 * bend) > -1 - min(doubt, 0.05 * half))
 
 
-def _notes(levels: Array, sound: NDArray[np.bool_], order: int, run: _Run, noise: float) -> tuple[str, ...]:
+def _notes(levels: Array, sound: NDArray[np.bool_], order: int, run: _Run, noise: float, unit: str) -> tuple[str, ...]:
     notes = []
     if not sound.all():
         notes.append(f"{int(np.sum(~sound))} extremes are clipped and left out")
@@ -567,7 +567,7 @@ def _notes(levels: Array, sound: NDArray[np.bool_], order: int, run: _Run, noise
         swing = abs(levels[0] - levels[1])
         fall = 1 - abs(levels[1] - levels[2]) / swing
         if abs(rise) > max(max(DRIFTS, fall**3 / 4) * swing, 4 * noise):  # uneven swings leave a trend of their own
-            notes.append(f"the rest position drifts by {rise:.2g}: see remove_drift(record)")
+            notes.append(f"the rest position drifts by {rise:.2g} {unit}: the extremes alone are off by as much")
     if run.parted:
         notes.append(LOST)
     return tuple(notes)

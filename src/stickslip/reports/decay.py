@@ -9,6 +9,7 @@ import numpy as np
 from stickslip.decay_comparison import DecayComparison
 from stickslip.decays import DecayFindings
 from stickslip.estimate import Estimate
+from stickslip.identify.release import CAUGHT
 from stickslip.reports.words import interval_of, number, value_of
 
 MOST = 0.5  # of the power of what is left over
@@ -151,6 +152,7 @@ def _motion(findings: DecayFindings) -> Iterator[str]:
     many = f"{len(rings)} releases were found; the first" if len(rings) > 1 else "The motion"
     first = rings[0]
     end = f"comes to rest at {first.stop:.4g} s" if first.stopped else "is still going on at the end"
+    end = f"is caught at {first.stop:.4g} s" if CAUGHT in first.notes else end
     begin = f"begins at {first.release:.4g} s" if first.held else "is under way when the record begins"
     yield (
         f"{many} {begin}, swings at {value_of(findings.best.frequency)} through {len(first.turns)} extremes from "
