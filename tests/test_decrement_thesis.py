@@ -197,3 +197,20 @@ def test_table_6_8_was_computed_from_a_rate_cut_off() -> None:
     assert round(ex.rate(x, i=2, m=7), 5) == 0.03238
     assert round(float(ex.dry(x, 0.0323)[1]), 4) == 0.0196
     assert round(0.0323 - BETA, 4) == 0.0007
+
+
+def test_an_error_of_table_6_3_is_larger_than_its_bound() -> None:
+    bound, measured, _ = MEASURED["random"]
+    off = np.abs(np.array(TRUE) - measured)
+    assert off[1] == pytest.approx(0.00502, abs=1e-9)  # printed as .0050, of a bound of .005
+    assert np.delete(off, 1).max() < bound
+
+
+def test_the_effective_errors_of_tables_6_9_to_6_11() -> None:
+    """What the largest difference of two errors is, for every m: the tables print only what follows from it."""
+    used = {"random": [8, 8, 8, 8], "quantisation": [1.5, 0.5, 1.5, 4], "sampling": [6.5, 6.5, 6.5, 6.5]}
+    for kind, wanted in used.items():
+        off = 1e-4 * np.array(MEASURED[kind][2])
+        assert [np.abs(ex.differences(off))[[1, m + 1]].max() / 2 for m in STEPS] == pytest.approx(
+            [1e-4 * each for each in wanted]
+        )

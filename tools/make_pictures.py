@@ -1,6 +1,6 @@
-"""Draw the picture of the README from the bundled record, with the project's own figures.
+"""Draw the pictures of the README and of the pages, with the project's own figures.
 
-python tools/make_pictures.py          writes docs/images/loops.png
+python tools/make_pictures.py          writes docs/images/loops.png and decay.png
 """
 
 from __future__ import annotations
@@ -12,14 +12,18 @@ import matplotlib as mpl
 mpl.use("agg")
 
 import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
 
 import stickslip as ss
 from stickslip.plot.contact import plot_displacement_loop, plot_velocity_loop
+from stickslip.plot.decay import plot_decay, plot_differences
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 
 
-def main() -> None:
+def loops() -> None:
+    """Friction against velocity and displacement of the bundled record."""
     record = ss.datasets.demo()
     rig = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
     findings = ss.analyze(record, **rig)
@@ -31,10 +35,29 @@ def main() -> None:
         if axes.get_legend() is not None:
             axes.get_legend().remove()
     figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False)
+    saved(figure, "loops.png")
+
+
+def decay() -> None:
+    """The example of the page on free decay: its envelopes, and its amplitude differences."""
+    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
+    x = ss.simulate(slider, duration=20.0, start={"x": 1.0}).record(fs=100)["x"]
+    noisy = x + 5e-3 * np.random.default_rng(1).standard_normal(len(x))
+    findings = ss.analyze_decay(ss.Record.of({"x": noisy}, fs=100), stiffness=10.0)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+    plot_decay(findings, ax=left)
+    plot_differences(findings.thesis, ax=right)
+    for axes in (left, right):
+        axes.legend(ncols=1, loc="lower right" if axes is left else "upper right", fontsize="small")
+    saved(figure, "decay.png")
+
+
+def saved(figure: Figure, name: str) -> None:
     IMAGES.mkdir(exist_ok=True)
-    figure.savefig(IMAGES / "loops.png", dpi=110)
-    print(f"{IMAGES / 'loops.png'}: {(IMAGES / 'loops.png').stat().st_size / 1024:.0f} kB; {findings.level}")
+    figure.savefig(IMAGES / name, dpi=110)
+    print(f"{IMAGES / name}: {(IMAGES / name).stat().st_size / 1024:.0f} kB")
 
 
 if __name__ == "__main__":
-    main()
+    loops()
+    decay()
