@@ -23,7 +23,7 @@ TELLING = 0.999  # of what all lines tell of a mount: the rest is left out
 NEAR = 64  # lines over which the noise around a line is averaged
 FARTHEST = 0.25  # s: longer delays are not looked for
 TRIED = 5  # delays from which a fit begins, of two kinds
-ROUNDS = 4  # in which the windows are moved to the delay and the noise is found anew
+ROUNDS = 3  # in which the windows are moved to the delay and the noise is found anew
 CHANCE = 3.0  # deviations by which noise alone may leave more than its power
 SAME = 6.0  # deviations of a misfit by which another delay's may be worse and still not be told from the best
 
@@ -215,7 +215,7 @@ def align(
     room : int
         Samples at both ends that are left out.
     rounds : int
-        Of fitting; in one or two all noise is taken for white.
+        Of fitting; in the first all noise is taken for white.
 
     Returns
     -------
@@ -236,7 +236,7 @@ def align(
         if not done:
             theta[1] = told(parts).gain or 1.0
         parts = [part.without_offset(theta[1]) for part in parts]
-        lines = told([part.weighed(theta) for part in parts] if done and rounds > 2 else parts)
+        lines = told([part.weighed(theta) for part in parts] if done else parts)
         unit = 1 / lines.rate
         scale = np.array([unit, abs(theta[1]), unit, unit**2])[used]
 
@@ -297,7 +297,7 @@ def likely_delays(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> l
     """
     tried = sorted({delay for pair in pairs for delay in _peaks(pair)}, key=abs)
     room = math.ceil(abs(tried[-1]) * max(pair.fs for pair in pairs)) + 2
-    fits = [align(pairs, delay, mount=mount, free=mount is None, room=room, rounds=2) for delay in tried]
+    fits = [align(pairs, delay, mount=mount, free=mount is None, room=room, rounds=1) for delay in tried]
     best = min(fits, key=lambda fit: fit.misfit)
     limit = best.misfit + SAME * math.sqrt(4 * len(best.lines.turn)) * best.widening
     alike: list[Alignment] = []
