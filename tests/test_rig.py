@@ -87,6 +87,14 @@ def test_counts_clips_offsets_and_gaps() -> None:
     assert record.check()
 
 
+@pytest.mark.parametrize("limit", [0.9, 1.05, 1.09])
+def test_a_saturated_load_cell_is_seen(limit: float) -> None:
+    """Its friction has plateaus by nature, of 1.1 N here: what tells a limit is that no noise moves it."""
+    cut = ss.Rig().having("load", limit=limit).measure(run(), fs=4000, rng=1, start=2.0)
+    assert [(fault.kind, fault.channel) for fault in cut.check()] == [("clipped", "load")]
+    assert not ss.Rig().measure(run(), fs=4000, rng=1, start=2.0).check()
+
+
 def test_a_unit_with_its_own_clock_is_found_by_synchronise() -> None:
     amplitude = {"noise": Noise(1e-7)}
     one = ss.Rig((Sensor("x", **amplitude),)).measure(run(), fs=1000, rng=1)  # type: ignore[arg-type]

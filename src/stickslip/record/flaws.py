@@ -185,7 +185,8 @@ def clipped(values: Array, *, plateaus: bool = False, step: float | None = None)
 
     A cut top is entered and left with a slope, so that parabolas through the samples before and after it rise above
     it; a stuck mass arrives at its plateau with the slope gone, and the parabola only just reaches it. In a signal
-    that is mostly noise, a cut top is a level held more often than the next one.
+    that is mostly noise, a cut top is a level held more often than the next one. A level held to the last digit, where
+    the sensor's noise moves all its other samples, was cut whatever its shape.
 
     Parameters
     ----------
@@ -200,6 +201,8 @@ def clipped(values: Array, *, plateaus: bool = False, step: float | None = None)
     if len(values) < 16 or span == 0:
         return ()
     noise, step = roughness(values), quantum(values) if step is None else step
+    if plateaus and (exact := saturated(values)).any() and roughness(values[~exact]) > step:
+        return runs_of(exact)
     top, bottom = (_clipped_top(side, noise, step, plateaus) for side in (values, -values))
     # an instrument that cuts one end off cuts the other too: there, less evidence is enough
     if top.any() != bottom.any():
