@@ -29,23 +29,29 @@ RUNS = {  # frequency [Hz], base amplitude [m], friction [N], seconds
 }
 
 
+BEGIN = 0.1  # s: before, the mounts have not yet rung out
+
+
 @cache
-def moved(name: str) -> tuple[ss.Trajectory, float]:
-    """The motion, and when the record begins."""
+def moved(name: str) -> ss.Trajectory:
+    """The motion, from its periodic orbit on where it is driven."""
     frequency, amplitude, friction, seconds = RUNS[name]
     law = ss.CompliantContact(friction, stiffness=192000, damping=23.9) if friction else ss.Coulomb(0.0)
     if not frequency:
         slider = ss.Oscillator(law=law, **BALANCE)
-        return ss.simulate(slider, duration=seconds + 0.1, start={"x": amplitude}), 0.1
-    settled = 8.0 if friction else 120.0
+        return ss.simulate(slider, duration=seconds + BEGIN, start={"x": amplitude})
     slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **BALANCE)
-    return ss.simulate(slider, duration=settled + seconds), settled
+    if friction:
+        settled = ss.simulate(slider, cycles=60)
+        start = {key: value for key, value in settled.state(settled.duration).items() if key in ("x", "v")}
+    else:
+        start = dict(zip("xv", ss.steady_state(slider).orbit.sample(np.zeros(1), ("x", "v"))[0][:, 0], strict=True))
+    return ss.simulate(slider, duration=seconds + BEGIN, start=start)
 
 
 def record(name: str, rig: ss.Rig, seed: int, *, mount: bool) -> ss.Record:
     """What the rig writes; the mount stated or not."""
-    run, start = moved(name)
-    found = rig.measure(run, fs=FS, rng=seed, start=start)
+    found = rig.measure(moved(name), fs=FS, rng=seed, start=BEGIN)
     return found.with_details("a", mount=MOUNT) if mount else found
 
 
@@ -56,8 +62,8 @@ def information(name: str) -> np.ndarray:
     variance s_a^2 + |G|^2 w^4 s_x^2, whose slopes are those of G. A ring-down is windowed, and its lines scaled to the
     power that it has.
     """
-    run, start = moved(name)
-    times = start + np.arange(round(RUNS[name][3] * FS)) / FS
+    run = moved(name)
+    times = BEGIN + np.arange(round(RUNS[name][3] * FS)) / FS
     truth = run.sample(times, ("a",))[0][0]
     frequency = RUNS[name][0]
     window = np.ones(len(times))

@@ -103,6 +103,61 @@ def test_a_unit_with_its_own_clock_is_found_by_synchronise() -> None:
     assert abs(abs(offset.value) - 0.1234) < 1e-4
 
 
+def test_a_unit_whose_clock_runs_fast_is_found() -> None:
+    sensor = Sensor("x", noise=Noise(1e-8))
+    true, fast = (ss.Rig((sensor,), rate=rate).measure(run(), fs=1000, rng=1) for rate in (0.0, 2e-3))
+    assert len(fast) == pytest.approx(len(true) * 1.002, abs=2)
+    assert 1 / ss.clock_rate(true, fast).value - 1 == pytest.approx(2e-3, rel=0.01)
+
+
+def test_the_presets_are_the_rigs_of_the_thesis() -> None:
+    """Sections 2.2, 2.3, 2.5 and 7.2, each figure in the unit in which it stands there."""
+    pound, gravity = 4.4482216152605, 9.80665
+    x, z, a, load = ss.Rig.air_track().sensors
+    assert (x.digitiser.step, x.digitiser.limit) == (2.5e-6, 0.0127)
+    assert x.lag * 30.91 == pytest.approx(0.0389)
+    assert (z.digitiser, z.lag) == (x.digitiser, x.lag)
+    assert a.mount is not None
+    assert load.mount is not None
+    assert (a.mount.frequency, load.mount.frequency) == (125, 250)
+    assert (a.sensitivity, load.sensitivity) == ("1 V/g", "500 mV/lbf")
+    assert load.digitiser.step == pytest.approx(0.0002 * pound)
+    assert load.digitiser.limit == pytest.approx(10 * pound)
+    assert (a.lag, load.lag, load.discharge) == (0, 0, 50)
+    assert ss.Rig.air_track() == ss.Rig()
+    *same, normal, sound = ss.Rig.linear_bearing().sensors
+    assert [sensor.channel for sensor in same] == ["x", "z", "a", "load"]
+    assert [sensor.mount for sensor in same] == [sensor.mount for sensor in ss.Rig().sensors]
+    assert normal.sensitivity == "10 mV/g"
+    assert normal.digitiser.limit == 500 * gravity
+    assert 20 * np.log10(sound.noise.white / 20e-6) == pytest.approx(55)
+    assert 20 * np.log10(abs(sound.response.at(5000.0))) == pytest.approx(-3.01, abs=0.01)
+
+
+def test_the_normal_direction_of_a_structure_is_heard() -> None:
+    block = ss.Structure(
+        mass=np.diag([1.0, 1.0]), damping=np.diag([0.1, 0.1]), stiffness=np.diag([100.0, 400.0]), contacts=(),
+        drive=ss.Release(),
+    )  # fmt: skip
+    motion = ss.simulate(block, start={"x1": 1e-2, "x2": 1e-2}, duration=2.0)
+    rig = ss.Rig.linear_bearing().having("ay", of="a2", white=0.0).having("a", of="a1")
+    record = rig.measure(motion, fs=10_000, rng=1)
+    assert list(record) == ["a", "ay"]
+    assert np.array_equal(record["ay"], motion.sample(record.time, ("a",))[0][1])
+
+
+def test_what_a_calibration_would_say_is_stated() -> None:
+    rig = ss.Rig().having("x", gain=1.01)
+    record = rig.stated(rig.measure(run(), fs=4000, rng=1, start=2.0))
+    x, a, load = (record.channels[name] for name in ("x", "a", "load"))
+    assert (x.delay, a.delay, a.mount) == (0.0389 / 30.91, 0, (125, 0.1))
+    assert (load.mount, load.inertia, load.discharge) == ((250, 0.05), 0.05, 50)
+    assert x.noise == pytest.approx(np.sqrt(1e-12 + 2.5e-6**2 / 12))
+    assert load.sensitivity == "500 mV/lbf"
+    perfect = ss.Rig.perfect()
+    assert perfect.stated(perfect.measure(run(), fs=1000)).channels["x"].noise is None
+
+
 def test_the_truth_stands_beside_the_record() -> None:
     record = ss.Rig().measure(run(), fs=2000, rng=1, start=2.0)
     truth = record.truth

@@ -21,7 +21,7 @@ from stickslip.solve.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 SENSED = {"load": "friction"}  # what a channel's sensor sits on, where the run calls it otherwise
-POUND = 4.4482216152605  # force [N]
+POUND, GRAVITY = 4.4482216152605, 9.80665  # force [N], acceleration [m/s^2]
 
 
 @dataclass(frozen=True)
@@ -228,6 +228,8 @@ class Sensor:
         What is added.
     digitiser : Digitiser
         How readings become numbers.
+    sensitivity : str
+        Nominal, in words ("500 mV/lbf"), for the channel; the samples have it applied.
 
     Raises
     ------
@@ -248,6 +250,7 @@ class Sensor:
     discharge: float = math.inf
     noise: Noise = field(default_factory=Noise)
     digitiser: Digitiser = field(default_factory=Digitiser)
+    sensitivity: str = ""
 
     def __post_init__(self) -> None:
         finite("gain", self.gain, unit="(ratio)", signed=True)
@@ -267,6 +270,15 @@ class Sensor:
         """Its mount and its discharge as one filter."""
         mount = resonance(self.mount.frequency, self.mount.damping) if self.mount else Response()
         return mount.then(leak(self.discharge)) if math.isfinite(self.discharge) else mount
+
+    @property
+    def certificate(self) -> dict[str, Any]:
+        """What a calibration would say of it, as :meth:`Record.with_details` takes it; of its gain it knows nothing."""
+        noise = math.hypot(self.noise.white, self.noise.band, self.digitiser.step / math.sqrt(12))
+        details: dict[str, Any] = {"delay": self.lag, "noise": noise or None}
+        if self.mount:
+            details |= {"mount": (self.mount.frequency, self.mount.damping), "inertia": self.mount.mass}
+        return details | ({"discharge": self.discharge} if math.isfinite(self.discharge) else {})
 
     def having(self, **changes: Any) -> Sensor:
         """The same sensor with other values; a name is looked for in the sensor, its mount, noise and digitiser.
@@ -303,15 +315,30 @@ def _air_track() -> tuple[Sensor, ...]:
     return (
         lvdt,
         replace(lvdt, channel="z"),
-        Sensor("a", mount=Mount(125.0, 0.1), noise=Noise(0.04), digitiser=Digitiser(limit=5 * 9.80665)),
+        Sensor(
+            "a",
+            mount=Mount(125.0, 0.1),
+            noise=Noise(0.04),
+            digitiser=Digitiser(limit=5 * GRAVITY),
+            sensitivity="1 V/g",
+        ),
         Sensor(
             "load",
             mount=Mount(250.0, 0.05, mass=0.05),
             discharge=50.0,
             noise=Noise(0.002),
             digitiser=Digitiser(step=0.0002 * POUND, limit=10 * POUND),
+            sensitivity="500 mV/lbf",
         ),
     )
+
+
+def _linear_bearing() -> tuple[Sensor, ...]:
+    """Section 7.2: the same, and what listens to the normal direction and to the sound."""
+    calm = (sensor.having(white=sensor.noise.white / 2) for sensor in _air_track())
+    normal = Sensor("ay", noise=Noise(0.1), digitiser=Digitiser(limit=500 * GRAVITY), sensitivity="10 mV/g")
+    microphone = Sensor("sound", mount=Mount(5000.0, math.sqrt(0.5)), noise=Noise(20e-6 * 10 ** (55 / 20)))
+    return (*calm, normal, microphone)
 
 
 @dataclass(frozen=True)
@@ -363,21 +390,29 @@ class Rig:
     def air_track(cls) -> Rig:
         """The rig of the thesis's chapters 2 to 5.
 
-        Two LVDTs with 2.5 um counts that come 0.0389 rad at 30.91 rad/s late (section 2.3), an accelerometer on a
-        mount that rings at 125 Hz, a load cell behind a flange that rings at 250 Hz (section 2.5), with 0.0002 lb
-        resolution, 10 lb range and a discharge of 50 s (section 2.2). Not in the thesis, and assumed: the noise (1 um,
-        0.04 m/s^2, 2 mN), the mounts' damping (0.10, 0.05), the flange's 50 g, the ranges of LVDT and accelerometer.
+        Two LVDTs (Robinson-Halpern 210A-0500: half an inch of either sign) with 2.5 um counts (section 2.2) that come
+        0.0389 rad at 30.91 rad/s late (section 2.3); an accelerometer of 1 V/g (PCB 393C) on a mount that rings at
+        125 Hz; a load cell (PCB 208B) of 500 mV/lb with 0.0002 lb resolution, 10 lb range and a discharge of 50 s
+        (section 2.2) behind a flange that rings at 250 Hz (section 2.5).
+
+        Not in the thesis, and assumed: the noise (1 um, 0.04 m/s^2, 2 mN), the mounts' damping (0.10, 0.05), the
+        flange's 50 g, the accelerometer's range of 5 g. In the thesis, and left out: the sensors' own resonances of
+        3.5 and 70 kHz, far above the mounts', and that the accelerometer reads from 0.025 Hz on only
+        (``having("a", discharge=20.0)`` adds that: 0.2 ms of lead at 2.5 Hz), and 5 % of the transverse acceleration.
         """
         return cls()
 
     @classmethod
     def linear_bearing(cls) -> Rig:
-        """The rig of the thesis's chapter 7: the same on a linear bearing, with an accelerometer in normal direction.
+        """The rig of the thesis's chapter 7: the same on a linear bearing, and sensors of what squeaks.
 
-        The air track's sound is gone. Assumed: noise half as large.
+        The air track's sound is gone, and the noise of chapter 2's sensors is assumed to be half as large. An
+        accelerometer of 10 mV/g (PCB 303A02; noise of 0.1 m/s^2 and range of 500 g assumed) reads the normal direction
+        as ``ay``, and a microphone in 55 dB of noise the sound, low-passed at 5 kHz (section 7.2). They write what a
+        run has: ``having("ay", of="a2")`` where the second coordinate of a structure is the normal one. The thesis
+        sampled at 10 kHz. The bearing's own 0.413 N and damping ratio of 0.0177 (section 6.5) belong to the system.
         """
-        calm = tuple(sensor.having(white=sensor.noise.white / 2) for sensor in _air_track())
-        return cls(calm)
+        return cls(_linear_bearing())
 
     @classmethod
     def perfect(cls, *channels: str) -> Rig:
@@ -409,6 +444,24 @@ class Rig:
             raise ModelError(f"no sensor writes '{channel}'", f"the rig has {', '.join(names)}", "choose one of them")
         changed = [s.having(**changes) if s.channel == channel else s for s in self.sensors]
         return replace(self, sensors=tuple(changed))
+
+    def stated(self, record: Record) -> Record:
+        """A record of this rig with what a calibration of its sensors would say, stated in the channels.
+
+        Parameters
+        ----------
+        record : Record
+            From :meth:`measure`.
+
+        Returns
+        -------
+        Record
+            With each channel's delay, noise, mount, inertia and discharge; wrong gains remain, as nobody knows them.
+        """
+        for sensor in self.sensors:
+            if sensor.channel in record:
+                record = record.with_details(sensor.channel, **sensor.certificate)
+        return record
 
     def measure(
         self, run: Trajectory, *, fs: float, rng: int | np.random.Generator | None = None, start: float = 0.0
@@ -459,7 +512,8 @@ class Rig:
                 continue
             samples[sensor.channel] = _read(sensor, signals, run.starts, times, own)
             unit = signals[sensor.source].unit
-            channels[sensor.channel] = Channel(sensor.channel, unit, described(sensor.channel, unit), source="Rig")
+            words = described(sensor.channel, unit)
+            channels[sensor.channel] = Channel(sensor.channel, unit, words, "Rig", sensor.sensitivity)
         if not samples:
             raise ModelError(
                 f"sensors of {', '.join(s.source for s in self.sensors)}",
