@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         StickslipError as StickslipError,
     )
     from stickslip.estimate import Estimate as Estimate
+    from stickslip.experiment import ExperimentPlan as ExperimentPlan, plan_experiment as plan_experiment
     from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
     from stickslip.files.write import write_record as write_record
     from stickslip.findings import Findings as Findings
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     )
     from stickslip.identify.impact import ImpactTest as ImpactTest, impact_test as impact_test
     from stickslip.identify.mounts import Resonance as Resonance
+    from stickslip.plot.experiment import plot_plan as plot_plan
     from stickslip.plot.force import plot_force_comparison as plot_force_comparison
     from stickslip.identify.breakaway import Breakaway as Breakaway, breakaway as breakaway
     from stickslip.identify.contact import (
@@ -87,6 +89,7 @@ if TYPE_CHECKING:
     from stickslip.record.record import Record as Record, Step as Step
     from stickslip.reports.folder import publish as publish
     from stickslip.reports.page import report as report
+    from stickslip.reports.rig import publish_rig as publish_rig
     from stickslip.reports.summary import summary as summary
     from stickslip.signals.delay import without_delays as without_delays
     from stickslip.signals.differentiate import differentiate as differentiate, smooth as smooth
@@ -221,6 +224,8 @@ _ROOMS = {
     "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",
     "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",
     "extreme_decay": "identify.envelope", "hilbert_decay": "identify.envelope", "EnvelopeDecay": "identify.envelope",
+    "plan_experiment": "experiment", "ExperimentPlan": "experiment",
+    "plot_plan": "plot.experiment", "publish_rig": "reports.rig",
     "analyze_decay": "decays", "DecayFindings": "decays",
     "compare_decays": "decay_comparison", "DecayComparison": "decay_comparison",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import stickslip as ss
-from stickslip.cli.options import pair, result_options
+from stickslip.cli.cases import case_options, folder_name, wanted_case
+from stickslip.cli.options import result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.show import show_run
-
-if TYPE_CHECKING:
-    from stickslip import Case
-
 
 INTERRUPTED = 130
 LIST_WIDTH = 100
@@ -26,15 +22,7 @@ LIST_WIDTH = 100
 @click.command()
 @click.argument("case", required=False, metavar="[SCENARIO|FILE.toml]")
 @click.option("--list", "listed", is_flag=True, help="List the scenarios, with what is known of each.")
-@click.option("--duration", metavar="TIME", help="Time to simulate in s, or with its unit.")
-@click.option("--cycles", type=click.FloatRange(min=0, min_open=True), help="The same in periods of the drive.")
-@click.option(
-    "--set",
-    "changes",
-    multiple=True,
-    metavar='"NAME=VALUE"',
-    help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm", "law.stiffness=2 N/um". Repeatable.',
-)
+@case_options
 @click.option("--fs", metavar="HZ", help="Sampling rate of the record; fine enough for the motion unless given.")
 @click.option(
     "--format",
@@ -63,8 +51,8 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
     if case is None or listed:
         _list_scenarios(as_json=as_json)
         return
-    wanted = _case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
-    folder = output or (None if as_json else Path(f"{_fit_for_a_file(wanted.name)}-stickslip"))
+    wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
+    folder = output or (None if as_json else folder_name(wanted, "stickslip"))
     if folder:
         ss.require_output(wanted, folder=folder, **options)
     with progress(4 if options["animation"] else 3) as tell:
@@ -74,17 +62,6 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
     show_run(result, written, as_json=as_json)
     if result.run.status == "interrupted":
         raise SystemExit(INTERRUPTED)
-
-
-def _case(name: str, *, duration: str | None, cycles: float | None, changes: Sequence[str], fs: str | None) -> Case:
-    """The scenario or the file of that name, with what the command line changes."""
-    case = ss.read_system(name) if name.endswith(".toml") or Path(name).is_file() else ss.scenario_case(name)
-    case = case.having(**dict(pair(change, "--set") for change in changes))
-    return case.lasting(duration=duration, cycles=cycles, fs=fs)
-
-
-def _fit_for_a_file(name: str) -> str:
-    return "".join(sign if sign.isalnum() or sign in "-_." else "-" for sign in name)
 
 
 def _list_scenarios(*, as_json: bool) -> None:

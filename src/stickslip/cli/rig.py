@@ -1,0 +1,175 @@
+"""stickslip rig"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.cases import case_options, folder_name, wanted_case
+from stickslip.cli.options import pair, result_options
+from stickslip.cli.progress import progress
+from stickslip.cli.show import table
+from stickslip.cli.words import spoken
+
+if TYPE_CHECKING:
+    from stickslip import ExperimentPlan, Record, Rig, Trajectory
+
+FS, RATES = (4000.0,), (1000.0, 2000.0, 4000.0)  # Hz
+PRESETS = {"air-track": "air_track", "linear-bearing": "linear_bearing", "perfect": "perfect"}
+
+
+@click.command()
+@click.argument("case", metavar="SCENARIO|FILE.toml")
+@click.option(
+    "--preset",
+    type=click.Choice(list(PRESETS)),
+    default="air-track",
+    show_default=True,
+    help="The sensors: one of the thesis's two rigs, or sensors without a fault.",
+)
+@click.option(
+    "--sensor",
+    "sensors",
+    multiple=True,
+    metavar='"CHANNEL.NAME=VALUE"',
+    help='Another value of a sensor, in SI: "x.lag=0", "load.limit=20", "a.frequency=2000". Repeatable.',
+)
+@click.option(
+    "--fs",
+    "rates",
+    type=click.FloatRange(min=0, min_open=True),
+    multiple=True,
+    metavar="HZ",
+    help="Sampling rate, 4000 unless given; of a plan 1000, 2000 and 4000. Repeatable in a plan.",
+)
+@click.option(
+    "--start", type=float, metavar="S", default=0.0, show_default=True, help="Time of the motion when recording begins."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="The same seed, the same noise.")
+@click.option("--stated", is_flag=True, help="State in the record what a calibration of the sensors would say.")
+@click.option("--plan", is_flag=True, help="Do not keep a record: tell how accurate which sensors and rates would be.")
+@click.option(
+    "--draws", type=click.IntRange(min=1), default=5, show_default=True, help="Records of each rate in a plan."
+)
+@click.option(
+    "--need",
+    multiple=True,
+    metavar='"QUESTION=ERROR"',
+    help='Of a plan, the least that is enough: "contact stiffness=500 N/m", "friction=10 mN". Repeatable.',
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["csv", "h5", "parquet"]),
+    default="csv",
+    show_default=True,
+    help="Format of the record.",
+)
+@case_options
+@result_options("NAME-rig")
+def rig(case: str, output: Path | None, as_json: bool, plan: bool, **options: Any) -> None:
+    """Measure a simulated motion with a virtual rig, or plan an experiment on it.
+
+    SCENARIO or FILE.toml is what stickslip simulate takes. The record is what sensors would have written that lag,
+    ring, forget, clip and round, with the truth beside it: try a method on it before there is a rig.
+
+    With --plan the motion is measured again and again, at each --fs, with and without the accelerometer and the load
+    cell, and a table tells how far off the answers are: the delay between sensors, the friction at each moment and its
+    level, the contact's stiffness.
+
+    \b
+    stickslip rig slider.toml --fs 4000 --start 2 --output run1
+    stickslip rig slider.toml --plan --fs 500 --fs 1000 --fs 4000 --start 2 --need "friction=10 mN"
+    """
+    wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes")})
+    bench = _bench(options.pop("preset"), options.pop("sensors"))
+    folder = output or (None if as_json else folder_name(wanted, "rig"))
+    needs = [pair(each, "--need") for each in options.pop("need")]
+    if needs and not plan:
+        raise click.BadParameter("what is needed is asked of a plan; add --plan", param_hint="--need")
+    form = options.pop("form")
+    with progress(1) as tell:
+        tell("simulating", 0)
+        run = ss.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", 0)).run
+        results = _planned(run, bench, tell, options) if plan else _measured(run, bench, tell, options)
+        written = ss.publish_rig(results, folder=folder, form=form) if folder else None
+    if as_json:
+        click.echo(json.dumps(_told(results), indent=2, ensure_ascii=False, allow_nan=False))
+        return
+    if isinstance(results, ss.ExperimentPlan):
+        _show_plan(results, needs)
+    else:
+        _show_record(results)
+    if written is not None:
+        click.echo(f"Results: {written}")
+
+
+def _bench(preset: str, changes: tuple[str, ...]) -> Rig:
+    """The rig of that name, with what the command line changes of its sensors."""
+    chosen: Rig = getattr(ss.Rig, PRESETS[preset])()
+    for change in changes:
+        name, text = pair(change, "--sensor")
+        channel, point, detail = name.partition(".")
+        try:
+            value = float(text)
+        except ValueError:
+            point = ""
+        if not point:
+            raise click.BadParameter(f"'{change}' is not CHANNEL.NAME=NUMBER", param_hint="--sensor")
+        chosen = chosen.having(channel, **{detail: value})
+    return chosen
+
+
+def _measured(run: Trajectory, bench: Rig, tell: Callable[[str, float], None], options: Mapping[str, Any]) -> Record:
+    """One record."""
+    if len(options["rates"]) > 1:
+        raise click.BadParameter("a record has one sampling rate; several go with --plan", param_hint="--fs")
+    tell("measuring", 0.5)
+    record = bench.measure(run, fs=(options["rates"] or FS)[0], rng=options["seed"], start=options["start"])
+    return bench.stated(record) if options["stated"] else record
+
+
+def _planned(
+    run: Trajectory, bench: Rig, tell: Callable[[str, float], None], options: Mapping[str, Any]
+) -> ExperimentPlan:
+    """Many."""
+    chosen = {name: options[name] for name in ("draws", "seed", "start")}
+    return ss.plan_experiment(run, rig=bench, rates=options["rates"] or RATES, progress=tell, **chosen)
+
+
+def _told(results: Record | ExperimentPlan) -> dict[str, Any]:
+    if isinstance(results, ss.ExperimentPlan):
+        return results.to_dict()
+    return {"fs": results.fs, "truth": dict(results.truth), "faults": [str(fault) for fault in results.check()]}
+
+
+def _show_record(record: Record) -> None:
+    from rich.console import Console
+
+    click.echo(repr(record))
+    rows = [(name, f"{value:.6g}") for name, value in record.truth.items() if name != "events"]
+    Console(highlight=False).print(table(("what is true", "SI"), rows))
+    for fault in record.check():
+        click.echo(f"- {spoken(fault)}")
+
+
+def _show_plan(plan: ExperimentPlan, needs: Sequence[tuple[str, str]]) -> None:
+    from rich.console import Console
+
+    rows = [
+        [f"{setup.fs:g}", ", ".join(setup.sensors), *(str(setup.accuracy[each]) for each in plan.questions)]
+        for setup in plan.setups
+    ]
+    Console(highlight=False).print(table(("fs [Hz]", "sensors", *plan.questions), rows))
+    click.echo(f"Root-mean-square errors over {plan.draws} draws, and their share of the true value.")
+    for reason in plan.refusals:
+        click.echo(f"- {spoken(reason)}")
+    for question, error in needs:
+        setup = plan.enough(question, error)
+        found = f"{', '.join(setup.sensors)} at {setup.fs:g} Hz" if setup else "none of these"
+        click.echo(f"{question} within {error}: {found}")
