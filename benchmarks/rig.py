@@ -21,7 +21,7 @@ import numpy as np
 
 import stickslip as ss
 from stickslip.identify.contact import branch_slopes
-from stickslip.identify.holding import likely_contact, sliding_level
+from stickslip.identify.likely_contact import likely_contact, sliding_level
 
 MOTIONS = {2.5: (0.65e-3, 1.1), 5.61: (0.6e-3, 1.05), 8.7: (1.1e-3, 1.1), 11.1: (2e-3, 1.1)}
 """Frequency [Hz] of the base: its amplitude [m], and the friction [N]."""

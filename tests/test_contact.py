@@ -80,3 +80,68 @@ def test_what_it_lacks_is_said() -> None:
         ss.contact_stiffness(balanced(2.5), method="guess")
     with pytest.raises(EstimateError, match="sticks"):
         ss.contact_stiffness(balanced(2.5).rows(0, 300))
+
+
+def record_of(law: object, frequency: float = 2.5, rig: ss.Rig | None = None, fs: float = 4000.0) -> ss.Record:
+    """Two seconds of the thesis's motion on another contact, or by other sensors, taken as told."""
+    drive = ss.HarmonicBase({2.5: 0.65e-3, 8.7: 1.1e-3}[frequency], frequency=frequency)
+    run = ss.simulate(ss.Oscillator(law=law, drive=drive, **RIG), duration=6.0)  # type: ignore[arg-type]
+    return told((rig or ss.Rig()).measure(run, fs=fs, rng=3, start=4.0))
+
+
+CONTACT = ss.CompliantContact(1.1, stiffness=STIFFNESS, damping=DAMPING)
+
+
+def test_a_rigid_contact_gets_a_lower_bound() -> None:
+    found = ss.contact_stiffness(ss.friction_force(record_of(ss.Coulomb(1.1)), method="fusion", **RIG))
+    assert found.interval[0] > 1e8
+    assert found.interval[1] == np.inf
+    assert "not told from a rigid contact" in found.status
+
+
+def test_a_stiff_contact_is_told_while_it_rings_below_half_the_rate() -> None:
+    law = ss.CompliantContact(1.1, stiffness=1e7, damping=200)
+    found = ss.contact_stiffness(ss.friction_force(record_of(law), method="fusion", **RIG))
+    assert found.value == pytest.approx(1e7, rel=2e-3)
+    assert found.status == "ok"
+
+
+def test_in_sliding_a_contact_that_holds_for_no_three_samples_is_refused() -> None:
+    record = ss.friction_force(record_of(ss.Coulomb(1.1), 8.7), method="fusion", **RIG)
+    with pytest.raises(EstimateError, match="rigid"):
+        ss.contact_stiffness(record)
+
+
+def test_a_rate_too_low_for_the_transition_is_named() -> None:
+    found = ss.contact_stiffness(ss.friction_force(record_of(CONTACT, fs=250), method="fusion", **RIG))
+    assert "samples to a cycle" in found.status
+
+
+def test_a_delay_that_is_not_stated_is_named_with_its_sensor() -> None:
+    record = record_of(CONTACT)
+    for name in ("x", "z"):
+        record = record.with_details(name, delay=0.0)
+    found = ss.contact_stiffness(ss.friction_force(record, method="fusion", **RIG))
+    assert "times its noise" in found.status
+    assert found.sd > 1e-3 * STIFFNESS  # of 2e-4 with the delay stated
+
+
+def test_a_load_cell_of_the_wrong_sign_is_refused() -> None:
+    record = record_of(CONTACT, rig=ss.Rig().having("load", gain=-1.0))
+    with pytest.raises(EstimateError, match="times its noise"):
+        ss.contact_stiffness(ss.friction_force(record, method="fusion", **RIG))
+
+
+def test_displacement_alone_does_not_pass_for_sure() -> None:
+    rig = ss.Rig(ss.Rig().sensors[:2])
+    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+    run = ss.simulate(ss.Oscillator(law=CONTACT, drive=drive, **RIG), duration=6.0)
+    record = rig.measure(run, fs=4000, rng=3, start=4.0)
+    found = ss.contact_stiffness(ss.friction_force(record, method="motion", **RIG))
+    assert "displacement alone" in found.status
+
+
+def test_an_unknown_mass_is_named() -> None:
+    record = ss.friction_force(record_of(CONTACT), method="F2")
+    with pytest.raises(EstimateError, match="mass"):
+        ss.contact_stiffness(record)

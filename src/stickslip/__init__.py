@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from stickslip.identify.impact import ImpactTest as ImpactTest, impact_test as impact_test
     from stickslip.identify.mounts import Resonance as Resonance
     from stickslip.plot.experiment import plot_plan as plot_plan
+    from stickslip.plot.contact import plot_transition_speed as plot_transition_speed
     from stickslip.plot.force import plot_force_comparison as plot_force_comparison
     from stickslip.identify.breakaway import Breakaway as Breakaway, breakaway as breakaway
     from stickslip.identify.contact import (
@@ -127,6 +128,11 @@ if TYPE_CHECKING:
     from stickslip.identify.mechanism import Mechanism as Mechanism, mechanism as mechanism
     from stickslip.identify.microslip import find_microslips as find_microslips
     from stickslip.identify.transition import Transition as Transition, transition as transition
+    from stickslip.identify.transition_speed import (
+        TransitionSpeed as TransitionSpeed,
+        coupled_frequency as coupled_frequency,
+        transition_speed as transition_speed,
+    )
     from stickslip.timefrequency import TimeFrequency as TimeFrequency, time_frequency as time_frequency
     from stickslip.plot.wavelet import plot_wavelet as plot_wavelet
     from stickslip.drives import (
@@ -210,6 +216,8 @@ _ROOMS = {
     "impact_test": "identify.impact", "ImpactTest": "identify.impact",
     "plot_force_comparison": "plot.force",
     "contact_stiffness": "identify.contact", "contact_damping": "identify.contact",
+    "transition_speed": "identify.transition_speed", "TransitionSpeed": "identify.transition_speed",
+    "coupled_frequency": "identify.transition_speed", "plot_transition_speed": "plot.contact",
     "breakaway": "identify.breakaway", "Breakaway": "identify.breakaway",
     "presliding": "identify.presliding", "Presliding": "identify.presliding",
     "pulled_slider": "identify.pull", "Pull": "identify.pull",

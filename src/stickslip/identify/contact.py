@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.identify.holding import HELD, LEAST, STIFFNESS, likely_contact, sliding_level
+from stickslip.identify.likely_contact import HELD, LEAST, STIFFNESS, likely_contact, sliding_level
 from stickslip.identify.loops import Loops
 from stickslip.identify.motion import stretches
 from stickslip.record.record import Record

@@ -13,7 +13,7 @@ from stickslip.record.channels import Channel
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import LEAST, Filter, best_bandwidth, noise_along
-from stickslip.signals.kalman import Motion, Seen, Smoothed, log_likelihood, smooth_motion
+from stickslip.signals.kalman import Motion, Seen, Smoothed, log_likelihood, smooth_motion, surprises
 from stickslip.signals.noise import local_noise
 
 Array = NDArray[np.float64]
@@ -222,9 +222,18 @@ class Held:
 
     def log_likelihood(self, stiffness: float, damping: float) -> float:
         """Of all readings, were the contact so stiff [N/m] and damped [N s/m]."""
-        models = [self.model, self.model.held(stiffness, damping), replace(self.model, share=0.5)]
-        motion, seen = _steps(models, self.regime, self.sensed)
+        motion, seen = self._motion(stiffness, damping)
         return log_likelihood(motion, seen, unknown=self.unknown)
+
+    def misfit(self, stiffness: float, damping: float) -> Array:
+        """Each sensor's mean square surprise while the contact holds: 1 where all is as stated."""
+        motion, seen = self._motion(stiffness, damping)
+        found = surprises(motion, seen, unknown=self.unknown)[self.regime == 1]
+        return np.asarray(np.nanmean(found**2, axis=0))
+
+    def _motion(self, stiffness: float, damping: float) -> tuple[Motion, Seen]:
+        models = [self.model, self.model.held(stiffness, damping), replace(self.model, share=0.5)]
+        return _steps(models, self.regime, self.sensed)
 
 
 def _excess(told: Smoothed) -> Array:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip.findings import Findings
+    from stickslip.identify.transition_speed import TransitionSpeed
 
 MOST_CYCLES = 30
 POINTS_A_CYCLE = 300
@@ -114,6 +115,47 @@ def plot_sticks(findings: Findings) -> Figure:
     left.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
     right.set(xlabel="how many")
     return figure
+
+
+@styled
+def plot_transition_speed(found: TransitionSpeed, *, ax: Axes | None = None) -> Axes:
+    """At which speed does sliding begin after a turn? The mean curve of friction against velocity, and each method.
+
+    Parameters
+    ----------
+    found : TransitionSpeed
+        From :func:`~stickslip.transition_speed`.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    >>> slider = ss.Oscillator(mass=2.42, stiffness=2310, law=contact, drive=ss.HarmonicBase(1.1e-3, frequency=8.7))
+    >>> record = ss.Rig.perfect().having("x", white=1e-7).measure(ss.simulate(slider, cycles=20), fs=4000, rng=1)
+    >>> record = ss.friction_force(record.between(1.0, 2.2), mass=2.42, stiffness=2310, method="fusion")
+    >>> plot_transition_speed(ss.transition_speed(record)).get_ylabel()
+    'friction [N]'
+    """
+    ax = axes_of(ax)
+    x_factor, x_unit = prefixed(found.velocity, "m/s")
+    y_factor, y_unit = prefixed(found.friction, found.level.unit)
+    ax.plot(x_factor * found.velocity, y_factor * found.friction, "o-", color=INK, markersize=3, label="mean of turns")
+    for name, colour, dashes in (("contact", BLUE, "-"), ("curve", ORANGE, "--"), ("equation", INK, ":")):
+        speed = getattr(found, name)
+        if speed is not None:
+            ax.axvline(x_factor * speed.value, color=colour, linestyle=dashes, linewidth=1.2, label=f"by the {name}")
+            ax.axvspan(*(x_factor * end for end in speed.interval), color=colour, alpha=0.15, linewidth=0)
+    for side in (-1, 1):
+        ax.axhline(side * y_factor * found.level.value, color=FAINT, linewidth=1.0)
+    ax.set(xlabel=axis_label("velocity after the turn", x_unit), ylabel=axis_label("friction", y_unit))
+    _legend_above(ax)
+    return ax
 
 
 def _loop(findings: Findings, abscissa: str, ax: Axes) -> Axes:

@@ -136,6 +136,25 @@ def log_likelihood(motion: Motion, seen: Seen, *, unknown: Array) -> float:
     return _filtered(motion, seen, unknown)[1]
 
 
+def surprises(motion: Motion, seen: Seen, *, unknown: Array) -> Array:
+    """How far is each reading from what all before it foretold, in standard deviations?
+
+    Parameters
+    ----------
+    motion : Motion
+    seen : Seen
+    unknown : ndarray (N,)
+        Variance q of the unknown w of each step.
+
+    Returns
+    -------
+    ndarray (N, m)
+        Of mean square 1 where the motion is as stated; NaN where nothing was read.
+    """
+    _, _, _, surprise, variance = _filtered(motion, seen, unknown)[0]
+    return surprise / np.sqrt(np.where(variance > 0, variance, np.nan))
+
+
 def _filtered(motion: Motion, seen: Seen, unknown: Array) -> tuple[tuple[Array, ...], float]:
     count, size, sensors = len(unknown), len(motion.start), seen.readings.shape[1]
     kept = (
