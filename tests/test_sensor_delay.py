@@ -159,6 +159,24 @@ def test_what_is_found_is_used() -> None:
     assert np.sqrt(np.mean((raw["friction"] - true)[400:-400] ** 2)) > 0.05
 
 
+def test_swapped_channels_are_found() -> None:
+    record = ring_down(1.2585e-3, 3)
+    swapped = ss.Record.of({"x": record["a"], "a": record["x"]}, fs=FS)
+    with pytest.raises(EstimateError, match="swapped"):
+        ss.sensor_delay(swapped)
+    friction = measured(*FRICTION[0])
+    swapped = ss.Record.of({"x": friction["a"], "a": friction["x"]}, fs=4000)
+    with pytest.raises(EstimateError, match="swapped"):
+        ss.sensor_delay(swapped)
+
+
+def test_a_wrong_unit_is_named() -> None:
+    record = ring_down(1.2585e-3, 3)
+    found = ss.sensor_delay(record.with_channel("a", record["a"] / 9.80665, unit="m/s^2"))
+    assert "0.102 times" in found.status
+    assert found.delay.includes(-1.2585e-3)
+
+
 def test_noise_that_is_not_white_widens_the_interval() -> None:
     rng = np.random.default_rng(1)
     record = ring_down(1.2585e-3, 3)

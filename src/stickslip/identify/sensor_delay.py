@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ NEEDED = 30.0  # by which a mount betters the misfit, if it is there; noise alon
 FIRM = 0.1  # relative standard deviation up to which a mount counts as found
 CHANCE, FAINT = 3.0, 10.0  # deviations below zero that a damping may have, and above that a gain has
 HIDDEN = 3.0  # times a delay's deviation that a free mount would add to it where a run does not tell the two apart
+ALIKE = 2.0  # factor up to which two sensors may differ in size without being asked why
 UNEXPLAINED = 2.0  # power at the lines, over that of the noise, from which the model is doubted
 
 
@@ -110,7 +111,7 @@ def sensor_delay(
     RecordError
         A channel is missing or not finite, the clock is broken, or the record is short.
     EstimateError
-        Unknown channels or method, or no motion that both channels see above their noise.
+        Unknown channels or method, channels that are swapped, or no motion that both see above their noise.
 
     Examples
     --------
@@ -132,16 +133,36 @@ def sensor_delay(
     if method == "residual":
         return _by_residual(records[0], channels)
     pairs, mount = [_pair(each, channels, order) for each in records], records[0].channels[channels[1]].mount
-    shortest, *others = likely_delays(pairs, mount)
-    held, free = align(pairs, shortest.delay, mount=mount), align(pairs, shortest.delay, free=True)
-    found = free if _is_firm(free, held) else held
+    found, free, others = _fit(pairs, mount)
     if abs(found.theta[1]) < FAINT * found.sd([0, 1, 0, 0]):
         raise EstimateError(
             f"{channels[1]} does not follow {channels[0]} (gain {found.theta[1]:.2g} -+ {found.sd([0, 1, 0, 0]):.2g})",
             f"{QUESTION} needs one motion that both see",
             "check whether the channels are named right",
         )
+    if order and not _alike(found):
+        turned = _fit(
+            [replace(pair, first=pair.second, second=pair.first, noise=pair.noise[::-1]) for pair in pairs], None
+        )
+        if _alike(turned[0]):
+            raise EstimateError(
+                f"{channels[0]} follows {channels[1]} as {channels[1]} should follow {channels[0]}",
+                "the channels are swapped",
+                "name them the other way round when reading",
+            )
     return _answer(found, free, others, mount, channels)
+
+
+def _fit(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> tuple[Alignment, Alignment, list[Alignment]]:
+    """The fit that the pairs support, the one whose mount is free, and those of other delays."""
+    shortest, *others = likely_delays(pairs, mount)
+    held, free = align(pairs, shortest.delay, mount=mount), align(pairs, shortest.delay, free=True)
+    return free if _is_firm(free, held) else held, free, others
+
+
+def _alike(found: Alignment) -> bool:
+    """Whether both sensors give the same size to what they see."""
+    return bool(1 / ALIKE < abs(found.theta[1]) < ALIKE)
 
 
 def _order(channels: tuple[str, str]) -> int:
@@ -240,6 +261,8 @@ def _status(found: Alignment, others: Sequence[float], channels: tuple[str, str]
     (first, second), gain, said = channels, found.theta[1], []
     if gain < 0:
         said.append(f"{first} or {second} has the wrong sign: the gain is {gain:.3g}")
+    if not _alike(found):
+        said.append(f"{second} is {abs(gain):.3g} times what {first} makes of it: see the units and the sensitivities")
     if others:
         delays = " or ".join(f"{delay:.4g}" for delay in others[:2])
         said.append(f"the motion repeats itself: a delay of {delays} s would explain it as well; the shortest is taken")

@@ -17,10 +17,12 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 BLOCK = 1 << 16  # samples under one window of a long record
+QUICK = 4 * BLOCK  # samples in which delays are told apart
 HIGHEST = 0.4  # of the sampling rate, up to which lines are used
 CLEAR = 20.0  # power of a line over its noise, of which noise alone has 1
 TELLING = 0.999  # of what all lines tell of a mount: the rest is left out
 NEAR = 64  # lines over which the noise around a line is averaged
+EXACT = 1e-10  # of the largest curvature: a smaller one is none
 FARTHEST = 0.25  # s: longer delays are not looked for
 TRIED = 5  # delays from which a fit begins, of two kinds
 ROUNDS = 3  # in which the windows are moved to the delay and the noise is found anew
@@ -136,6 +138,21 @@ class Lines:
         spread = np.abs(factor) ** 2 * self.noise[1] + gain**2 * self.noise[0]
         return np.asarray((left - gain * np.exp(-1j * self.turn * delay) * self.first) / np.sqrt(spread))
 
+    def noise_slopes(self, theta: Array) -> tuple[Array, Array]:
+        """What noise alone adds to the products of the residual's slopes by theta, and how much of that only turns.
+
+        At a delay of zero. The misfit of noise does not change with theta, though its residuals do.
+        """
+        _, gain, damped, squared = theta
+        none, w = np.zeros_like(self.turn), self.turn
+        factor = 1 + 1j * damped * w - squared * w**2
+        left = np.array([none, none, 1j * w, -(w**2)])
+        right = np.array([-1j * w * gain, none + 1, none, none])
+        of_first, of_second = self.noise / (np.abs(factor) ** 2 * self.noise[1] + gain**2 * self.noise[0])
+        along = left * factor.conj() * of_second + right * gain * of_first
+        products = np.real(left * of_second @ left.conj().T + right * of_first @ right.conj().T)
+        return 2 * (products - along.real @ along.real.T), 2 * along.imag @ along.imag.T
+
     def weighed(self, theta: Array) -> Lines:
         """The same with the noise that is found around each line, between the clear ones."""
         from scipy.ndimage import uniform_filter1d
@@ -250,10 +267,24 @@ def align(
         theta[used] = answer.x * scale
         delay, theta[0] = float(np.clip(delay + theta[0], -FARTHEST, FARTHEST)), 0.0
     covariance = np.zeros((4, 4))
-    covariance[np.ix_(used, used)] = np.linalg.pinv(answer.jac.T @ answer.jac) * np.outer(scale, scale)
+    noise, turned = (each[np.ix_(used, used)] * np.outer(scale, scale) for each in lines.noise_slopes(theta))
+    covariance[np.ix_(used, used)] = _covariance(answer.jac, noise, turned) * np.outer(scale, scale)
     square = window(1 << 12) ** 2
     overlap = float(np.mean(square**2) / np.mean(square) ** 2)  # neighbouring lines share some noise
     return Alignment(np.array([delay, *theta[1:]]), covariance * overlap, float(2 * answer.cost), lines)
+
+
+def _covariance(slopes: Array, noise: Array, turned: Array) -> Array:
+    """Of the parameters: the curvature of the misfit is what the slopes have beyond those of noise alone.
+
+    Noise adds to the spread of the slope of the misfit, but for what only turns, and nothing to its curvature.
+    """
+    products = slopes.T @ slopes
+    curvature = products - noise
+    if np.linalg.eigvalsh(curvature)[0] < EXACT * np.linalg.eigvalsh(products)[-1]:  # the lines do not tell all of them
+        return np.asarray(np.linalg.pinv(products))
+    inverse = np.linalg.inv(curvature)
+    return np.asarray(inverse @ (products - turned) @ inverse)
 
 
 def _terms(mount: tuple[float, float] | None) -> tuple[float, float]:
@@ -295,6 +326,7 @@ def likely_delays(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> l
     list of Alignment
         Quick ones, all of the same samples.
     """
+    pairs = [_middle(pair, QUICK) for pair in pairs]
     tried = sorted({delay for pair in pairs for delay in _peaks(pair)}, key=abs)
     room = math.ceil(abs(tried[-1]) * max(pair.fs for pair in pairs)) + 2
     fits = [align(pairs, delay, mount=mount, free=mount is None, room=room, rounds=1) for delay in tried]
@@ -307,11 +339,16 @@ def likely_delays(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> l
     return alike
 
 
+def _middle(pair: Pair, most: int) -> Pair:
+    """So many samples of it at most."""
+    skip = max(0, (len(pair.first) - most + 1) // 2)
+    rows = slice(skip, len(pair.first) - skip)
+    return replace(pair, first=pair.first[rows], second=pair.second[rows])
+
+
 def _peaks(pair: Pair) -> list[float]:
     """Delays [s], to a sample, at which a pair correlates most, fast lines first: the highest and the nearest."""
-    skip = max(0, (len(pair.first) - BLOCK) // 2)
-    rows = slice(skip, len(pair.first) - skip)
-    part = replace(pair, first=pair.first[rows], second=pair.second[rows]).stretches(0.0)[0]
+    part = _middle(pair, BLOCK).stretches(0.0)[0]
     lines, step = told([part]), float(part.turn[1])
     count = round(2 * math.pi * pair.fs / step)
     spectrum = np.zeros(count // 2 + 1, dtype=complex)
