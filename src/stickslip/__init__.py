@@ -47,6 +47,8 @@ if TYPE_CHECKING:
         ForceComparison as ForceComparison,
         compare_force as compare_force,
     )
+    from stickslip.identify.checks import Check as Check
+    from stickslip.identify.consistency import Consistency as Consistency, consistency as consistency
     from stickslip.identify.impact import ImpactTest as ImpactTest, impact_test as impact_test
     from stickslip.identify.mounts import Resonance as Resonance
     from stickslip.plot.experiment import plot_plan as plot_plan
@@ -213,6 +215,7 @@ _ROOMS = {
     "inverse_wavelet": "signals.wavelet", "plot_wavelet": "plot.wavelet",
     "compare_force": "identify.compare_force", "ForceComparison": "identify.compare_force",
     "ForceBand": "identify.compare_force", "Resonance": "identify.mounts",
+    "consistency": "identify.consistency", "Consistency": "identify.consistency", "Check": "identify.checks",
     "impact_test": "identify.impact", "ImpactTest": "identify.impact",
     "plot_force_comparison": "plot.force",
     "contact_stiffness": "identify.contact", "contact_damping": "identify.contact",

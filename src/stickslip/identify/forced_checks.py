@@ -1,0 +1,308 @@
+"""The forces, the energy and the motion of a harmonically driven mass: what must be true of their harmonics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.identify.checks import APART, HOLDS, UNTOLD, Check, compared, judged, untold
+from stickslip.identify.lines import Complex, Lines, find_lines
+from stickslip.identify.mixups import Balance
+from stickslip.identify.sliding_balance import Slider
+from stickslip.record.channels import Channel
+from stickslip.record.record import Record
+from stickslip.signals.response import Response, leak, resonance
+from stickslip.statistics import mean_uncertainty
+from stickslip.units import parse_value
+
+Array = NDArray[np.float64]
+
+UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
+LOUD = 5.0  # standard deviations of its mean from which a harmonic counts
+SLOW = 0.04  # share of the peak speed below which the mass rests
+STOPS = 0.1  # share of the time below it from which a motion stops: a harmonic one is there for 0.025
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A record's lines as the motion made them, and the rig's constants where known."""
+
+    lines: Lines
+    channels: Mapping[str, Complex]
+    rig: Mapping[str, float]
+    damper: str
+    tolerance: float
+    at: int
+    channels_told: Mapping[str, Channel]
+
+    @classmethod
+    def of(cls, record: Record, names: list[str], rig: Mapping[str, Any], tolerance: float, question: str) -> Seen:
+        lines = find_lines(record, names, contact=rig.get("contact"), question=question)
+        known = {name: parse_value(rig[name], unit) for name, unit in UNITS.items() if name in rig}
+        told = {name: record.channels[name] for name in names}
+        made = {name: lines.amplitudes[name] / _response(told[name]).at(lines.frequency) for name in names}
+        if "load" in made and told["load"].inertia:
+            w = 2 * np.pi * lines.frequency
+            made["load"] = made["load"] - told["load"].inertia * made.get("a", -(w**2) * made["x"])
+        at = 0 if lines.cycles is not None else int(np.argmax(np.abs(made["x"]).mean(axis=0) * lines.frequency))
+        return cls(lines, made, known, str(rig.get("damper", "ground")), tolerance, at, told)
+
+    @property
+    def angular(self) -> float:
+        """Of the strongest line [rad/s]."""
+        return 2 * math.pi * float(self.lines.frequency[self.at])
+
+    @property
+    def knows(self) -> bool:
+        """Whether the forces can be written down."""
+        return {"mass", "stiffness"} <= set(self.rig)
+
+    @property
+    def damping(self) -> float:
+        return self.rig.get("damping", 0.0)
+
+    def strongest(self, name: str) -> Complex:
+        """Of each stretch, at the strongest line; zero where there is no such channel."""
+        return self.channels[name][:, self.at] if name in self.channels else np.zeros(self.lines.count, dtype=complex)
+
+    @property
+    def acceleration(self) -> Complex:
+        return self.strongest("a") if "a" in self.channels else -(self.angular**2) * self.strongest("x")
+
+    def work(self, force: Complex) -> Array:
+        r"""Of each cycle [J]: :math:`\oint f\,dx = \pi \sum_n n\,\mathrm{Re}(F_n \overline{i X_n})`."""
+        order = np.arange(1, force.shape[1] + 1)
+        return np.asarray(np.pi * (order * (force * np.conj(1j * self.channels["x"])).real).sum(axis=1))
+
+    def sd(self, values: Array | Complex) -> float:
+        """Of the mean over stretches."""
+        parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
+        found = [mean_uncertainty(np.asarray(part, dtype=float))[0] if len(part) > 1 else 0.0 for part in parts]
+        return math.hypot(*found) / math.sqrt(self.lines.worth)
+
+    @property
+    def balance(self) -> Balance:
+        """The strongest lines as read, for mix-ups."""
+        values = {name: complex(read[:, self.at].mean()) for name, read in self.lines.amplitudes.items()}
+        return Balance(values, self.angular, self.rig, self.damper, self.tolerance)
+
+
+def _response(channel: Channel) -> Response:
+    """Of a sensor, as stated."""
+    mount = resonance(*channel.mount) if channel.mount is not None else Response()
+    return mount.then(leak(channel.discharge)) if channel.discharge is not None else mount
+
+
+def acceleration_check(seen: Seen) -> Check:
+    name = "acceleration is that of the displacement"
+    if "a" not in seen.channels:
+        return untold(name, "no accelerometer")
+    read, moved = seen.strongest("a"), -(seen.angular**2) * seen.strongest("x")
+    left, right = abs(read.mean()), abs(moved.mean())
+    sd = math.hypot(seen.sd(read - moved), math.sqrt(2) * seen.tolerance * right)
+    ratio = complex(read.mean() / moved.mean())
+    return judged(
+        name, float(left), float(right), abs(complex((read - moved).mean())) / sd, unit="m/s^2",
+        holds="amplitude and phase of a are those of x",
+        fails=_off("a", "x", ratio, seen),
+    )  # fmt: skip
+
+
+def _off(name: str, other: str, ratio: complex, seen: Seen) -> str:
+    """In which way one reading is not what another lets expect."""
+    phase = float(np.angle(ratio))
+    small = 3 * math.sqrt(2) * seen.tolerance
+    words = []
+    if abs(abs(phase) - math.pi) < 0.3:
+        words.append(f"{name} and {other} have opposite signs")
+        phase = float(np.angle(-ratio))
+    if abs(phase) > small:
+        ahead = "ahead of" if phase > 0 else "behind"
+        words.append(
+            f"{name} is {1e3 * abs(phase) / seen.angular:.3g} ms {ahead} {other}, or that and whole cycles: state the "
+            "delay of the later one"
+        )
+    if abs(abs(ratio) - 1) > small:
+        words.append(f"{name} is {abs(ratio):.3g} times what {other} lets expect")
+    return "; ".join(words) or f"{name} is not quite what {other} lets expect"
+
+
+def forces_check(seen: Seen) -> Check:
+    name = "forces balance at the forcing frequency"
+    if "load" not in seen.channels:
+        return untold(name, "no load cell: the friction is what is left of the balance")
+    if not seen.knows:
+        return untold(name, "mass and stiffness are not known")
+    w, k, m = seen.angular, seen.rig["stiffness"], seen.rig["mass"]
+    x, z = seen.strongest("x"), seen.strongest("z")
+    driven = 1j * w * seen.damping * (x - (z if seen.damper == "base" else 0))
+    inertia = m * seen.acceleration
+    computed = k * (z - x) - driven + seen.strongest("force") - inertia
+    felt = seen.strongest("load")
+    sizes = [abs(each.mean()) for each in (k * z, k * x, inertia, felt, seen.strongest("force"))]
+    sd = math.hypot(seen.sd(felt - computed), math.sqrt(2) * seen.tolerance * float(np.linalg.norm(sizes)))
+    rest = complex((felt - computed).mean())
+    return judged(
+        name, float(abs(felt.mean())), float(abs(computed.mean())), abs(rest) / sd,
+        unit="N", holds="the load cell feels what the motion leaves over",
+        fails=_unbalanced(rest, complex(felt.mean()), complex((inertia / m).mean()), complex((z - x).mean()), seen, sd),
+    )  # fmt: skip
+
+
+def _unbalanced(rest: complex, felt: complex, acceleration: complex, stretch: complex, seen: Seen, sd: float) -> str:
+    """What would balance the forces: another sign of the load cell, another mass, another spring."""
+    if abs(rest - 2 * felt) < APART * sd:
+        return "the load cell and k z - k x - m a have opposite signs"
+    cures = []
+    for name, unit, per, sign in (("mass", "kg", acceleration, -1.0), ("stiffness", "N/m", stretch, 1.0)):
+        change = sign * rest / per
+        other = seen.rig[name] + change.real
+        if abs(change.imag * per) < APART * sd and other > 0:
+            cures.append(f"a {name} of {other:.4g} {unit}")
+    turned = math.degrees(float(np.angle(felt / (felt - rest))))
+    leaves = f"the motion leaves {abs(felt - rest):.3g} N, {turned:.0f} degrees apart"
+    words = f"the load cell feels {abs(felt):.3g} N where {leaves}"
+    return (
+        f"{words}; {' or '.join(cures)} would balance them" if cures else f"{words}: a delay, a calibration or a sign"
+    )
+
+
+def energy_check(seen: Seen) -> Check:
+    name = "energy of whole cycles"
+    if seen.lines.cycles is None:
+        return untold(name, "the motion does not repeat")
+    drives = [each for each in ("z", "force") if each in seen.channels]
+    moved = seen.channels["x"]
+    taken = seen.work(seen.channels["load"]) if "load" in seen.channels else None
+    given = np.zeros(seen.lines.count)
+    if "force" in drives:
+        given = given + seen.work(seen.channels["force"])
+    if "z" in drives and "stiffness" in seen.rig:
+        given = given + seen.work(seen.rig["stiffness"] * seen.channels["z"])
+    elif "z" in drives:
+        taken = None
+        given = given + seen.work(seen.channels["z"])
+    if taken is None or not drives:
+        only = given if drives else taken
+        if only is None:
+            return untold(name, "neither a drive nor a load cell")
+        what = "the base moves the mass" if drives else "friction takes energy"
+        unit = "J" if "stiffness" in seen.rig or not drives else "m^2"
+        return compared(
+            name, 0.0, float(only.mean()), sd=math.hypot(seen.sd(only), seen.tolerance * abs(float(only.mean()))),
+            unit=unit, bound=True, holds=what,
+            fails=f"{'the mass moves the base' if drives else 'friction gives energy'}: a channel has the wrong sign, "
+            "or two are exchanged",
+        )  # fmt: skip
+    speed = 1j * 2 * np.pi * seen.lines.frequency * (moved - (seen.channels["z"] if seen.damper == "base" else 0))
+    damped = seen.work(seen.damping * speed)
+    left, right = float(given.mean()), float((taken + damped).mean())
+    size = math.sqrt(2) * seen.tolerance * math.hypot(left, right)
+    turned = min(left, right) < 0
+    return compared(
+        name, left, right, sd=math.hypot(seen.sd(given - taken - damped), size), unit="J",
+        holds="friction and damper take what the drive gives",
+        fails="energy runs the wrong way: a channel has the wrong sign, or two are exchanged" if turned else
+        f"friction and damper take {100 * abs(right / left - 1):.0f} % {'more' if right > left else 'less'} than the "
+        "drive gives: a calibration, the spring or a delay is off",
+    )  # fmt: skip
+
+
+def momentum_check(seen: Seen) -> Check:
+    name = "mean force is zero"
+    means = seen.lines.means
+    if seen.lines.cycles is None:
+        return untold(name, "the motion does not repeat")
+    if seen.knows and "load" in means and seen.channels_told["load"].discharge is None:
+        pull = seen.rig["stiffness"] * (means.get("z", 0.0) - means["x"]) + means.get("force", 0.0)
+        left, right, unit = pull, means["load"], "N"
+        size = float(abs(seen.strongest("load").mean()))
+        off = float(np.mean(left) - np.mean(right))
+        words = f"a zero is off by {off:.3g} N, or {1e3 * off / seen.rig['stiffness']:.3g} mm of x or z"
+    elif "a" in means:
+        left, right, unit = means["a"], np.zeros(seen.lines.count), "m/s^2"
+        size = float(abs(seen.strongest("a").mean()))
+        words = f"the accelerometer's zero is off by {float(np.mean(left)):.3g} m/s^2"
+    else:
+        return untold(name, "neither an accelerometer nor a load cell that keeps its charge, with mass and stiffness")
+    sd = math.hypot(seen.sd(np.asarray(left - right)), seen.tolerance * size)
+    return compared(
+        name, float(np.mean(left)), float(np.mean(right)), sd=sd, unit=unit,
+        holds="what acts on the mass has no mean over whole cycles", fails=words,
+    )  # fmt: skip
+
+
+def identity_check(seen: Seen) -> Check:
+    r""":math:`\oint f (\dddot x + w^2 \dot x)\,dt = 0`: harmonics n > 1 of f and x are in phase or opposed."""
+    name = "identity of harmonic forcing"
+    if "load" not in seen.channels or seen.lines.cycles is None:
+        return untold(name, "no load cell" if "load" not in seen.channels else "the motion does not repeat")
+    if "z" in seen.channels and "stiffness" not in seen.rig:
+        return untold(name, "the stiffness is not known, and the base is not harmonic to the last digit")
+    w, x = seen.angular, seen.channels["x"]
+    order = np.arange(1, x.shape[1] + 1)
+    level = np.sqrt(np.mean(np.abs(x - x.mean(axis=0)) ** 2, axis=0) / max(1, seen.lines.count - 1))
+    heard = np.flatnonzero((np.abs(x.mean(axis=0)) > LOUD * level) & (order > 1) & (order < 60))
+    if not len(heard):
+        return untold(name, "no harmonic of the displacement stands out of its noise")
+    speed = 1j * order * w * (x - (seen.channels["z"] if seen.damper == "base" and "z" in seen.channels else 0))
+    force = seen.channels["load"] + seen.damping * speed
+    if "z" in seen.channels:
+        force = force - seen.rig["stiffness"] * seen.channels["z"]
+    if "force" in seen.channels:
+        force = force - seen.channels["force"]
+    weight = np.pi * (order * (order**2 - 1.0)) * w**2
+    terms = weight * (force * np.conj(1j * x)).real
+    per_cycle = terms[:, heard].sum(axis=1)
+    sizes = weight[heard] * np.abs(force.mean(axis=0) * x.mean(axis=0))[heard]
+    first = float(w**2 * seen.work(seen.channels["load"]).mean())
+    sd = math.hypot(seen.sd(per_cycle), math.sqrt(2) * seen.tolerance * float(np.linalg.norm(sizes)))
+    return compared(
+        name, first + float(per_cycle.mean()), first, sd=sd, unit="N m/s^2",
+        holds="the integrals of -f x''' and w^2 f x' over a cycle are one, as under any friction law",
+        fails="load and x are not of one motion under one harmonic drive: a delay, a mount or a second frequency",
+    )  # fmt: skip
+
+
+def stops_check(seen: Seen) -> Check:
+    name = "sliding without stops"
+    if not seen.knows or "z" not in seen.channels or seen.lines.cycles is None:
+        return untold(name, "mass, stiffness, base motion and whole cycles are needed")
+    x = seen.channels["x"]
+    w, k, m = seen.angular, seen.rig["stiffness"], seen.rig["mass"]
+    z = abs(complex(seen.strongest("z").mean()))
+    phase = np.exp(2j * np.pi * np.outer(np.arange(1, 41)[: x.shape[1]], np.arange(2000) / 2000))
+    mean = x.mean(axis=0)[: len(phase)]
+    path, speed = (mean @ phase).real, ((1j * np.arange(1, len(mean) + 1) * mean) @ phase).real
+    amplitude = float(np.ptp(path)) / 2
+    given = seen.work(k * seen.channels["z"])
+    source = seen.work(seen.channels["load"]) if "load" in seen.channels else given
+    friction = float(source.mean()) / (4 * amplitude)
+    if friction <= 0:
+        return untold(name, "energy runs the wrong way")
+    share, least = friction / (k * z), Slider(m, k, w, seen.damping).boundary()
+    rests = float(np.mean(np.abs(speed) < SLOW * np.abs(speed).max()))
+    sd = math.sqrt(3) * seen.tolerance * share
+    if rests > STOPS:
+        if share > least - APART * sd:
+            return Check(name, share, least, "1", 0.0, HOLDS, "it stops, and friction makes it stop")
+        words = (
+            "it stops, though sliding on is possible too: friction at rest above that of sliding, or it was started so"
+        )
+        return Check(name, share, least, "1", (least - share) / sd, UNTOLD, words)
+    check = compared(
+        name, share, math.pi / 4, sd=sd, unit="1", bound=True, holds="it slides on, as this friction allows",
+        fails=f"it slides on against {friction:.3g} N, and against more than {math.pi * k * z / 4:.3g} N (pi k Z / 4) "
+        "it can not: friction, base motion or stiffness is wrong",
+    )  # fmt: skip
+    if check.verdict == HOLDS and share > least + APART * sd:
+        words = (
+            f"it slides on where a rigid contact would stop ({least:.3g} of k Z, Den Hartog): the contact is elastic"
+        )
+        return Check(name, share, least, "1", (share - least) / sd, HOLDS, words)
+    return replace(check, right=least) if check.verdict == HOLDS else check

@@ -1,0 +1,129 @@
+"""What a record says of its sensors: their ranges, their rate, and whether they tell of the same cycle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.identify.checks import FAILS, HOLDS, Check, compared, judged, untold
+from stickslip.identify.forced_checks import Seen
+from stickslip.identify.motion import stretches
+from stickslip.record.flaws import saturated
+from stickslip.record.record import Record
+from stickslip.signals.differentiate import Filter
+
+Array = NDArray[np.float64]
+
+NOISY = ("v", "a", "load", "force")  # whose noise moves every sample, unless it is held
+CROSSED = 0.8  # of the friction's level: a reversal goes from one side of it to the other
+LEAST_SAMPLES = 4.0  # of a reversal
+SMOOTHED = 6.0  # times the forcing frequency, to which channels are smoothed before they are compared in time
+FEW_CYCLES = 6
+FARTHEST = 20  # whole cycles of a lag that is looked for
+UNIQUE = 1.03  # times the least that the next best shift leaves over, if the best is to be named
+SURE = 5.0  # standard deviations of what is left over, from which shifts differ
+
+
+def range_checks(record: Record, names: Sequence[str]) -> list[Check]:
+    """Whether a sensor stands at the end of its range."""
+    ends = {f.channel: f.message for f in record.check() if f.kind == "clipped" and f.channel in names}
+    found = []
+    for name in names:
+        mask = saturated(record[name]) if name in NOISY else np.zeros(1, dtype=bool)
+        if not mask.any() and name not in ends:
+            continue
+        top = float(np.abs(record[name]).max())
+        words = ends.get(name, f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples")
+        found.append(
+            Check(f"range of {name}", top, top, record.channels[name].unit, math.inf, FAILS, words.rstrip("."))
+        )
+    return found or [
+        Check("range of the sensors", math.nan, math.nan, "1", math.nan, HOLDS, "none stands at the end of its range")
+    ]
+
+
+def sampling_check(record: Record, seen: Seen) -> Check:
+    name = "samples of a reversal"
+    source = next((each for each in ("load", "friction") if each in record), "")
+    if not source or not np.isfinite(record[source]).all():
+        return untold(name, "no friction is measured, or computed yet")
+    force = record[source] - np.mean(record[source])
+    level = float(np.median(np.abs(force)))
+    signs = np.sign(force) * (np.abs(force) > CROSSED * level)
+    counts = []
+    for first, last in zip(*stretches(signs == 0), strict=True):
+        if first > 0 and last < len(signs) and signs[first - 1] * signs[last] < 0:
+            counts.append(last - first)
+    sides = signs[signs != 0]
+    turns = int(np.sum(sides[1:] * sides[:-1] < 0))
+    if not turns:
+        return untold(name, "the friction never reverses")
+    mean = sum(counts) / turns
+    return compared(
+        name, LEAST_SAMPLES, mean, sd=max(0.25, seen.tolerance), unit="1", bound=True,
+        holds="enough to see how the friction turns round",
+        fails=f"{mean:.2g} samples are too few to see how the friction turns round: sample at "
+        f"{record.fs * LEAST_SAMPLES / max(mean, 0.5):.2g} Hz or more, or the contact is rigid",
+    )  # fmt: skip
+
+
+def cycle_checks(record: Record, seen: Seen) -> list[Check]:
+    """Whether channels tell of the same cycle: what does not repeat cancels at one shift of whole cycles only."""
+    if seen.lines.cycles is None:
+        return []
+    edges, checks = seen.lines.cycles.edges, []
+    if len(edges) < FEW_CYCLES:
+        return [untold("channels are of the same cycle", f"fewer than {FEW_CYCLES} cycles")]
+    smooth = Filter("smoother", record.fs, min(SMOOTHED / float(np.diff(edges).mean()), 0.2) * record.fs)
+    moved = smooth.apply(record["x"], {2: 1.0})
+    expected = {"a": moved}
+    if seen.knows:
+        pull = -seen.rig["stiffness"] * record["x"] - seen.damping * np.gradient(record["x"], 1 / record.fs)
+        for name, factor in (("z", seen.rig["stiffness"]), ("force", 1.0)):
+            pull = pull + factor * record[name] if name in record else pull
+        expected["load"] = smooth.apply(pull, {0: 1.0}) - seen.rig["mass"] * moved
+    for name in (each for each in expected if each in seen.channels):
+        title = f"{name} is of the same cycle as x"
+        left = _left_over(smooth.apply(record[name], {0: 1.0}), expected[name], edges)
+        best, here = min(left, key=lambda shift: left[shift]), left[0]
+        # a channel smoothed to b Hz for T s is worth 2 b T samples; the deviation of their size is 1 / sqrt(4 b T)
+        distinct = left[best] * (1 + SURE / math.sqrt(4 * SMOOTHED * len(edges)))
+        if max(left.values()) < distinct:
+            checks.append(untold(title, "the motion repeats: a lag of whole cycles leaves no trace, and does no harm"))
+            continue
+        if best and here < distinct:
+            checks.append(untold(title, "the cycles differ too little to tell a lag of whole cycles"))
+            continue
+        apart = math.inf if best else 0.0
+        next_best = min(left[shift] for shift in left if shift != best)
+        many = f"{abs(best)} whole cycles {'late' if best > 0 else 'early'}" if next_best > UNIQUE * left[best] else ""
+        late = f"{name} comes {many or 'some whole cycles late or early'} against x"
+        what = "what does not repeat in the one does not repeat in the other"
+        unit = record.channels[name].unit
+        checks.append(judged(title, here, left[best], apart, unit=unit, holds=what, fails=late))
+    return checks
+
+
+def _left_over(read: Array, expected: Array, edges: Array) -> dict[int, float]:
+    """Root mean square of what one holds beyond the other and does not repeat, by the shift of whole cycles."""
+    found, period = {}, float(np.diff(edges).mean())
+    most = min(FARTHEST, (len(edges) - 1) // 3)
+    margin = round(period / 2)  # where the smoothing feels the ends
+    read, expected = read[margin:-margin], expected[margin:-margin]
+    for shift in range(-most, most + 1):
+        rows = round(shift * period)
+        late, early = (read[rows:], expected[: len(read) - rows]) if rows >= 0 else (read[:rows], expected[-rows:])
+        rest = _unrepeated(late - early, period)
+        found[shift] = float(np.sqrt(np.mean(rest**2) / (1 - period / len(rest))))
+    return found
+
+
+def _unrepeated(values: Array, period: float) -> Array:
+    """A channel less its mean cycle."""
+    bins = max(8, int(period))
+    place = (np.arange(len(values)) / period % 1.0 * bins).astype(int)
+    mean = np.bincount(place, values, bins) / np.maximum(np.bincount(place, minlength=bins), 1)
+    return np.asarray(values - mean[place])
