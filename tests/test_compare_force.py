@@ -9,9 +9,9 @@ import pytest
 from scipy.signal import lsim, lti
 
 import stickslip as ss
+from rigs import CASES, RIG, measured, told
 from stickslip.errors import EstimateError, RecordError
 from stickslip.signals.response import resonance
-from test_fusion import CASES, RIG, measured, told
 
 
 @cache

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from rigs import CASES, RIG, measured, told
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.signals.differentiate import five_point_average
-from test_fusion import CASES, RIG, error, measured, told
+from test_fusion import error
 
 # Root mean square errors [N] of the thesis's methods on its own rig, from an independent simulation of six records.
 BASELINE = {
