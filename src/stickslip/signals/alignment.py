@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -52,14 +52,15 @@ class Pair:
     noise: tuple[float, float]
     order: int
 
-    def stretches(self, delay: float, room: int = 0) -> list[Lines]:
+    def stretches(self, delay: float, room: int = 0) -> Iterator[Lines]:
         """All of it, one window each, with the first later by `delay` [s]; `room` samples at both ends are left out."""
         whole = round(delay * self.fs)
         begin, end = max(room, whole), len(self.second) - max(room, -whole)
         blocks = max(1, (end - begin) // BLOCK)
         step = (end - begin) // blocks
         count = step - step % (1 << max(0, step.bit_length() - 8))  # few prime factors: fast to transform
-        return [self._lines(begin + j * step, count, delay, whole) for j in range(blocks)]
+        for j in range(blocks):
+            yield self._lines(begin + j * step, count, delay, whole)
 
     def _lines(self, begin: int, count: int, delay: float, whole: int) -> Lines:
         before, shift = self.first[begin - whole : begin - whole + count], delay - whole / self.fs
@@ -249,11 +250,10 @@ def align(
     theta = np.array([0.0, math.nan, *_terms(mount)])
     used = [0, 1, 2, 3] if free else [0, 1]
     for done in range(rounds):
-        parts = [part for pair in pairs for part in pair.stretches(delay, room)]
         if not done:
-            theta[1] = told(parts).gain or 1.0
-        parts = [part.without_offset(theta[1]) for part in parts]
-        lines = told([part.weighed(theta) for part in parts] if done else parts)
+            theta[1] = told([next(pairs[0].stretches(delay, room))]).gain or 1.0
+        parts = (part.without_offset(theta[1]) for pair in pairs for part in pair.stretches(delay, room))
+        lines = told(part.weighed(theta) if done else part for part in parts)
         unit = 1 / lines.rate
         scale = np.array([unit, abs(theta[1]), unit, unit**2])[used]
 
@@ -295,7 +295,7 @@ def _terms(mount: tuple[float, float] | None) -> tuple[float, float]:
     return 2 * mount[1] / turn, 1 / turn**2
 
 
-def told(parts: Sequence[Lines]) -> Lines:
+def told(parts: Iterable[Lines]) -> Lines:
     """The clear lines of all stretches that tell something of a delay or a mount."""
     clear = [each.chosen(each.clear) for each in parts]
     lines = Lines(*(np.concatenate([getattr(each, field.name) for each in clear], axis=-1) for field in fields(Lines)))
@@ -348,7 +348,7 @@ def _middle(pair: Pair, most: int) -> Pair:
 
 def _peaks(pair: Pair) -> list[float]:
     """Delays [s], to a sample, at which a pair correlates most, fast lines first: the highest and the nearest."""
-    part = _middle(pair, BLOCK).stretches(0.0)[0]
+    part = next(_middle(pair, BLOCK).stretches(0.0))
     lines, step = told([part]), float(part.turn[1])
     count = round(2 * math.pi * pair.fs / step)
     spectrum = np.zeros(count // 2 + 1, dtype=complex)
