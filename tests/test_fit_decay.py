@@ -397,6 +397,54 @@ def test_several_releases_share_the_friction_and_narrow_the_bracket() -> None:
     assert found.static_displacement.sd <= min(each.static_displacement.sd for each in alone)
 
 
+@pytest.mark.parametrize(("index", "value"), [(2, 0.03), (1, 0.05), (0, 7.0)], ids=["dry", "damping", "frequency"])
+def test_releases_that_share_no_friction_are_said_to(index: int, value: float) -> None:
+    records = []
+    for seed, truth in enumerate((TRUTH, TRUTH.copy())):
+        truth[index] = value if seed else truth[index]
+        samples, dt, _ = ring_down(seed=seed, truth=truth)
+        records.append(ss.Record.of({"x": samples}, fs=1 / dt))
+    found = ss.fit_decay(records)
+    assert found.status.startswith("the releases do not share one friction and frequency")
+    assert all(np.isfinite(each.interval).all() for each in found.estimates)
+
+
+def test_several_releases_in_one_file_are_fitted_together() -> None:
+    """With the hand's slow pull between them, and another amplitude."""
+    parts, random = [], np.random.default_rng(1)
+    for seed, amplitude in enumerate((1.0, 0.8, -0.9)):
+        truth = TRUTH.copy()
+        truth[4] = amplitude
+        samples, dt, _ = ring_down(seed=seed, truth=truth)
+        if parts:
+            before = parts[-1][-1]
+            pull = before + (samples[0] - before) * (1 - np.cos(np.linspace(0, math.pi, 300))) / 2
+            parts.append(pull + 1e-3 * random.standard_normal(300))
+        parts.append(samples)
+    found = ss.fit_decay(ss.Record.of({"x": np.concatenate(parts)}, fs=1 / dt))
+    assert len(found.ring_downs) == 3
+    assert len(found.half_cycles) == 3
+    assert found.status == "ok"
+    assert abs(found.damping_ratio.value - DAMPING) < 4 * found.damping_ratio.sd
+    assert abs(found.dry_displacement.value - DRY) < 4 * found.dry_displacement.sd
+
+
+@pytest.mark.parametrize("extremes", [3, 4])
+def test_three_or_four_extremes_are_enough(extremes: int) -> None:
+    """Release and the first turns alone, with the dry friction that stops it there, or cut off while it moves."""
+    inside = []
+    for seed in range(20):
+        for dry in (0.2 if extremes == 3 else 0.15, DRY):
+            truth = TRUTH.copy()
+            truth[2] = dry
+            samples, dt, _ = ring_down(seed=seed, truth=truth)
+            if dry == DRY:
+                samples = samples[: int((truth[5] + (extremes - 1) / 2 + 0.2) / dt)]
+            found = ss.fit_decay(ss.Record.of({"x": samples}, fs=1 / dt))
+            inside.append([found.damping_ratio.includes(DAMPING), found.dry_displacement.includes(dry)])
+    assert np.all(np.mean(inside, axis=0) >= 0.85)
+
+
 def test_one_release_twice_is_half_the_variance() -> None:
     """The general likelihood gives what the compiled fit of one release gives."""
     samples, dt, _ = ring_down()
@@ -458,6 +506,27 @@ def test_a_growing_swing_is_refused() -> None:
     seen = 1e-3 * np.exp(0.4 * t) * np.cos(30 * t) + 1e-6 * np.random.default_rng(0).standard_normal(3000)
     with pytest.raises(ss.EstimateError, match="grow"):
         ss.fit_decay(ss.Record.of({"x": seen}, fs=500))
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e3])
+def test_the_same_answer_in_other_units(length: float) -> None:
+    samples, dt, _ = ring_down()
+    metres = ss.fit_decay(ss.Record.of({"x": samples}, fs=1 / dt))
+    other = ss.fit_decay(ss.Record.of({"x": length * samples}, fs=0.1 / dt))
+    assert other.damping_ratio.value == pytest.approx(metres.damping_ratio.value, rel=1e-9)
+    assert other.dry_displacement.interval == pytest.approx(
+        [length * end for end in metres.dry_displacement.interval], rel=1e-6
+    )
+
+
+def test_counts_at_a_high_rate_are_counts_still() -> None:
+    """Without noise a count's error is steady over many samples, and no part of it averages out."""
+    x = np.round(free_decay(np.arange(36000) / 4000, [2 * math.pi, DAMPING, DRY, 0.013, 1.0, 0.3, *[0] * 6])[0], 2)
+    found = ss.fit_decay(ss.Record.of({"x": x}, fs=4000.0))
+    assert "counts" in found.noise
+    assert found.status == "ok"
+    assert found.damping_ratio.includes(DAMPING)
+    assert found.dry_displacement.includes(DRY)
 
 
 def test_a_motion_without_noise_that_came_to_rest_is_not_taken_for_counts() -> None:

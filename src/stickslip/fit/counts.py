@@ -10,6 +10,8 @@ import math
 
 from stickslip.compiled import FAST, compiled
 
+SURE = 9.0  # standard deviations from which a count tells nothing
+
 
 @compiled(**FAST)
 def mills(a):
@@ -32,6 +34,8 @@ def add_counts(values, jacobian, counts, step, level, slope, curvature):
             curvature[k, j] = 0.0
     for i in range(values.shape[0]):
         a, b = (counts[i] - 0.5 * step - values[i]) / level, (counts[i] + 0.5 * step - values[i]) / level
+        if a < -SURE and b > SURE:
+            continue
         side = 1.0
         if a + b < 0.0:
             a, b, side = -b, -a, -1.0

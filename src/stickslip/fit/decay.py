@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 UNLIKE = 2.0  # times the noise that the residual may be before the model is doubted
+APART = 1e-3  # p-value of sharing friction and frequency, below which releases are not one experiment
+PARTS = 8  # of a period, by which a rest is watched
+STRAYED = 4.0  # standard deviations
 DOUBTED = 0.01  # likelihood below which a number of half cycles does not widen the static friction's bracket
 
 
@@ -146,7 +149,12 @@ def fit_decay(
 
 
 def _described(ring_down: RingDown, record: Record) -> RingDown:
-    """What the model describes: no clipped swings; a velocity or an acceleration from before its first extreme."""
+    """What the model describes: no clipped swings; a velocity or an acceleration from before its first extreme.
+
+    Of a displacement no rest that a hand begins to disturb.
+    """
+    if ring_down.order == 0:
+        ring_down = _undisturbed(ring_down)
     cut = np.flatnonzero(~ring_down.sound[:-1])
     if len(cut):
         first = int(ring_down.turns[cut[-1] : cut[-1] + 2].mean())
@@ -159,6 +167,28 @@ def _described(ring_down: RingDown, record: Record) -> RingDown:
     before = min(first, round(record.fs / ring_down.frequency))
     samples = np.concatenate([record[ring_down.channel][first - before : first], ring_down.samples])
     return replace(ring_down, first=ring_down.first - before / record.fs, samples=samples)
+
+
+def _undisturbed(ring_down: RingDown) -> RingDown:
+    """Hold and tail without their far ends, where these leave the level."""
+    size = max(1, round(ring_down.fs / ring_down.frequency / PARTS))
+    hold, tail = ring_down.samples[ring_down.hold][::-1], ring_down.samples[ring_down.tail]
+    early, late = (_strayed(part, size, ring_down.noise) for part in (hold, tail))
+    return replace(
+        ring_down, first=ring_down.first + early / ring_down.fs, turns=ring_down.turns - early,
+        samples=ring_down.samples[early : len(ring_down.samples) - late],
+    )  # fmt: skip
+
+
+def _strayed(samples: Array, size: int, noise: float) -> int:
+    """How many samples at the end of a rest have left its level; means over `size` of them tell."""
+    count = len(samples) // size
+    if count < 4:
+        return 0
+    means = samples[: count * size].reshape(count, size).mean(axis=1)
+    away = np.abs(means - np.median(means[: count // 2])) > STRAYED * noise / math.sqrt(size)
+    kept = int(np.flatnonzero(~away)[-1]) + 1
+    return 0 if kept == count else len(samples) - size * max(kept - 1, count // 4)
 
 
 def _release(ring_down: RingDown, noise: str | None) -> Release:
@@ -189,6 +219,7 @@ class _Motion:
     ends: Array
     candidates: tuple[tuple[tuple[int, ...], float], ...]
     motions: tuple[tuple[Array, ...], ...]  # of each candidate, the six parameters of each release
+    alike: float = 1.0  # p-value of the releases sharing what they are taken to share
 
 
 def _alone(release: Release) -> _Motion:
@@ -206,7 +237,7 @@ def _alone(release: Release) -> _Motion:
 
 
 def _together(releases: list[Release]) -> _Motion:
-    from stickslip.fit.joint import candidates, ends
+    from stickslip.fit.joint import candidates, ends, unlike
 
     found = candidates(releases)
     least = min(each.value for each in found)
@@ -217,7 +248,8 @@ def _together(releases: list[Release]) -> _Motion:
     limits = ends(found, least + student(freedom) ** 2, 6)
     motions = [tuple(each.motion(k) for k in range(len(releases))) for each in found]
     rows = np.array([each.p[:6] for each in found])
-    return _mean(rows, share / share.sum(), covariance, limits, [each.half_cycles for each in found], motions)
+    mean = _mean(rows, share / share.sum(), covariance, limits, [each.half_cycles for each in found], motions)
+    return replace(mean, alike=unlike(releases, found))
 
 
 def _mean(
@@ -254,7 +286,9 @@ def _answer(
     lost = (LOST,) if any(LOST in each.notes for each in ring_downs) else ()
     choices = [each.choice for each in motions]
     other = next((each.seen_beside("both", "static") for each in choices if each.seen_beside("both", "static")), "")
-    worries = (*cut, *lost, *_misfit(releases, fitted), *filter(None, [other]))
+    unlike = f"the releases do not share one friction and frequency (p = {motion.alike:.1g}): fit each alone"
+    doubts = (unlike,) if motion.alike < APART else _misfit(releases, fitted)
+    worries = (*cut, *lost, *doubts, *filter(None, [other]))
     status = "; ".join(worries) or "ok"
     many = ", ".join(map(str, half_cycles))
     checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)
@@ -341,7 +375,7 @@ def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:
             stayed.append(max(abs(float(end)) - error, 0.0) if rests else 0.0)
             turned.append(float(swing + p[2]) + error)
             rested |= rests
-        low, high = max(low, min(stayed)), min(high, max(turned))
+        low, high = max(low, min(stayed)), min(high, max(*turned, 0.0))
     status = "ok" if rested else "the mass does not come to rest in the record: only an upper bound"
     if low > high:
         low, high, status = high, low, "the releases disagree on it: it changes, or the model does not hold"

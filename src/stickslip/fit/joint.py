@@ -111,12 +111,24 @@ def _fitted(releases: list[Release], half_cycles: tuple[int, ...], start: Array 
     return Candidate(half_cycles, p, value, curvature, objective, tuple(places))
 
 
+def unlike(releases: list[Release], found: list[Candidate]) -> float:
+    """p-value of the releases sharing frequency, damping ratio and dry friction: what sharing costs is chi-square."""
+    from scipy.special import chdtrc
+
+    if len(releases) == 1:
+        return 1.0
+    alone = sum(min(each.value for each in candidates([release])) for release in releases)
+    cost = min(each.value for each in found) - alone
+    return float(chdtrc(SHARED * (len(releases) - 1), max(cost, 0.0)))
+
+
 def ends(found: list[Candidate], level: float, count: int) -> Array:
     """Ends (count, 2) of the profile likelihood of the first parameters, by the best candidate at each end."""
     answer = np.empty((count, 2))
     for which in range(count):
         for column, side in enumerate((-1, 1)):
-            reached = []
+            reached: list[float] = []
+            beyond: list[float] = []
             for each in found:
                 if each.value >= level:
                     continue
@@ -126,7 +138,7 @@ def ends(found: list[Candidate], level: float, count: int) -> Array:
                     reached.append(
                         each.p[which] + side * math.sqrt((level - each.value) * solve(each.curvature, aim)[which])
                     )
-                elif each.possible(p):
-                    reached.append(p[which])
-            answer[which, column] = side * max((side * each for each in reached), default=math.inf)
+                else:
+                    (reached if each.possible(p) else beyond).append(p[which])
+            answer[which, column] = side * max((side * each for each in reached or beyond), default=math.inf)
     return answer

@@ -17,6 +17,7 @@ Objective = Callable[[Array], tuple[float, Array, Array]]
 
 CLOSE = 1e-4  # what minus twice the log likelihood may still fall
 STEPS = 60
+PATIENCE = 10  # steps after which an end should be near
 
 
 def solve(curvature: Array, right: Array, extra: float = 0.0) -> Array:
@@ -52,15 +53,16 @@ def extreme(objective: Objective, best: Array, value: float, which: int, side: i
     p = best.copy()
     aim = np.zeros(len(p))
     aim[which] = 1.0
-    for _ in range(STEPS):
+    for count in range(STEPS):
         now, slope, curvature = objective(p)
         step, across = solve(curvature, slope), solve(curvature, aim)
         room = max(level - now + float(step @ slope), 0.0)
         whole = np.sqrt((level - value) * across[which])
         step = step + side * np.sqrt(room / across[which]) * across
         move = abs(step[which])
-        p = p + step * min(1.0, 2 * whole / max(move, 1e-300))
-        if not np.all(np.isfinite(p)):
+        shorter = 1.0 / (1 + count // 6)  # lest it jump about
+        p = p + step * min(shorter, 2 * whole / max(move, 1e-300))
+        if not np.all(np.isfinite(p)) or (count >= PATIENCE and now - level > level - value):
             return None
         if move < 5e-3 * whole and abs(now - level) < 0.05 * (level - value):
             return np.asarray(p)

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 STEEPEST = 0.9  # damping ratio
 FINEST = 0.02  # of the step: less noise than this is not told from it
+LOOSE = 1.0  # what holds the logarithm of a noise that counts do not show
 CORNERS = 30  # trial corners of the drift's spectrum
 GAINED = 2.7  # minus twice the log likelihood that drift must gain before it is believed
 COARSE = 0.7  # of the step: noise, the counts' own included, below which counts are not a sum of white noises
@@ -76,9 +77,10 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
     row = fits[np.argmin(fits[:, 1])]
     least = variance(fits, blocks)
     level = math.sqrt(least * blocks.size)
-    if kind == "quantised" or (kind is None and step > 0 and level < COARSE * step):
+    left = _left(samples, blocks, int(row[0]), row[3:]) if step > 0 else math.inf
+    if kind == "quantised" or (kind is None and left < COARSE * step):
         return Noise(
-            "quantised", max(level, 0.3 * step), f"counts of {step:.3g}",
+            "quantised", max(left, 0.3 * step), f"counts of {step:.3g}",
             lambda n: quantised(samples, n, step, blocks.dt, blocks.order),
         )  # fmt: skip
     if kind == "coloured" and len(blocks.means) <= SHORT:
@@ -97,6 +99,13 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
             words = f"white, and drift that outweighs it below {corner:.3g} Hz"
             return Noise("coloured", white, words, lambda n: coloured(blocks, n, power))
     return Noise("white", level, "white", lambda n: white_noise(blocks, n, least))
+
+
+def _left(samples: Array, blocks: Blocks, n: int, p: Array) -> float:
+    """Standard deviation of the samples from a motion; the blocks' would take a count's steady error for more."""
+    values, jacobian = np.empty(len(samples)), np.empty((6, len(samples)))
+    sample_motion(p, n, 1, len(samples), blocks.dt, blocks.order, values, jacobian, np.empty((3, 7, 6)))
+    return float(np.sqrt(np.mean((samples - values) ** 2)))
 
 
 def _refined(blocks: Blocks, n: int, p: Array, power: Array) -> Array:
@@ -120,20 +129,27 @@ def white_noise(blocks: Blocks, n: int, variance: float) -> Objective:
 
 
 def quantised(samples: Array, n: int, step: float, dt: float, order: int) -> Objective:
-    """The likelihood of counts, of six parameters of the motion and the logarithm of the noise."""
+    """The likelihood of counts, of six parameters of the motion and the logarithm of the noise.
+
+    Counts can not tell less noise than a small share of their step from none: that much is added to it.
+    """
     values, jacobian, work = np.empty(len(samples)), np.empty((6, len(samples))), np.empty((3, 7, 6))
-    least = math.log(FINEST * step)
+    least = FINEST * step
 
     def objective(p: Array) -> tuple[float, Array, Array]:
         slope, curvature = np.empty(7), np.empty((7, 7))
         if not (abs(p[1]) < STEEPEST and p[0] > 0 and p[6] < 700):
             return math.inf, slope, curvature
         sample_motion(p[:6], n, 1, len(samples), dt, order, values, jacobian, work)
-        total = add_counts(values, jacobian, samples, step, math.exp(max(p[6], least)), slope, curvature)
-        under = max(least - p[6], 0.0)
-        slope[6] += under
-        curvature[6, 6] += 1e-3 + (1.0 if under else 0.0)
-        return float(total) + under**2, slope, curvature
+        level = math.hypot(math.exp(p[6]), least)
+        total = add_counts(values, jacobian, samples, step, level, slope, curvature)
+        share, off = (math.exp(p[6]) / level) ** 2, p[6] - math.log(least)
+        slope[6] *= share
+        curvature[6] *= share
+        curvature[:, 6] *= share
+        slope[6] -= LOOSE * off
+        curvature[6, 6] += LOOSE
+        return float(total) + LOOSE * off**2, slope, curvature
 
     return objective
 

@@ -285,6 +285,7 @@ def sample_motion(p, n, size, total, dt, order, values, jacobian, work):
     zeta, w = p[DAMPING], p[RATE]
     root = math.sqrt(1.0 - zeta * zeta)
     lam, half = complex(-zeta * w, root * w), math.pi / (w * root)
+    turn, z = _exponential(lam, size * dt), complex(1.0, 0.0)
     fall(p, state, False)
     i = 0
     for piece in range(-1, n + 1):
@@ -295,11 +296,14 @@ def sample_motion(p, n, size, total, dt, order, values, jacobian, work):
         described = 0
         while i < stop:
             count = min(stop - i, size - i % size)
+            tau = (i + 0.5 * (count - 1)) * dt - begin
+            if piece < 0 or piece >= n:
+                z = complex(1.0, 0.0)
+            else:
+                z = z * turn if count == size == described else _exponential(lam, tau)
             if count != described:
                 describe(p, n, order, piece, count, dt, state, rows)
                 described = count
-            tau = (i + 0.5 * (count - 1)) * dt - begin
-            z = complex(1.0, 0.0) if piece < 0 or piece >= n else _exponential(lam, tau)
             block = i // size
             share = count / min(size, total - block * size)
             basis = (1.0, z.real, z.imag, tau * z.real, tau * z.imag)
