@@ -165,6 +165,47 @@ def test_too_few_extremes_for_any_method_are_refused():
         ss.analyze_decay(ss.Record.of({"x": values}, fs=fs), method="thesis")
 
 
+def test_a_pendulum_is_read_with_its_sine_and_by_its_own_waveform(dataset):
+    record = ss.read_record(dataset("pendulum_decay") / "pend1.csv", channels={"theta": "#2 [rad]"}, time="#1")
+    found = ss.analyze_decay(record, restoring="pendulum", stiffness="0.6956 N m/rad")
+    assert found.best is found.waveform
+    assert found.thesis is None
+    assert set(found.comparisons[0].name.split(", ")) == {"damping ratio", "extremes alone"}
+    assert 3.6e-3 < found.dry_force.value < 4.9e-3
+    low, high = found.as_force(found.whichever[1], "").interval
+    assert low < 3.6e-3 < 4.8e-3 < high
+    other = found.as_force(found.older["extremes alone"].dry_displacement, "")
+    assert low < other.value < high
+    assert [plate.name for plate in ss.figures(found)] == ["decay", "identified"]
+    with pytest.raises(ss.EstimateError, match="hold for a linear spring"):
+        ss.analyze_decay(record, restoring="pendulum", method="thesis")
+
+
+@pytest.mark.parametrize("name", ["60.txt", "100.txt"])
+def test_a_clock_that_can_not_be_trusted_leaves_the_extremes(dataset, name):
+    path = dataset("pendulum_bad_clock") / name
+    record = ss.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
+    found = ss.analyze_decay(record, restoring="pendulum")
+    assert found.waveform is None
+    assert found.best is found.older["extremes alone"]
+    assert 0.0051 < found.best.damping_ratio.value < 0.0065
+    low, high = np.degrees(found.best.dry_displacement.interval)
+    assert low < 0.0155
+    assert high > 0.0115
+    told = " ".join(ss.summary(found).headline)
+    assert "read from its extremes alone" in told
+    assert 'restoring="pendulum"' in told
+
+
+def test_a_clock_that_runs_unevenly_is_told_by_what_the_waveform_leaves():
+    values, fs, _ = free_decay(dry=0.005)
+    along = np.arange(len(values))
+    warped = np.interp(along + 0.35 * fs * np.sin(2 * np.pi * along / (2.5 * fs)), along, values)
+    noisy = warped + 1e-4 * np.random.default_rng(1).standard_normal(len(warped))
+    with pytest.raises(ss.EstimateError, match="of the motion; a waveform is read where the clock is even"):
+        ss.analyze_decay(ss.Record.of({"x": noisy}, fs=fs), method="waveform")
+
+
 def test_the_pendulum_has_a_page(dataset, tmp_path):
     path = dataset("pendulum_decay") / "pend1.csv"
     record = ss.read_record(path, channels={"theta": "#2 [rad]"}, time="#1")

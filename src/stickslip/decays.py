@@ -6,7 +6,9 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
+
+import numpy as np
 
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Estimate, Result
@@ -17,7 +19,7 @@ from stickslip.fit.motions import Restoring
 from stickslip.fit.which_motion import DecayMotion, choose_motion
 from stickslip.identify.decrement import Decrement, decrement
 from stickslip.identify.envelope import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
-from stickslip.identify.release import Releases, find_releases
+from stickslip.identify.release import SEEN, Releases, find_releases
 from stickslip.record.record import Record
 from stickslip.units import parse_value
 
@@ -26,12 +28,31 @@ if TYPE_CHECKING:
 
 Answer = TypeVar("Answer")
 
+EXTREMES = "extremes alone"
+LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
 METHODS = ("thesis", "waveform", "all")
 OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
-    "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, "extremes alone": extreme_decay,
+    "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, EXTREMES: extreme_decay,
     "Hilbert envelope": hilbert_decay,
 }  # fmt: skip
-FOR_PENDULUMS = {"extremes alone": functools.partial(extreme_decay, restoring="pendulum")}
+FOR_PENDULUMS = {EXTREMES: functools.partial(extreme_decay, restoring="pendulum")}
+
+
+class BothFrictions(Protocol):
+    """What every answer tells."""
+
+    @property
+    def damping_ratio(self) -> Estimate: ...
+    @property
+    def dry_displacement(self) -> Estimate: ...
+    @property
+    def frequency(self) -> Estimate: ...
+    @property
+    def model(self) -> str: ...
+    @property
+    def status(self) -> str: ...
+    @property
+    def estimates(self) -> tuple[Estimate, ...]: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,9 +95,10 @@ class DecayFindings(Result):
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def best(self) -> DecayFit | Decrement | DecayMotion:
-        """The surest answer: of the whole waveform where there is one."""
-        found = next((each for each in (self.waveform, self.thesis, self.motion) if each is not None), None)
+    def best(self) -> BothFrictions:
+        """The surest answer: of the whole waveform where there is one; of a pendulum without one, of its extremes."""
+        swings = cast(BothFrictions | None, self.older.get(EXTREMES))  # of extremes alone, and they tell both
+        found = next((each for each in (self.waveform, self.thesis, self.motion, swings) if each is not None), None)
         assert found is not None
         return found
 
@@ -122,8 +144,8 @@ class DecayFindings(Result):
         """Every number found, the best answer first; the decrements' are named so where both methods answer."""
         force = self.dry_force
         found = [] if force is None else [force]
-        if self.best is self.motion:
-            found += self.motion.estimates
+        if self.waveform is None and self.thesis is None:
+            found += self.best.estimates
         elif self.waveform is not None:
             found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
             found += [] if self.waveform.motions else self.whichever
@@ -135,9 +157,11 @@ class DecayFindings(Result):
     @property
     def comparisons(self) -> tuple[Estimate, ...]:
         """What the older methods say, each with what it gets wrong; not to be relied on."""
+        by_extremes = self.waveform is None and self.thesis is None and self.motion is None
         return tuple(
             replace(estimate, name=f"{estimate.name}, {name}", method=f"for comparison: {each.bias}", status="ok")
             for name, each in self.older.items()
+            if name != EXTREMES or not by_extremes
             for estimate in (each.damping_ratio, each.dry_displacement)
             if estimate is not None
         )
@@ -282,21 +306,37 @@ def analyze_decay(
         if releases.ring_downs[0].order == 0:
             waveform = ask("Which motion", lambda: fit(candidates="all"))
         waveform = waveform or ask("The whole waveform", fit)
-        if waveform is not None and waveform.motions:
-            motion = waveform.motions[0]
-        elif waveform is None and releases.ring_downs[0].order == 0:
+        if waveform is not None:
+            motion = waveform.motions[0] if waveform.motions else None
+            waveform = ask("The whole waveform", functools.partial(_followed, waveform))
+            motion = motion if waveform is not None else None
+        elif releases.ring_downs[0].order == 0:
             motion = ask("Which motion", lambda: choose_motion(record, channel=used, restoring=restoring))
     if method != "waveform" and restoring == "linear":
         thesis = ask("The decrements", lambda: decrement(record, channel=used))
-    if waveform is None and thesis is None and motion is None:
-        raise refusals[-1]
+    last = refusals[-1:]
     ways = {} if method != "all" or releases.ring_downs[0].order else OLDER if restoring == "linear" else FOR_PENDULUMS
     older = {
         name: found
         for name, way in ways.items()
         if (found := ask(name.capitalize(), functools.partial(way, record, channel=used))) is not None
     }
+    if waveform is None and thesis is None and motion is None and (restoring == "linear" or not older):
+        raise last[0]
     return DecayFindings(
         record_name(record), record, faults, releases, waveform, thesis, motion, older,
         tuple(dict.fromkeys(notes)), {"method": method, "channel": used, "restoring": restoring, **constants},
     )  # fmt: skip
+
+
+def _followed(fit: DecayFit) -> DecayFit:
+    """The fit, where it follows the motion; refused where it leaves much of it."""
+    left, moved = np.concatenate(fit.residual), np.concatenate(fit.measured) - fit.bias.value
+    share = float(np.linalg.norm(left) / np.linalg.norm(moved))
+    if share > LOST and float(np.std(left)) > SEEN * fit.ring_downs[0].noise:
+        raise EstimateError(
+            f"the fit leaves {100 * share:.0f} % of the motion",
+            "a waveform is read where the clock is even and the spring is the one that was chosen",
+            'mend the clock, choose restoring="pendulum" of a pendulum, or rely on the extremes',
+        )
+    return fit

@@ -15,6 +15,7 @@ _SPOKEN = (
     (r"\bask friction_loops\(record\)", "ask stickslip analyze"),
     (r", or ask (?:extreme|fit)_decay\(record\)[^;.]*", ""),
     (r', or choose form="plain"[^;.]*', ""),
+    (r'\brestoring="pendulum"', "--restoring pendulum"),
     (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
     (r"\b(channels|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness)=(?=\W|$)", r"--\1"),

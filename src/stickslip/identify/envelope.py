@@ -50,6 +50,12 @@ class EnvelopeDecay(Result):
     bias: str
     status: str
 
+    @property
+    def model(self) -> str:
+        """The frictions that the intervals hold apart from zero, in words."""
+        both = (("viscous", self.damping_ratio), ("dry", self.dry_displacement))
+        return " and ".join(word for word, each in both if each is not None and each.interval[0] > 0) or "no friction"
+
 
 def log_decrement(record: Record, *, channel: str | None = None) -> EnvelopeDecay:
     r"""Which damping ratio explains a free decay, if all of its damping were viscous?

@@ -253,7 +253,7 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
         plate("decay", plot_decay(findings), "How it dies away",
               f"{envelopes}Grey: at rest before the release and after.{many}")
     ]  # fmt: skip
-    if findings.waveform is not None or ring.order == 0:
+    if findings.waveform is not None or (ring.order == 0 and findings.best in (findings.motion, thesis)):
         plates.append(
             plate("identified", plot_identified(findings), "Measured and identified",
                   "Top: the motion that the identified friction gives, over the measured one. Bottom: what is left "

@@ -15,6 +15,7 @@ from stickslip.reports.words import interval_of, number, value_of
 MOST = 0.5  # of the power of what is left over
 OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
 LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
+WAVEFORM = "The whole waveform: "
 BOTH = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
 METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
 
@@ -55,6 +56,9 @@ def _sentences(findings: DecayFindings) -> Iterator[str]:
     else:
         yield "Neither viscous nor dry friction can be told from zero."
     yield from _left_over(findings)
+    for note in findings.notes:
+        if findings.waveform is None and note.startswith(WAVEFORM):
+            yield f"It is read from its extremes alone, for of the whole waveform {note.removeprefix(WAVEFORM)}"
     force = findings.dry_force
     if force is not None:
         yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
