@@ -65,9 +65,7 @@ class Accuracy:
     def __str__(self) -> str:
         if not self.answered:
             return "-"
-        share = f" ({100 * self.error / abs(self.truth):.2g} %)" if self.truth and math.isfinite(self.truth) else ""
-        some = f" in {self.answered}" if self.refusal else ""
-        return f"{self.error:.2g} {self.unit}{share}{some}"
+        return f"{self.error:.2g} {self.unit}" + (f" in {self.answered}" if self.refusal else "")
 
 
 @dataclass(frozen=True)

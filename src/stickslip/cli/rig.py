@@ -166,7 +166,7 @@ def _show_plan(plan: ExperimentPlan, needs: Sequence[tuple[str, str]]) -> None:
         for setup in plan.setups
     ]
     Console(highlight=False).print(table(("fs [Hz]", "sensors", *plan.questions), rows))
-    click.echo(f"Root-mean-square errors over {plan.draws} draws, and their share of the true value.")
+    click.echo(f"Root-mean-square errors of {plan.draws} record{'s' * (plan.draws > 1)} at each rate.")
     for reason in plan.refusals:
         click.echo(f"- {spoken(reason)}")
     for question, error in needs:

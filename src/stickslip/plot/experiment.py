@@ -38,6 +38,8 @@ def plot_plan(plan: ExperimentPlan) -> Figure:
     >>> len(plot_plan(plan).axes)
     3
     """
+    from matplotlib.ticker import NullFormatter
+
     figure, panels = new_figure(len(plan.questions), height=0.6 + 1.5 * len(plan.questions))
     choices = list(dict.fromkeys(setup.sensors for setup in plan.setups))
     for panel, question in zip(np.atleast_1d(panels), plan.questions, strict=True):
@@ -49,8 +51,13 @@ def plot_plan(plan: ExperimentPlan) -> Figure:
             style = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "markersize": 4}
             panel.plot(rates, factor * errors, label=", ".join(sensors), **style)
         panel.set(xscale="log", yscale="log", ylabel=axis_label("rms error", text))
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter(NullFormatter())
         panel.set_title(question, loc="left")
         panel.grid(visible=True, which="minor", color=FAINT, alpha=0.15)
+    panel.set_xticks(sorted({setup.fs for setup in plan.setups}))
+    panel.xaxis.set_major_formatter("{x:g}")
+    panel.xaxis.set_minor_formatter(NullFormatter())
     panel.set_xlabel(axis_label("sampling rate", "Hz"))
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=2)
