@@ -7,6 +7,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import EstimateError, RecordError
+from stickslip.identify.contact import branch_slopes
 from test_fusion import RIG, measured, told
 
 STIFFNESS, DAMPING = 192000.0, 23.9
@@ -53,6 +54,10 @@ def test_the_slope_is_right_where_nothing_lies() -> None:
     record = ss.Rig.perfect("x", "z", "load").measure(_run(), fs=20_000)
     record = record.with_channel("friction", record["load"], unit="N")
     assert ss.contact_stiffness(record, method="slope").value == pytest.approx(STIFFNESS, rel=0.03)
+
+
+def test_a_stick_within_one_count_of_the_sensor_has_no_slope() -> None:
+    assert branch_slopes(np.full(9, 0.1), np.linspace(-1.0, 1.0, 9), 1.0).size == 0
 
 
 def test_loops_tell_the_slope_of_their_mean_cycle() -> None:

@@ -22,7 +22,7 @@ POOL = 12.0  # samples over which the unrest of the friction is averaged
 FIRST = 0.05  # share of the friction's size by which it may change in a sample, before anything is known
 CALMEST = 1e-9  # share of the force's size below which the friction's wandering is none
 FINEST = 1e-6  # of a sensor's range: a sensor without noise would leave the filter no digits
-CALM = 1e-4  # share of the sliding friction by which friction strays from a holding contact in a sample
+CALM = 3e-5  # share of the sliding friction by which friction strays from a holding contact in a sample
 PLACES = {"x": 0, "v": 1, "load": 2}  # of what a sensor reads in the state
 BLOCK, OVERLAP = 1 << 15, 1 << 11  # samples smoothed at a time, and those beside them that settle the ends
 
@@ -206,7 +206,8 @@ class Held:
     ) -> Held:
         """`holds` is true for each step from a sample to the next within a stick; `level` [N] is the sliding friction.
 
-        Between sticks nothing is taken over from what was found of the friction: it would lean on its own choice.
+        Between sticks nothing is taken over from what was found of the friction: it would lean on its own choice. The
+        base's smoothing error is slow, and within a stick no more than a constant: it makes nothing less sure here.
         """
         known, _ = _readable(record, sensors)
         known = {name: values for name, values in known.items() if np.isfinite(values).sum() >= LEAST}
@@ -218,7 +219,9 @@ class Held:
         readings = np.where(second[:, None], np.nan, sensed.readings[rows])
         halved = np.interp(rows + second / 2, np.arange(len(holds)), sensed.push)
         unknown = np.where(holds, (CALM * level) ** 2, level**2)[rows]
-        return cls(model, replace(sensed, readings=readings, push=halved), (holds + 2 * bends)[rows], unknown)
+        return cls(
+            model, replace(sensed, readings=readings, push=halved, stray=0.0), (holds + 2 * bends)[rows], unknown
+        )
 
     def log_likelihood(self, stiffness: float, damping: float) -> float:
         """Of all readings, were the contact so stiff [N/m] and damped [N s/m]."""

@@ -256,7 +256,7 @@ def _answer(
     doubt = np.diag([2 * math.pi * loops.frequency.sd, amplitude[1], level.sd, stiffness.sd / stiffness.value]) ** 2
     stops = _stops(loops, branches, turn * amplitude[0])
     equation = _propagated(
-        _equation, known, doubt, "equation 3.4 of the thesis",
+        "equation", _equation, known, doubt, "equation 3.4 of the thesis",
         ("without damping of the contact, and for harmonic sliding: 3 to 5 % high on a rig like the thesis's",),
     )  # fmt: skip
     curve = _read(branches, level.value, lagging)
@@ -298,7 +298,7 @@ def _exact(
     doubt[3:, 3:] = fitted.covariance
     told = math.log(fitted.stiffness.value), fitted.damping.value
     return _propagated(
-        lambda values: _set_going(values, rig), np.array([*known, *told]), doubt,
+        "contact", lambda values: _set_going(values, rig), np.array([*known, *told]), doubt,
         "motion after the turn on the fitted contact",
         ("with the friction and the pull found at the turns; errors of the mass and of gains go into it",),
     )  # fmt: skip
@@ -347,7 +347,7 @@ def _set_going(known: Array, rig: Balance) -> float:
 
 
 def _propagated(
-    function: Callable[[Array], float], known: Array, covariance: Array, method: str, checks: tuple[str, ...]
+    name: str, function: Callable[[Array], float], known: Array, covariance: Array, method: str, checks: tuple[str, ...]
 ) -> Estimate:
     """The function of what is known, with the first-order deviation."""
     step = np.sqrt(np.diag(covariance))
@@ -355,7 +355,7 @@ def _propagated(
     slope = [(function(known + d) - function(known - d)) / (2 * d.sum()) for d in np.diag(step)]
     within = np.where(np.isfinite(covariance), covariance, 0.0)
     sd = math.sqrt(max(0.0, float(np.array(slope) @ within @ slope)))
-    return Estimate.normal(SPEED, function(known), sd=sd, unit="m/s", method=method, checks=checks)
+    return Estimate.normal(f"{SPEED} by the {name}", function(known), sd=sd, unit="m/s", method=method, checks=checks)
 
 
 def _at_most(speed: Estimate) -> Estimate:
@@ -391,7 +391,7 @@ def _read(branches: Sequence[Branch], level: float, lagging: str) -> Estimate:
     sd, freedom = mean_uncertainty(speeds)
     scatter = float(np.std(speeds, ddof=1)) if len(speeds) > 1 else math.nan
     return Estimate.normal(
-        SPEED, float(np.mean(speeds)), sd=sd, unit="m/s", quantile=student(freedom),
+        f"{SPEED} by the curve", float(np.mean(speeds)), sd=sd, unit="m/s", quantile=student(freedom),
         method="mean curve of friction against velocity, where it reaches the sliding friction",
         status="ok" if len(speeds) >= FEW else f"only {len(speeds)} turns: the interval is crude",
         checks=(
