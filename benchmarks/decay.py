@@ -96,7 +96,7 @@ def white(condition: Condition, trials: int, search: Search, seed: int) -> Outco
         if trial < 20:
             variance += np.diag(np.linalg.inv(jacobian @ jacobian.T)) * condition.noise**2 / min(20, trials)
         samples = values + condition.noise * random.standard_normal(condition.total)
-        begin = time.perf_counter()
+        begin = time.process_time()
         blocks = search.blocks(samples, 1 / condition.rate)
         fits = search.candidates(blocks) if blocks else np.empty((0, 9))
         if blocks is None or not len(fits):
@@ -104,9 +104,9 @@ def white(condition: Condition, trials: int, search: Search, seed: int) -> Outco
             continue
         share = weights(fits, blocks)
         found = share @ fits[:, 3:]
-        points.append(time.perf_counter() - begin)
+        points.append(time.process_time() - begin)
         ends = search.intervals(blocks, fits)
-        wholes.append(time.perf_counter() - begin)
+        wholes.append(time.process_time() - begin)
         errors.append(found - truth)
         inside.append((ends[:, 0] <= truth) & (truth <= ends[:, 1]))
         right += int(fits[np.argmax(share), 0]) == condition.half_cycles
@@ -153,10 +153,25 @@ def tell(outcomes: list[Outcome], trials: int) -> None:
 
 
 def rates(trials: int) -> None:
-    print("\nsamples a period   point fit [ms]   with intervals [ms]   (17 cycles)")
+    print("\nmedian processor time [ms], 17 cycles; the last column finds release and noise too")
+    print("samples a period   point fit   with intervals   fit_decay(record)")
     for rate in (20, 100, 400, 2000, 10000):
-        outcome = white(Condition(0.0177, 0.005, 1e-3, rate, "to rest"), trials, Search(), 0)
-        print(f"{rate:16} {1e3 * outcome.point:16.3f} {1e3 * outcome.whole:21.3f}")
+        condition = Condition(0.0177, 0.005, 1e-3, rate, "to rest")
+        outcome, asked = white(condition, trials, Search(), 0), public(condition, trials)
+        print(f"{rate:16} {1e3 * outcome.point:11.3f} {1e3 * outcome.whole:16.3f} {1e3 * asked:19.3f}")
+
+
+def public(condition: Condition, trials: int) -> float:
+    """Median processor time [s] of the public call."""
+    random, seconds = np.random.default_rng(0), []
+    for _ in range(trials):
+        values, _ = condition.motion(condition.truth(random))
+        samples = values + condition.noise * random.standard_normal(condition.total)
+        record = ss.Record.of({"x": samples}, fs=float(condition.rate))
+        begin = time.process_time()
+        fit_decay(record)
+        seconds.append(time.process_time() - begin)
+    return statistics.median(seconds)
 
 
 def counted_bound(values: np.ndarray, jacobian: np.ndarray, step: float, noise: float) -> np.ndarray:
