@@ -37,17 +37,30 @@ def test_its_interval_is_neither_too_narrow_nor_too_wide() -> None:
     assert 0.3 < strayed < 2.7  # chi square of 10: 3 in 1000 on either side
 
 
+def test_of_a_long_record_some_stretches_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stickslip.identify.likely_contact.MOST", 6000)
+    monkeypatch.setattr("stickslip.identify.likely_contact.PIECES", 2)
+    found = ss.contact_stiffness(balanced(2.5))
+    assert found.value == pytest.approx(STIFFNESS, rel=1e-3)
+    assert abs(found.value - STIFFNESS) < 3.5 * found.sd
+
+
 def test_its_damping_too() -> None:
     found = ss.contact_damping(balanced(2.5))
     assert found.value == pytest.approx(DAMPING, rel=0.02)
     assert abs(found.value - DAMPING) < 3.5 * found.sd
 
 
-def test_the_slope_scatters_and_is_low_as_the_thesis_found() -> None:
-    found = ss.contact_stiffness(balanced(8.7), method="slope")
-    sticks = 2 * 3 * 8.7
-    assert 0.05 < found.sd * np.sqrt(sticks) / found.value < 0.2
-    assert -0.27 < found.value / STIFFNESS - 1 < -0.02
+def test_the_thesis_s_slopes_scatter_by_13_percent_and_are_low() -> None:
+    """Table 3.1 quotes 13.1, 13.9 and 14.0 % of scatter; here its friction F1, and its line through each stick."""
+    record = balanced(8.7, method="F1")
+    slopes = branch_slopes(record["x"], record["friction"], 1.1)
+    assert len(slopes) > 40
+    assert 0.09 < slopes.std(ddof=1) / slopes.mean() < 0.18
+    assert -0.35 < slopes.mean() / STIFFNESS - 1 < -0.15
+    found = ss.contact_stiffness(record, method="slope")
+    assert found.value == pytest.approx(slopes.mean(), rel=0.1)
+    assert "scatter" in found.checks[1]
 
 
 def test_the_slope_is_right_where_nothing_lies() -> None:
