@@ -96,6 +96,14 @@ def test_a_motion_without_noise_is_the_simplest_that_makes_it(length: float) -> 
     assert ss.fit_decay(ss.Record.of({"x": x}, fs=200)).noise == "white"
 
 
+def test_a_simulated_release_is_what_it_was_made_of() -> None:
+    """Without noise, from the exact engine, in blocks of nine samples that hold turning points too."""
+    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
+    found = ss.choose_motion(ss.simulate(slider, duration=20.0, start={"x": 1.0}).record(fs=200))
+    assert (found.model, found.status) == ("both", "ok")
+    assert found.dry_displacement_any.includes(0.02)
+
+
 @pytest.mark.parametrize(("step", "noise"), [(5e-3, 1e-4), (5e-3, 2.5e-4), (5e-3, 2e-3)])
 @pytest.mark.parametrize("counts", [False, True])
 def test_a_coarse_encoder_feigns_no_friction(step: float, noise: float, counts: bool) -> None:

@@ -18,7 +18,7 @@ FIRST = 4.0  # periods fitted first; then twice as many, till the end: the phase
 LEAST = 24  # blocks of a fit
 HOPELESS = 4.0  # times what viscous damping with dry friction leaves
 EVALUATIONS = 60  # of one search
-PRECISION = 1e-7  # of the range: no record is better, no residual below it says anything
+PRECISION = 1e-6  # of the range: no record is better, no residual below it says anything
 CONVERGED = 1e-8  # relative change of the sum of squares, and of the parameters
 LOWEST = {"damping_ratio": 0.0, "dry_displacement": 0.0, "quadratic": 0.0, "rise": 0.0, "micro_slip": 0.0}
 SHAPES = {
@@ -60,8 +60,8 @@ class BlockMeans:
 
     @property
     def floor(self) -> float:
-        """What rounding may leave of a motion that is fitted exactly."""
-        return PRECISION * float(np.ptp(self.values))
+        """What rounding, and the means of blocks across a turning point, may leave of a motion that is the true one."""
+        return PRECISION * float(np.ptp(self.values)) * math.sqrt(float(self.weights.mean()))
 
     @cached_property
     def spread(self) -> Array:
