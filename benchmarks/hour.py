@@ -16,7 +16,6 @@ from dataclasses import replace
 import numpy as np
 
 import stickslip as ss
-from stickslip.identify.parts import join_sticks, overlapping
 
 RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
 LAG = 0.0389 / 30.91
@@ -51,12 +50,14 @@ def main() -> None:
     parser.add_argument("--minutes", type=int, default=60)
     minutes = parser.parse_args().minutes
     began, used = time.perf_counter(), time.process_time()
-    found = []
-    for stretch in overlapping(parts(minutes)):
-        record = ss.friction_force(stretch.record, method="fusion", **RIG)
-        found.append((replace(stretch, record=record.rows(0, 1)), ss.find_sticks(record)))
-        print(f"\r{stretch.last:6.0f} of {60 * minutes} s", end="", file=sys.stderr)
-    sticks = join_sticks(found)
+
+    def found() -> Iterator[tuple[ss.Stretch, ss.Sticks]]:
+        for stretch in ss.overlapping(parts(minutes)):
+            yield stretch, ss.find_sticks(ss.friction_force(stretch.record, method="fusion", **RIG))
+            print(f"\r{stretch.last:6.0f} of {60 * minutes} s", end="", file=sys.stderr)
+
+    sticks = ss.join_sticks(found())
+    print(sticks)
     kinds = [event.kind for event in sticks.events]
     print(sticks)
     print({kind: kinds.count(kind) for kind in sorted(set(kinds))}, sticks.kind, sticks.status, sticks.lost)

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         linear_decrement as linear_decrement,
         log_decrement as log_decrement,
     )
+    from stickslip.identify.cause import Cause as Cause, lag_or_compliance as lag_or_compliance
     from stickslip.identify.compare_force import (
         ForceBand as ForceBand,
         ForceComparison as ForceComparison,
@@ -225,6 +226,7 @@ _ROOMS = {
     "presliding": "identify.presliding", "Presliding": "identify.presliding",
     "pulled_slider": "identify.pull", "Pull": "identify.pull",
     "friction_force": "identify.force", "friction_loops": "identify.loops", "find_sticks": "identify.sticks",
+    "lag_or_compliance": "identify.cause", "Cause": "identify.cause",
     "StickEvent": "identify.sticks", "Sticks": "identify.sticks", "Stretch": "identify.parts",
     "overlapping": "identify.parts", "join_sticks": "identify.parts",
     "regress_friction": "identify.regression",

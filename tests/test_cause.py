@@ -1,0 +1,75 @@
+"""A late sensor against a contact that gives way, on simulated records of each."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+import stickslip as ss
+from rigs import CASES, LAG, RIG, SETTLED
+from stickslip.errors import EstimateError, RecordError
+
+
+@cache
+def seen(frequency: float, soft: bool, late: bool) -> ss.Record:
+    """What the rig reads of a rigid or a compliant contact, by displacement sensors that are late or not."""
+    amplitude, kinetic = CASES[frequency]
+    law = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9) if soft else ss.Coulomb(kinetic)
+    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
+    rig = ss.Rig()
+    for name in ("x", "z"):
+        rig = rig.having(name, lag=LAG if late else 0.0)
+    record = rig.measure(ss.simulate(slider, duration=SETTLED + 2), fs=4000, rng=1, start=SETTLED)
+    record = record.with_details("load", mount=(250.0, 0.05), inertia=0.05, discharge=50.0)
+    return record.with_details("a", mount=(125.0, 0.1))
+
+
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize(("frequency", "soft"), [(2.5, True), (5.61, True), (8.7, True), (8.7, False), (11.1, False)])
+def test_each_cause_is_told_from_the_others(frequency: float, soft: bool, late: bool) -> None:
+    found = ss.lag_or_compliance(seen(frequency, soft, late))
+    names = {(True, True): "both", (True, False): "contact compliance", (False, True): "sensor lag"}
+    assert found.cause == names.get((soft, late), found.cause)
+    if not soft and not late:
+        assert found.cause in ("neither", "cannot be told")
+    assert found.lag.includes(LAG if late else 0.0)
+    if soft:
+        assert found.stiffness is not None
+        assert found.stiffness.value == pytest.approx(192000, rel=0.12)
+        assert "gives way" in found.reason
+
+
+def test_a_lag_would_pass_for_a_third_of_the_transition_speed() -> None:
+    found = ss.lag_or_compliance(seen(8.7, True, True))
+    assert 0.22 < found.mimicked < 0.4
+    assert "would pass for" in found.reason
+
+
+def test_a_stated_delay_is_no_lag() -> None:
+    record = seen(8.7, True, True)
+    for name in ("x", "z"):
+        record = record.with_details(name, delay=LAG)
+    assert ss.lag_or_compliance(record).cause == "contact compliance"
+
+
+def test_the_friction_alone_tells_it_less_surely() -> None:
+    record = seen(8.7, True, True)
+    bare = ss.Record.of({name: record[name] for name in ("x", "load")}, fs=4000)
+    bare = bare.with_details("load", mount=(250.0, 0.05), inertia=0.05, discharge=50.0)
+    found = ss.lag_or_compliance(bare)
+    assert found.cause == "both"
+    assert found.lag.includes(LAG)
+    assert "mount is not stated" in ss.lag_or_compliance(bare.with_details("load", mount=None)).status
+
+
+def test_a_rigid_contact_that_sticks_tells_nothing() -> None:
+    assert ss.lag_or_compliance(seen(2.5, False, True)).cause == "cannot be told"
+
+
+def test_what_it_needs() -> None:
+    record = seen(8.7, True, False)
+    with pytest.raises(RecordError, match="friction"):
+        ss.lag_or_compliance(ss.Record.of({"x": record["x"]}, fs=4000))
+    with pytest.raises(EstimateError, match="reversals"):
+        ss.lag_or_compliance(record.rows(0, 400))
