@@ -81,6 +81,7 @@ if TYPE_CHECKING:
         Sticks as Sticks,
         find_sticks as find_sticks,
     )
+    from stickslip.long_records import analyze_blocks as analyze_blocks
     from stickslip.mending import mend as mend
     from stickslip.plot.figures import figures as figures
     from stickslip.record.channels import Channel as Channel
@@ -242,7 +243,7 @@ _ROOMS = {
     "analyze_decay": "decays", "DecayFindings": "decays",
     "compare_decays": "decay_comparison", "DecayComparison": "decay_comparison",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
-    "analyze": "analysis", "compare": "comparison", "Comparison": "comparison",
+    "analyze": "analysis", "analyze_blocks": "long_records", "compare": "comparison", "Comparison": "comparison",
     "Findings": "findings", "mend": "mending",
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",
     "Tabulated": "laws.tabulated", "StateVariable": "laws.state_variable", "InertialContact": "laws.inertial",

@@ -12,14 +12,14 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.findings import Findings, record_name
 from stickslip.identify.breakaway import breakaway
 from stickslip.identify.contact import contact_damping, contact_stiffness
-from stickslip.identify.force import FUSIONS
+from stickslip.identify.force import FUSIONS, friction_force
 from stickslip.identify.loops import friction_loops
 from stickslip.identify.motion import is_measured, slid_on
 from stickslip.identify.presliding import presliding
 from stickslip.identify.pull import pulled_slider
 from stickslip.identify.regression import regress_friction
 from stickslip.identify.sticks import find_sticks
-from stickslip.preparation import CONSTANTS, MOTION, Asked, normal_load, ready
+from stickslip.preparation import AT_ONCE, CONSTANTS, MOTION, Asked, middle, normal_load, ready
 from stickslip.record.record import Record
 
 STRETCH = 1 << 15  # samples in which the contact is fitted
@@ -142,7 +142,7 @@ class Question:
         return (
             all(any(name in record for name in group) for group in self.needs)
             and not any(name in record for name in self.without)
-            and (not self.fused or _told(record).get("differentiation") in FUSIONS)
+            and (not self.fused or _can_be_fused(record))
         )
 
 
@@ -152,11 +152,11 @@ QUESTIONS = (
     Question("sticks", "Sticks and slips", (MOTION,), lambda r, on: find_sticks(r, contact=on)),
     Question("breakaway", "Breakaway", (("friction",), MOTION), lambda r, on: breakaway(r, contact=on)),
     Question(
-        "stiffness", "Contact stiffness", (("friction",), ("x",)), lambda r, on: contact_stiffness(_stretch(r)),
+        "stiffness", "Contact stiffness", (("friction",), ("x",)), lambda r, on: contact_stiffness(_fused(r)),
         fused=True,
     ),
     Question(
-        "contact_damping", "Contact damping", (("friction",), ("x",)), lambda r, on: contact_damping(_stretch(r)),
+        "contact_damping", "Contact damping", (("friction",), ("x",)), lambda r, on: contact_damping(_fused(r)),
         follows="stiffness", fused=True,
     ),
     Question(
@@ -181,6 +181,15 @@ def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
     return rig_settings({**(rig.model_dump(exclude_unset=True) if rig is not None else {}), **given}, source="the call")
 
 
+def _can_be_fused(record: Record) -> bool:
+    """Whether the friction comes from all sensors together, or might have if the record were not so long."""
+    method = _told(record).get("differentiation")
+    sensors = any(is_measured(record, name) for name in ("a", "load"))
+    return method in FUSIONS or (
+        method == "smoother" and len(record) > AT_ONCE and sensors and slid_on(record, None) == "ground"
+    )
+
+
 def _doubt(answers: dict[str, Any], reason: str) -> None:
     """Flag what rests on sensors that are not known."""
     for key in ("stiffness", "contact_damping"):
@@ -189,10 +198,13 @@ def _doubt(answers: dict[str, Any], reason: str) -> None:
             answers[key] = replace(found, status=reason)
 
 
-def _stretch(record: Record) -> Record:
-    """The middle of a long record: enough to fit a contact by its likelihood."""
-    first = max(0, (len(record) - STRETCH) // 2)
-    return record.rows(first, first + STRETCH) if first else record
+def _fused(record: Record) -> Record:
+    """The middle of a record, enough to fit a contact by its likelihood, with all sensors put together."""
+    cut = middle(record, STRETCH)
+    told = [step.arguments for step in record.history if step.action == "friction_force"][-1]
+    return cut if told["method"] in FUSIONS else friction_force(
+        cut, method="fusion", **{key: told[key] for key in CONSTANTS}
+    )  # fmt: skip
 
 
 def _told(record: Record) -> dict[str, Any]:

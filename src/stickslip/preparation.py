@@ -22,7 +22,8 @@ Answer = TypeVar("Answer")
 MOTION = ("x", "v", "theta")
 USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
 CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
-STRETCH = 1 << 16  # samples from the middle in which a delay is looked for
+STRETCH = 1 << 15  # samples from the middle in which a delay is looked for, and the forces are compared
+AT_ONCE = 1 << 18  # samples of which all sensors are put together unasked
 SURE = 3.0  # standard deviations from which a delay is taken out
 
 
@@ -82,12 +83,18 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
         _tell_unused(rig, asked)
     elif "x" in whole and rig.mass is not None and rig.stiffness is not None:
         if {"a", "load"} <= set(whole):
-            comparison = asked.ask("Force comparison", lambda: compare_force(whole, **_constants(rig)))
+            comparison = asked.ask("Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig)))
             whole = _with_mounts(whole, comparison, asked)
         whole = _balanced(whole, rig, method, asked)
     if "friction" not in whole:
         whole = _by_load(whole, rig, asked)
     return Ready(whole, delay, comparison, _doubt(whole, delay))
+
+
+def middle(record: Record, samples: int) -> Record:
+    """At most so many samples, from the middle of a record."""
+    first = (len(record) - samples) // 2
+    return record.rows(first, first + samples) if first > 0 else record
 
 
 def _constants(rig: RigSettings) -> dict[str, Any]:
@@ -100,8 +107,7 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
     """The record with the delay of displacement against acceleration stated, where it was not."""
     if not {"x", "a"} <= set(record) or any(record.channels[name].delay for name in ("x", "z", "a") if name in record):
         return record, None
-    first = max(0, (len(record) - STRETCH) // 2)
-    found = asked.ask("Sensor delay", lambda: sensor_delay(record.rows(first, first + STRETCH)))
+    found = asked.ask("Sensor delay", lambda: sensor_delay(middle(record, STRETCH)))
     if found is None:
         return record, None
     if found.gain.value < 0:
@@ -154,6 +160,11 @@ def _tell_unused(rig: RigSettings, asked: Asked) -> None:
 def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
     """By which method the friction is found, and why."""
     helps = [name for name in ("a", "load") if name in record]
+    if len(record) > AT_ONCE:
+        return (
+            "smoother",
+            f"{len(record)} samples are many; the method fusion takes them all together if it is asked to",
+        )
     if helps and rig.contact == "ground":
         return "fusion", f"{' and '.join(helps)} beside x: all sensors together by a Kalman smoother"
     why = "the contact is on the moving base" if helps else "there is neither an accelerometer nor a load cell"

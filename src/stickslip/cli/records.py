@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from stickslip import Comparison, DecayComparison, DecayFindings, Findings, Record, RigSettings
 
 Answer = TypeVar("Answer")
+
+LONG = 1 << 26  # bytes on the disk
+PART = 1 << 18  # rows of a long record's part
 Result = TypeVar("Result", "Findings | Comparison", "DecayFindings | DecayComparison")
 
 
@@ -92,12 +95,18 @@ def read(files: Sequence[Path], rig: RigSettings) -> Record:
     return ss.mend(_with_source(record, files), repairs=rig.repair)
 
 
-def read_parts(files: Sequence[Path], rig: RigSettings) -> Iterator[Record]:
+def is_long(files: Sequence[Path]) -> bool:
+    """Whether the record may be too long to be held in memory with all that is made of it."""
+    return sum(path.stat().st_size for path in files) > LONG
+
+
+def read_parts(files: Sequence[Path], rig: RigSettings, size: int | None = None) -> Iterator[Record]:
     """The record in parts that fit into memory; whole where rows of it or repairs are asked for."""
     if rig.rows or rig.repair:
         yield read(files, rig)
         return
-    for part in ss.read_blocks(_paths(files), **_told(rig)):
+    told = {**_told(rig), **({} if size is None else {"size": size})}
+    for part in ss.read_blocks(_paths(files), **told):
         yield _with_source(part, files)
 
 
@@ -142,14 +151,23 @@ def answers(
     groups: Sequence[Sequence[Path]],
     rig: RigSettings,
     ask: Callable[[Record], Answer],
-    tell: Callable[[str, int], None],
+    tell: Callable[[str, float], None],
+    *,
+    of_parts: Callable[[Iterator[Record], Callable[[str], None]], Answer] | None = None,
 ) -> tuple[list[Answer], list[ss.StickslipError]]:
-    """What each record answers, and why those that are left out do not; the last word where none does."""
+    """What each record answers, and why those that are left out do not; the last word where none does.
+
+    With `of_parts` a long record is asked part by part, and a sentence is told of each.
+    """
     found: list[Answer] = []
     refused: list[ss.StickslipError] = []
     for number, group in enumerate(groups):
         with collected(refused, group):
             tell(f"reading {name_of(group)}", 2 * number)
+            if of_parts is not None and is_long(group):
+                say = functools.partial(_say, tell, f"analysing {name_of(group)}", 2 * number)
+                found.append(of_parts(read_parts(group, rig, size=PART), say))
+                continue
             record = read(group, rig)
             tell(f"checking and analysing {name_of(group)}", 2 * number + 1)
             found.append(ask(record))
@@ -161,6 +179,10 @@ def answers(
     raise type(refused[0])(
         f"none of {len(refused)} records answers", "each has its own reason, told above", "mend them, or give others"
     )
+
+
+def _say(tell: Callable[[str, float], None], what: str, done: float, words: str) -> None:
+    tell(f"{what}, {words}", done)
 
 
 def with_left_out(results: Result, refused: Sequence[ss.StickslipError]) -> Result:

@@ -24,7 +24,8 @@ QUESTION = "the friction at breakaway"
 SIDES = ((1, "forward"), (-1, "back"))
 TRAVEL = 0.05  # of a stroke: how far the start of a slip is followed
 BEFORE = 5  # a stick's last fifth tells what it bears at its end
-MOST = 400  # strokes looked at, evenly chosen: their mean is known well enough
+ROWS = 256  # of the start of a slip that are looked at
+MOST = 200  # strokes looked at, evenly chosen: their mean is known well enough
 LEAST = 8  # samples in which a stick's end and a slip's start can be told
 RING = 16  # samples in which a ring can be told
 SLOW = 8  # degree of the polynomial that is not the ring
@@ -73,12 +74,12 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
 
     A mass at rest has no inertia force: the contact bears exactly what pulls, :math:`p = k (z - x) + c\,\dot z + P`
     (the second term for a damper on the base), which is known without any differentiation. When the slip begins is
-    found from its first travel, :math:`m\ddot x = p - f` with f constant so early, by least squares over the instant
-    and f; the pull can not be less than f then. Static friction is the pull at that instant, from a line through the
-    stick's last fifth. Of a friction that was measured, or found by all sensors together, it is the largest value
-    before the contact moves, which noise makes too large by two of its deviations at most: the interval's low end goes
-    as far down. Of a contact that gives way before it slips it is the first peak once friction is near its level, which
-    the ring that follows raises.
+    found, to a sample, from its first travel, :math:`m\ddot x = p - f` with f constant so early, by least squares over
+    the instant and f; the pull can not be less than f then. Static friction is the pull at that instant, from a line
+    through the stick's last fifth. Of a friction that was measured, or found by all sensors together, it is the largest
+    value before the contact moves, which noise makes too large by two of its deviations at most: the interval's low end
+    goes as far down. Of a contact that gives way before it slips it is the first peak once friction is near its level,
+    which the ring that follows raises.
 
     Parameters
     ----------
@@ -112,46 +113,48 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     fs = record.fs
     chosen = strokes.strokes[:: max(1, len(strokes.strokes) // MOST)]
     borne = [(each, _borne(each, pull, rig, fs)) for each in chosen]
-    found = [(each, friction) for each, friction in borne if friction is not None]
+    found = [(each, *answer) for each, answer in borne if answer is not None]
     if not found:
         raise EstimateError(
             f"the first travel of none of {len(chosen)} slips can be followed",
             "the start of a slip takes 4 samples at least",
             "sample faster, or give a longer record",
         )
+    unsure = float(np.median([change for *_, change in found]))  # the instant is known to a sample
     above = 0.0 if pull is not None else 2 * (record.channels["friction"].noise or noise_level(record["friction"], fs))
-    rested = sum(each.rests for each, _ in found)
+    rested = sum(each.rests for each, *_ in found)
     method = "pull at the start of the slip" if pull is not None and 2 * rested > len(found) else "peak before the slip"
-    level = [
-        _lowered(
-            mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=f"{method}, mean of strokes"),
-            above,
+    how = f"{method}, mean of strokes"
+    levels = [
+        _widened(
+            mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=how), unsure + above, unsure
         )
-        if (values := [friction for each, friction in found if each.way == way])
+        if (values := [friction for each, friction, _ in found if each.way == way])
         else None
         for way, side in SIDES
     ]
     ratio = mean_of_cycles(
-        "static over sliding friction", [friction / each.level for each, friction in found], unit="1",
+        "static over sliding friction", [friction / each.level for each, friction, _ in found], unit="1",
         method=f"{method} over the median of the stroke, mean of strokes",
     )  # fmt: skip
-    ratio = _lowered(ratio, above / float(np.median([each.level for each, _ in found])))
-    measured = [each for each, _ in found if is_measured(record, "friction")]  # a balance rings by its own smoothing
+    sliding = float(np.median([each.level for each, *_ in found]))
+    ratio = _widened(ratio, (unsure + above) / sliding, unsure / sliding)
+    measured = [each for each, *_ in found if is_measured(record, "friction")]  # a balance rings by its own smoothing
     rings = [_ringing([each for each in measured if each.way == way], side, fs) for way, side in SIDES]
-    swings = [_swing([each for each, _ in found if each.way == way], side) for way, side in SIDES]
+    swings = [_swing([each for each, *_ in found if each.way == way], side) for way, side in SIDES]
     gives = "the contact gives way before it slips: the first peak holds the ring that follows"
     status = "ok" if 2 * rested > len(found) else gives
-    flagged = [replace(each, status=status) if each is not None and each.status == "ok" else each for each in level]
+    flagged = [replace(each, status=status) if each is not None and each.status == "ok" else each for each in levels]
     return Breakaway(
         flagged[0], flagged[1], replace(ratio, status=status) if ratio.status == "ok" else ratio, rings[0], rings[1],
         swings[0], swings[1], len(found), status,
     )  # fmt: skip
 
 
-def _lowered(estimate: Estimate, above: float) -> Estimate:
-    """The estimate, its interval down to where noise may have lifted it from."""
+def _widened(estimate: Estimate, below: float, above: float) -> Estimate:
+    """The estimate, its interval as far as noise and the instant of a sample may have moved it."""
     low, high = estimate.interval
-    return replace(estimate, interval=(low - above, high), sd=float(np.hypot(estimate.sd, above / 2)))
+    return replace(estimate, interval=(low - below, high + above), sd=float(np.hypot(estimate.sd, (below + above) / 4)))
 
 
 def _pull(record: Record) -> tuple[Array | None, Mapping[str, Any]]:
@@ -170,10 +173,10 @@ def _pull(record: Record) -> tuple[Array | None, Mapping[str, Any]]:
     return (pull + record["force"] if "force" in record else pull), rig
 
 
-def _borne(stroke: Stroke, pull: Array | None, rig: Mapping[str, Any], fs: float) -> float | None:
-    """What the contact bears just before it slips."""
+def _borne(stroke: Stroke, pull: Array | None, rig: Mapping[str, Any], fs: float) -> tuple[float, float] | None:
+    """What the contact bears just before it slips, and by how much that changes from a sample to the next."""
     if pull is None or not stroke.rests:
-        return float(stroke.friction[stroke.slip])
+        return float(stroke.friction[stroke.slip]), 0.0
     if stroke.slip < LEAST:
         return None
     first = stroke.slip // 2
@@ -186,34 +189,39 @@ def _borne(stroke: Stroke, pull: Array | None, rig: Mapping[str, Any], fs: float
     if begins is None:
         return None
     rows = np.arange(max(0, int(begins) - max(4, (first + int(begins)) // BEFORE)), int(begins) + 1)
-    line = np.polyfit(rows - begins, force[rows], 1) if len(rows) > 1 else force[rows]
-    return float(line[-1])
+    slope, value = np.polyfit(rows - begins, force[rows], 1) if len(rows) > 1 else (0.0, force[rows[0]])
+    return float(value), float(abs(slope))
 
 
 def _start(travel: Array, pull: Array, mass: float, fs: float) -> float | None:
     """When, in samples, a slip begins of which the first travel is known."""
-    costs = {}
-    for begin in range(1, len(travel) - 3):
-        free = np.zeros((2, len(travel)))  # travel that the pull alone, and a force of 1 N, would make
-        free[0, begin:], free[1, begin:] = _twice(pull[begin:]), _twice(np.ones(len(travel) - begin))
-        free /= mass * fs**2
-        design = np.column_stack([np.ones(len(travel)), -free[1] / free[1, -1]])
-        answer = np.linalg.lstsq(design, travel - free[0], rcond=None)[0]
-        if pull[begin] >= answer[1] / free[1, -1]:
-            costs[begin] = float(np.sum((design @ answer - travel + free[0]) ** 2))
-    if not costs:
+    every = len(travel) // ROWS + 1
+    travel, pull, count = travel[::every], pull[::every], len(travel[::every])
+    begins = np.arange(1, count - 3)
+    since = np.maximum(np.arange(count) - begins[:, None], 0.0)
+    once = _summed(pull)
+    twice = _summed(once)
+    # by the pull alone, and by a force of 1 N, from each begin on
+    pulled = np.where(since > 0, twice - twice[begins, None] - once[begins, None] * since, 0.0)
+    step = every**2 / (mass * fs**2)
+    held, rest = step * since**2 / 2, travel - step * pulled
+    held_about, rest_about = (each - each.mean(axis=1, keepdims=True) for each in (held, rest))
+    friction = -np.sum(held_about * rest_about, axis=1) / np.sum(held_about**2, axis=1)
+    cost = np.sum((rest_about + friction[:, None] * held_about) ** 2, axis=1)
+    cost[pull[begins] < friction] = np.inf
+    best = int(np.argmin(cost))
+    if not np.isfinite(cost[best]):
         return None
-    best = min(costs, key=lambda begin: costs[begin])
-    low, middle, high = (costs.get(best + side, np.inf) for side in (-1, 0, 1))
-    curved = low - 2 * middle + high
-    return best + (low - high) / (2 * curved) if np.isfinite(curved) and curved > 0 else float(best)
+    around = cost[max(best - 1, 0) : best + 2]
+    moved = 0.0
+    if len(around) == 3 and np.isfinite(around).all() and (curved := around[0] - 2 * around[1] + around[2]) > 0:
+        moved = (around[0] - around[2]) / (2 * curved)
+    return float(every * (begins[best] + moved))
 
 
-def _twice(values: Array) -> Array:
-    """The integral of the integral, by trapezoids of one sample."""
-    for _ in range(2):
-        values = np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2)])
-    return values
+def _summed(values: Array) -> Array:
+    """The integral, by trapezoids of one sample."""
+    return np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2)])
 
 
 def _swing(strokes: Sequence[Stroke], side: str) -> Estimate | None:
