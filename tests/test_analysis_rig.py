@@ -89,3 +89,71 @@ def test_without_accelerometer_or_load_cell_it_falls_back_and_says_so(readings: 
     assert any("neither an accelerometer nor a load cell" in note for note in found.notes)
     assert found.level is not None
     assert found.level.value == pytest.approx(1.1, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("turned", "words"),
+    [
+        ({"a": -1.0}, "x or a has the wrong sign"),
+        ({"load": -1.0}, "opposite signs"),
+        ({"x": -1.0, "z": -1.0}, "wrong sign"),
+        ({"z": -1.0}, "the forces differ"),
+    ],
+)
+def test_a_sensor_with_the_wrong_sign_is_named(readings: ss.Record, turned: dict[str, float], words: str) -> None:
+    samples = {name: turned.get(name, 1.0) * readings[name] for name in readings}
+    found = ss.analyze(ss.Record.of(samples, fs=readings.fs), mass=2.42, stiffness=2310, damping=0)
+    assert words in " ".join(ss.summary(found).cautions)
+
+
+def test_swapped_displacements_are_named(readings: ss.Record) -> None:
+    samples = {**{name: readings[name] for name in readings}, "x": readings["z"], "z": readings["x"]}
+    found = ss.analyze(ss.Record.of(samples, fs=readings.fs), mass=2.42, stiffness=2310, damping=0)
+    assert "differ by more than noise" in " ".join(ss.summary(found).cautions)
+    assert found.stiffness is None or found.stiffness.status != "ok"
+
+
+def test_a_load_cell_at_the_end_of_its_range_is_named_and_left_out(readings: ss.Record) -> None:
+    samples = {**{name: readings[name] for name in readings}, "load": np.clip(readings["load"], -0.6, 0.6)}
+    found = ss.analyze(ss.Record.of(samples, fs=readings.fs), mass=2.42, stiffness=2310, damping=0)
+    assert found.level is not None
+    assert found.level.value == pytest.approx(1.1, rel=0.01)
+    assert any(fault.channel == "load" and fault.kind == "clipped" for fault in found.faults)
+
+
+def test_without_mass_the_load_cell_answers_and_what_is_lacking_is_said(readings: ss.Record) -> None:
+    found = ss.analyze(ss.Record.of({name: readings[name] for name in readings}, fs=readings.fs), stiffness=2310)
+    assert found.level is not None
+    assert found.level.value == pytest.approx(1.1, rel=0.01)
+    assert "load cell's reading is taken" in " ".join(found.notes)
+
+
+def test_blocks_tell_what_the_whole_tells(readings: ss.Record) -> None:
+    record = readings.with_details("x", delay=0.0389 / 30.91).with_details("z", delay=0.0389 / 30.91)
+    record = record.with_details("a", mount=(125.0, 0.1))
+    record = record.with_details("load", mount=(250.0, 0.05), inertia=0.05, discharge=50.0)
+    said: list[str] = []
+    rig = ss.rig_settings({"mass": 2.42, "stiffness": 2310, "damping": 0})
+    halves = (record.rows(first, first + len(record) // 2) for first in (0, len(record) // 2))
+    found = ss.analyze_blocks(halves, rig=rig, progress=said.append)
+    assert said == ["block 1, from 0 s", f"block 2, from {len(record) // 2 / 4000:.5g} s"]
+    assert found.level is not None
+    assert found.level.value == pytest.approx(1.1, rel=0.0005)
+    assert found.stiffness is not None
+    assert found.stiffness.value == pytest.approx(192000, rel=0.002)
+    assert found.sticks is not None
+    assert found.sticks.events[-1].time > len(record) / 4000 * 0.75
+    assert "2 blocks" in found.notes[0]
+    assert len(found.record) == len(record) // 2
+
+
+def test_a_block_that_answers_nothing_is_named_and_left_out(readings: ss.Record) -> None:
+    still = ss.Record.of({name: np.zeros(4000) for name in ("x", "friction")}, fs=4000)
+    time = np.arange(8000) / 4000
+    moving = ss.Record.of(
+        {"x": np.sin(20 * time), "friction": np.sign(np.cos(20 * time)) + 0.01 * np.sin(7919.0 * time)}, fs=4000
+    )
+    found = ss.analyze_blocks([moving, still])
+    assert any("Block 2" in note and "answers nothing" in note for note in found.notes)
+    with pytest.raises(ss.EstimateError, match="none of 1 blocks"):
+        ss.analyze_blocks([still])

@@ -19,6 +19,7 @@ from stickslip.identify.presliding import presliding
 from stickslip.identify.pull import pulled_slider
 from stickslip.identify.regression import regress_friction
 from stickslip.identify.sticks import find_sticks
+from stickslip.identify.transition_speed import coupled_frequency, transition_speed
 from stickslip.preparation import AT_ONCE, CONSTANTS, MOTION, Asked, middle, normal_load, ready
 from stickslip.record.record import Record
 
@@ -160,6 +161,14 @@ QUESTIONS = (
         follows="stiffness", fused=True,
     ),
     Question(
+        "transition", "Transition speed", (("friction",), ("x",)), lambda r, on: transition_speed(_fused(r)),
+        follows="stiffness", fused=True,
+    ),
+    Question(
+        "coupled", "Coupled frequency", (("friction",), ("x",)), lambda r, on: coupled_frequency(_fused(r)),
+        follows="stiffness", fused=True,
+    ),
+    Question(
         "presliding", "Presliding", (("friction",), MOTION), lambda r, on: presliding(r, contact=on),
         unless="stiffness",
     ),
@@ -192,7 +201,7 @@ def _can_be_fused(record: Record) -> bool:
 
 def _doubt(answers: dict[str, Any], reason: str) -> None:
     """Flag what rests on sensors that are not known."""
-    for key in ("stiffness", "contact_damping"):
+    for key in ("stiffness", "contact_damping", "coupled"):
         found = answers.get(key)
         if reason and found is not None and found.status == "ok":
             answers[key] = replace(found, status=reason)

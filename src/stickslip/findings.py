@@ -18,6 +18,7 @@ from stickslip.identify.pull import Pull
 from stickslip.identify.regression import Regression
 from stickslip.identify.sensor_delay import SensorDelay
 from stickslip.identify.sticks import Sticks
+from stickslip.identify.transition_speed import TransitionSpeed
 from stickslip.record.record import Record
 
 if TYPE_CHECKING:
@@ -42,6 +43,10 @@ class Findings(Result):
         How it begins to slip, what it does before, and of a force alone how a pulled slider moves.
     stiffness, contact_damping : Estimate or None
         Of the contact while it holds, from all sensors together.
+    transition : TransitionSpeed or None
+        Speed at which the contact begins to slide after the motion has turned.
+    coupled : Estimate or None
+        Frequency at which the mass rings while the contact holds.
     delay : SensorDelay or None
         Of the accelerometer behind the displacement.
     comparison : ForceComparison or None
@@ -66,6 +71,8 @@ class Findings(Result):
     pull: Pull | None = None
     stiffness: Estimate | None = None
     contact_damping: Estimate | None = None
+    transition: TransitionSpeed | None = None
+    coupled: Estimate | None = None
     delay: SensorDelay | None = None
     comparison: ForceComparison | None = None
     normal: float | None = None
@@ -99,6 +106,13 @@ class Findings(Result):
         for estimate in found:
             first.setdefault(estimate.name, estimate)
         return tuple(first.values())
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What the answers as wholes say that keeps them from being sure."""
+        names = {"delay": "sensor delay", "comparison": "comparison of the forces", "loops": "friction loops"}
+        told = ((names.get(name, name), getattr(value, "status", "ok")) for name, value in vars(self).items())
+        return tuple(f"{name}: {status}." for name, status in told if status != "ok" and name in names.values())
 
     def true_value(self, estimate: Estimate) -> float | None:
         """The true value of what was estimated, where the record is simulated and tells it."""

@@ -24,6 +24,8 @@ USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels th
 CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
 STRETCH = 1 << 15  # samples from the middle in which a delay is looked for, and the forces are compared
 AT_ONCE = 1 << 18  # samples of which all sensors are put together unasked
+REPEATS = "the motion repeats itself"  # so that other delays would do as well, the shortest being taken
+STRANGE = "differ by more than noise"
 SURE = 3.0  # standard deviations from which a delay is taken out
 
 
@@ -117,6 +119,9 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
         )
         return record, found
     late = -found.delay.value
+    if found.status != "ok" and (not found.status.startswith(REPEATS) or STRANGE in found.status):
+        asked.notes.append(f"The delay of x against a, {1e3 * late:.3g} ms, is not taken out: {found.status}.")
+        return record, found
     if abs(late) < SURE * found.delay.sd:
         return record, found
     for name in ("x", "z"):
@@ -132,7 +137,8 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
 
 def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Asked) -> Record:
     """The record with the mounts stated that the comparison of forces shows, where they were not."""
-    for each in comparison.resonances if comparison is not None else ():
+    differ = comparison is not None and any(word in comparison.status for word in ("opposite", "differ"))
+    for each in () if comparison is None or differ else comparison.resonances:
         name = "a" if "accelerometer" in each.name else "load"
         if "mount" in each.name and record.channels[name].mount is None:
             record = record.with_details(name, mount=(each.frequency.value, each.damping.value))

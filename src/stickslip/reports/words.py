@@ -68,6 +68,7 @@ def headline(result: Findings | Comparison) -> list[str]:
 def cautions(findings: Findings | DecayFindings) -> list[str]:
     """What should keep the reader from trusting a number."""
     flagged = doubts(findings.estimates)
+    flagged += [_sentence(words) for words in getattr(findings, "doubts", ())]
     if findings.faults:
         many = len(findings.faults)
         flagged.append(f"The check-up found {many} fault{'s' * (many > 1)} in the record, listed below.")
