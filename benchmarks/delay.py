@@ -119,7 +119,8 @@ def lags(draws: int) -> None:
         rig = RIG.having("x", lag=lag)
         phase = [ss.sensor_delay(record(name, rig, s, mount=True)).delay.value + lag for s in range(draws)]
         few = [record(name, rig, s, mount=True) for s in range(2)]
-        residual = [ss.sensor_delay(each, method="residual").delay.value + lag for each in few]
+        mounted = 2 * MOUNT[1] / (2 * math.pi * MOUNT[0])  # what the mount adds to a delay that knows none
+        residual = [ss.sensor_delay(each, method="residual").delay.value + lag - mounted for each in few]
         print(
             f"{name}, lag {5 + part:.1f} samples: mean {np.mean(phase) * 1e6:+6.2f} us -+ "
             f"{least / math.sqrt(draws) * 1e6:.2f}, rms/bound {np.sqrt(np.mean(np.square(phase))) / least:.2f}; "

@@ -126,6 +126,14 @@ class Lines:
             self.turn[which], self.first[which], self.second[:, which], self.noise[:, which], self.constant[which]
         )
 
+    @property
+    def telling(self) -> Lines:
+        """The lines that tell nearly all that these tell of a mount."""
+        told = self.information * self.turn**4
+        ordered = np.sort(told)
+        least = np.searchsorted(np.cumsum(ordered), (1 - TELLING) * ordered.sum())
+        return self.chosen(told >= ordered[least]) if len(told) else self
+
     def without_offset(self, gain: float) -> Lines:
         """The second less its offset, which is all that the relation leaves at frequency zero."""
         offset = (self.second[0, 0] - gain * self.first[0]).real / self.constant[0].real
@@ -296,8 +304,8 @@ def _terms(mount: tuple[float, float] | None) -> tuple[float, float]:
 
 
 def told(parts: Iterable[Lines]) -> Lines:
-    """The clear lines of all stretches that tell something of a delay or a mount."""
-    clear = [each.chosen(each.clear) for each in parts]
+    """The clear lines of all stretches that tell something of a delay or a mount, of what their own stretch tells."""
+    clear = [each.chosen(each.clear).telling for each in parts]
     lines = Lines(*(np.concatenate([getattr(each, field.name) for each in clear], axis=-1) for field in fields(Lines)))
     if len(lines.turn) < 2:
         raise EstimateError(
@@ -305,10 +313,7 @@ def told(parts: Iterable[Lines]) -> Lines:
             "a delay between sensors needs a motion that both see",
             "record a livelier motion",
         )
-    telling = lines.information * lines.turn**4
-    ordered = np.sort(telling)
-    least = ordered[np.searchsorted(np.cumsum(ordered), (1 - TELLING) * ordered.sum())]
-    return lines.chosen(telling >= least)
+    return lines
 
 
 def likely_delays(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> list[Alignment]:
