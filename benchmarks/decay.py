@@ -245,9 +245,9 @@ def other_noise(trials: int) -> None:
         errors, inside, seconds, kinds = [], [], [], []
         for truth, bound, samples in records(condition, trials, step, share, corner):
             record = ss.Record.of({"x": samples}, fs=float(condition.rate))
-            begin = time.perf_counter()
+            begin = time.process_time()
             found = fit_decay(record)
-            seconds.append(time.perf_counter() - begin)
+            seconds.append(time.process_time() - begin)
             answers = (found.damping_ratio, found.dry_displacement)
             errors.append([(a.value - truth[k]) / bound[k] for a, k in zip(answers, SHOWN, strict=True)])
             inside.append([a.includes(truth[k]) for a, k in zip(answers, SHOWN, strict=True)])
