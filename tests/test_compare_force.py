@@ -33,7 +33,7 @@ def test_both_mounts_are_found_and_named(frequency: float) -> None:
 def test_the_mounts_intervals_hold() -> None:
     rig, inside = ss.Rig(), []
     run = measured_run(11.1)
-    for seed in range(6):
+    for seed in range(4):
         record = told(rig.measure(run, fs=4000, rng=seed, start=6.0))
         first, second = ss.compare_force(record, **RIG).resonances
         inside += [first.frequency.includes(125.0), first.damping.includes(0.1)]
@@ -132,9 +132,10 @@ def test_the_figure_and_the_plain_data() -> None:
 # ---- a hammer tap
 
 
-def tap(seed: int = 1, noise: float = 1.0, damping: float = 23.9, stiffness: float = 192000.0) -> ss.Record:
+@cache
+def struck() -> tuple[np.ndarray, np.ndarray]:
     """The thesis's impact test: a contact that holds, a half sine of 2 ms on the mass, both mounts swinging."""
-    fs, fine, mass, spring, inertia = 4000, 10, 2.42, 2310.0, 0.05
+    fs, fine, mass, spring, inertia, damping, stiffness = 4000, 10, 2.42, 2310.0, 0.05, 23.9, 192000.0
     t = np.arange(fs * fine // 2) / (fs * fine)
     blow = np.where((t > 0.1) & (t < 0.102), 20 * np.sin(np.pi * (t - 0.1) / 2e-3), 0.0)
     whole = [mass, damping, spring + stiffness]
@@ -147,12 +148,17 @@ def tap(seed: int = 1, noise: float = 1.0, damping: float = 23.9, stiffness: flo
         read: np.ndarray = lsim(lti([w * w], [1, 2 * ratio * w, w * w]), values, t)[1][::fine]
         return read
 
+    return swung(a, 125.0, 0.1), swung(friction + inertia * a, 250.0, 0.05)
+
+
+def tap(seed: int = 1, noise: float = 1.0) -> ss.Record:
+    """What accelerometer and load cell read of it."""
     rng = np.random.default_rng(seed)
-    channels = {
-        "a": swung(a, 125.0, 0.1) + noise * 0.04 * rng.standard_normal(len(t) // fine),
-        "load": swung(friction + inertia * a, 250.0, 0.05) + noise * 0.002 * rng.standard_normal(len(t) // fine),
-    }
-    return ss.Record.of(channels, fs=fs)
+    readings = [
+        each + noise * level * rng.standard_normal(len(each))
+        for each, level in zip(struck(), (0.04, 0.002), strict=True)
+    ]
+    return ss.Record.of(dict(zip(("a", "load"), readings, strict=True)), fs=4000)
 
 
 TRUE = {

@@ -20,6 +20,7 @@ from stickslip.identify.forced_checks import (
     identity_check,
     momentum_check,
     stops_check,
+    velocity_check,
 )
 from stickslip.identify.mixups import mixups
 from stickslip.identify.motion import is_measured
@@ -30,7 +31,7 @@ from stickslip.signals.delay import without_delays
 
 QUESTION = "the consistency of a record"
 USED = ("x", "z", "v", "a", "load", "force")
-FORCED = (acceleration_check, forces_check, energy_check, momentum_check, identity_check, stops_check)
+FORCED = (acceleration_check, velocity_check, forces_check, energy_check, momentum_check, identity_check, stops_check)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

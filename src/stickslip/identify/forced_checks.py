@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,8 +23,10 @@ from stickslip.units import parse_value
 Array = NDArray[np.float64]
 
 UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
+RATES = ("x_rate", "x_rate_rate")  # the displacement's derivatives
 LOUD = 5.0  # standard deviations of its mean from which a harmonic counts
 SLOW = 0.04  # share of the peak speed below which the mass rests
+FEW_TRIPS = 2.0  # times the largest force over the stroke, that a spring might have kept
 STOPS = 0.1  # share of the time below it from which a motion stops: a harmonic one is there for 0.025
 
 
@@ -38,11 +40,17 @@ class Seen:
     damper: str
     tolerance: float
     at: int
+    trips: float  # work of the load cell's force over the record, in its largest force times the stroke
     channels_told: Mapping[str, Channel]
 
     @classmethod
     def of(cls, record: Record, names: list[str], rig: Mapping[str, Any], tolerance: float, question: str) -> Seen:
-        lines = find_lines(record, names, contact=rig.get("contact"), question=question)
+        contact = rig.get("contact")
+        lines = find_lines(record, names, contact=contact, question=question)
+        if lines.cycles is None:
+            rates = dict(zip(RATES, _rates(record["x"], record.fs), strict=True))
+            whole = replace(record, samples={**record.samples, **rates}, channels={**record.channels, **_plain(RATES)})
+            lines = find_lines(whole, [*names, *RATES], contact=contact, question=question)
         known = {name: parse_value(rig[name], unit) for name, unit in UNITS.items() if name in rig}
         told = {name: record.channels[name] for name in names}
         made = {name: lines.amplitudes[name] / _response(told[name]).at(lines.frequency) for name in names}
@@ -50,7 +58,7 @@ class Seen:
             w = 2 * np.pi * lines.frequency
             made["load"] = made["load"] - told["load"].inertia * made.get("a", -(w**2) * made["x"])
         at = 0 if lines.cycles is not None else int(np.argmax(np.abs(made["x"]).mean(axis=0) * lines.frequency))
-        return cls(lines, made, known, str(rig.get("damper", "ground")), tolerance, at, told)
+        return cls(lines, made, known, str(rig.get("damper", "ground")), tolerance, at, _trips(record), told)
 
     @property
     def angular(self) -> float:
@@ -88,8 +96,27 @@ class Seen:
     @property
     def balance(self) -> Balance:
         """The strongest lines as read, for mix-ups."""
-        values = {name: complex(read[:, self.at].mean()) for name, read in self.lines.amplitudes.items()}
+        values = {
+            name: complex(read[:, self.at].mean()) for name, read in self.lines.amplitudes.items() if name not in RATES
+        }
         return Balance(values, self.angular, self.rig, self.damper, self.tolerance)
+
+
+def _rates(x: Array, fs: float) -> tuple[Array, Array]:
+    speed = np.gradient(x, 1 / fs)
+    return speed, np.gradient(speed, 1 / fs)
+
+
+def _plain(names: Sequence[str]) -> dict[str, Channel]:
+    return {name: Channel(name, "1") for name in names}
+
+
+def _trips(record: Record) -> float:
+    if "load" not in record or not np.isfinite(record["load"]).all():
+        return 0.0
+    force, x = record["load"] - np.mean(record["load"]), record["x"]
+    most = float(np.abs(force).max() * np.ptp(x))
+    return float(np.sum((force[1:] + force[:-1]) / 2 * np.diff(x))) / most if most > 0 else 0.0
 
 
 def _response(channel: Channel) -> Response:
@@ -99,17 +126,30 @@ def _response(channel: Channel) -> Response:
 
 
 def acceleration_check(seen: Seen) -> Check:
-    name = "acceleration is that of the displacement"
-    if "a" not in seen.channels:
-        return untold(name, "no accelerometer")
-    read, moved = seen.strongest("a"), -(seen.angular**2) * seen.strongest("x")
+    """Whether a is the second derivative of x."""
+    return _derivative(seen, "a", "acceleration is that of the displacement", "m/s^2")
+
+
+def velocity_check(seen: Seen) -> Check:
+    """Whether v is the first derivative of x."""
+    return _derivative(seen, "v", "velocity is that of the displacement", "m/s")
+
+
+def _derivative(seen: Seen, channel: str, name: str, unit: str) -> Check:
+    if channel not in seen.channels:
+        return untold(name, f"no {'accelerometer' if channel == 'a' else 'velocity'} was measured")
+    order = 1 if channel == "v" else 2
+    read, moved = seen.strongest(channel), (1j * seen.angular) ** order * seen.strongest("x")
+    if seen.lines.cycles is None:  # a window's line is no single frequency, and begins at any phase
+        moved = seen.lines.amplitudes[RATES[order - 1]][:, seen.at]
+        turn = np.conj(moved) / np.abs(moved)
+        read, moved = read * turn, moved * turn
     left, right = abs(read.mean()), abs(moved.mean())
     sd = math.hypot(seen.sd(read - moved), math.sqrt(2) * seen.tolerance * right)
-    ratio = complex(read.mean() / moved.mean())
     return judged(
-        name, float(left), float(right), abs(complex((read - moved).mean())) / sd, unit="m/s^2",
-        holds="amplitude and phase of a are those of x",
-        fails=_off("a", "x", ratio, seen),
+        name, float(left), float(right), abs(complex((read - moved).mean())) / sd, unit=unit,
+        holds=f"amplitude and phase of {channel} are those of x",
+        fails=_off(channel, "x", complex(read.mean() / moved.mean()), seen),
     )  # fmt: skip
 
 
@@ -125,7 +165,7 @@ def _off(name: str, other: str, ratio: complex, seen: Seen) -> str:
         ahead = "ahead of" if phase > 0 else "behind"
         words.append(
             f"{name} is {1e3 * abs(phase) / seen.angular:.3g} ms {ahead} {other}, or that and whole cycles: state the "
-            "delay of the later one"
+            "delay of the later one (sensor_delay finds it)"
         )
     if abs(abs(ratio) - 1) > small:
         words.append(f"{name} is {abs(ratio):.3g} times what {other} lets expect")
@@ -175,7 +215,13 @@ def _unbalanced(rest: complex, felt: complex, acceleration: complex, stretch: co
 def energy_check(seen: Seen) -> Check:
     name = "energy of whole cycles"
     if seen.lines.cycles is None:
-        return untold(name, "the motion does not repeat")
+        if abs(seen.trips) < FEW_TRIPS:
+            return untold(name, "the motion does not repeat")
+        return compared(
+            name, 0.0, seen.trips, sd=1.0, unit="1", bound=True,
+            holds="over the record friction takes energy, though no cycle is like another",
+            fails="friction gives energy: load or x has the wrong sign",
+        )  # fmt: skip
     drives = [each for each in ("z", "force") if each in seen.channels]
     moved = seen.channels["x"]
     taken = seen.work(seen.channels["load"]) if "load" in seen.channels else None

@@ -91,11 +91,11 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     ax.plot(frequency, coherence, color=GREEN, linewidth=1.0, label="coherence")
     ax.plot(frequency, [b.significant for b in comparison.bands], ":", color=GREEN, linewidth=1.0, label="by chance")
     ax.axvline(max(comparison.agree_up_to.value, frequency[0]), color=BLUE, linewidth=1.0)
-    for each in comparison.resonances:
+    for number, each in enumerate(comparison.resonances):
         ax.axvline(each.frequency.value, color=FAINT, linewidth=1.0, linestyle="--")
         ax.annotate(
-            f"{each.name}\n{each.frequency.value:.0f} Hz", (each.frequency.value, 0.97), ha="right", va="top",
-            xycoords=("data", "axes fraction"), fontsize=7,
+            f" {each.name}\n {each.frequency.value:.0f} Hz", (each.frequency.value, 0.97 - 0.25 * number),
+            ha="left", va="top", xycoords=("data", "axes fraction"), fontsize=7,
         )  # fmt: skip
     top = max(2.0, 1.1 * float(gain[heard].max(initial=0.0)))
     ax.set(xscale="log", ylim=(0, min(top, 10.0)), xlabel="frequency [Hz]", ylabel="ratio, coherence")
