@@ -233,6 +233,7 @@ def test_a_record_without_noise_is_no_digitiser_however_long_it_rests():
     assert found.releases.ring_downs[0].step == 0
     assert found.waveform.damping_ratio.value == pytest.approx(0.1 / 10**0.5, rel=1e-5)
     assert found.waveform.damping_ratio.sd < 1e-5
+    assert found.motion.model == "both"
     told = " ".join(ss.summary(found).headline)
     assert "within within" not in told
 
