@@ -21,7 +21,7 @@ def contact_stiffness(record: Record | Loops, *, method: str | None = None) -> E
 
     While it holds, friction follows :math:`f = f_0 + K_y (x - x_0) + c\,\dot x` (thesis, equations 3.8 to 3.11). With
     "stick" the K_y and c are taken under which everything that the sensors read is most likely (a Kalman filter that
-    lets the friction follow the contact where it holds, and do as it likes elsewhere): 0.011 % from 3 s of a rig like
+    lets the friction follow the contact where it holds, and do as it likes elsewhere): 0.012 % from 3 s of a rig like
     the thesis's in stick-slip, 0.2 % in sliding at 8.7 Hz, 0.4 % at 11.1 Hz. With "slope" a line is drawn through
     friction against displacement in each stick, as in the thesis's section 3.5; its answers scatter by 10 to 20 %
     between sticks on that rig, and are up to 30 % off, the more the faster the stick is over.

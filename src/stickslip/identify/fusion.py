@@ -22,7 +22,7 @@ POOL = 12.0  # samples over which the unrest of the friction is averaged
 FIRST = 0.05  # share of the friction's size by which it may change in a sample, before anything is known
 CALMEST = 1e-9  # share of the force's size below which the friction's wandering is none
 FINEST = 1e-6  # of a sensor's range: a sensor without noise would leave the filter no digits
-CALM = 3e-5  # share of the sliding friction by which friction strays from a holding contact in a sample
+CALM = 1e-4  # share of the sliding friction by which friction strays from a holding contact in a sample
 PLACES = {"x": 0, "v": 1, "load": 2}  # of what a sensor reads in the state
 BLOCK, OVERLAP = 1 << 15, 1 << 11  # samples smoothed at a time, and those beside them that settle the ends
 
