@@ -11,6 +11,8 @@ from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.findings import Findings, record_name
 from stickslip.identify.breakaway import breakaway
+from stickslip.identify.cause import lag_or_compliance
+from stickslip.identify.consistency import consistency
 from stickslip.identify.contact import contact_damping, contact_stiffness
 from stickslip.identify.force import FUSIONS, friction_force
 from stickslip.identify.loops import friction_loops
@@ -127,6 +129,8 @@ class Question:
         The question whose answer makes this one idle.
     fused : bool
         Whether the friction must come from all sensors together.
+    derived : bool
+        Whether it must come from a balance of forces, whose constants are known then.
     """
 
     key: str
@@ -137,6 +141,7 @@ class Question:
     follows: str = ""
     unless: str = ""
     fused: bool = False
+    derived: bool = False
 
     def fits(self, record: Record) -> bool:
         """Whether the record has the channels."""
@@ -144,6 +149,7 @@ class Question:
             all(any(name in record for name in group) for group in self.needs)
             and not any(name in record for name in self.without)
             and (not self.fused or _can_be_fused(record))
+            and (not self.derived or bool(_told(record)))
         )
 
 
@@ -167,6 +173,14 @@ QUESTIONS = (
     Question(
         "coupled", "Coupled frequency", (("friction",), ("x",)), lambda r, on: coupled_frequency(_fused(r)),
         follows="stiffness", fused=True,
+    ),
+    Question(
+        "cause", "Sensor lag or compliance", (("friction",), ("x",)), lambda r, on: lag_or_compliance(_fused(r)),
+        follows="stiffness", fused=True,
+    ),
+    Question(
+        "consistency", "Consistency", (("friction",), ("x",)), lambda r, on: consistency(middle(r, STRETCH)),
+        follows="loops", derived=True,
     ),
     Question(
         "presliding", "Presliding", (("friction",), MOTION), lambda r, on: presliding(r, contact=on),

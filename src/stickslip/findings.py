@@ -11,7 +11,9 @@ import numpy as np
 
 from stickslip.estimate import Estimate, Result
 from stickslip.identify.breakaway import Breakaway
+from stickslip.identify.cause import Cause
 from stickslip.identify.compare_force import ForceComparison
+from stickslip.identify.consistency import Consistency
 from stickslip.identify.loops import Loops
 from stickslip.identify.presliding import Presliding
 from stickslip.identify.pull import Pull
@@ -47,6 +49,10 @@ class Findings(Result):
         Speed at which the contact begins to slide after the motion has turned.
     coupled : Estimate or None
         Frequency at which the mass rings while the contact holds.
+    cause : Cause or None
+        Whether a lag of the sensors or a contact that gives way makes the friction turn late.
+    consistency : Consistency or None
+        What of the record and the rig's constants can not all be true.
     delay : SensorDelay or None
         Of the accelerometer behind the displacement.
     comparison : ForceComparison or None
@@ -73,6 +79,8 @@ class Findings(Result):
     contact_damping: Estimate | None = None
     transition: TransitionSpeed | None = None
     coupled: Estimate | None = None
+    cause: Cause | None = None
+    consistency: Consistency | None = None
     delay: SensorDelay | None = None
     comparison: ForceComparison | None = None
     normal: float | None = None
@@ -110,7 +118,12 @@ class Findings(Result):
     @property
     def doubts(self) -> tuple[str, ...]:
         """What the answers as wholes say that keeps them from being sure."""
-        names = {"delay": "sensor delay", "comparison": "comparison of the forces", "loops": "friction loops"}
+        names = {
+            "delay": "sensor delay",
+            "comparison": "comparison of the forces",
+            "loops": "friction loops",
+            "consistency": "consistency",
+        }
         told = ((names.get(name, name), getattr(value, "status", "ok")) for name, value in vars(self).items())
         return tuple(f"{name}: {status}." for name, status in told if status != "ok" and name in names.values())
 

@@ -130,6 +130,8 @@ def _of_findings(findings: Findings) -> Iterator[str]:
         yield from _of_breakaway(findings.breakaway)
     if findings.stiffness is not None:
         yield _of_contact(findings.stiffness, findings.contact_damping)
+    if findings.cause is not None:
+        yield _sentence(f"{findings.cause.cause}: {findings.cause.reason.rstrip('.')}.")
     if findings.presliding is not None:
         yield from _of_presliding(findings.presliding)
     if findings.pull is not None:
