@@ -76,7 +76,7 @@ def test_it_reaches_its_bound_and_the_interval_holds() -> None:
 @pytest.mark.parametrize("channels", [("x", "z"), ("x", "v"), ("v", "a")])
 @pytest.mark.parametrize("delay", [25e-3, -3.21e-3])
 def test_any_two_channels_of_one_motion_are_aligned(channels: tuple[str, str], delay: float) -> None:
-    """Two tones of no common cycle: no lag is like another."""
+    """Two tones, in units of their own."""
     rng, order = np.random.default_rng(6), {"x": 0, "z": 0, "v": 1, "a": 2}
 
     def reading(channel: str, times: Array) -> Array:
@@ -88,7 +88,7 @@ def test_any_two_channels_of_one_motion_are_aligned(channels: tuple[str, str], d
     found = ss.sensor_delay(
         ss.Record.of({first: reading(first, T), second: reading(second, T - delay)}, fs=FS), channels=channels
     )
-    assert found.status.startswith("what a mount of a") or found.status == "ok"
+    assert "more than noise" not in found.status
     assert found.delay.value == pytest.approx(delay, abs=5 * found.delay.sd)
     assert found.delay.sd < 3e-6
 

@@ -241,7 +241,7 @@ def align(
     room : int
         Samples at both ends that are left out.
     rounds : int
-        Of fitting; in the first all noise is taken for white.
+        Of fitting; in the first, and where there are two, all noise is taken for white.
 
     Returns
     -------
@@ -261,7 +261,7 @@ def align(
         if not done:
             theta[1] = told([next(pairs[0].stretches(delay, room))]).gain or 1.0
         parts = (part.without_offset(theta[1]) for pair in pairs for part in pair.stretches(delay, room))
-        lines = told(part.weighed(theta) if done else part for part in parts)
+        lines = told(part.weighed(theta) if done and rounds > 2 else part for part in parts)
         unit = 1 / lines.rate
         scale = np.array([unit, abs(theta[1]), unit, unit**2])[used]
 
@@ -334,7 +334,7 @@ def likely_delays(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> l
     pairs = [_middle(pair, QUICK) for pair in pairs]
     tried = sorted({delay for pair in pairs for delay in _peaks(pair)}, key=abs)
     room = math.ceil(abs(tried[-1]) * max(pair.fs for pair in pairs)) + 2
-    fits = [align(pairs, delay, mount=mount, free=mount is None, room=room, rounds=1) for delay in tried]
+    fits = [align(pairs, delay, mount=mount, free=mount is None, room=room, rounds=2) for delay in tried]
     best = min(fits, key=lambda fit: fit.misfit)
     limit = best.misfit + SAME * math.sqrt(4 * len(best.lines.turn)) * best.widening
     alike: list[Alignment] = []
