@@ -25,7 +25,7 @@ from stickslip.identify.transition_speed import coupled_frequency, transition_sp
 from stickslip.preparation import AT_ONCE, CONSTANTS, MOTION, Asked, middle, normal_load, ready
 from stickslip.record.record import Record
 
-STRETCH = 1 << 15  # samples in which the contact is fitted
+STRETCH = 1 << 14  # samples in which the contact is fitted
 
 
 def analyze(
@@ -148,7 +148,7 @@ class Question:
         return (
             all(any(name in record for name in group) for group in self.needs)
             and not any(name in record for name in self.without)
-            and (not self.fused or _can_be_fused(record))
+            and (not self.fused or _can_be_fused(record, again=not self.follows))
             and (not self.derived or bool(_told(record)))
         )
 
@@ -204,12 +204,12 @@ def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
     return rig_settings({**(rig.model_dump(exclude_unset=True) if rig is not None else {}), **given}, source="the call")
 
 
-def _can_be_fused(record: Record) -> bool:
-    """Whether the friction comes from all sensors together, or might have if the record were not so long."""
+def _can_be_fused(record: Record, *, again: bool) -> bool:
+    """Whether the friction comes from all sensors together; or might have, `again`, if the record were not so long."""
     method = _told(record).get("differentiation")
     sensors = any(is_measured(record, name) for name in ("a", "load"))
     return method in FUSIONS or (
-        method == "smoother" and len(record) > AT_ONCE and sensors and slid_on(record, None) == "ground"
+        again and method == "smoother" and len(record) > AT_ONCE and sensors and slid_on(record, None) == "ground"
     )
 
 

@@ -25,7 +25,6 @@ SIDES = ((1, "forward"), (-1, "back"))
 TRAVEL = 0.05  # of a stroke: how far the start of a slip is followed
 BEFORE = 5  # a stick's last fifth tells what it bears at its end
 ROWS = 256  # of the start of a slip that are looked at
-MOST = 200  # strokes looked at, evenly chosen: their mean is known well enough
 LEAST = 8  # samples in which a stick's end and a slip's start can be told
 RING = 16  # samples in which a ring can be told
 SLOW = 8  # degree of the polynomial that is not the ring
@@ -111,7 +110,7 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     strokes = find_strokes(record, contact=contact, question=QUESTION)
     pull, rig = _pull(record)
     fs = record.fs
-    chosen = strokes.strokes[:: max(1, len(strokes.strokes) // MOST)]
+    chosen = strokes.strokes
     borne = [(each, _borne(each, pull, rig, fs)) for each in chosen]
     found = [(each, *answer) for each, answer in borne if answer is not None]
     if not found:
