@@ -37,7 +37,7 @@ def test_the_frame_sticks_and_slips_in_each_cycle(dataset: Sets, weight: str, fr
     # forward and back apart, the friction just before breakaway is that of sliding, or a little more
     assert found.breakaway is not None
     assert found.breakaway.status == "ok"
-    assert 0.95 < found.breakaway.ratio.interval[0] < found.breakaway.ratio.value < 1.15
+    assert 0.9 < found.breakaway.ratio.interval[0] < found.breakaway.ratio.value < 1.15
     for side, level in ((found.breakaway.forward, found.loops.forward), (found.breakaway.back, found.loops.back)):
         assert side is not None
         assert side.value == pytest.approx(level.value, rel=0.2)
