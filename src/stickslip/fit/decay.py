@@ -30,6 +30,8 @@ UNLIKE = 2.0  # times the noise that the residual may be before the model is dou
 APART = 1e-3  # p-value of sharing friction and frequency, below which releases are not one experiment
 PARTS = 8  # of a period, by which a rest is watched
 STRAYED = 4.0  # standard deviations
+SHORT = 0.15  # of a half cycle: a hold so short can not be told from the turn of a swing
+AFTER = 0.08  # of a half cycle, within which the first turn is known
 DOUBTED = 0.01  # likelihood below which a number of half cycles does not widen the static friction's bracket
 
 
@@ -157,16 +159,32 @@ def _described(ring_down: RingDown, record: Record) -> RingDown:
         ring_down = _undisturbed(ring_down)
     cut = np.flatnonzero(~ring_down.sound[:-1])
     if len(cut):
-        first = int(ring_down.turns[cut[-1] : cut[-1] + 2].mean())
-        samples = ring_down.samples[first:]
-        return replace(ring_down, first=ring_down.first + first / ring_down.fs, samples=samples, held=False)
+        later = _from(ring_down, int(ring_down.turns[cut[-1] : cut[-1] + 2].mean()))
+        return replace(later, held=False, notes=(*later.notes, CLIPPED))
     if ring_down.order == 0:
-        return ring_down
+        return _from_motion(ring_down)
     record = without_delays(record, ring_down.channel)
     first = round((ring_down.first - record.start) * record.fs)
     before = min(first, round(record.fs / ring_down.frequency))
     samples = np.concatenate([record[ring_down.channel][first - before : first], ring_down.samples])
     return replace(ring_down, first=ring_down.first - before / record.fs, samples=samples)
+
+
+def _from(ring_down: RingDown, first: int) -> RingDown:
+    """The ring-down from row `first` on."""
+    kept = ring_down.turns >= first
+    return replace(
+        ring_down, first=ring_down.first + first / ring_down.fs, samples=ring_down.samples[first:],
+        turns=ring_down.turns[kept] - first, sound=ring_down.sound[kept],
+    )  # fmt: skip
+
+
+def _from_motion(ring_down: RingDown) -> RingDown:
+    """From after the first turn where no hold before it is seen: what the model held there, the record did not."""
+    half, before = ring_down.fs / ring_down.frequency / 2, ring_down.hold.stop
+    if ring_down.turns[0] != before or (ring_down.held and before >= SHORT * half):
+        return ring_down
+    return _from(ring_down, before + round(AFTER * half))
 
 
 def _undisturbed(ring_down: RingDown) -> RingDown:
@@ -282,7 +300,7 @@ def _answer(
     length, unit = ("rad" if name == "theta" else "m"), ring_downs[0].unit
     half_cycles, likelihood = motion.candidates[0]
     fitted = [_fitted(each.blocks, n, p) for each, n, p in zip(releases, half_cycles, motion.motions[0], strict=True)]
-    cut = (CLIPPED,) if not all(each.sound.all() for each in ring_downs) else ()
+    cut = (CLIPPED,) if any(CLIPPED in each.notes or not each.sound.all() for each in ring_downs) else ()
     lost = (LOST,) if any(LOST in each.notes for each in ring_downs) else ()
     choices = [each.choice for each in motions]
     other = next((each.seen_beside("both", "static") for each in choices if each.seen_beside("both", "static")), "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from stickslip.statistics import student
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # of the range
+AT_ONCE = 0.1  # samples after the first one, within which a turn is before it
 CANDIDATES = 40  # numbers of half cycles kept
 
 
@@ -68,13 +70,28 @@ class Search:
         """For each number of half cycles that may be: it, the sum of squares, log det J'J, and six parameters."""
         first = guess(*blocks.data, self.rows, self.times, self.start, self.work)
         kept = over_half_cycles(self.start, first, *blocks.data, self.fits, self.work) if first else 0
-        return np.array(self.fits[:kept])
+        fits = np.array(self.fits[:kept])
+        for row in fits:
+            _begin_late(row, AT_ONCE * blocks.dt)
+        return fits
 
     def intervals(self, blocks: Blocks, fits: Array) -> Array:
         """Ends (6, 2) of the 95 % profile likelihood of each parameter, the noise's level unknown."""
         level = fits[:, 1].min() + variance(fits, blocks) * student(blocks.freedom) ** 2
         intervals(fits, len(fits), level, *blocks.data, self.ends, self.work)
         return self.ends
+
+
+def _begin_late(row: Array, first: float) -> None:
+    """Let a motion begin at its last turn before the first sample: half cycles that no sample shows are none."""
+    _, damping, dry, _, amplitude, release = row[3:]
+    half = math.pi / (row[3] * math.sqrt(1 - damping**2))
+    fade = math.exp(-math.pi * damping / math.sqrt(1 - damping**2))
+    while row[0] > 1 and release + half <= first:
+        amplitude = math.copysign(1 + fade, amplitude) * dry - fade * amplitude
+        release += half
+        row[0] -= 1
+    row[7], row[8] = amplitude, release
 
 
 def variance(fits: Array, blocks: Blocks) -> float:

@@ -38,6 +38,9 @@ DRIFTS = 0.003  # of the first swing: a rise of the rest position that matters
 CUT_SHORT = 0.08  # less than the half period that the swing before tells: a last swing that was cut off
 STEEPNESS = 1.1  # three standard deviations of a half period told by steepness, times the swing over the least seen
 HELD = 1.5  # times the last turn of another release: friction does not hold a mass there
+FLUSH = 0.03  # of a half cycle before the first turn: a record that begins there begins with the release
+HOLDS = (0.5, 0.3)  # of a half cycle before a release, in which a hold must be flat
+BENT = 0.5  # of the bend after a release: what bends so much before it is no hold
 STANDS_OFF = 0.02  # of the record's range: a spike that may be taken for an extreme
 STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 LOST = "an extreme was lost, and what lies beyond it is left out"
@@ -504,9 +507,10 @@ def _ring_down(
     release, stop = middles[0] - gaps[0] / 2, middles[-1] + gaps[-1] / 2
     rest = _centre(levels)
     near = max(SEEN * noise, 1.5 * step, 0.02 * abs(levels[0] - rest))
-    held = not run.inside and (release >= 0 or (release > -0.25 * half and _flat_start(values, half, noise)))
+    turned = not run.inside and (release >= 0 or (release > -0.25 * half and _flat_start(values, half, noise)))
     ends = stop + half <= bounds[1] - 1 or bounds[1] < len(values)
     start = max(0, round(release))
+    held = turned and (ORDERS[name] > 0 or start <= FLUSH * half or _flat_before(values, start, half, noise))
     end = min(round(stop), len(values) - 1)
     hold = _reach(values[min(bounds[0], start) : start + 1][::-1], near) if held else 1
     tail = _reach(values[end : max(bounds[1], end + 1)], near) if ends else len(values) - end
@@ -515,7 +519,7 @@ def _ring_down(
     tops = levels[1:-1] > levels[:-2]
     sides = np.where(tops, 1.0, -1.0)
     inner = [extreme(values, round(a), round(b), side) for (a, b), side in zip(pairwise(middles), sides, strict=True)]
-    turns = [*([start] if held or run.inside else []), *inner, *([end] if stop <= len(values) - 1 - half / 8 else [])]
+    turns = [*([start] if turned or run.inside else []), *inner, *([end] if stop <= len(values) - 1 - half / 8 else [])]
     rows = np.array([row for row in turns if first <= row < last], dtype=np.intp)
     sound = ~unsound[rows]
     notes = (
@@ -553,6 +557,20 @@ def _flat_start(values: Array, half: float, noise: float) -> bool:
         return False
     doubt = 2 * noise * 14 / (2 * abs(bend) * count**1.5)  # standard deviations of the slope at a parabola's end
     return bool(-slope / (2 * bend) > -1 - min(doubt, 0.05 * half))
+
+
+def _flat_before(values: Array, start: int, half: float, noise: float) -> bool:
+    """Whether nothing moves before a release: a swing that only turns there bends before as it does after."""
+    for share in HOLDS:
+        reach = min(start, round(share * half))
+        rows = np.arange(start - reach, min(start + reach + 1, len(values)))
+        bend = 1 - np.cos(math.pi / half * (rows - start))
+        design = np.column_stack([np.ones(len(rows)), bend * (rows < start), bend * (rows > start)])
+        found = np.linalg.lstsq(design, values[rows], rcond=None)[0]
+        doubt = 2 * noise * math.sqrt(float(np.linalg.pinv(design.T @ design)[1, 1]))
+        if reach > 1 and abs(found[1]) + doubt < BENT * abs(found[2]):
+            return True
+    return False
 
 
 def _notes(levels: Array, sound: NDArray[np.bool_], order: int, run: _Run, noise: float, unit: str) -> tuple[str, ...]:
