@@ -113,6 +113,20 @@ def test_a_damper_is_part_of_the_unknown_balance() -> None:
         ss.friction_force(record, damping=8.0)
 
 
+@pytest.mark.parametrize("known", [{"stiffness": 2310.0}, {"mass": 2.42}])
+def test_an_applied_force_is_part_of_the_unknown_balance(known: dict[str, float]) -> None:
+    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    drive = ss.HarmonicForce(4.0, frequency=6.0)
+    run = ss.simulate(ss.Oscillator(mass=2.42, stiffness=2310, law=law, drive=drive), duration=6.0)
+    record = ss.Rig.perfect("x", "a").having("x", white=1e-7).measure(run, fs=4000, rng=1, start=4.0)
+    applied = 4.0 * np.cos(2 * np.pi * 6.0 * (4.0 + record.time))
+    record = record.with_channel("force", applied, unit="N")
+    told = ss.friction_force(record, method="F", **known).history[-1].arguments
+    assert told["stiffness"] / told["mass"] == pytest.approx(2310 / 2.42, rel=0.01)
+    with pytest.raises(ModelError, match="an applied force without mass and stiffness"):
+        ss.friction_force(record)
+
+
 def test_a_wrong_sign_is_no_mass() -> None:
     record = told(measured(8.7)[0])
     wrong = record.with_channel("a", -record["a"], unit="m/s^2")

@@ -62,6 +62,19 @@ def test_an_event_longer_than_the_overlap_is_one() -> None:
     assert sum(event.duration for event in found.events) == pytest.approx(60.0, abs=0.05)
 
 
+def test_what_a_threshold_leaves_open_stays_open_in_the_mean() -> None:
+    t = np.arange(80000) / 1000
+    drive = np.sin(2 * np.pi * t)
+    x = np.cumsum(np.maximum(np.abs(drive) - 0.5, 0) * np.sign(drive)) / 1000
+    record = ss.Record.of({"x": x + 1e-6 * np.random.default_rng(0).standard_normal(t.size)}, fs=1000)
+    whole = ss.find_sticks(record, threshold=0.03)
+    stretches = overlapping(record, seconds=10)
+    found = join_sticks((each, ss.find_sticks(each.record, threshold=0.03)) for each in stretches)
+    assert found.method == "speed"
+    assert found.share.includes(1 / 3)
+    assert found.share.interval == pytest.approx(whole.share.interval, abs=0.01)
+
+
 def test_parts_that_do_not_follow_are_refused() -> None:
     record = ss.Record.of({"x": np.arange(1000.0)}, fs=100)
     with pytest.raises(RecordError, match="follow each other"):

@@ -240,21 +240,25 @@ def _with_friction(record: Record, force: Array, sd: Array, step: Step) -> Recor
 
 def _completed(record: Record, rig: _Rig, unknown: Sequence[str], method: str, bandwidth: float | str | None) -> Record:
     """The friction force with the mass or the stiffness from the record; per mass, with neither."""
-    if rig.damping and len(unknown) == 2:
+    others = [*(["damping"] if rig.damping else []), *(["an applied force"] if "force" in record else [])]
+    if others and len(unknown) == 2:
         raise ModelError(
-            f"damping = {rig.damping:g} N s/m without mass and stiffness",
+            f"{' and '.join(others)} without mass and stiffness",
             "of forces only ratios can be found where no mass and no stiffness is known",
-            "give the mass or the stiffness, or leave the damping out",
+            f"give the mass or the stiffness, or leave {' and '.join(others)} out",
         )
-    record.require_clean(*(name for name in ("x", "z", "a") if name in record or name == "x"), question=QUESTION)
+    if "mass" in unknown and rig.stiffness == 0:
+        raise ModelError("stiffness = 0 and no mass", "the mass is found from how a spring moves it", "give the mass")
+    used = ["x", *(name for name in ("z", "a", "force") if name in record)]
+    record.require_clean(*used, question=QUESTION)
+    require_fit(record, *({"force"} & set(record)), length="m", question=QUESTION)
     punctual = without_delays(record, question=QUESTION, samples=LEAST)
-    found = stiffness_per_mass(punctual, contact=rig.contact)
+    known = punctual["force"] if "force" in record else np.zeros(len(punctual))
     if rig.damping:
         across = -_stretch(punctual) if rig.damper == "base" else punctual["x"]
-        drag = rig.damping * differentiate(across, record.fs).values
-        for _ in range(2):
-            moving = rig.stiffness / found.value if "mass" in unknown else rig.mass
-            found = stiffness_per_mass(punctual, resisting=drag / moving, contact=rig.contact)
+        known = known - rig.damping * differentiate(across, record.fs).values
+    over = {"stretched": known / rig.stiffness} if "mass" in unknown else {"resisting": -known / rig.mass}
+    found = stiffness_per_mass(punctual, contact=rig.contact, **(over if others else {}))
     if found.value <= 0:
         raise EstimateError(
             f"k/m = {found.value:.3g} 1/s^2 where it slides",

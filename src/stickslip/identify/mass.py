@@ -19,10 +19,12 @@ QUESTION = "the stiffness over the mass"
 FAST = np.linspace(0.2, 0.7, 6)  # shares of the peak speed above which the contact slides with its whole friction
 
 
-def stiffness_per_mass(record: Record, *, resisting: Array | float = 0.0, contact: str = "ground") -> Estimate:
+def stiffness_per_mass(
+    record: Record, *, resisting: Array | float = 0.0, stretched: Array | float = 0.0, contact: str = "ground"
+) -> Estimate:
     r"""How large is the spring's stiffness over the mass, if the friction does not change while it slides?
 
-    By least squares, where it slides, on :math:`\ddot x + r = (k/m)(z - x) - (F/m)\,\mathrm{sign}\,v + g`. The
+    By least squares, where it slides, on :math:`\ddot x + r = (k/m)(z - x + s) - (F/m)\,\mathrm{sign}\,v + g`. The
     acceleration stands alone on its side, for it is the channel that rings; and reversals, where an elastic contact
     acts as one more spring, are left out. What rings on after them shows in how the answer hangs on how much is left
     out: it is the mean over several such choices, and their scatter is in its deviation.
@@ -32,7 +34,9 @@ def stiffness_per_mass(record: Record, *, resisting: Array | float = 0.0, contac
     record : Record
         With ``x``, ``z`` where the base moves, ``a`` where measured.
     resisting : ndarray (n,) or float
-        r, the damper's force over the mass [m/s^2] on the record's samples.
+        r, what else than the spring is known to hold the mass back, over the mass [m/s^2], on the record's samples.
+    stretched : ndarray (n,) or float
+        s, what else than the spring is known to pull the mass, over the stiffness [m].
     contact : {"ground", "base"}
         What the mass slides on.
 
@@ -50,7 +54,7 @@ def stiffness_per_mass(record: Record, *, resisting: Array | float = 0.0, contac
     cycles = find_cycles(record, motion)
     stretch = record["z"] - record["x"] if "z" in record else -record["x"]
     acceleration = record["a"] if is_measured(record, "a") else differentiate(record["x"], record.fs, order=2).values
-    columns = np.column_stack([stretch, np.sign(motion.velocity), np.ones(len(record))])
+    columns = np.column_stack([stretch + stretched, np.sign(motion.velocity), np.ones(len(record))])
     fits = []
     for share in FAST:
         fast = np.abs(motion.velocity) > share * cycles.peak

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Estimate
+from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.identify.sticks import StickEvent, Sticks
 from stickslip.record.record import Record, Step
 
@@ -144,8 +144,9 @@ def join_sticks(found: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
     lost = {said: sum(said in each.lost for each in kept) for each in kept for said in each.lost}
     bad = {said: sum(said == each.status for each in kept) for each in kept if (said := each.status) != "ok"}
     kinds = [each.kind for each in kept]
+    method = "fusion" if all(each.method == "fusion" for each in kept) else "speed"
     return Sticks(
-        share=_pooled([each.share for each in kept], spans),
+        share=_pooled([each.share for each in kept], spans, shared=method == "speed"),
         per_cycle=_pooled([each.per_cycle for each in kept], spans),
         microslips=_pooled(*(list(part) for part in zip(*microslips, strict=True))) if microslips else None,
         kind=max(kinds, key=lambda kind: sum(s for k, s in zip(kinds, spans, strict=True) if k == kind)),
@@ -153,7 +154,7 @@ def join_sticks(found: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
         threshold=float(np.median([each.threshold for each in kept])),
         noise=float(np.median([each.noise for each in kept])),
         frequency=_pooled([each.frequency for each in kept], spans),
-        method="fusion" if all(each.method == "fusion" for each in kept) else "speed",
+        method=method,
         lost=tuple(_often(said, count, len(kept)) for said, count in lost.items()),
         status="; ".join(_often(said, count, len(kept)) for said, count in bad.items()) or "ok",
     )
@@ -176,8 +177,11 @@ def _often(said: str, count: int, all_: int) -> str:
     return said if count == all_ else f"{said} (in {count} of {all_} stretches)"
 
 
-def _pooled(parts: list[Estimate], spans: list[float]) -> Estimate:
-    """The mean weighed by length, as sure as the stretches are, or as their scatter lets it be."""
+def _pooled(parts: list[Estimate], spans: list[float], *, shared: bool = False) -> Estimate:
+    """The mean weighed by length, as sure as the stretches are, or as their scatter lets it be.
+
+    With `shared` all of them are unsure for one reason (a threshold), which no mean takes away.
+    """
     weights = np.array(spans) / np.sum(spans)
     values, sds = np.array([each.value for each in parts]), np.array([each.sd for each in parts])
     value = float(weights @ values)
@@ -185,7 +189,8 @@ def _pooled(parts: list[Estimate], spans: list[float]) -> Estimate:
     sd = max(float(np.sqrt(weights**2 @ sds**2)), scatter)
     bad = [each.status for each in parts if each.status != "ok"]
     status = "ok" if len(parts) > 1 and len(bad) < len(parts) else bad[0] if bad else "ok"
-    return Estimate.normal(
-        parts[0].name, value, sd=sd, unit=parts[0].unit, method=f"{parts[0].method}; mean of {len(parts)} stretches",
-        status=status,
-    )  # fmt: skip
+    name, unit, method = parts[0].name, parts[0].unit, f"{parts[0].method}; mean of {len(parts)} stretches"
+    if shared:
+        low, high = (float(weights @ ends) for ends in np.transpose([each.interval for each in parts]))
+        return Estimate(name, value, (low, high), (high - low) / (2 * NORMAL_95), unit, method, status)
+    return Estimate.normal(name, value, sd=sd, unit=unit, method=method, status=status)
