@@ -142,3 +142,11 @@ def test_the_smoother_is_the_least_squares_of_all_readings() -> None:
         assert np.allclose(smoothed.values[:, t], effect[t] @ best + known[t], atol=1e-9)
         assert np.allclose(smoothed.variance[:, t], np.diag(effect[t] @ covariance @ effect[t].T), atol=1e-9)
     assert np.allclose(unknown[:-1] * smoothed.score[:-1], best[size : size + count - 1], atol=1e-9)
+
+
+def test_turns_held_within_a_sensors_step_are_no_end_of_its_range() -> None:
+    run = ss.simulate(
+        ss.Oscillator(law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5), **RIG), cycles=8
+    )
+    record = ss.Rig().having("x", white=1e-8, lag=0.0).measure(run, fs=4000, rng=1, start=1.0)
+    assert "end of its range" not in ss.friction_force(record, method="fusion", **RIG).history[-1].outcome

@@ -201,7 +201,7 @@ def clipped(values: Array, *, plateaus: bool = False, step: float | None = None)
     if len(values) < 16 or span == 0:
         return ()
     noise, step = roughness(values), quantum(values) if step is None else step
-    if plateaus and (exact := saturated(values)).any() and roughness(values[~exact]) > step:
+    if plateaus and (exact := saturated(values)).any():
         return runs_of(exact)
     top, bottom = (_clipped_top(side, noise, step, plateaus) for side in (values, -values))
     # an instrument that cuts one end off cuts the other too: there, less evidence is enough
@@ -214,7 +214,8 @@ def clipped(values: Array, *, plateaus: bool = False, step: float | None = None)
 def saturated(values: Array, shortest: int = 5) -> Mask:
     """Samples at an extreme that is held to the last digit, though noise moves the sensor's other samples.
 
-    So a limit shows even in a force that has plateaus by nature, which are as noisy as the rest.
+    So a limit shows even in a force that has plateaus by nature, which are as noisy as the rest. Noise within a step
+    between the sensor's levels moves nothing: there the turns of a motion are held to the last digit too.
     """
     mask = np.zeros(len(values), dtype=bool)
     span = float(np.ptp(values)) if len(values) else 0.0
@@ -223,7 +224,9 @@ def saturated(values: Array, shortest: int = 5) -> Mask:
         if any(last - first + 1 >= shortest for first, last in runs_of(at)):
             mask |= at
     rest = values[~mask]
-    return mask if mask.any() and len(rest) > shortest and roughness(rest) > MOVED * span else np.zeros_like(mask)
+    if not mask.any() or len(rest) <= shortest or roughness(rest) <= max(MOVED * span, quantum(values)):
+        return np.zeros_like(mask)
+    return mask
 
 
 def _clipped_top(values: Array, noise: float, step: float, plateaus: bool, strictness: float = 1.0) -> Mask:
