@@ -117,6 +117,8 @@ def test_what_can_not_be_compared_is_refused() -> None:
         ss.compare_force(ss.Record.of({"x": record["x"]}, fs=4000), **RIG)
     with pytest.raises(EstimateError, match="tolerance"):
         ss.compare_force(record, tolerance=2.0, **RIG)
+    with pytest.raises(EstimateError, match="give mass= or stiffness="):
+        ss.compare_force(record)
 
 
 def test_the_figure_and_the_plain_data() -> None:

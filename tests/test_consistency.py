@@ -96,6 +96,8 @@ def test_with_motion_sensors_alone_a_sign_is_still_found() -> None:
 def test_a_mistaken_unit_is_found() -> None:
     in_g = ss.consistency(changed(good(), a=good()["a"] / 9.80665), **RIG)
     assert "a is in g" in in_g["one slip that explains it"].sentence
+    in_mm = ss.consistency(changed(good(), a=1e3 * good()["a"]), **RIG)
+    assert "a is in mm/s^2" in in_mm["one slip that explains it"].sentence
     in_lb = ss.consistency(changed(good(), load=good()["load"] / 4.4482216152605), **RIG)
     assert "load is in lbf" in in_lb["one slip that explains it"].sentence
 

@@ -97,6 +97,15 @@ def test_the_least_residual_is_drawn_half_way_between_samples() -> None:
     errors = [ss.sensor_delay(ring_down(5.1 / FS, seed), method="residual").delay.value + 5.1 / FS for seed in range(4)]
     assert max(errors) < -0.05 / FS  # the phase is 1e-6 s off
     assert "interpolation" in ss.sensor_delay(ring_down(5.1 / FS, 1), method="residual").status
+    with pytest.raises(EstimateError, match="2 records"):
+        ss.sensor_delay([ring_down(0.0, 1), ring_down(0.0, 2)], method="residual")
+
+
+def test_the_least_residual_at_a_few_samples_a_second() -> None:
+    t, rng = np.arange(400) / 8, np.random.default_rng(0)
+    x, a = (sign * np.sin(t) + 1e-6 * rng.standard_normal(t.size) for sign in (1, -1))
+    found = ss.sensor_delay(ss.Record.of({"x": x, "a": a}, fs=8.0), method="residual")
+    assert found.delay.includes(0.0)
 
 
 def test_a_stated_mount_is_held_and_a_hidden_one_is_said() -> None:

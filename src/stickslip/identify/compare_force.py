@@ -155,7 +155,7 @@ def compare_force(
     RecordError
         A channel is missing, broken or too short.
     EstimateError
-        A tolerance that is none, or no lines to compare.
+        A tolerance that is none, neither mass nor stiffness, or no lines to compare.
 
     Examples
     --------
@@ -174,6 +174,12 @@ def compare_force(
         raise EstimateError(f"tolerance = {tolerance}", "a share between 0 and 1", "leave it at 0.1")
     record.require_clean("load", "x", question=QUESTION)
     rig = told_rig(record, mass=mass, stiffness=stiffness, damping=damping, damper=damper)
+    if not {"mass", "stiffness"} & set(rig):
+        raise EstimateError(
+            "neither mass nor stiffness is known",
+            "a force can not be held against one that is known per mass only",
+            "give mass= or stiffness=",
+        )
     record = without_delays(record, *(name for name in USED if name in record), question=QUESTION)
     balanced = friction_force(record, method="F", **rig)
     told = balanced.history[-1].arguments

@@ -9,8 +9,8 @@ from itertools import combinations
 
 from stickslip.identify.checks import APART, FAILS, Check
 
-UNITS = {9.80665: "g", 1e-3: "mm", 4.4482216152605: "lbf", 0.0254: "inch"}
-SCALED = {"x": (1e-3, 0.0254), "z": (1e-3, 0.0254), "a": (9.80665, 1e-3), "load": (4.4482216152605,)}
+LENGTHS = {"mm": 1e-3, "inch": 0.0254}
+UNITS = {"x": LENGTHS, "z": LENGTHS, "a": {"g": 9.80665, "mm/s^2": 1e-3}, "load": {"lbf": 4.4482216152605}}
 BETTER = 25.0  # times by which a slip must lower the sum of squares to be named
 
 
@@ -64,6 +64,6 @@ def _slips(values: Mapping[str, complex]) -> Iterator[tuple[str, dict[str, compl
         yield f"{name} has the wrong sign", {**values, name: -values[name]}
     for one, other in combinations(values, 2):
         yield f"{one} and {other} are exchanged", {**values, one: values[other], other: values[one]}
-    for name, factors in SCALED.items():
-        for factor in factors if name in values else ():
-            yield f"{name} is in {UNITS[factor]}, not in its SI unit", {**values, name: factor * values[name]}
+    for name in values:
+        for unit, factor in UNITS.get(name, {}).items():
+            yield f"{name} is in {unit}, not in its SI unit", {**values, name: factor * values[name]}

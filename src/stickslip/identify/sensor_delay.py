@@ -131,6 +131,8 @@ def sensor_delay(
     for each in records:
         each.require_clean(*channels, question=QUESTION, samples=LEAST)
     if method == "residual":
+        if len(records) > 1:
+            raise EstimateError(f"{len(records)} records", "the least residual is that of one", "pass them one by one")
         return _by_residual(records[0], channels)
     pairs, mount = [_pair(each, channels, order) for each in records], records[0].channels[channels[1]].mount
     found, free, others = _fit(pairs, mount)
@@ -286,7 +288,7 @@ def _by_residual(record: Record, channels: tuple[str, str]) -> SensorDelay:
     minimise: Any = minimize_scalar
     names = [channels[0], *({"z"} & set(record) - set(channels))]
     columns = np.column_stack([*(record[name] for name in names), np.ones(len(record))])
-    room = min(round(SHIFTED * record.fs), len(record) // 8)
+    room = max(2, min(round(SHIFTED * record.fs), len(record) // 8))
     rows = np.arange(room, len(record) - room, dtype=float)
     basis, _ = np.linalg.qr(columns[room : len(record) - room])
 
@@ -305,13 +307,6 @@ def _by_residual(record: Record, channels: tuple[str, str]) -> SensorDelay:
     of_delay = Estimate(
         f"delay of {channels[1]} behind {channels[0]}", delay, (delay - half, delay + half), half, "s", method, status
     )
-    of_gain = Estimate(
-        f"gain of {channels[1]} over {channels[0]}",
-        math.nan,
-        (math.nan, math.nan),
-        math.nan,
-        "1",
-        method,
-        "not found this way",
-    )
+    name, none = f"gain of {channels[1]} over {channels[0]}", math.nan
+    of_gain = Estimate(name, none, (none, none), none, "1", method, "not found this way")
     return SensorDelay(of_delay, of_gain, None, None, (), channels, "residual", status)
