@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.analysis import analyze
-from stickslip.comparison import Comparison, compare
+from stickslip.analysis.comparison import Comparison, compare
+from stickslip.analysis.findings import Findings, record_name
+from stickslip.analysis.mending import mend
+from stickslip.analysis.questions import analyze
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, ModelError
-from stickslip.findings import Findings, record_name
-from stickslip.mending import mend
 
 FS = 500.0
 TIME = np.arange(5000) / FS

@@ -9,7 +9,7 @@ import pytest
 
 import stickslip as ss
 from motions import free_decay
-from stickslip.decay_comparison import _apart
+from stickslip.analysis.decay_comparison import _apart
 
 
 def record(seed, **motion):

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 import stickslip as ss
-from stickslip.analysis import analyze
-from stickslip.comparison import compare
-from stickslip.findings import Findings
+from stickslip.analysis.comparison import compare
+from stickslip.analysis.findings import Findings
+from stickslip.analysis.questions import analyze
 from stickslip.plot.comparison import plot_load_dependence
 from stickslip.plot.contact import plot_velocity_loop
 from stickslip.plot.figures import figures

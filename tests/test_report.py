@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.analysis import analyze
-from stickslip.comparison import compare
+from stickslip.analysis.comparison import compare
+from stickslip.analysis.findings import Findings
+from stickslip.analysis.questions import analyze
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Estimate
-from stickslip.findings import Findings
 from stickslip.reports import folder as folder_module
 from stickslip.reports.folder import publish
 from stickslip.reports.page import report

@@ -173,7 +173,7 @@ def test_everything_at_once() -> None:
 
 
 def test_a_record_in_parts_is_mapped_whole_and_its_begin_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip.timefrequency.LONG", 8000)
+    monkeypatch.setattr("stickslip.analysis.time_frequency.LONG", 8000)
     record = noisy("two", 40)
     parts = [record.rows(first, min(first + 6000, len(record))) for first in range(0, len(record), 6000)]
     whole, found = (ss.time_frequency(each, frequencies=(5, 1000)) for each in (record, iter(parts)))

@@ -13,11 +13,11 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from stickslip import datasets as datasets
-    from stickslip.analysis import analyze as analyze
-    from stickslip.comparison import Comparison as Comparison, compare as compare
+    from stickslip.analysis.questions import analyze as analyze
+    from stickslip.analysis.comparison import Comparison as Comparison, compare as compare
     from stickslip.config import RigSettings as RigSettings, read_rig as read_rig, rig_settings as rig_settings
-    from stickslip.decay_comparison import DecayComparison as DecayComparison, compare_decays as compare_decays
-    from stickslip.decays import DecayFindings as DecayFindings, analyze_decay as analyze_decay
+    from stickslip.analysis.decay_comparison import DecayComparison as DecayComparison, compare_decays as compare_decays
+    from stickslip.analysis.decays import DecayFindings as DecayFindings, analyze_decay as analyze_decay
     from stickslip.errors import (
         EstimateError as EstimateError,
         FormatError as FormatError,
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
         StickslipError as StickslipError,
     )
     from stickslip.estimate import Estimate as Estimate
-    from stickslip.experiment import ExperimentPlan as ExperimentPlan, plan_experiment as plan_experiment
+    from stickslip.analysis.experiment import ExperimentPlan as ExperimentPlan, plan_experiment as plan_experiment
     from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
     from stickslip.files.write import write_record as write_record
-    from stickslip.findings import Findings as Findings
+    from stickslip.analysis.findings import Findings as Findings
     from stickslip.fit.answer import DecayFit as DecayFit
     from stickslip.fit.decay import fit_decay as fit_decay
     from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
@@ -81,8 +81,8 @@ if TYPE_CHECKING:
         Sticks as Sticks,
         find_sticks as find_sticks,
     )
-    from stickslip.long_records import analyze_blocks as analyze_blocks
-    from stickslip.mending import mend as mend
+    from stickslip.analysis.long_records import analyze_blocks as analyze_blocks
+    from stickslip.analysis.mending import mend as mend
     from stickslip.plot.figures import figures as figures
     from stickslip.record.channels import Channel as Channel
     from stickslip.record.check import Fault as Fault
@@ -137,7 +137,7 @@ if TYPE_CHECKING:
         coupled_frequency as coupled_frequency,
         transition_speed as transition_speed,
     )
-    from stickslip.timefrequency import TimeFrequency as TimeFrequency, time_frequency as time_frequency
+    from stickslip.analysis.time_frequency import TimeFrequency as TimeFrequency, time_frequency as time_frequency
     from stickslip.plot.wavelet import plot_wavelet as plot_wavelet
     from stickslip.drives import (
         Belt as Belt,
@@ -213,7 +213,7 @@ _ROOMS = {
     "Ridge": "signals.ridges", "LocalMaximum": "signals.ridges", "Spike": "signals.ridges",
     "transition": "identify.transition", "Transition": "identify.transition",
     "find_microslips": "identify.microslip", "mechanism": "identify.mechanism", "Mechanism": "identify.mechanism",
-    "time_frequency": "timefrequency", "TimeFrequency": "timefrequency",
+    "time_frequency": "analysis.time_frequency", "TimeFrequency": "analysis.time_frequency",
     "inverse_wavelet": "signals.wavelet", "plot_wavelet": "plot.wavelet",
     "compare_force": "identify.compare_force", "ForceComparison": "identify.compare_force",
     "ForceBand": "identify.compare_force", "Resonance": "identify.mounts",
@@ -238,13 +238,14 @@ _ROOMS = {
     "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",
     "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",
     "extreme_decay": "identify.envelope", "hilbert_decay": "identify.envelope", "EnvelopeDecay": "identify.envelope",
-    "plan_experiment": "experiment", "ExperimentPlan": "experiment",
+    "plan_experiment": "analysis.experiment", "ExperimentPlan": "analysis.experiment",
     "plot_plan": "plot.experiment", "publish_rig": "reports.rig",
-    "analyze_decay": "decays", "DecayFindings": "decays",
-    "compare_decays": "decay_comparison", "DecayComparison": "decay_comparison",
+    "analyze_decay": "analysis.decays", "DecayFindings": "analysis.decays",
+    "compare_decays": "analysis.decay_comparison", "DecayComparison": "analysis.decay_comparison",
     "read_rig": "config", "rig_settings": "config", "RigSettings": "config",
-    "analyze": "analysis", "analyze_blocks": "long_records", "compare": "comparison", "Comparison": "comparison",
-    "Findings": "findings", "mend": "mending",
+    "analyze": "analysis.questions", "analyze_blocks": "analysis.long_records",
+    "compare": "analysis.comparison", "Comparison": "analysis.comparison",
+    "Findings": "analysis.findings", "mend": "analysis.mending",
     "Coulomb": "laws.coulomb", "CompliantContact": "laws.compliant", "LinearSlope": "laws.linear_slope",
     "Tabulated": "laws.tabulated", "StateVariable": "laws.state_variable", "InertialContact": "laws.inertial",
     "ElastoSlip": "laws.elastoslip", "PositionLoad": "laws.position_load", "RoughSurface": "laws.rough",

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.findings import Findings
+    from stickslip.analysis.findings import Findings
     from stickslip.identify.transition_speed import TransitionSpeed
 
 MOST_CYCLES = 30

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.decay_comparison import DecayComparison
-    from stickslip.decays import DecayFindings
+    from stickslip.analysis.decay_comparison import DecayComparison
+    from stickslip.analysis.decays import DecayFindings
     from stickslip.identify.decrement import Decrement
     from stickslip.identify.release import RingDown
 

@@ -11,7 +11,7 @@ from stickslip.plot.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, axis_label,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip.experiment import ExperimentPlan
+    from stickslip.analysis.experiment import ExperimentPlan
 
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 MARKS = ("o", "s", "^", "D")

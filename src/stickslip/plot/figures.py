@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from stickslip.comparison import Comparison
-from stickslip.decay_comparison import DecayComparison
-from stickslip.decays import DecayFindings
-from stickslip.findings import Findings
+from stickslip.analysis.comparison import Comparison
+from stickslip.analysis.decay_comparison import DecayComparison
+from stickslip.analysis.decays import DecayFindings
+from stickslip.analysis.findings import Findings
+from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.contact import plot_displacement_loop, plot_sticks, plot_velocity_loop
 from stickslip.plot.decay import plates_of as decay_plates
@@ -15,7 +16,6 @@ from stickslip.plot.decay import plates_together as together_plates
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
-from stickslip.timefrequency import TimeFrequency
 
 if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory

@@ -11,7 +11,7 @@ from stickslip.plot.style import FAINT, INK, ORANGE, PURPLE, axis_label, envelop
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip.findings import Findings
+    from stickslip.analysis.findings import Findings
 
 
 @styled

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.findings import Findings
+    from stickslip.analysis.findings import Findings
     from stickslip.record.record import Record
 
 PANELS = (("x", "z"), ("theta",), ("v",), ("a",), ("force",), ("load",), ("friction",), ("normal",), ("y",), ("sound",))

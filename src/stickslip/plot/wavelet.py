@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from stickslip.analysis.time_frequency import TimeFrequency
     from stickslip.record.record import Record
-    from stickslip.timefrequency import TimeFrequency
 
 SPAN = 80.0  # dB between the largest modulus and the threshold
 LEVELS = 18  # contour lines across them, as in the thesis

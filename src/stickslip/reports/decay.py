@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stickslip.decay_comparison import DecayComparison
-from stickslip.decays import DecayFindings
+from stickslip.analysis.decay_comparison import DecayComparison
+from stickslip.analysis.decays import DecayFindings
 from stickslip.estimate import Estimate
 from stickslip.identify.release import CAUGHT
 from stickslip.reports.words import interval_of, number, value_of

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from stickslip import __version__
-from stickslip.comparison import Comparison
-from stickslip.decay_comparison import DecayComparison
-from stickslip.decays import DecayFindings
+from stickslip.analysis.comparison import Comparison
+from stickslip.analysis.decay_comparison import DecayComparison
+from stickslip.analysis.decays import DecayFindings
+from stickslip.analysis.findings import Findings
+from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.errors import ModelError, RecordError
-from stickslip.findings import Findings
 from stickslip.plot.plate import Plate
 from stickslip.reports.page import render, sections_of
-from stickslip.timefrequency import TimeFrequency
 
 PROGRAM = "stickslip"
 NUMBERS = "results.json"

@@ -9,18 +9,18 @@ from pathlib import Path
 from typing import Any, cast
 
 from stickslip import __version__
-from stickslip.comparison import Comparison
-from stickslip.decay_comparison import DecayComparison
-from stickslip.decays import DecayFindings
+from stickslip.analysis.comparison import Comparison
+from stickslip.analysis.decay_comparison import DecayComparison
+from stickslip.analysis.decays import DecayFindings
+from stickslip.analysis.findings import Findings
+from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.estimate import Estimate
 from stickslip.files.write import whole
-from stickslip.findings import Findings
 from stickslip.plot import style
 from stickslip.plot.figures import figures
 from stickslip.plot.plate import Plate
 from stickslip.record.record import Record
 from stickslip.reports.summary import Summary, summary
-from stickslip.timefrequency import TimeFrequency
 
 TEMPLATE = "page.html.jinja"
 _COLOURS = {

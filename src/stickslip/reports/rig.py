@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from stickslip.analysis.experiment import ExperimentPlan
 from stickslip.errors import ModelError
-from stickslip.experiment import ExperimentPlan
 from stickslip.files.write import WRITERS, write_record
 from stickslip.plot.experiment import plot_plan
 from stickslip.plot.plate import plate

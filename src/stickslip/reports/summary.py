@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from stickslip.comparison import Comparison
-from stickslip.decay_comparison import DecayComparison
-from stickslip.decays import DecayFindings
+from stickslip.analysis.comparison import Comparison
+from stickslip.analysis.decay_comparison import DecayComparison
+from stickslip.analysis.decays import DecayFindings
+from stickslip.analysis.findings import Findings, record_name
+from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.findings import Findings, record_name
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record, Step
 from stickslip.reports import decay
 from stickslip.reports.words import cautions, doubts, headline, interval_of, number, ringing_told, value_of
-from stickslip.timefrequency import TimeFrequency
 
 _CONSTANT_UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 

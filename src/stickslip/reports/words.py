@@ -7,15 +7,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stickslip.comparison import Comparison
-from stickslip.decays import DecayFindings
+from stickslip.analysis.comparison import Comparison
+from stickslip.analysis.decays import DecayFindings
+from stickslip.analysis.findings import Findings
+from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.estimate import NORMAL_95, Estimate, decimals
-from stickslip.findings import Findings
 from stickslip.identify.breakaway import Breakaway
 from stickslip.identify.presliding import Presliding
 from stickslip.identify.pull import Pull
 from stickslip.plot.style import prefixed
-from stickslip.timefrequency import TimeFrequency
 
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
 
 import numpy as np
 
+from stickslip.analysis.findings import plain, record_name
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Estimate, Result
-from stickslip.findings import plain, record_name
 from stickslip.fit.answer import DecayFit
 from stickslip.fit.decay import fit_decay
 from stickslip.fit.motions import Restoring

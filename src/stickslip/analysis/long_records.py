@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analysis import analyze
+from stickslip.analysis.findings import Findings
+from stickslip.analysis.questions import analyze
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import NORMAL_95, Estimate, Result
-from stickslip.findings import Findings
 from stickslip.record.record import Record
 from stickslip.statistics import student
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stickslip.analysis.findings import record_name
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Result
-from stickslip.findings import record_name
 from stickslip.identify.mechanism import UNTOLD, Mechanism, mechanism_of
 from stickslip.identify.microslip import MicroSlips, microslips_of
 from stickslip.identify.ringing import Ringing, find_ringing

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from stickslip.analysis.findings import Findings, record_name
+from stickslip.analysis.preparation import AT_ONCE, CONSTANTS, MOTION, Asked, middle, normal_load, ready
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.findings import Findings, record_name
 from stickslip.identify.breakaway import breakaway
 from stickslip.identify.cause import lag_or_compliance
 from stickslip.identify.consistency import consistency
@@ -22,7 +23,6 @@ from stickslip.identify.pull import pulled_slider
 from stickslip.identify.regression import regress_friction
 from stickslip.identify.sticks import find_sticks
 from stickslip.identify.transition_speed import coupled_frequency, transition_speed
-from stickslip.preparation import AT_ONCE, CONSTANTS, MOTION, Asked, middle, normal_load, ready
 from stickslip.record.record import Record
 
 STRETCH = 1 << 14  # samples in which the contact is fitted

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from stickslip.decays import DecayFindings
+from stickslip.analysis.decays import DecayFindings
+from stickslip.analysis.findings import plain
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Estimate, Result
-from stickslip.findings import plain
 from stickslip.fit.answer import DecayFit
 from stickslip.fit.decay import fit_decay
 from stickslip.fit.which_motion import whichever
