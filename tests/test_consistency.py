@@ -171,6 +171,19 @@ def test_a_motion_that_does_not_repeat_is_checked_where_it_can_be() -> None:
     assert "no cycle is like another" in found["energy of whole cycles"].sentence
 
 
+@pytest.mark.parametrize("damper", ["ground", "base"])
+def test_a_mass_that_a_force_drives_is_checked_too(damper: str) -> None:
+    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=5.0, law=law, drive=ss.HarmonicForce(4.0, frequency=6.0))
+    record = ss.Rig.perfect().measure(ss.simulate(slider, duration=8.0), fs=4000, rng=1, start=5.0)
+    record = record.with_channel("force", 4.0 * np.cos(2 * np.pi * 6.0 * (5.0 + record.time)), unit="N")
+    found = ss.consistency(record, mass=2.42, stiffness=2310, damping=5.0, damper=damper)
+    assert found.status == "ok"
+    assert found["energy of whole cycles"].verdict == "holds"
+    without = ss.consistency(record, mass=2.42, stiffness=2310)["energy of whole cycles"]
+    assert (without.verdict, without.left > without.right) == ("fails", True)
+
+
 def test_plain_data_and_words() -> None:
     found = ss.consistency(good(), **RIG)
     data = found.to_dict()

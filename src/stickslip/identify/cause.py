@@ -276,7 +276,7 @@ def _by_accelerometer(record: Record) -> Estimate | None:
     if not is_measured(record, "a"):
         return None
     try:
-        found = sensor_delay(record, channels=("x", "a"))
+        found = sensor_delay(without_delays(record, "a", question=QUESTION), channels=("x", "a"))
     except StickslipError:
         return None
     return found.delay if found.delay.status == "ok" else None

@@ -74,6 +74,14 @@ class Seen:
     def damping(self) -> float:
         return self.rig.get("damping", 0.0)
 
+    @property
+    def drag(self) -> Complex:
+        """The damper's force [N], line by line."""
+        moved = self.channels["x"]
+        if self.damper == "base" and "z" in self.channels:
+            moved = moved - self.channels["z"]
+        return np.asarray(2j * np.pi * self.damping * self.lines.frequency * moved)
+
     def strongest(self, name: str) -> Complex:
         """Of each stretch, at the strongest line; zero where there is no such channel."""
         return self.channels[name][:, self.at] if name in self.channels else np.zeros(self.lines.count, dtype=complex)
@@ -178,11 +186,10 @@ def forces_check(seen: Seen) -> Check:
         return untold(name, "no load cell: the friction is what is left of the balance")
     if not seen.knows:
         return untold(name, "mass and stiffness are not known")
-    w, k, m = seen.angular, seen.rig["stiffness"], seen.rig["mass"]
+    k, m = seen.rig["stiffness"], seen.rig["mass"]
     x, z = seen.strongest("x"), seen.strongest("z")
-    driven = 1j * w * seen.damping * (x - (z if seen.damper == "base" else 0))
     inertia = m * seen.acceleration
-    computed = k * (z - x) - driven + seen.strongest("force") - inertia
+    computed = k * (z - x) - seen.drag[:, seen.at] + seen.strongest("force") - inertia
     felt = seen.strongest("load")
     sizes = [abs(each.mean()) for each in (k * z, k * x, inertia, felt, seen.strongest("force"))]
     sd = math.hypot(seen.sd(felt - computed), math.sqrt(2) * seen.tolerance * float(np.linalg.norm(sizes)))
@@ -223,7 +230,6 @@ def energy_check(seen: Seen) -> Check:
             fails="friction gives energy: load or x has the wrong sign",
         )  # fmt: skip
     drives = [each for each in ("z", "force") if each in seen.channels]
-    moved = seen.channels["x"]
     taken = seen.work(seen.channels["load"]) if "load" in seen.channels else None
     given = np.zeros(seen.lines.count)
     if "force" in drives:
@@ -245,8 +251,7 @@ def energy_check(seen: Seen) -> Check:
             fails=f"{'the mass moves the base' if drives else 'friction gives energy'}: a channel has the wrong sign, "
             "or two are exchanged",
         )  # fmt: skip
-    speed = 1j * 2 * np.pi * seen.lines.frequency * (moved - (seen.channels["z"] if seen.damper == "base" else 0))
-    damped = seen.work(seen.damping * speed)
+    damped = seen.work(seen.drag)
     left, right = float(given.mean()), float((taken + damped).mean())
     size = math.sqrt(2) * seen.tolerance * math.hypot(left, right)
     turned = min(left, right) < 0
@@ -296,8 +301,7 @@ def identity_check(seen: Seen) -> Check:
     heard = np.flatnonzero((np.abs(x.mean(axis=0)) > LOUD * level) & (order > 1) & (order < 60))
     if not len(heard):
         return untold(name, "no harmonic of the displacement stands out of its noise")
-    speed = 1j * order * w * (x - (seen.channels["z"] if seen.damper == "base" and "z" in seen.channels else 0))
-    force = seen.channels["load"] + seen.damping * speed
+    force = seen.channels["load"] + seen.drag
     if "z" in seen.channels:
         force = force - seen.rig["stiffness"] * seen.channels["z"]
     if "force" in seen.channels:
@@ -317,8 +321,8 @@ def identity_check(seen: Seen) -> Check:
 
 def stops_check(seen: Seen) -> Check:
     name = "sliding without stops"
-    if not seen.knows or "z" not in seen.channels or seen.lines.cycles is None:
-        return untold(name, "mass, stiffness, base motion and whole cycles are needed")
+    if not seen.knows or "z" not in seen.channels or "force" in seen.channels or seen.lines.cycles is None:
+        return untold(name, "mass, stiffness, whole cycles and a base that alone drives the mass are needed")
     x = seen.channels["x"]
     w, k, m = seen.angular, seen.rig["stiffness"], seen.rig["mass"]
     z = abs(complex(seen.strongest("z").mean()))
@@ -326,8 +330,8 @@ def stops_check(seen: Seen) -> Check:
     mean = x.mean(axis=0)[: len(phase)]
     path, speed = (mean @ phase).real, ((1j * np.arange(1, len(mean) + 1) * mean) @ phase).real
     amplitude = float(np.ptp(path)) / 2
-    given = seen.work(k * seen.channels["z"])
-    source = seen.work(seen.channels["load"]) if "load" in seen.channels else given
+    left = k * seen.channels["z"] - seen.drag
+    source = seen.work(seen.channels.get("load", left))
     friction = float(source.mean()) / (4 * amplitude)
     if friction <= 0:
         return untold(name, "energy runs the wrong way")
