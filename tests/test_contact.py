@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from rigs import RIG, measured, told
 from stickslip.errors import EstimateError, RecordError
 from stickslip.identify.contact import branch_slopes
-from test_fusion import RIG, measured, told
 
 STIFFNESS, DAMPING = 192000.0, 23.9
 
@@ -163,3 +163,12 @@ def test_an_unknown_mass_is_named() -> None:
     record = ss.friction_force(record_of(CONTACT), method="F2")
     with pytest.raises(EstimateError, match="mass"):
         ss.contact_stiffness(record)
+
+
+def test_a_sensor_whose_zero_is_off_changes_no_stiffness() -> None:
+    record = told(measured(2.5, 0.0, 3.0)[0])
+    off = record.with_channel("x", record["x"] + 0.1e-3, unit="m").with_details("x", delay=record.channels["x"].delay)
+    for method in ("motion", "fusion"):
+        right, wrong = (ss.contact_stiffness(ss.friction_force(each, method=method, **RIG)) for each in (record, off))
+        assert wrong.status == "ok"
+        assert wrong.value == pytest.approx(right.value, rel=1e-4)

@@ -151,3 +151,11 @@ def test_by_speed_the_stated_deviation_holds_the_true_onset() -> None:
     for event in sticks:
         assert np.abs(begins - event.time).min() < 3 * event.time_sd
         assert np.abs(ends - event.time - event.duration).min() < 3 * event.duration_sd
+
+
+def test_a_sensor_whose_zero_is_off_changes_no_event() -> None:
+    record = told(measured(2.5)[0])
+    off = record.with_channel("x", record["x"] + 0.1e-3, unit="m").with_details("x", delay=record.channels["x"].delay)
+    right, wrong = (ss.find_sticks(ss.friction_force(each, method="motion", **RIG)).events for each in (record, off))
+    assert [each.kind for each in wrong] == [each.kind for each in right]
+    assert [each.time for each in wrong] == pytest.approx([each.time for each in right], abs=1e-6)

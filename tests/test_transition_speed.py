@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from rigs import CASES, RIG, SETTLED, measured, told
 from stickslip.errors import EstimateError, RecordError
-from test_fusion import CASES, RIG, SETTLED, measured, told
 
 METHODS = ("contact", "curve", "equation")
 ROUGH = 0.03
@@ -118,3 +118,14 @@ def test_what_it_lacks_is_said() -> None:
     few = ss.Record.of({name: slow[name][::16] for name in ("x", "v", "friction")}, fs=250)
     with pytest.raises(EstimateError, match="sample faster"):
         ss.transition_speed(few)
+
+
+def test_a_sensor_whose_zero_is_off_changes_no_speed() -> None:
+    record = told(measured(8.7)[0])
+    off = record.with_channel("x", record["x"] + 0.1e-3, unit="m").with_details("x", delay=record.channels["x"].delay)
+    right, wrong = (ss.transition_speed(ss.friction_force(each, method="fusion", **RIG)) for each in (record, off))
+    for one, other in ((right.contact, wrong.contact), (right.curve, wrong.curve), (right.equation, wrong.equation)):
+        assert one is not None
+        assert other is not None
+        assert other.value == pytest.approx(one.value, rel=1e-4)
+        assert other.sd == pytest.approx(one.sd, rel=0.02)

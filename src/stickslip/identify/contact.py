@@ -60,13 +60,14 @@ def contact_stiffness(record: Record | Loops, *, method: str | None = None) -> E
     if isinstance(record, Loops):
         if method not in (None, "slope"):
             raise _no_method(method, ("slope",))
-        return _slope(branch_slopes(record.displacement, record.friction, record.level.value), record.unit)
+        friction = record.friction - record.offset.value
+        return _slope(branch_slopes(record.displacement, friction, record.level.value), record.unit)
     if method not in (None, "stick", "slope"):
         raise _no_method(method, ("stick", "slope"))
     if method == "slope":
         record.require_clean("x", "friction", question=STIFFNESS)
-        level = sliding_level(record["friction"], np.gradient(record["x"]))
-        return _slope(branch_slopes(record["x"], record["friction"], level), "m")
+        level, middle = sliding_level(record["friction"], np.gradient(record["x"]))
+        return _slope(branch_slopes(record["x"], record["friction"] - middle, level), "m")
     return likely_contact(record).stiffness
 
 

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.identify.likely_contact import sliding_level
 from stickslip.identify.motion import stretches
 from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
 
 HELD = 0.9  # share of the sliding friction below which the contact certainly holds
-FAST = 0.5  # share of the peak speed above which it certainly slides
 LEAST = 4  # samples of one hold from which its spring is told
 BEFORE, AFTER = (-20, -3), (4, 20)  # samples before a hold and after it that tell the sliding friction there
 SURE = 4.0  # standard deviations that a reversal of the velocity, and the friction's fall in it, must have
@@ -96,11 +96,10 @@ def find_holds(trace: Trace) -> tuple[Hold, ...]:
     tuple of Hold
         Those that begin and end in the record; none, if fewer than four are resolved.
     """
-    speed = np.abs(trace.velocity)
-    fast = speed > FAST * np.quantile(speed, 0.99)
-    level = float(np.median(np.abs(trace.friction[fast])))
+    level, middle = sliding_level(trace.friction, trace.velocity)
+    trace = replace(trace, friction=trace.friction - middle)
     turns = np.flatnonzero(trace.velocity[:-1] * trace.velocity[1:] < 0)
-    turns = turns[(turns > -BEFORE[0]) & (turns < len(speed) - AFTER[1])]
+    turns = turns[(turns > -BEFORE[0]) & (turns < len(trace.velocity) - AFTER[1])]
     cores = _cores(trace, level, turns)
     if len(cores) < FEW:
         return ()

@@ -67,11 +67,12 @@ def likely_contact(record: Record) -> LikelyContact:
     for rows in _looked_at(len(record)):
         part = record.rows(rows.start, rows.stop)
         friction, velocity = (part["friction"], part["v"]) if fused else _fused(part, balance, sensors)
-        levels.append(sliding_level(friction, velocity))
-        holds, found = held_steps(friction, velocity, levels[-1])
+        level, middle = sliding_level(friction, velocity)
+        levels.append(level)
+        holds, found = held_steps(friction - middle, velocity, level)
         sticks += [last - first for first, last in found]
         if found:
-            parts.append(Held.of(part, balance, sensors, holds, levels[-1]))
+            parts.append(Held.of(part, balance, sensors, holds, level))
             change, way = np.diff(friction)[holds[:-1]], (velocity[:-1] / record.fs)[holds[:-1]]
             guesses.append((float(change @ way), float(way @ way)))
     if len(sticks) < FEW:
@@ -138,10 +139,13 @@ def _unsure(best: Array, balance: Balance, fs: float, sticks: Sequence[int]) -> 
     return words
 
 
-def sliding_level(friction: Array, velocity: Array) -> float:
-    """The friction's magnitude [N] where the contact certainly slides."""
+def sliding_level(friction: Array, velocity: Array) -> tuple[float, float]:
+    """The friction's magnitude [N] where the contact certainly slides, and its middle: a sensor's zero may be off."""
     speed = np.abs(velocity)
-    return float(np.median(np.abs(friction)[speed > FAST * np.quantile(speed, 0.99)]))
+    fast = speed > FAST * np.quantile(speed, 0.99)
+    ways = [friction[fast & (sign * velocity > 0)] for sign in (1, -1)]
+    middle = sum(float(np.median(way)) for way in ways) / 2 if all(map(len, ways)) else 0.0
+    return float(np.median(np.abs(friction[fast] - middle))), middle
 
 
 def held_steps(friction: Array, velocity: Array, level: float) -> tuple[NDArray[np.bool_], Stretches]:

@@ -126,7 +126,7 @@ def transition_speed(record: Record | Loops, *, method: str | None = None) -> Tr
     friction = record["friction"] - loops.offset.value
     branches = _branches(friction, velocity, loops.level.value)
     stiffness = fitted.stiffness if fitted else contact_stiffness(record, method="slope")
-    exact = _exact(record, friction, velocity, branches, fitted) if fitted else None
+    exact = _exact(record, friction, loops.offset.value, branches, fitted) if fitted else None
     return _answer(loops, branches, stiffness, exact, method or ("contact" if exact else "equation"), lost)
 
 
@@ -282,11 +282,11 @@ def _equation(known: Array) -> float:
 
 
 def _exact(
-    record: Record, friction: Array, velocity: Array, branches: Sequence[Branch], fitted: LikelyContact
+    record: Record, friction: Array, offset: float, branches: Sequence[Branch], fitted: LikelyContact
 ) -> Estimate:
     """From the contact, and from the friction before, the pull at, and its change after each turn."""
     rig, found = fitted.balance, []
-    pull = _pull(record, rig)
+    pull = _pull(record, rig) - offset  # the zero of a sensor is in both
     for each in branches:
         before = slice(max(0, each.first - BEFORE - 1), max(1, each.first - 1))
         rows = np.arange(each.first, each.first + len(each.force))
