@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -194,7 +195,8 @@ def test_a_clock_that_can_not_be_trusted_leaves_the_extremes(dataset, name):
     assert high > 0.0115
     told = " ".join(ss.summary(found).headline)
     assert "read from its extremes alone" in told
-    assert 'restoring="pendulum"' in told
+    assert "mend the clock, or trust the extremes" in told
+    assert "choose restoring" not in told
 
 
 def test_a_clock_that_runs_unevenly_is_told_by_what_the_waveform_leaves():
@@ -284,3 +286,56 @@ def test_every_release_of_a_record_counts_for_the_interval_of_any_motion():
     assert len(both.waveform.motions) == 2
     assert both.whichever[1].includes(0.02)
     assert np.ptp(both.whichever[1].interval) < 0.5 * np.ptp(both.motion.dry_displacement_any.interval)
+
+
+def test_the_headline_names_the_motion_that_the_record_leaves():
+    from stickslip.fit.motions import free_decay as any_decay
+
+    t = np.arange(4000) / 500
+    w, damping, quadratic, length = 20.0, 0.01, 20.0, 0.03
+    x = any_decay(t, [w, damping, 0, 0, length, 0, quadratic, 0, 0, 0, 0.5, 0])[0]
+    found = ss.analyze_decay(ss.Record.of({"x": x + 3e-5 * np.random.default_rng(7).standard_normal(t.size)}, fs=500))
+    assert found.best is found.motion
+    assert found.motion.model == "air"
+    told = " ".join(ss.summary(found).headline)
+    assert "dies away by viscous and quadratic (air) damping, no dry friction: a damping ratio of 0.01" in told
+    assert "quadratic damping of " in told
+    estimates = {each.name: each for each in found.estimates}
+    assert estimates["damping ratio"].includes(damping)
+    assert estimates["quadratic damping"].includes(quadratic)
+    assert estimates["quadratic damping"].unit == "1/m"
+    assert "dry friction displacement" not in estimates
+    assert ss.figures(found)
+
+
+def test_a_pendulum_read_with_a_straight_spring_is_told_so():
+    from stickslip.fit.motions import free_decay as any_decay
+
+    t = np.arange(1000) / 100
+    x = any_decay(t, [6, 0.005, 0.01, 0, 1.2, 0, 0, 0, 0, 0, 0.5, 0], restoring="pendulum")[0]
+    record = ss.Record.of({"theta": x + 1e-3 * np.random.default_rng(1).standard_normal(t.size)}, fs=100)
+    told = " ".join(ss.summary(ss.analyze_decay(record)).headline)
+    assert 'of a pendulum ask with restoring="pendulum"' in told
+    assert "dies away by dry" not in told
+    found = ss.analyze_decay(record, restoring="pendulum")
+    assert found.best.dry_displacement.includes(0.01)
+    assert "straight spring" not in " ".join(ss.summary(found).headline)
+
+
+def test_a_friction_below_zero_is_never_told_as_friction():
+    found = analyzed(np.asarray(free_decay()[0]), free_decay()[1])
+    estimate = replace(found.waveform.dry_displacement, value=-1e-3, interval=(-2e-3, -1e-4))
+    below = replace(found, waveform=replace(found.waveform, dry_displacement=estimate), motion=None)
+    assert "which the record speaks against" in ss.summary(below).headline[0]
+
+
+def test_a_motion_rejected_by_chance_is_not_denied_as_a_fact():
+    values, fs, _ = free_decay()
+    found = analyzed(values, fs)
+    choice = found.motion.choice
+    weak = replace(choice, candidates=tuple(replace(each, p_value=0.01) for each in choice.candidates))
+    told = " ".join(ss.summary(replace(found, motion=replace(found.motion, choice=weak))).headline)
+    assert "dies away by viscous and dry friction" in told
+    assert "but weakly (p = 0.01)" in told
+    assert "friction of another kind too" not in told
+    assert all("p = 0)" not in verdict for _, _, verdict in found.motion.candidates)

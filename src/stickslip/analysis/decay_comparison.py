@@ -118,7 +118,7 @@ def compare_decays(findings: Sequence[DecayFindings]) -> DecayComparison:
     if mixed:
         said = "; ".join(f"{key} is {' and '.join(map(str, dict.fromkeys(ways[key])))}" for key in mixed)
         notes.append(f"The records are not fitted together: {said}.")
-    elif not apart and all(each.waveform is not None for each in findings):
+    elif not apart and all(each.best is each.waveform for each in findings):
         try:
             joint = _whichever(fit_decay([each.record for each in findings], **asked), findings)
         except StickslipError as error:

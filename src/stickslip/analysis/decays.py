@@ -30,6 +30,8 @@ Answer = TypeVar("Answer")
 
 EXTREMES = "extremes alone"
 LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
+PLAIN = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
+CLEAR = 1e-3  # p-value below which a motion's rejection is no chance of one true motion in twenty
 METHODS = ("thesis", "waveform", "all")
 OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
     "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, EXTREMES: extreme_decay,
@@ -96,11 +98,22 @@ class DecayFindings(Result):
 
     @property
     def best(self) -> BothFrictions:
-        """The surest answer: of the whole waveform where there is one; of a pendulum without one, of its extremes."""
+        """The surest answer: of the whole waveform where there is one; of a pendulum without one, of its extremes.
+
+        Where the record speaks against viscous and dry friction and for another of the motions tried, of that one.
+        """
+        if self.motion is not None and self.against < CLEAR and self.motion.choice.status == "ok":
+            return self.motion
         swings = cast(BothFrictions | None, self.older.get(EXTREMES))  # of extremes alone, and they tell both
         found = next((each for each in (self.waveform, self.thesis, self.motion, swings) if each is not None), None)
         assert found is not None
         return found
+
+    @property
+    def against(self) -> float:
+        """How likely a record like this is if viscous and dry friction are the motion: the greatest p-value of them."""
+        tried = () if self.motion is None else self.motion.choice.candidates
+        return max((each.p_value for each in tried if each.name in PLAIN), default=1.0)
 
     @property
     def rest(self) -> float:
@@ -128,23 +141,27 @@ class DecayFindings(Result):
     @property
     def dry_force(self) -> Estimate | None:
         """The dry friction as a force, where the mass or the stiffness is stated."""
-        return self.as_force(self.best.dry_displacement, "dry friction force")
+        dry = self.best.dry_displacement
+        return None if dry.interval == (0.0, 0.0) else self.as_force(dry, "dry friction force")
 
     def as_force(self, displacement: Estimate, name: str) -> Estimate | None:
         """A displacement of the spring as its force, where the mass or the stiffness is stated."""
         spring = self.settings.get("stiffness")
         if spring is None and self.settings.get("mass") is not None:
             spring = self.settings["mass"] * (2 * math.pi * self.best.frequency.value) ** 2
-        return (
-            None if spring is None else displacement.scaled(spring, "N m" if displacement.unit == "rad" else "N", name)
-        )
+        if spring is None:
+            return None
+        unit, word = ("N m", "torque") if displacement.unit == "rad" else ("N", "force")
+        return displacement.scaled(spring, unit, name.replace("force", word))
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number found, the best answer first; the decrements' are named so where both methods answer."""
         force = self.dry_force
         found = [] if force is None else [force]
-        if self.waveform is None and self.thesis is None:
+        if self.motion is not None and self.best is self.motion:
+            found += [*self.motion.terms, self.motion.frequency, *self.whichever]
+        elif self.waveform is None and self.thesis is None:
             found += self.best.estimates
         elif self.waveform is not None:
             found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
@@ -308,8 +325,9 @@ def analyze_decay(
         waveform = waveform or ask("The whole waveform", fit)
         if waveform is not None:
             motion = waveform.motions[0] if waveform.motions else None
-            waveform = ask("The whole waveform", functools.partial(_followed, waveform))
-            motion = motion if waveform is not None else None
+            waveform = ask("The whole waveform", functools.partial(_followed, waveform, restoring))
+            unsure = motion is not None and motion.choice.status != "ok"
+            motion = None if waveform is None and unsure else motion
         elif releases.ring_downs[0].order == 0:
             motion = ask("Which motion", lambda: choose_motion(record, channel=used, restoring=restoring))
     if method != "waveform" and restoring == "linear":
@@ -329,14 +347,16 @@ def analyze_decay(
     )  # fmt: skip
 
 
-def _followed(fit: DecayFit) -> DecayFit:
+def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:
     """The fit, where it follows the motion; refused where it leaves much of it."""
     left, moved = np.concatenate(fit.residual), np.concatenate(fit.measured) - fit.bias.value
     share = float(np.linalg.norm(left) / np.linalg.norm(moved))
     if share > LOST and float(np.std(left)) > SEEN * fit.ring_downs[0].noise:
+        straight = restoring == "linear" and fit.channel == "theta"
         raise EstimateError(
             f"the fit leaves {100 * share:.0f} % of the motion",
             "a waveform is read where the clock is even and the spring is the one that was chosen",
-            'mend the clock, choose restoring="pendulum" of a pendulum, or rely on the extremes',
+            ('choose restoring="pendulum" of a pendulum, ' if straight else "") + "mend the clock, or trust the "
+            "extremes, which need none",
         )
     return fit

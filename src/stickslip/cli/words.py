@@ -15,6 +15,8 @@ _SPOKEN = (
     (r"\bask friction_loops\(record\)", "ask stickslip analyze"),
     (r", or ask (?:extreme|fit)_decay\(record\)[^;.]*", ""),
     (r', or choose form="plain"[^;.]*', ""),
+    (r" \(see choose_motion\)", ""),
+    (r"; use log_decrement or fit_decay instead", ""),
     (r'\brestoring="pendulum"', "--restoring pendulum"),
     (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),

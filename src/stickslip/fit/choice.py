@@ -117,10 +117,11 @@ class Candidate:
 
     @property
     def verdict(self) -> str:
-        """In words."""
+        """In words; the term named is most like what is left over, and need not be at work."""
         if self.kept:
             return f"kept (p = {self.p_value:.2g})"
-        return f"rejected: {self.against} is seen (p = {self.p_value:.1g})"
+        likely = "p < 1e-6" if self.p_value < 1e-6 else f"p = {self.p_value:.1g}"
+        return f"rejected ({likely}): something like {self.against} is missing"
 
     @cached_property
     def _influences(self) -> dict[str, Array]:
@@ -213,7 +214,7 @@ class Choice:
         tried = [each for each in self.candidates if each.name in names]
         if not tried or any(each.kept for each in tried):
             return ""
-        best = min(tried, key=lambda each: each.fitted.cost)
+        best = min(tried, key=lambda each: each.fitted.motion.size)
         return f"{best.against} is seen beside {best.fitted.motion.words}"
 
     def candidate(self, name: str) -> Candidate:

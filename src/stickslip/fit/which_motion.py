@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
-from stickslip.fit.choice import Choice, choose, interval_of, kept_by_all
+from stickslip.fit.choice import Candidate, Choice, choose, interval_of, kept_by_all
 from stickslip.fit.motions import MOTIONS, RESTORING, Restoring
 from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.record.record import Record
@@ -21,6 +21,16 @@ Array = NDArray[np.float64]
 SWING = 2.5  # rad, above which a pendulum lingers near its top and its phase can not be held
 COARSE = 0.5  # of a digitiser's step: less noise than this, the counts' own included, does not blur it
 TAIL = 2.0  # periods at rest that are kept
+TERMS = {
+    "damping_ratio": ("damping ratio", "1"),
+    "dry_displacement": ("dry friction displacement", "{}"),
+    "quadratic": ("quadratic damping", "1/{}"),
+    "rise": ("rise of friction towards rest", "1"),
+    "stribeck_speed": ("Stribeck speed", "{}/s"),
+    "micro_slip": ("micro-slip at the first amplitude", "1"),
+    "exponent": ("exponent of micro-slip", "1"),
+    "curvature": ("curvature of the spring", "1/{}^2"),
+}  # names and units of a motion's terms, {} the displacement's
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,6 +52,9 @@ class DecayMotion(Result):
         Their fits.
     status : str
         "ok", or in words what to beware of.
+    terms : tuple of Estimate
+        Every term of `model`, as quadratic damping ``q`` [1/m] (:func:`~stickslip.fit.motions.free_decay` has the
+        equation), but for the shape of one too faint to show it.
     """
 
     damping_ratio: Estimate
@@ -53,6 +66,7 @@ class DecayMotion(Result):
     candidates: tuple[tuple[str, str, str], ...]
     choice: Choice
     status: str
+    terms: tuple[Estimate, ...] = ()
 
 
 def choose_motion(
@@ -244,5 +258,16 @@ def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
         damping, dry, frequency, whichever((choice,), damping, "damping_ratio"),
         whichever((choice,), dry, "dry_displacement"), choice.model,
         tuple((each.name, each.fitted.motion.words, each.verdict) for each in choice.candidates),
-        choice, told(ring_down, "" if choice.status == "ok" else choice.status),
+        choice, told(ring_down, "" if choice.status == "ok" else choice.status), _terms(chosen, unit),
     )  # fmt: skip
+
+
+def _terms(chosen: Candidate, unit: str) -> tuple[Estimate, ...]:
+    """Every term of a motion that has an interval."""
+    found = []
+    for parameter in chosen.fitted.motion.terms:
+        name, per = TERMS[parameter]
+        scale = abs(chosen.fitted.value("amplitude")) ** chosen.fitted.value("exponent")
+        factor = scale if parameter == "micro_slip" else 1.0
+        found.append(chosen.estimate(parameter, name=name, unit=per.format(unit), factor=factor))
+    return tuple(each for each in found if each.sd > 0)

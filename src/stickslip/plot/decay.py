@@ -308,8 +308,8 @@ def _envelopes(findings: DecayFindings, ring: RingDown) -> tuple[Array, Array, A
     best = findings.best
     time = np.linspace(ring.release, ring.stop, POINTS)
     since, w = time - ring.release, 2 * math.pi * best.frequency.value
-    viscous = abs(ring.amplitude) * np.exp(-best.damping_ratio.value * w * since)
-    fall = best.dry_displacement.value * w**ring.order * 4 * best.frequency.value
+    viscous = abs(ring.amplitude) * np.exp(-max(0.0, best.damping_ratio.value) * w * since)
+    fall = max(0.0, best.dry_displacement.value) * w**ring.order * 4 * best.frequency.value
     return time, viscous, np.maximum(0.0, abs(ring.amplitude) - fall * since)
 
 

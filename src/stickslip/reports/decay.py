@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.analysis.decay_comparison import DecayComparison
-from stickslip.analysis.decays import DecayFindings
+from stickslip.analysis.decays import CLEAR, DecayFindings
 from stickslip.estimate import Estimate
+from stickslip.fit.choice import SIZE
 from stickslip.identify.release import CAUGHT
 from stickslip.reports.words import interval_of, number, value_of
 
@@ -16,7 +17,7 @@ MOST = 0.5  # of the power of what is left over
 OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
 LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
 WAVEFORM = "The whole waveform: "
-BOTH = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
+FAR = 0.2  # rad: a pendulum's swing that a straight spring does not follow
 METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
 
 
@@ -43,45 +44,55 @@ def settings(findings: DecayFindings) -> dict[str, str]:
 
 
 def _sentences(findings: DecayFindings) -> Iterator[str]:
+    yield from _frictions(findings)
+    yield from _left_over(findings)
+    for note in findings.notes:
+        if findings.waveform is None and findings.best is not findings.motion and note.startswith(WAVEFORM):
+            yield f"It is read from its extremes alone, for of the whole waveform {note.removeprefix(WAVEFORM)}"
+    force = findings.dry_force
+    word = "torque" if findings.settings["channel"] == "theta" else "force"
+    if force is not None:
+        yield f"That is a dry friction {word} of {value_of(force)} (95 % sure: {interval_of(force)})."
+    elif findings.best.dry_displacement.interval[0] > 0:
+        yield f"The dry friction {word} is that displacement times the spring's stiffness; state stiffness= or mass=."
+    yield from _motion(findings)
+    yield from _chosen(findings)
+    yield from _compared(findings)
+
+
+def _frictions(findings: DecayFindings) -> Iterator[str]:
+    """What makes it die away, and what the record says against that."""
     ratio, dry = findings.best.damping_ratio, findings.best.dry_displacement
     viscous, rubs = ratio.interval[0] > 0, dry.interval[0] > 0
-    if viscous and rubs and _doubted(findings):
-        yield f"Read as {_model(findings)}, which the record speaks against, it shows {_both(ratio, dry)}."
+    shown, swings = _both(ratio, dry), findings.releases.ring_downs
+    curved = findings.best is findings.thesis and not swings[0].isochronous
+    if findings.motion is not None and findings.best is findings.motion:
+        words = findings.motion.choice.chosen.fitted.motion.words
+        yield f"The motion dies away by {words}: {_listed([_told(each) for each in findings.motion.terms])}."
+    elif findings.against < CLEAR or dry.interval[1] < 0 or curved:
+        yield f"Read as viscous and dry friction, which the record speaks against, it shows {shown}."
     elif viscous and rubs:
-        yield f"The motion dies away by {_model(findings)}: {_both(ratio, dry)}."
+        model = findings.best.model
+        yield f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
     elif viscous:
         yield f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(dry, 'dry friction')}"
     elif rubs:
         yield f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
     else:
         yield "Neither viscous nor dry friction can be told from zero."
-    yield from _left_over(findings)
-    for note in findings.notes:
-        if findings.waveform is None and note.startswith(WAVEFORM):
-            yield f"It is read from its extremes alone, for of the whole waveform {note.removeprefix(WAVEFORM)}"
-    force = findings.dry_force
-    if force is not None:
-        yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
-    elif rubs:
-        yield "The dry friction force is that displacement times the spring's stiffness; state stiffness= or mass=."
-    yield from _motion(findings)
-    yield from _chosen(findings)
-    yield from _compared(findings)
+    if CLEAR <= findings.against < SIZE:
+        yield (
+            f"The motions tried speak against viscous and dry friction, but weakly (p = {findings.against:.1g}): of "
+            "true ones too one in twenty does so."
+        )
+    far = max(abs(each.amplitude) for each in swings)
+    straight = findings.settings["channel"] == "theta" and findings.settings["restoring"] == "linear"
+    if straight and far > FAR and (findings.against < CLEAR or not swings[0].isochronous):
+        yield f'A swing of {far:.2g} rad is far for a straight spring: of a pendulum ask with restoring="pendulum".'
 
 
-def _model(findings: DecayFindings) -> str:
-    if findings.best is findings.motion:
-        return next(words for name, words, _ in findings.motion.candidates if name == findings.motion.model)
-    model = findings.best.model
-    return model if "friction" in model else f"{model} friction"
-
-
-def _doubted(findings: DecayFindings) -> bool:
-    """Whether the record speaks against the motion that the best answer is of."""
-    if findings.motion is None:
-        return False
-    names = (findings.motion.model,) if findings.best is findings.motion else BOTH
-    return not any(each.kept for each in findings.motion.choice.candidates if each.name in names)
+def _listed(parts: list[str]) -> str:
+    return " and ".join([", ".join(parts[:-1])] * (len(parts) > 1) + parts[-1:])
 
 
 def _chosen(findings: DecayFindings) -> Iterator[str]:
@@ -91,16 +102,24 @@ def _chosen(findings: DecayFindings) -> Iterator[str]:
         return
     kept = [each.fitted.motion.words for each in motion.choice.candidates if each.kept]
     tried = len(motion.candidates)
-    if not kept:
+    nearest = max(motion.choice.candidates, key=lambda each: each.p_value)
+    if kept and motion.choice.status == "ok":
+        yield f"Of {tried} motions tried the record does not speak against {len(kept)}: {'; '.join(kept)}."
+    elif kept:
+        yield f"Of {tried} motions tried {len(kept)} can not be excluded, but what they leave over is not noise alone."
+    elif nearest.p_value < CLEAR:
         yield f"The record speaks against each of the {tried} motions tried: there is friction of another kind too."
     else:
-        yield f"Of {tried} motions tried the record does not speak against {len(kept)}: {'; '.join(kept)}."
+        yield (
+            f"The record speaks against each of the {tried} motions tried, least against "
+            f"{nearest.fitted.motion.words} (p = {nearest.p_value:.1g}), which may be chance."
+        )
     more = findings.viscous_residual
     if more is not None and more > LEAVES_MORE:
         yield f"Viscous damping alone leaves {more:.3g} times the residual that it leaves together with dry friction."
     dry = findings.whichever[1]
     force = findings.as_force(dry, "")
-    also = f", its force {_reach(force)}" if force is not None else ""
+    also = f", its {'torque' if force.unit == 'N m' else 'force'} {_reach(force)}" if force is not None else ""
     which = "Whichever of them it is" if kept else "By all that leave at most twice the least residual"
     yield f"{which}, the dry friction displacement is {_reach(dry)}{also}."
 

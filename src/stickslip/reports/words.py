@@ -81,7 +81,12 @@ def doubts(estimates: Sequence[Estimate]) -> list[str]:
     for estimate in estimates:
         if estimate.status != "ok":
             flagged.setdefault(estimate.status, []).append(estimate.name)
-    return [_sentence(f"{', '.join(names)}: {status}.") for status, names in flagged.items()]
+    return [_sentence(f"{_few(names)}: {status}.") for status, names in flagged.items()]
+
+
+def _few(names: list[str]) -> str:
+    """Three names at most."""
+    return ", ".join(names) if len(names) <= 3 else f"{names[0]} and {len(names) - 1} more numbers"
 
 
 def ringing_told(found: TimeFrequency) -> Iterator[str]:
