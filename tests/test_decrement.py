@@ -172,3 +172,24 @@ def test_the_large_pendulum_is_flagged(dataset):
     assert 3.6e-3 < mass * gravity * length * late.dry_displacement.value < 4.9e-3
     inertia, w = mass * length**2, 2 * np.pi * late.frequency.value
     assert 2e-4 < 2 * inertia * w * late.damping_ratio.value < 6e-4
+
+
+@pytest.mark.parametrize(("hold", "side"), [(400, 1), (400, -1), (0, 1)])
+def test_a_noisy_acceleration_tells_what_the_displacement_does(hold, side):
+    """It jumps from nothing at the release: what is held before has no sign and is no extreme."""
+    slider = ss.Oscillator(mass=2.0, stiffness=800.0, damping=1.6, law=ss.Coulomb(0.8))
+    motion = ss.simulate(slider, duration=4.0, start={"x": side * 0.03}).record(fs=500)["a"]
+    motion = np.concatenate([np.zeros(hold), motion])
+    held, waves = [], []
+    for seed in range(12):
+        noisy = motion + 0.03 * np.random.default_rng(seed).standard_normal(len(motion))
+        found = ss.decrement(of(noisy, 500.0, "a"))
+        assert found.bias.name == "sensor offset"
+        assert abs(found.ring_down.amplitude) == pytest.approx(11.3, rel=0.06)  # (k x - f) / m, or the next turn's
+        assert np.median(found.bounds.dry) == pytest.approx(1e-3, rel=0.3)
+        held.append((found.damping_ratio.includes(0.02), found.dry_displacement.includes(1e-3)))
+        fit = ss.fit_decay(of(noisy, 500.0, "a"))
+        waves.append((fit.damping_ratio.includes(0.02), fit.dry_displacement.includes(1e-3)))
+        assert fit.release_time.value == pytest.approx(hold / 500, abs=0.002)
+    assert np.sum(held, axis=0).min() >= 10
+    assert np.sum(waves, axis=0).min() >= 9

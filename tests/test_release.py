@@ -218,3 +218,23 @@ def test_drift_that_spoils_the_decrements_is_told():
     for zeta in (0.0177, 0.0316, 0.15, 0.25):
         steady, fs, _ = free_decay(damping_ratio=zeta, dry=0.03, amplitude=1.0)
         assert "drifts" not in find_releases(of(steady, fs)).status
+
+
+def test_a_release_s_window_begins_with_its_hold_and_not_with_the_hand_s_pull():
+    rng = np.random.default_rng(3)
+    values, fs, _ = free_decay(tail=4, hold=1.5)
+    values = values + 0.4
+    ramp = np.linspace(0, 1, 240)
+    pull = values[-1] + (values[0] - values[-1]) * ramp**2 * (3 - 2 * ramp)
+    whole = np.concatenate([values, pull, values, pull, values])
+    record = of(whole + 1e-3 * rng.standard_normal(len(whole)), fs)
+    found = find_releases(record).ring_downs
+    assert len(found) == 3
+    for each in found:
+        assert each.held
+        assert np.abs(each.samples[each.hold] - values[0]).max() < 6e-3
+        assert each.hold.stop > 100
+    fit = ss.fit_decay(record)
+    assert fit.status == "ok"
+    alone = ss.fit_decay(of(values + 1e-3 * rng.standard_normal(len(values)), fs))
+    assert fit.damping_ratio.sd < 0.75 * alone.damping_ratio.sd

@@ -28,8 +28,6 @@ Array = NDArray[np.float64]
 
 UNLIKE = 2.0  # times the noise that the residual may be before the model is doubted
 APART = 1e-3  # p-value of sharing friction and frequency, below which releases are not one experiment
-PARTS = 8  # of a period, by which a rest is watched
-STRAYED = 4.0  # standard deviations
 SHORT = 0.15  # of a half cycle: a hold so short can not be told from the turn of a swing
 AFTER = 0.08  # of a half cycle, within which the first turn is known
 DOUBTED = 0.01  # likelihood below which a number of half cycles does not widen the static friction's bracket
@@ -151,12 +149,7 @@ def fit_decay(
 
 
 def _described(ring_down: RingDown, record: Record) -> RingDown:
-    """What the model describes: no clipped swings; a velocity or an acceleration from before its first extreme.
-
-    Of a displacement no rest that a hand begins to disturb.
-    """
-    if ring_down.order == 0:
-        ring_down = _undisturbed(ring_down)
+    """What the model describes: no clipped swings; a velocity or an acceleration from before its first extreme."""
     cut = np.flatnonzero(~ring_down.sound[:-1])
     if len(cut):
         later = _from(ring_down, int(ring_down.turns[cut[-1] : cut[-1] + 2].mean()))
@@ -185,28 +178,6 @@ def _from_motion(ring_down: RingDown) -> RingDown:
     if ring_down.turns[0] != before or (ring_down.held and before >= SHORT * half):
         return ring_down
     return _from(ring_down, before + round(AFTER * half))
-
-
-def _undisturbed(ring_down: RingDown) -> RingDown:
-    """Hold and tail without their far ends, where these leave the level."""
-    size = max(1, round(ring_down.fs / ring_down.frequency / PARTS))
-    hold, tail = ring_down.samples[ring_down.hold][::-1], ring_down.samples[ring_down.tail]
-    early, late = (_strayed(part, size, ring_down.noise) for part in (hold, tail))
-    return replace(
-        ring_down, first=ring_down.first + early / ring_down.fs, turns=ring_down.turns - early,
-        samples=ring_down.samples[early : len(ring_down.samples) - late],
-    )  # fmt: skip
-
-
-def _strayed(samples: Array, size: int, noise: float) -> int:
-    """How many samples at the end of a rest have left its level; means over `size` of them tell."""
-    count = len(samples) // size
-    if count < 4:
-        return 0
-    means = samples[: count * size].reshape(count, size).mean(axis=1)
-    away = np.abs(means - np.median(means[: count // 2])) > STRAYED * noise / math.sqrt(size)
-    kept = int(np.flatnonzero(~away)[-1]) + 1
-    return 0 if kept == count else len(samples) - size * max(kept - 1, count // 4)
 
 
 def _release(ring_down: RingDown, noise: str | None) -> Release:

@@ -72,7 +72,7 @@ class Search:
         kept = over_half_cycles(self.start, first, *blocks.data, self.fits, self.work) if first else 0
         fits = np.array(self.fits[:kept])
         for row in fits:
-            _begin_late(row, AT_ONCE * blocks.dt)
+            _begin_late(row, *blocks.data[3:])
         return fits
 
     def intervals(self, blocks: Blocks, fits: Array) -> Array:
@@ -82,14 +82,14 @@ class Search:
         return self.ends
 
 
-def _begin_late(row: Array, first: float) -> None:
+def _begin_late(row: Array, dt: float, order: int) -> None:
     """Let a motion begin at its last turn before the first sample: half cycles that no sample shows are none."""
-    _, damping, dry, _, amplitude, release = row[3:]
-    half = math.pi / (row[3] * math.sqrt(1 - damping**2))
+    w, damping, dry, _, amplitude, release = row[3:]
+    half = math.pi / (w * math.sqrt(1 - damping**2))
     fade = math.exp(-math.pi * damping / math.sqrt(1 - damping**2))
-    while row[0] > 1 and release + half <= first:
+    while row[0] > 1 and release + half <= (AT_ONCE if order < 2 else 1.0) * dt:
         amplitude = math.copysign(1 + fade, amplitude) * dry - fade * amplitude
-        release += half
+        release = release + half if order < 2 else min(release + half, 0.0)  # an acceleration that is held is zero
         row[0] -= 1
     row[7], row[8] = amplitude, release
 

@@ -39,7 +39,7 @@ class Bounds:
         No extreme is off by more than this, in the channel's unit: noise, half a step of the digitiser, and the top
         missed between two samples.
     rate, dry : ndarray, shape (k,)
-        Viscous rate ``beta = zeta / sqrt(1 - zeta^2)`` by (6.14), and x_k by (6.9) at i, in the channel's unit.
+        Viscous rate ``beta = zeta / sqrt(1 - zeta^2)`` by (6.14), and x_k by (6.9) at i [m or rad].
     rate_first_order, rate_worst : ndarray, shape (k,)
         Largest error of beta: by (6.16), and exactly.
     dry_first_order, dry_worst : ndarray, shape (k,)
@@ -258,16 +258,18 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
         "dry friction displacement", found[1], sd=spread[1], unit=length, status=status, checks=quoted[1],
         method=f"equation {'6.9' if form == 'immune' else '6.6'}, mean of the last {last}",
     )  # fmt: skip
+    offset = "rest position" if ring_down.order == 0 else "sensor offset"
     if form == "plain":
-        bias = Estimate.normal("rest position", 0.0, sd=0.0, unit=ring_down.unit, method="taken to be zero")
+        bias = Estimate.normal(offset, 0.0, sd=0.0, unit=ring_down.unit, method="taken to be zero")
     else:
         bias = Estimate.normal(
-            "rest position", centre + side * found[2], sd=spread[2], unit=ring_down.unit, status=status,
+            offset, centre + side * found[2], sd=spread[2], unit=ring_down.unit, status=status,
             method="what alternating extremes have in common",
         )  # fmt: skip
     return Decrement(
         damping_ratio, dry_displacement, natural, bias, _model(damping_ratio, dry_displacement), times, values, sd,
-        side * ex.differences(upright, form), _bounds(upright, errors, i, ring_down), scatter, ring_down, (), status,
+        side * ex.differences(upright, form), _bounds(upright, errors, i, (ring_down.order, frequency.value)), scatter,
+        ring_down, (), status,
     )  # fmt: skip
 
 
@@ -408,8 +410,8 @@ def _quoted(values: Array) -> tuple[str, ...]:
     )
 
 
-def _bounds(x: Array, errors: Array, i: int, ring_down: RingDown) -> Bounds:
-    """Worst cases at this i for every m that the extremes allow."""
+def _bounds(x: Array, errors: Array, i: int, motion: tuple[int, float]) -> Bounds:
+    """Worst cases at this i for every m that the extremes allow; `motion` is what was derived, and its frequency."""
     i = min(max(i, 1), len(x) - 3) if len(x) >= 4 else 0
     error = float(np.max(errors))
     rows = []
@@ -422,7 +424,8 @@ def _bounds(x: Array, errors: Array, i: int, ring_down: RingDown) -> Bounds:
         pull = float(ex.dry(x, beta)[i - 1])
         psi = ex.dry_bound(x, i=i, beta=beta, dry_displacement=pull, error=error, rate_error=alpha)
         worst = (ex.rate_worst(x, i=i, m=m, error=error), ex.dry_worst(x, i=i, m=m, error=error))
-        rows.append((m, beta, alpha, worst[0], pull, psi, worst[1]))
+        shown = [_displacement(each, beta, *motion) for each in (pull, psi, worst[1])]
+        rows.append((m, beta, alpha, worst[0], *shown))
     table = np.array(rows).reshape(-1, 7)
     best = int(table[np.argmin(table[:, 3]), 0]) if len(table) else 0
     steps, *rest = (np.asarray(column) for column in table.T)

@@ -41,6 +41,9 @@ HELD = 1.5  # times the last turn of another release: friction does not hold a m
 FLUSH = 0.03  # of a half cycle before the first turn: a record that begins there begins with the release
 HOLDS = (0.5, 0.3)  # of a half cycle before a release, in which a hold must be flat
 BENT = 0.5  # of the bend after a release: what bends so much before it is no hold
+PARTS = 8  # of a period, by which a rest is watched
+STRAYED = 4.0  # standard deviations of their means
+STAYS = 1e-4  # of the first swing, by which a rest may move
 STANDS_OFF = 0.02  # of the record's range: a spike that may be taken for an extreme
 STEADY = 0.01  # of the swings: a smaller decrease over many cycles is none
 LOST = "an extreme was lost, and what lies beyond it is left out"
@@ -516,10 +519,16 @@ def _ring_down(
     tail = _reach(values[end : max(bounds[1], end + 1)], near) if ends else len(values) - end
     stopped = ends and (ORDERS[name] > 0 or tail >= half / 2)
     first, last = max(0, start + 1 - hold), end + (tail if stopped or not ends else 1)
+    if ORDERS[name] == 0:
+        part, least = max(1, round(2 * half / PARTS)), (noise, STAYS * abs(float(levels[0]) - rest))
+        first += _strayed(values[first:start][::-1], part, least)
+        last -= _strayed(values[end + 1 : last], part, least)
     tops = levels[1:-1] > levels[:-2]
     sides = np.where(tops, 1.0, -1.0)
     inner = [extreme(values, round(a), round(b), side) for (a, b), side in zip(pairwise(middles), sides, strict=True)]
     turns = [*([start] if turned or run.inside else []), *inner, *([end] if stop <= len(values) - 1 - half / 8 else [])]
+    if ORDERS[name] == 2 and turned:  # what was held jumps
+        turns[0] = extreme(values, start, round(middles[0]), -float(sides[0]))
     rows = np.array([row for row in turns if first <= row < last], dtype=np.intp)
     sound = ~unsound[rows]
     notes = (
@@ -546,6 +555,21 @@ def _reach(values: Array, near: float) -> int:
     level = float(np.median(values[: max(1, min(8, len(values)))]))
     away = np.flatnonzero(np.abs(values[1:] - level) > near)
     return 1 + int(away[0]) if len(away) else len(values)
+
+
+def _strayed(samples: Array, size: int, least: tuple[float, float]) -> int:
+    """How many samples at the end of a rest have left its level by `least` (noise, and at all).
+
+    Means over `size` of them tell.
+    """
+    count = len(samples) // size
+    if count < 4:
+        return 0
+    means = samples[: count * size].reshape(count, size).mean(axis=1)
+    near = max(STRAYED * least[0] / math.sqrt(size), least[1])
+    away = np.abs(means - np.median(means[: count // 2])) > near
+    kept = 0 if away.all() else int(np.flatnonzero(~away)[-1]) + 1
+    return 0 if kept in (0, count) else len(samples) - size * max(kept - 1, count // 4)
 
 
 def _flat_start(values: Array, half: float, noise: float) -> bool:

@@ -161,7 +161,7 @@ def plot_bounds(found: Decrement) -> Figure:
     Figure
     """
     bounds = found.bounds
-    factor, unit = prefixed(bounds.dry, found.ring_down.unit)
+    factor, unit = prefixed(bounds.dry, found.dry_displacement.unit)
     figure, axes = new_figure(2, height=4.6)
     rows = (
         (bounds.rate, bounds.rate_first_order, bounds.rate_worst, "viscous rate β"),
