@@ -1,0 +1,266 @@
+"""How the friction rings after a slip begins, and whether it does so alike in both directions."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import Estimate, Result
+from stickslip.identify.motion import is_measured
+from stickslip.identify.strokes import Stroke, find_strokes
+from stickslip.record.record import Record
+from stickslip.statistics import FEW_CYCLES as FEW, mean_of_cycles, student
+
+Array = NDArray[np.float64]
+
+QUESTION = "the ringing after slip begins"
+SOON = 4  # after slip begins: a quarter of the stroke
+SLOW = 4  # degree of the polynomial that is not the ring
+STIFF = 8  # of the one taken off before the strongest line is looked for, which knows no ring to leave
+FASTER = 5.0  # cycles in that quarter: a slower ring is not told from the polynomial
+LEAST = 48  # samples in which a ring can be told
+SAMPLES = 5  # a cycle, at least
+MOST = 60  # strokes of a direction looked at, evenly chosen: their mode is known well enough
+PARTS = 20  # in which strokes are left out in turn, at most
+LOUD = 0.03  # of the sliding friction: a ring of a smaller amplitude is none
+EXPLAINED = 0.25  # of what the polynomial leaves: a mode that explains less is none
+ALIKE = 0.25  # of the strongest line's frequency: a mode that is farther off is another
+PADDED = 4  # times the samples of the spectrum
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlipRinging(Result):
+    """How the friction rings after a slip begins.
+
+    Attributes
+    ----------
+    forward, back : Estimate or None
+        Frequency [Hz]; None where a direction does not ring.
+    damping_forward, damping_back : Estimate or None
+        Damping ratio; about zero where the ring goes on, negative where it grows.
+    amplitude_forward, amplitude_back : Estimate or None
+        At the begin of the slip, over the sliding friction.
+    difference : Estimate or None
+        Frequency forward less back [Hz].
+    verdict : str
+        "higher forward", "higher back", "no difference can be told", "forward alone" or "back alone".
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    forward: Estimate | None
+    back: Estimate | None
+    damping_forward: Estimate | None
+    damping_back: Estimate | None
+    amplitude_forward: Estimate | None
+    amplitude_back: Estimate | None
+    difference: Estimate | None
+    verdict: str
+    status: str
+
+
+def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
+    r"""At which frequency does a measured friction ring once a slip has begun, and is it the same in both directions?
+
+    A contact that gives way, or the rig that holds it, is let go when the slip begins, and rings about the sliding
+    friction: :math:`f(t) = q(t) + \mathrm{Re}\, c\, e^{pt}`, with a polynomial q of degree 8 for the friction itself, over
+    the quarter of the stroke after the breakaway. The pole p is fitted to each stroke by least squares, with c and q
+    eliminated (variable projection; Golub and Pereyra 1973), from the strongest line of all strokes of its direction;
+    the frequency is :math:`\mathrm{Im}\, p / 2\pi`, the damping ratio :math:`-\mathrm{Re}\, p / |p|`. A direction rings
+    where most of its strokes do within 25 % of one frequency, by 3 % of the sliding friction or more. The interval
+    of the difference follows from both intervals (MOVER; Zou and Donner 2008).
+
+    Parameters
+    ----------
+    record : Record
+        With ``friction`` that was measured, and ``x`` (or ``theta``, or ``v``).
+    contact : {"ground", "base"}, optional
+        What the mass slides on; the ground, when not given.
+
+    Returns
+    -------
+    SlipRinging
+
+    Raises
+    ------
+    RecordError
+        A channel is missing, broken or too short; or friction came from a balance, whose smoothing rings by itself.
+    EstimateError
+        No stroke in which the contact slides, or "no ringing" after the slips of either direction.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> time = np.arange(8000) / 1000
+    >>> since, way = np.mod(time + 0.5, 1.0), np.sign(np.cos(np.pi * time))
+    >>> ring = np.where(way > 0, np.cos(2 * np.pi * 47 * since), np.cos(2 * np.pi * 54 * since))
+    >>> friction = way * (2 + 0.6 * np.exp(-since / 0.1) * ring)
+    >>> found = slip_ringing(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": friction}, fs=1000))
+    >>> round(found.forward.value, 1), round(found.back.value, 1), found.verdict
+    (47.0, 54.0, 'higher back')
+    """
+    record.require("friction", question=QUESTION)
+    if not is_measured(record, "friction"):
+        raise RecordError(
+            "friction came from a balance of forces", f"{QUESTION} needs one that was measured: smoothing rings itself",
+            "give the load cell's channel as friction",
+        )  # fmt: skip
+    strokes = find_strokes(record, contact=contact, question=QUESTION)
+    found = ringing_of(strokes.strokes, record.fs)
+    if found is None:
+        raise EstimateError(
+            f"no ringing: the friction of {len(strokes.strokes)} strokes swings about its level by less than "
+            f"{LOUD:.0%} of it, or in each stroke otherwise",
+            f"{QUESTION} is a line of {FASTER:g} cycles at least in the quarter of a stroke after the breakaway",
+            "sample faster, or look at the map",
+        )
+    return found
+
+
+def ringing_of(strokes: Sequence[Stroke], fs: float) -> SlipRinging | None:
+    """How the friction of some strokes rings; None where it does not."""
+    forward, back = (_direction([each for each in strokes if each.way == way], side, fs)
+                     for way, side in ((1, "forward"), (-1, "back")))  # fmt: skip
+    if forward is None and back is None:
+        return None
+    difference = None if forward is None or back is None else _difference(forward[0], back[0])
+    (f, z, a), (g, y, b) = forward or (None, None, None), back or (None, None, None)
+    flags = [each.status for each in (f, g) if each is not None and each.status != "ok"]
+    verdict = ("back alone" if f is None else "forward alone") if difference is None else _verdict(difference)
+    return SlipRinging(f, g, z, y, a, b, difference, verdict, flags[0] if flags else "ok")
+
+
+def _verdict(difference: Estimate) -> str:
+    low, high = difference.interval
+    return "higher forward" if low > 0 else "higher back" if high < 0 else "no difference can be told"
+
+
+def _difference(forward: Estimate, back: Estimate) -> Estimate:
+    """Forward less back, its interval by both intervals' halves in squares."""
+    value = forward.value - back.value
+    (low, high), (under, over) = forward.interval, back.interval
+    below, above = math.hypot(forward.value - low, over - back.value), math.hypot(high - forward.value, back.value - under)
+    flags = [each.status for each in (forward, back) if each.status != "ok"]
+    return Estimate(
+        "ringing after slip begins, forward less back", value, interval=(value - below, value + above),
+        sd=math.hypot(forward.sd, back.sd), unit="Hz", method="difference of both directions' means",
+        status=flags[0] if flags else "ok",
+    )  # fmt: skip
+
+
+def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimate, Estimate, Estimate] | None:
+    """Frequency, damping ratio and amplitude of the strokes of one direction; None where they do not ring alike."""
+    chosen = strokes[:: len(strokes) // MOST + 1]
+    cuts = [values for each in chosen if len(values := _after(each)) >= LEAST]
+    start = _strongest([_swings(values, STIFF) for values in cuts], fs)
+    if start is None or 2 * len(cuts) <= len(chosen):
+        return None
+    swings = [_swings(values, SLOW) for values in cuts]
+    turn = 2 * math.pi * start
+    mode = _mode(swings, np.array([-0.03 * turn, turn]), fs)
+    total = sum(float(each @ each) for each in swings)
+    amplitudes = [_amplitude(each, mode.x, fs) for each in swings]
+    if (
+        abs(mode.x[1] / turn - 1) > ALIKE
+        or float(mode.fun @ mode.fun) > (1 - EXPLAINED) * total
+        or np.median(amplitudes) < LOUD
+    ):
+        return None
+    parts = np.array_split(np.arange(len(swings)), min(len(swings), PARTS))
+    without = [
+        _told(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
+        for part in parts if len(parts) > 1
+    ]  # fmt: skip
+    checks = (f"{len(cuts)} strokes", f"amplitude {100 * np.median(amplitudes):.0f} % of the sliding friction")
+    frequency, damping = _jackknifed(_told(mode.x), np.reshape(without, (-1, 2)), len(cuts), side, checks)
+    amplitude = mean_of_cycles(
+        f"amplitude of that ringing over the friction, {side}", amplitudes, unit="1", method="at the begin of each slip"
+    )
+    return frequency, damping, amplitude
+
+
+def _jackknifed(
+    told: tuple[float, float], without: Array, count: int, side: str, checks: tuple[str, ...]
+) -> list[Estimate]:
+    """Frequency and damping ratio, as sure as the answers without some of the strokes agree."""
+    parts = len(without)
+    sd = np.sqrt((parts - 1) / parts * ((without - without.mean(axis=0)) ** 2).sum(axis=0)) if parts else [math.inf] * 2
+    few = f"only {count} stroke{'s' * (count > 1)} {side}: the interval is crude"
+    return [
+        Estimate.normal(
+            f"{what}, {side}", value, sd=float(each), unit=unit, quantile=student(max(parts - 1, 1)), checks=checks,
+            method="one decaying mode in all strokes, least squares; jackknife over strokes",
+            status="ok" if count >= FEW else few,
+        )
+        for what, unit, value, each in zip(
+            ("ringing after slip begins", "damping ratio of that ringing"), ("Hz", "1"), told, sd, strict=True
+        )
+    ]  # fmt: skip
+
+
+def _told(parameters: Array) -> tuple[float, float]:
+    """Frequency [Hz] and damping ratio of a pole."""
+    decay, turn = map(float, parameters)
+    return turn / (2 * math.pi), -decay / math.hypot(decay, turn)
+
+
+def _after(stroke: Stroke) -> Array:
+    """The friction in the quarter of the stroke after its breakaway, over the sliding friction."""
+    soon = (len(stroke.friction) - stroke.slip) // SOON
+    return stroke.friction[stroke.slip : stroke.slip + soon] / stroke.level
+
+
+@functools.lru_cache(maxsize=64)
+def _slow(count: int, degree: int) -> Array:
+    """Polynomials over some samples, orthonormal."""
+    return np.asarray(np.linalg.qr(np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, count), degree))[0])
+
+
+def _swings(values: Array, degree: int) -> Array:
+    slow = _slow(len(values), degree)
+    return np.asarray(values - slow @ (slow.T @ values))
+
+
+def _strongest(swings: Sequence[Array], fs: float) -> float | None:
+    """Frequency [Hz] of the strongest line of all strokes together."""
+    if not swings:
+        return None
+    longest = max(map(len, swings))
+    powers = np.sum([np.abs(np.fft.rfft(each, PADDED * longest)) ** 2 for each in swings], axis=0)
+    frequencies = np.fft.rfftfreq(PADDED * longest, 1 / fs)
+    allowed = (frequencies >= FASTER * fs / longest) & (frequencies <= fs / SAMPLES)
+    if not allowed.any() or powers[allowed].max() == 0:
+        return None
+    return float(frequencies[allowed][powers[allowed].argmax()])
+
+
+def _waves(parameters: Array, count: int, fs: float) -> Array:
+    """Cosine and sine of a decaying mode, less what a polynomial takes of them."""
+    wave = np.exp(complex(*parameters) * np.arange(count) / fs)
+    columns, slow = np.column_stack([wave.real, wave.imag]), _slow(count, SLOW)
+    return np.asarray(columns - slow @ (slow.T @ columns))
+
+
+def _mode(swings: Sequence[Array], start: Array, fs: float) -> Any:
+    """The one pole whose rings leave least of all strokes."""
+    from scipy.optimize import least_squares
+
+    def left(parameters: Array) -> Array:
+        rests = []
+        for each in swings:
+            basis = np.linalg.qr(_waves(parameters, len(each), fs))[0]
+            rests.append(each - basis @ (basis.T @ each))
+        return np.concatenate(rests)
+
+    return least_squares(left, start, x_scale=[start[1], start[1]], method="lm", max_nfev=60)
+
+
+def _amplitude(swings: Array, parameters: Array, fs: float) -> float:
+    return float(np.linalg.norm(np.linalg.lstsq(_waves(parameters, len(swings), fs), swings, rcond=None)[0]))
