@@ -74,6 +74,8 @@ def test_the_band_brake_rings_after_slip_begins(dataset: Sets) -> None:
     assert 41 < found.ringing_forward.value < 50
     assert found.ringing_back is not None
     assert 50 < found.ringing_back.value < 58
+    assert found.ringing_difference is not None
+    assert found.ringing_difference.interval[1] < 0
     assert found.ratio.value > 1.2  # the first peak, ring included
     assert "gives way" in found.status
 

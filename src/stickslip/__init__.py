@@ -131,6 +131,7 @@ if TYPE_CHECKING:
     )
     from stickslip.identify.mechanism import Mechanism as Mechanism, mechanism as mechanism
     from stickslip.identify.microslip import find_microslips as find_microslips
+    from stickslip.identify.slip_ringing import SlipRinging as SlipRinging, slip_ringing as slip_ringing
     from stickslip.identify.transition import Transition as Transition, transition as transition
     from stickslip.identify.transition_speed import (
         TransitionSpeed as TransitionSpeed,
@@ -211,6 +212,7 @@ _ROOMS = {
     "dyadic_map": "signals.wavelet", "stft_map": "signals.wavelet", "cone_of_influence": "signals.wavelet",
     "find_ridges": "signals.ridges", "local_maxima": "signals.ridges", "find_spikes": "signals.ridges",
     "Ridge": "signals.ridges", "LocalMaximum": "signals.ridges", "Spike": "signals.ridges",
+    "slip_ringing": "identify.slip_ringing", "SlipRinging": "identify.slip_ringing",
     "transition": "identify.transition", "Transition": "identify.transition",
     "find_microslips": "identify.microslip", "mechanism": "identify.mechanism", "Mechanism": "identify.mechanism",
     "time_frequency": "analysis.time_frequency", "TimeFrequency": "analysis.time_frequency",

@@ -15,7 +15,9 @@ from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Result
 from stickslip.identify.mechanism import UNTOLD, Mechanism, mechanism_of
 from stickslip.identify.microslip import MicroSlips, microslips_of
+from stickslip.identify.motion import is_measured
 from stickslip.identify.ringing import Ringing, find_ringing
+from stickslip.identify.slip_ringing import SlipRinging, slip_ringing
 from stickslip.identify.transition import Transition, transition_of
 from stickslip.record.record import Record
 from stickslip.signals.ridges import Ridge, Spike, find_ridges, find_spikes
@@ -55,6 +57,8 @@ class TimeFrequency(Result):
         What the sticks of an acceleration tell.
     mechanism : Mechanism or None
         The mechanism that they show.
+    slip_ringing : SlipRinging or None
+        How a measured friction rings after slips begin.
     notes : tuple of str
         What could not be asked, and why.
     """
@@ -69,12 +73,13 @@ class TimeFrequency(Result):
     transition: Transition | None = None
     microslips: MicroSlips | None = None
     mechanism: Mechanism | None = None
+    slip_ringing: SlipRinging | None = None
     notes: tuple[str, ...] = ()
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Every number found in the sticks."""
-        answers = (self.transition, self.microslips)
+        """Every number found in the sticks, and after the slips begin."""
+        answers = (self.transition, self.microslips, self.slip_ringing)
         return tuple(each for answer in answers if answer is not None for each in answer.estimates)
 
     def to_dict(self) -> dict[str, Any]:
@@ -89,6 +94,7 @@ class TimeFrequency(Result):
             "channel": self.channel,
             "mechanism": None if self.mechanism is None else self.mechanism.to_dict(),
             "estimates": [estimate.to_dict() for estimate in self.estimates],
+            "slip_ringing": None if self.slip_ringing is None else self.slip_ringing.verdict,
             "agreement": None if self.transition is None else self.transition.agreement,
             "sticks": [] if self.transition is None else [_stick(stick) for stick in self.transition.sticks],
             "micro_slips": [] if self.microslips is None else [vars(event) for event in self.microslips.events],
@@ -117,7 +123,7 @@ def time_frequency(
         At one rate; or the parts of a long one in order, as :func:`read_blocks` yields them, to be held one at a time.
     channel : str, optional
         Which channel; the first of a, sound, force, load, friction, v, x, or any other, when not given. The sticks are
-        asked of an acceleration.
+        asked of an acceleration, the ringing after slips begin of a measured friction beside a motion.
     frequencies : array_like, optional
         As in :func:`wavelet_map`.
     wavelet_frequency : float
@@ -188,6 +194,9 @@ def _spikes_and_sticks(
             notes.append(f"{what}: {error}")
             return None
 
+    if name == "friction" and is_measured(record, name) and any(each in record for each in ("x", "v", "theta")):
+        found["slip_ringing"] = asked("Ringing after slips", lambda: slip_ringing(record))
+        return found, notes
     if record.channels[name].unit != "m/s^2":
         notes.append(f"Channel {name} is no acceleration: what the sticks tell was not asked.")
         return found, notes

@@ -49,11 +49,12 @@ def _print_table(
         console.print(escape(spoken(sentence)))
     truth = summary.has_truth
     headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")
-    rows = (
+    rows = [
         [line.name, line.value, line.interval, *([line.true or "-"] if truth else []), line.status]
         for line in summary.lines
-    )
-    console.print(table(headings, rows))
+    ]
+    if rows:
+        console.print(table(headings, rows))
     if summary.verdicts:
         console.print(table(("motion tried", "verdict"), summary.verdicts))
     for note in summary.notes:

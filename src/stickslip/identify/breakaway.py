@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.identify.force import FUSIONS
-from stickslip.identify.motion import forcing_frequency, is_measured
+from stickslip.identify.motion import is_measured
+from stickslip.identify.slip_ringing import ringing_of
 from stickslip.identify.strokes import FAST, Stroke, find_strokes
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
@@ -26,13 +27,8 @@ TRAVEL = 0.05  # of a stroke: how far the start of a slip is followed
 BEFORE = 5  # a stick's last fifth tells what it bears at its end
 ROWS = 256  # of the start of a slip that are looked at
 LEAST = 8  # samples in which a stick's end and a slip's start can be told
-RING = 16  # samples in which a ring can be told
-SLOW = 8  # degree of the polynomial that is not the ring
-SOON = 4  # after slip begins: a quarter of the stroke
-LOUD = 0.03  # of the sliding friction: a ring of a smaller amplitude is none
 STEADY = 0.3  # of the sliding friction: one that swings by more is no friction to be quoted
 QUARTILE = 0.6744897501960817  # of the normal distribution
-ALIKE = 0.25  # of the frequency by which rings of one contact differ
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,8 +42,10 @@ class Breakaway(Result):
     ratio : Estimate
         That over the sliding friction of the same stroke, of both directions.
     ringing_forward, ringing_back : Estimate or None
-        Frequency [Hz] at which the friction swings after slip has begun, where it was measured and does by
-        3 % of its level or more.
+        Frequency [Hz] at which the friction rings after slip has begun, where it was measured and does; more of it
+        tells :func:`slip_ringing`.
+    ringing_difference : Estimate or None
+        Forward less back [Hz].
     swing_forward, swing_back : Estimate or None
         How much the friction swings about its level while it slides, over that level; a friction that is steady enough
         to be called one does so by less than 30 %.
@@ -62,6 +60,7 @@ class Breakaway(Result):
     ratio: Estimate
     ringing_forward: Estimate | None
     ringing_back: Estimate | None
+    ringing_difference: Estimate | None
     swing_forward: Estimate | None
     swing_back: Estimate | None
     count: int
@@ -138,14 +137,14 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     )  # fmt: skip
     sliding = float(np.median([each.level for each, *_ in found]))
     ratio = _widened(ratio, (unsure + above) / sliding, unsure / sliding)
-    measured = [each for each, *_ in found if is_measured(record, "friction")]  # a balance rings by its own smoothing
-    rings = [_ringing([each for each in measured if each.way == way], side, fs) for way, side in SIDES]
+    rings = ringing_of(strokes.strokes, fs) if is_measured(record, "friction") else None  # a balance rings by itself
+    heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
     swings = [_swing([each for each, *_ in found if each.way == way], side) for way, side in SIDES]
     gives = "the contact gives way before it slips: the first peak holds the ring that follows"
     status = "ok" if 2 * rested > len(found) else gives
     flagged = [replace(each, status=status) if each is not None and each.status == "ok" else each for each in levels]
     return Breakaway(
-        flagged[0], flagged[1], replace(ratio, status=status) if ratio.status == "ok" else ratio, rings[0], rings[1],
+        flagged[0], flagged[1], replace(ratio, status=status) if ratio.status == "ok" else ratio, *heard,
         swings[0], swings[1], len(found), status,
     )  # fmt: skip
 
@@ -237,31 +236,3 @@ def _swing(strokes: Sequence[Stroke], side: str) -> Estimate | None:
     )
     swings = f"the friction swings by {100 * found.value:.0f} % of its level while it slides: a vibration of the rig"
     return found if found.value < STEADY else replace(found, status=f"{swings} or a faulty record, no steady friction")
-
-
-def _ringing(strokes: Sequence[Stroke], side: str, fs: float) -> Estimate | None:
-    """How fast the friction swings after slip has begun, where it does, and in most strokes alike."""
-    lines = np.array([line for stroke in strokes if (line := _line(stroke, fs))]).reshape(-1, 2)
-    if not len(lines):
-        return None
-    alike = np.abs(lines[:, 0] / np.median(lines[:, 0]) - 1) < ALIKE
-    loud = float(np.median(lines[:, 1]))
-    if loud < LOUD or 2 * alike.sum() <= len(strokes):
-        return None
-    return mean_of_cycles(
-        f"ringing after slip begins, {side}", lines[alike, 0], unit="Hz", method="strongest line after each breakaway",
-        checks=(f"in {alike.sum()} of {len(strokes)} strokes", f"amplitude {100 * loud:.0f} % of the sliding friction"),
-    )  # fmt: skip
-
-
-def _line(stroke: Stroke, fs: float) -> tuple[float, float] | None:
-    """Frequency and amplitude, over the sliding friction, of the strongest line soon after the breakaway."""
-    after = stroke.friction[stroke.slip : stroke.slip + (len(stroke.friction) - stroke.slip) // SOON]
-    if len(after) < RING:
-        return None
-    rows = np.linspace(-1, 1, len(after))
-    swings = after - np.polynomial.Polynomial.fit(rows, after, SLOW)(rows)
-    frequency = forcing_frequency(swings, fs).value
-    phase = 2 * np.pi * frequency / fs * np.arange(len(after))
-    wave = np.column_stack([np.cos(phase), np.sin(phase)])
-    return frequency, float(np.linalg.norm(np.linalg.lstsq(wave, swings, rcond=None)[0])) / stroke.level

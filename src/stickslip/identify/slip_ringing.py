@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from stickslip.estimate import Estimate, Result
 from stickslip.identify.motion import is_measured
 from stickslip.identify.strokes import Stroke, find_strokes
 from stickslip.record.record import Record
-from stickslip.statistics import FEW_CYCLES as FEW, mean_of_cycles, student
+from stickslip.statistics import FEW_CYCLES, mean_of_cycles, student
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class SlipRinging(Result):
     damping_forward, damping_back : Estimate or None
         Damping ratio; about zero where the ring goes on, negative where it grows.
     amplitude_forward, amplitude_back : Estimate or None
-        At the begin of the slip, over the sliding friction.
+        At the breakaway, or the first peak after it, over the sliding friction.
     difference : Estimate or None
         Frequency forward less back [Hz].
     verdict : str
@@ -70,12 +70,13 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
     r"""At which frequency does a measured friction ring once a slip has begun, and is it the same in both directions?
 
     A contact that gives way, or the rig that holds it, is let go when the slip begins, and rings about the sliding
-    friction: :math:`f(t) = q(t) + \mathrm{Re}\, c\, e^{pt}`, with a polynomial q of degree 8 for the friction itself, over
-    the quarter of the stroke after the breakaway. The pole p is fitted to each stroke by least squares, with c and q
-    eliminated (variable projection; Golub and Pereyra 1973), from the strongest line of all strokes of its direction;
-    the frequency is :math:`\mathrm{Im}\, p / 2\pi`, the damping ratio :math:`-\mathrm{Re}\, p / |p|`. A direction rings
-    where most of its strokes do within 25 % of one frequency, by 3 % of the sliding friction or more. The interval
-    of the difference follows from both intervals (MOVER; Zou and Donner 2008).
+    friction: :math:`f(t) = q(t) + \mathrm{Re}\, c\, e^{pt}`, with a polynomial q of degree 4 for the friction's own
+    course, over the quarter of the stroke after the breakaway. One pole p is fitted to all strokes of a direction by
+    least squares, with c and q of each stroke eliminated (variable projection; Golub and Pereyra 1973), from the
+    strongest line of them all; the frequency is :math:`\mathrm{Im}\, p / 2\pi`, the damping ratio
+    :math:`-\mathrm{Re}\, p / |p|`, each as sure as the answers without some of the strokes agree (jackknife). A
+    direction rings where the mode explains a quarter of the swings or more, by 3 % of the sliding friction at least.
+    The interval of the difference follows from both intervals (MOVER; Zou and Donner 2008).
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
         raise EstimateError(
             f"no ringing: the friction of {len(strokes.strokes)} strokes swings about its level by less than "
             f"{LOUD:.0%} of it, or in each stroke otherwise",
-            f"{QUESTION} is a line of {FASTER:g} cycles at least in the quarter of a stroke after the breakaway",
+            f"{QUESTION} needs {FASTER:g} cycles at least in the quarter of a stroke after the breakaway",
             "sample faster, or look at the map",
         )
     return found
@@ -146,7 +147,10 @@ def _difference(forward: Estimate, back: Estimate) -> Estimate:
     """Forward less back, its interval by both intervals' halves in squares."""
     value = forward.value - back.value
     (low, high), (under, over) = forward.interval, back.interval
-    below, above = math.hypot(forward.value - low, over - back.value), math.hypot(high - forward.value, back.value - under)
+    below, above = (
+        math.hypot(forward.value - low, over - back.value),
+        math.hypot(high - forward.value, back.value - under),
+    )
     flags = [each.status for each in (forward, back) if each.status != "ok"]
     return Estimate(
         "ringing after slip begins, forward less back", value, interval=(value - below, value + above),
@@ -178,10 +182,19 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
         _told(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
         for part in parts if len(parts) > 1
     ]  # fmt: skip
-    checks = (f"{len(cuts)} strokes", f"amplitude {100 * np.median(amplitudes):.0f} % of the sliding friction")
+    other = _told(_mode([_swings(values, STIFF) for values in cuts], mode.x, fs, STIFF).x)[0]
+    checks = (f"{len(cuts)} strokes", f"{other:.4g} Hz beside a polynomial of degree {STIFF}")
     frequency, damping = _jackknifed(_told(mode.x), np.reshape(without, (-1, 2)), len(cuts), side, checks)
+    if not frequency.interval[0] <= other <= frequency.interval[1]:
+        mixed = (
+            f"the friction's own course takes part of the ring: beside a polynomial of degree {STIFF} {other:.4g} Hz"
+        )
+        frequency = replace(frequency, status=mixed)
     amplitude = mean_of_cycles(
-        f"amplitude of that ringing over the friction, {side}", amplitudes, unit="1", method="at the begin of each slip"
+        f"amplitude of that ringing over the friction, {side}",
+        amplitudes,
+        unit="1",
+        method="where each slip begins, mean of strokes",
     )
     return frequency, damping, amplitude
 
@@ -197,7 +210,7 @@ def _jackknifed(
         Estimate.normal(
             f"{what}, {side}", value, sd=float(each), unit=unit, quantile=student(max(parts - 1, 1)), checks=checks,
             method="one decaying mode in all strokes, least squares; jackknife over strokes",
-            status="ok" if count >= FEW else few,
+            status="ok" if count >= FEW_CYCLES else few,
         )
         for what, unit, value, each in zip(
             ("ringing after slip begins", "damping ratio of that ringing"), ("Hz", "1"), told, sd, strict=True
@@ -241,21 +254,21 @@ def _strongest(swings: Sequence[Array], fs: float) -> float | None:
     return float(frequencies[allowed][powers[allowed].argmax()])
 
 
-def _waves(parameters: Array, count: int, fs: float) -> Array:
+def _waves(parameters: Array, count: int, fs: float, degree: int = SLOW) -> Array:
     """Cosine and sine of a decaying mode, less what a polynomial takes of them."""
     wave = np.exp(complex(*parameters) * np.arange(count) / fs)
-    columns, slow = np.column_stack([wave.real, wave.imag]), _slow(count, SLOW)
+    columns, slow = np.column_stack([wave.real, wave.imag]), _slow(count, degree)
     return np.asarray(columns - slow @ (slow.T @ columns))
 
 
-def _mode(swings: Sequence[Array], start: Array, fs: float) -> Any:
+def _mode(swings: Sequence[Array], start: Array, fs: float, degree: int = SLOW) -> Any:
     """The one pole whose rings leave least of all strokes."""
     from scipy.optimize import least_squares
 
     def left(parameters: Array) -> Array:
         rests = []
         for each in swings:
-            basis = np.linalg.qr(_waves(parameters, len(each), fs))[0]
+            basis = np.linalg.qr(_waves(parameters, len(each), fs, degree))[0]
             rests.append(each - basis @ (basis.T @ each))
         return np.concatenate(rests)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -169,7 +170,8 @@ def _signal(axes: Axes, record: Record, channel: str, times: Array) -> None:
     values = record[channel][inside]
     factor, unit = prefixed(values, record.channels[channel].unit)
     axes.plot(*envelope(record.time[inside], factor * values), color=BLUE, linewidth=0.8)
-    axes.set_ylabel(axis_label(record.channels[channel].quantity or channel, unit, between="\n"))
+    words = re.split("[,(]", record.channels[channel].quantity or channel)[0].strip()  # the axis is short
+    axes.set_ylabel(axis_label(words, unit, between="\n"))
 
 
 def _grid(axes: Axes, wavelets: xr.DataArray, steps: Array, style: str) -> Any:

@@ -15,6 +15,7 @@ from stickslip.estimate import NORMAL_95, Estimate, decimals
 from stickslip.identify.breakaway import Breakaway
 from stickslip.identify.presliding import Presliding
 from stickslip.identify.pull import Pull
+from stickslip.identify.slip_ringing import SlipRinging
 from stickslip.plot.style import prefixed
 
 RARELY = 0.005  # of the time
@@ -105,10 +106,12 @@ def ringing_told(found: TimeFrequency) -> Iterator[str]:
     if found.microslips is not None:
         slips = found.microslips
         yield f"{len(slips.events)} micro-slips are found in {len(slips.counts)} sticks: {slips.kind}."
+    if found.slip_ringing is not None:
+        yield from _of_slip_ringing(found.slip_ringing)
     if found.ridges:
         ridge = found.ridges[0]
-        low, high = (number(float(end(ridge.frequency)), 0.0, "Hz") for end in (np.min, np.max))
-        span = low if low == high else f"{low} to {high}"
+        low, middle, high = (number(float(end(ridge.frequency)), 0.0, "Hz") for end in (np.min, np.median, np.max))
+        span = middle if low == high else f"near {middle} ({low} to {high})"
         yield f"The strongest ridge of the map: {span}, from {ridge.time[0]:.4g} s to {ridge.time[-1]:.4g} s."
     if found.spikes:
         groups = found.spikes[-1].group + 1
@@ -203,6 +206,22 @@ def _of_breakaway(found: Breakaway) -> Iterator[str]:
     rings = [each for each in (found.ringing_forward, found.ringing_back) if each is not None]
     if rings:
         yield f"After slip begins it rings at {' and '.join(f'{value_of(e)} {e.name.split()[-1]}' for e in rings)}."
+    apart = found.ringing_difference
+    if apart is not None and not apart.interval[0] <= 0 <= apart.interval[1]:
+        yield f"The two directions ring apart by {value_of(apart)} (95 % sure: {interval_of(apart)})."
+
+
+def _of_slip_ringing(found: SlipRinging) -> Iterator[str]:
+    sides = [
+        f"{value_of(frequency)} {frequency.name.split()[-1]} with a damping ratio of {value_of(damping)}"
+        for frequency, damping in ((found.forward, found.damping_forward), (found.back, found.damping_back))
+        if frequency is not None and damping is not None
+    ]
+    yield f"After slip begins the friction rings at {' and '.join(sides)}{'' if found.difference else ' alone'}."
+    if found.difference is not None:
+        told = found.verdict if found.verdict.startswith("no") else f"it is {found.verdict}"
+        low_high = interval_of(found.difference)
+        yield f"Between the directions {told}: forward less back {value_of(found.difference)} (95 % sure: {low_high})."
 
 
 def _of_contact(stiffness: Estimate, damping: Estimate | None) -> str:
