@@ -45,7 +45,7 @@ def test_frequency_damping_and_difference_of_closed_forms() -> None:
         assert getattr(found, name).value == pytest.approx(true, rel=0.04), name
     assert found.forward is not None
     assert found.amplitude_forward is not None
-    assert 0.3 * np.exp(-10 / FORWARD) < found.amplitude_forward.value < 0.3  # slip is seen at a peak of the ring
+    assert 0.7 * 0.3 < found.amplitude_forward.value < 0.3  # slip is seen at a peak of the ring
     assert found.forward.value == pytest.approx(FORWARD, rel=3e-3)
     assert found.verdict == "higher back"
 
