@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from rigs import RIG, measured, told
 from stickslip.errors import EstimateError, RecordError
 
 MASS, STIFFNESS, FS = 3.08, 1191.0, 500.0
@@ -29,6 +30,22 @@ def test_static_friction_is_found_whether_it_is_higher_or_not(static: float) -> 
         assert each.value == pytest.approx(static, rel=0.03)
     assert found.ringing_forward is None
     assert found.status == "ok"
+
+
+def test_a_pull_on_a_mass_that_rings_on_its_contact_is_flagged() -> None:
+    """The true friction is 1.1 N, at rest as in sliding; what pulls when the mass slips is 9 % less."""
+    record = told(measured(2.5)[0])
+    pulled = ss.breakaway(ss.friction_force(record, method="F", **RIG))
+    assert "rings on its contact" in pulled.status
+    fused = ss.breakaway(ss.friction_force(record, method="fusion", **RIG))
+    assert fused.status == "ok"
+    assert fused.ratio.value == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_slip_at_the_end_of_its_stroke_has_no_swing() -> None:
+    found = ss.breakaway(ss.friction_force(told(measured(8.7, 0.0, 3.0)[0]), method="F1", **RIG))
+    for swing in (found.swing_forward, found.swing_back):
+        assert swing is None or np.isfinite(swing.value)
 
 
 def test_breakaway_does_not_hang_on_units_of_motion_or_on_its_sign() -> None:

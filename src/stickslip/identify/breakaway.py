@@ -142,6 +142,11 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     swings = [_swing([each for each, *_ in found if each.way == way], side) for way, side in SIDES]
     gives = "the contact gives way before it slips: the first peak holds the ring that follows"
     status = "ok" if 2 * rested > len(found) else gives
+    if status == "ok" and pull is not None and ratio.interval[1] < 1:
+        status = (
+            "below the sliding friction: either that grows with speed, or the mass still rings on its contact when it "
+            'slips, and the pull is not what it bears: take friction_force(record, ..., method="fusion")'
+        )
     flagged = [replace(each, status=status) if each is not None and each.status == "ok" else each for each in levels]
     return Breakaway(
         flagged[0], flagged[1], replace(ratio, status=status) if ratio.status == "ok" else ratio, *heard,
@@ -224,13 +229,14 @@ def _summed(values: Array) -> Array:
 
 def _swing(strokes: Sequence[Stroke], side: str) -> Estimate | None:
     """Median deviation of the friction from its median while it slides, as a normal law's standard deviation."""
-    if not strokes:
-        return None
     shares = []
     for stroke in strokes:
-        fast = np.gradient(stroke.displacement)[stroke.slip :]
-        friction = stroke.friction[stroke.slip :][fast > FAST * fast.max()]
-        shares.append(float(np.median(np.abs(friction - np.median(friction)))) / QUARTILE / stroke.level)
+        speed = np.gradient(stroke.displacement)
+        friction = stroke.friction[stroke.slip :][speed[stroke.slip :] > FAST * speed.max()]
+        if len(friction):
+            shares.append(float(np.median(np.abs(friction - np.median(friction)))) / QUARTILE / stroke.level)
+    if not shares:
+        return None
     found = mean_of_cycles(
         f"swing of the friction while sliding {side}", shares, unit="1", method="median deviation from the median"
     )
