@@ -309,3 +309,13 @@ def test_it_can_be_drawn() -> None:
             assert [ax.get_ylabel() for ax in figure.axes][1] == "frequency [Hz]"
     with pytest.raises(RecordError, match="spans some decibel"):
         ss.plot_wavelet(maps[0], span=-3)
+
+
+def test_no_frequency_is_refused_and_a_single_one_is_drawn() -> None:
+    record = ss.Record.of({"a": np.sin(0.3 * np.arange(1000))}, fs=1000)
+    with pytest.raises(RecordError, match="positive and rise"):
+        ss.wavelet_map(record, "a", frequencies=[])
+    single = ss.wavelet_map(record, "a", frequencies=[45.0])
+    assert len(ss.plot_wavelet(single, record=record).axes) == 3
+    with pytest.raises(RecordError, match="two frequencies"):
+        ss.plot_wavelet(single, style="lines")

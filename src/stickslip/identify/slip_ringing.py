@@ -154,7 +154,7 @@ def _difference(forward: Estimate, back: Estimate) -> Estimate:
     flags = [each.status for each in (forward, back) if each.status != "ok"]
     return Estimate(
         "ringing after slip begins, forward less back", value, interval=(value - below, value + above),
-        sd=math.hypot(forward.sd, back.sd), unit="Hz", method="difference of both directions' means",
+        sd=math.hypot(forward.sd, back.sd), unit="Hz", method="difference of both directions",
         status=flags[0] if flags else "ok",
     )  # fmt: skip
 
@@ -205,7 +205,7 @@ def _jackknifed(
     """Frequency and damping ratio, as sure as the answers without some of the strokes agree."""
     parts = len(without)
     sd = np.sqrt((parts - 1) / parts * ((without - without.mean(axis=0)) ** 2).sum(axis=0)) if parts else [math.inf] * 2
-    few = f"only {count} stroke{'s' * (count > 1)} {side}: the interval is crude"
+    few = f"only {count} stroke{'s' * (count > 1)} a direction: the interval is crude"
     return [
         Estimate.normal(
             f"{what}, {side}", value, sd=float(each), unit=unit, quantile=student(max(parts - 1, 1)), checks=checks,

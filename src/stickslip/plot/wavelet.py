@@ -58,7 +58,7 @@ def plot_wavelet(
     Raises
     ------
     RecordError
-        A span or number of levels that is not positive, or a style that is not known.
+        A span or number of levels that is not positive, a style that is not known, or lines through one frequency.
 
     Examples
     --------
@@ -70,6 +70,10 @@ def plot_wavelet(
     """
     from matplotlib.figure import Figure
 
+    if style == "lines" and wavelets.ndim == 2 and wavelets.sizes["frequency"] < 2:
+        raise RecordError(
+            "a map of one frequency", "contour lines need two frequencies at least", 'leave style="filled"'
+        )
     if not (span > 0 and levels >= 2 and style in ("filled", "lines")):
         raise RecordError(
             f"span = {span}, levels = {levels}, style = '{style}'",
@@ -218,7 +222,8 @@ def _cone(axes: Axes, wavelets: xr.DataArray) -> None:
             linewidth=0.0,
         )  # fmt: skip
         axes.plot(edge + sign * cone, frequencies, color=INK, linewidth=0.8)
-    axes.set_ylim(frequencies[0], frequencies[-1])
+    if len(frequencies) > 1:
+        axes.set_ylim(frequencies[0], frequencies[-1])
 
 
 def _plain_ticks(axes: Axes) -> None:

@@ -496,7 +496,13 @@ def _grid(
         wanted = np.array([lowest / LONGEST, HIGHEST * fs])
     else:
         wanted = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    if wanted.ndim != 1 or not np.isfinite(wanted).all() or (wanted <= 0).any() or (np.diff(wanted) <= 0).any():
+    if (
+        wanted.ndim != 1
+        or not wanted.size
+        or not np.isfinite(wanted).all()
+        or (wanted <= 0).any()
+        or (np.diff(wanted) <= 0).any()
+    ):
         raise RecordError(
             f"frequencies = {_shortly(wanted)}", "they are positive and rise", "give the lowest and the highest in Hz"
         )
