@@ -20,6 +20,7 @@ from stickslip.record.channels import Channel
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 from stickslip.signals.differentiate import smooth
+from stickslip.signals.turns import turning_points
 from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]
@@ -258,17 +259,9 @@ def _slide(place: Array, give: float, share: Array) -> None:
 
 def _turns(place: Array, least: float) -> NDArray[np.intp]:
     """Where a motion turns back, after it went `least` at least."""
-    found: list[int] = []
-    low = high = 0
-    rising = 0
-    for row, value in enumerate(place):
-        high = row if value > place[high] else high
-        low = row if value < place[low] else low
-        if rising >= 0 and place[high] - value > least:
-            found, rising, low = [*found, high] if rising else found, -1, row
-        elif rising <= 0 and value - place[low] > least:
-            found, rising, high = [*found, low] if rising else found, 1, row
-    return np.array(found, dtype=np.intp)
+    rows = np.empty(len(place), dtype=np.intp)
+    count = turning_points(place, least, rows)
+    return rows[1 : max(1, count - 1)]  # without the first and the last extreme, before which it may have gone less
 
 
 def _by_accelerometer(record: Record) -> Estimate | None:
