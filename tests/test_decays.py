@@ -113,6 +113,8 @@ def test_every_file_that_can_not_answer_has_its_reason(release):
         (("forced.csv", *READ), 1, "a free decay dies away"),
         (("release.csv", *READ, "--stiffness", "-3"), 2, "stiffness"),
         (("release.csv", *READ, "--method", "guess"), 2, "guess"),
+        (("release.csv", *READ, "--repair", "drift"), 2, "--repair drift of a free decay"),
+        (("release.csv", *READ, "--repair", "drift:x"), 2, "--repair drift of a free decay"),
         (("release.csv", "--channels", "pressure=pos [mm]"), 1, "read from x, theta, v or a"),
         (("nowhere.csv",), 2, "nowhere.csv"),
         (("release.csv", *READ, "--channel", "v"), 1, "channel v is missing"),
@@ -339,3 +341,12 @@ def test_a_motion_rejected_by_chance_is_not_denied_as_a_fact():
     assert "but weakly (p = 0.01)" in told
     assert "friction of another kind too" not in told
     assert all("p = 0)" not in verdict for _, _, verdict in found.motion.candidates)
+
+
+def test_what_no_repair_bridges_is_not_sent_to_a_repair():
+    values = np.asarray(free_decay()[0]).copy()
+    values[300:380] = np.nan
+    with pytest.raises(ss.RecordError, match=r"too many in a row .* keep a part without them with record.rows\(\)"):
+        ss.analyze_decay(ss.Record.of({"x": values}, fs=100))
+    with pytest.raises(ss.RecordError, match="look at its cable"):
+        ss.analyze_decay(ss.Record.of({"x": np.full(400, np.nan)}, fs=100))

@@ -113,3 +113,14 @@ def test_a_coarse_encoder_feigns_no_friction(step: float, noise: float, counts: 
     found = ss.choose_motion(ss.Record.of({"x": np.round(x / step) * (1 if counts else step)}, fs=200))
     assert (found.model, found.status) == ("both", "ok")
     assert found.dry_displacement_any.includes(0.02 / (step if counts else 1))
+
+
+def test_dry_friction_beyond_doubt_stays_so_whichever_motion_it_was() -> None:
+    """Friction that may rise towards rest shares the dry friction with the rise, and never takes it all."""
+    x = free_decay(TIMES, [20, 0, 0.001, 0, 0.03, 0, 0, 0, 0, 0, 0.5, 0])[0]
+    x += 3e-5 * np.random.default_rng(1).standard_normal(TIMES.size)
+    found = ss.choose_motion(ss.Record.of({"x": x}, fs=200))
+    assert "stribeck" in [each.name for each in found.choice.kept]
+    low, high = found.dry_displacement_any.interval
+    assert 0.4e-3 < low < 1e-3 < high < 1.1e-3
+    assert found.damping_ratio_any.interval[1] < 0.005

@@ -57,6 +57,12 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options:
     """
     asked = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
     rig = rig_of(**options)
+    if any(each.partition(":")[0] == "drift" for each in rig.repair):
+        raise ss.ModelError(
+            "--repair drift of a free decay",
+            "a drift is told from a steady oscillation, and would take what friction does for drift",
+            "leave it out: what drifts is said, and the whole waveform bears it",
+        )
     groups = [group for argument in files for group in groups_of(argument)]
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
     asked |= {key: asked[key] or getattr(rig, key) for key in ("mass", "stiffness")}

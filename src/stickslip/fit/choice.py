@@ -147,6 +147,17 @@ class Candidate:
         reach = student(freedom) * sd
         return direction, -min(reach, value), min(reach, room)
 
+    @cached_property
+    def _yielding(self) -> float:
+        """How far the dry friction ``x_k`` gives way, over itself, to a rise ``sigma`` by one.
+
+        Their product is at work: ``x_k (1 + sigma s)`` stays, so ``x_k`` falls as a hyperbola and never to zero.
+        """
+        row, dry = self._influences.get("dry_displacement"), self.fitted.value("dry_displacement")
+        if self.fitted.added != "rise" or row is None or dry <= 0:
+            return 0.0
+        return max(0.0, float(row @ self._term[0])) / dry
+
     def estimate(self, parameter: str, *, name: str | None = None, unit: str = "1", factor: float = 1.0) -> Estimate:
         """One of its parameters with the interval that holds if this is the motion; exactly zero where it has none."""
         row = self._influences.get(parameter)
@@ -160,6 +171,7 @@ class Candidate:
         else:
             sd, freedom = self.noise.along(row)
             direction, below, above = self._term
+            above /= 1 + above * self._yielding
             moves = [-float(row @ direction) * end for end in (below, above)]
             reach = student(freedom) * sd
             low, high = value - math.hypot(reach, min(0.0, *moves)), value + math.hypot(reach, max(0.0, *moves))

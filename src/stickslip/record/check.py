@@ -218,7 +218,7 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
     faults = []
     if lost.any():
         what = _several(int(lost.sum()), "value that is not a number", "values that are not numbers")
-        faults.append(_fault("missing", name, flaws.runs_of(lost), what, _cure(values), "error"))
+        faults.append(_fault("missing", name, flaws.runs_of(lost), what, cure(values), "error"))
     if lost.all() or len(values) < 3:
         return faults
     if lost.any():
@@ -232,7 +232,7 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
     return faults + [fault for fault in _shape_faults(name, unit, values) if not _inside(fault.rows, lost)]
 
 
-def _cure(values: Array) -> str:
+def cure(values: Array) -> str:
     """What to do about values that are not numbers: fill short runs, cut off those at an end, keep a part else."""
     numbers = np.flatnonzero(np.isfinite(values))
     if not len(numbers):

@@ -233,6 +233,8 @@ class Record:
         for name in names:
             bad = np.flatnonzero(~np.isfinite(self.samples[name]))
             if len(bad):
+                from stickslip.record.check import cure
+
                 many = (
                     f"{len(bad)} values that are not numbers, the first"
                     if len(bad) > 1
@@ -241,7 +243,7 @@ class Record:
                 raise RecordError(
                     f"channel {name} has {many} at row {bad[0]}",
                     f"{question} needs numbers throughout",
-                    "see record.check() and fill them with fill_missing(record)",
+                    f"see record.check(): {cure(self.samples[name])}",
                 )
 
     # ---- deriving

@@ -57,6 +57,12 @@ def interval_of(estimate: Estimate) -> str:
     if low == high:
         return "no scatter"
     factor, text, digits = _scale(estimate)
+    while (
+        digits < FIGURES
+        and low <= estimate.value <= high
+        and not (round(factor * low, digits) <= factor * estimate.value <= round(factor * high, digits))
+    ):  # an end that is cut to fewer digits would exclude the value
+        digits += 1
     ends = f"{factor * low:.{digits}f}", f"{factor * high:.{digits}f}"
     return f"{ends[0]} to {ends[1]}{text}" if ends[0] != ends[1] else "within its last digit"
 
