@@ -350,3 +350,23 @@ def test_what_no_repair_bridges_is_not_sent_to_a_repair():
         ss.analyze_decay(ss.Record.of({"x": values}, fs=100))
     with pytest.raises(ss.RecordError, match="look at its cable"):
         ss.analyze_decay(ss.Record.of({"x": np.full(400, np.nan)}, fs=100))
+
+
+def test_the_release_is_told_by_one_number_everywhere():
+    from stickslip.reports.decay import headline
+    from stickslip.reports.words import value_of
+
+    values, fs, _ = free_decay(hold=1.0)
+    noisy = values + 1e-3 * np.random.default_rng(1).standard_normal(len(values))
+    for motion, words in (
+        (noisy, ("begins at", "release time")),
+        (noisy[120:], ("under way when the record begins (it is fitted from", "time of the first turn")),
+        (np.clip(noisy, -0.7, 0.7), ("(swings are left out: it is fitted from", "time of the first turn")),
+    ):
+        found = ss.analyze_decay(ss.Record.of({"x": motion}, fs=fs))
+        begin, far = found.waveform.release_time, found.waveform.amplitude
+        sentence = next(each for each in headline(found) if "extremes from" in each)
+        assert words[0] in sentence
+        assert begin.name == words[1]
+        assert f"at {value_of(begin)}" in sentence
+        assert f"from {value_of(far, abs(far.value))}" in sentence

@@ -34,9 +34,10 @@ class DecayFit(Result):
         Of the first release, as the two that follow: rest position in the record's zero [m or rad]; for velocity and
         acceleration the sensor's offset.
     release_time : Estimate
-        When the mass was let go [s]; in a record that begins in motion, when it last turned before.
+        When the mass was let go [s]. Where the motion is under way when the record begins, or its first swings are left
+        out, the turn that it is fitted from, and named so.
     amplitude : Estimate
-        Amplitude at the release, from the rest position [m or rad].
+        From the rest position [m or rad], at that time.
     static_displacement : Estimate
         Static friction over the stiffness [m or rad]: the interval from where the mass stayed to where it last turned,
         in all releases.
@@ -100,6 +101,11 @@ class DecayFit(Result):
     def residual(self) -> tuple[Array, ...]:
         """Measured minus fitted block means of each release."""
         return tuple(m - f for m, f in zip(self.measured, self.fitted, strict=True))
+
+
+def beginning(released: bool) -> tuple[str, str]:
+    """What the time and the amplitude are called where a fit begins."""
+    return ("release time", "amplitude at release") if released else ("time of the first turn", "first amplitude")
 
 
 def constants(mass: float | str | None, stiffness: float | str | None, name: str) -> tuple[float | None, float | None]:

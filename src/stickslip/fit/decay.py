@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.fit.answer import DecayFit, constants, spring_of
+from stickslip.fit.answer import DecayFit, beginning, constants, spring_of
 from stickslip.fit.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.record.record import Record, Step
@@ -283,7 +283,8 @@ def _answer(
     checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)
     noise = "; ".join(dict.fromkeys(each.noise.words for each in releases))
     method = f"whole waveform, noise {noise}, profile likelihood"
-    starts = [each.first for each in ring_downs]
+    starts, first = [each.first for each in ring_downs], ring_downs[0]
+    begins, far = beginning(first.held if first.order == 0 else float(motion.values[5]) > -1 / first.fs)
 
     def estimate(index: int, words: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
         low, high = (float(factor * end + offset) for end in motion.ends[index])
@@ -299,8 +300,8 @@ def _answer(
         dry_displacement=dry,
         frequency=frequency,
         bias=estimate(3, "rest position" if ring_downs[0].order == 0 else "sensor offset", unit),
-        release_time=estimate(5, "release time", "s", offset=starts[0]),
-        amplitude=estimate(4, "amplitude at release", length),
+        release_time=estimate(5, begins, "s", offset=starts[0]),
+        amplitude=estimate(4, far, length),
         static_displacement=_static(releases, motion, length),
         dry_force=None if spring is None else dry.scaled(spring, "N m" if name == "theta" else "N", "dry friction"),
         damping_ratio_any=whichever(choices, damping, "damping_ratio") if choices else None,

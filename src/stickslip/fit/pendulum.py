@@ -9,15 +9,16 @@ import numpy as np
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.fit.answer import DecayFit, spring_of
+from stickslip.fit.answer import DecayFit, beginning, spring_of
 from stickslip.fit.candidates import Fitted
 from stickslip.fit.choice import COLOURED, Candidate, lack_of_fit
 from stickslip.fit.motions import Restoring, free_decay
-from stickslip.fit.which_motion import DecayMotion, choice_of, told, whichever
+from stickslip.fit.which_motion import SWING, DecayMotion, choice_of, told, whichever
 from stickslip.identify.release import RingDown
 from stickslip.record.record import Step
 
 PLAIN = ("both", "static")
+BEYOND = f"swings beyond {SWING:g} rad are left out"
 SURE = 3.0  # standard deviations of the noise by which a bracket is widened
 
 
@@ -62,7 +63,9 @@ def fit_pendulum(
     ring_down = ring_downs[0]
     choice, zero = choice_of(ring_down, restoring=restoring, candidates=PLAIN)
     chosen = choice.chosen
-    status = told(ring_down, choice.seen_beside(*PLAIN) or lack_of_fit(chosen))
+    later = zero > ring_down.release
+    large = (BEYOND,) if later and abs(ring_down.amplitude) >= SWING else ()
+    status = told(ring_down, "; ".join(filter(None, [*large, choice.seen_beside(*PLAIN) or lack_of_fit(chosen)])))
     fitted = chosen.fitted
     blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
     kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"
@@ -76,6 +79,7 @@ def fit_pendulum(
             method=f"whole waveform, spring sin x, noise {kind}", checks=(f"{fitted.half_cycles} half cycles",),
         )  # fmt: skip
 
+    begins, far = beginning(ring_down.held and not later)
     damping = estimate("damping_ratio", "damping ratio", "1")
     dry = estimate("dry_displacement", "dry friction displacement", "rad")
     frequency = estimate("angular_frequency", "natural frequency", "Hz", 1 / (2 * math.pi))
@@ -86,8 +90,8 @@ def fit_pendulum(
         dry_displacement=dry,
         frequency=frequency,
         bias=estimate("rest", "rest position", "rad"),
-        release_time=estimate("release", "release time", "s", offset=zero),
-        amplitude=estimate("amplitude", "amplitude at release", "rad"),
+        release_time=estimate("release", begins, "s", offset=zero),
+        amplitude=estimate("amplitude", far, "rad"),
         static_displacement=_static(chosen, ring_down),
         dry_force=None if spring is None else dry.scaled(spring, "N m", "dry friction"),
         damping_ratio_any=whichever(choices, damping, "damping_ratio") if choices else None,

@@ -587,12 +587,14 @@ def _flat_before(values: Array, start: int, half: float, noise: float) -> bool:
     """Whether nothing moves before a release: a swing that only turns there bends before as it does after."""
     for share in HOLDS:
         reach = min(start, round(share * half))
+        if reach < 2:
+            return False
         rows = np.arange(start - reach, min(start + reach + 1, len(values)))
         bend = 1 - np.cos(math.pi / half * (rows - start))
         design = np.column_stack([np.ones(len(rows)), bend * (rows < start), bend * (rows > start)])
-        found = np.linalg.lstsq(design, values[rows], rcond=None)[0]
-        doubt = 2 * noise * math.sqrt(float(np.linalg.pinv(design.T @ design)[1, 1]))
-        if reach > 1 and abs(found[1]) + doubt < BENT * abs(found[2]):
+        inverse = np.linalg.inv(design.T @ design)
+        found = inverse @ design.T @ values[rows]
+        if abs(found[1]) + 2 * noise * math.sqrt(inverse[1, 1]) < BENT * abs(found[2]):
             return True
     return False
 

@@ -9,6 +9,7 @@ import numpy as np
 from stickslip.analysis.decay_comparison import DecayComparison
 from stickslip.analysis.decays import CLEAR, DecayFindings
 from stickslip.estimate import Estimate
+from stickslip.fit.answer import beginning
 from stickslip.fit.choice import SIZE
 from stickslip.identify.release import CAUGHT
 from stickslip.reports.words import interval_of, number, value_of
@@ -176,11 +177,24 @@ def _motion(findings: DecayFindings) -> Iterator[str]:
     first = rings[0]
     end = f"comes to rest at {first.stop:.4g} s" if first.stopped else "is still going on at the end"
     end = f"is caught at {first.stop:.4g} s" if CAUGHT in first.notes else end
-    begin = f"begins at {first.release:.4g} s" if first.held else "is under way when the record begins"
+    begin, far = _begin(findings)
     yield (
         f"{many} {begin}, swings at {value_of(findings.best.frequency)} through {len(first.turns)} extremes from "
-        f"{number(abs(first.amplitude), abs(first.amplitude) / 1000, first.unit)}, and {end}."
+        f"{far}, and {end}."
     )
+
+
+def _begin(findings: DecayFindings) -> tuple[str, str]:
+    """When the motion begins, and from how far; as it is fitted, where it is."""
+    first, fit = findings.releases.ring_downs[0], findings.waveform
+    begin = f"begins at {first.release:.4g} s" if first.held else "is under way when the record begins"
+    if fit is None:
+        return begin, number(abs(first.amplitude), abs(first.amplitude) / 1000, first.unit)
+    at, far = value_of(fit.release_time), value_of(fit.amplitude, abs(fit.amplitude.value))
+    if fit.release_time.name == beginning(True)[0]:
+        return f"begins at {at}", far
+    less = "swings are left out: " if first.held else ""
+    return f"{begin} ({less}it is fitted from its turn at {at})", far
 
 
 def _compared(findings: DecayFindings) -> Iterator[str]:
