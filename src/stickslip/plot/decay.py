@@ -249,9 +249,10 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
         "Viscous friction alone would let it die away along the curved envelope, dry friction alone along the straight "
         "one; together they are faster than either. "
     ) * ring.isochronous
+    grey = "Grey: at rest before the release or after." if ring.held or ring.stopped else ""
     plates = [
         plate("decay", plot_decay(findings), "How it dies away",
-              f"{envelopes}Grey: at rest before the release and after.{many}")
+              f"{envelopes}{grey}{many}")
     ]  # fmt: skip
     if findings.waveform is not None or (ring.order == 0 and findings.best in (findings.motion, thesis)):
         plates.append(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stickslip.analysis.comparison import Comparison
 from stickslip.analysis.decay_comparison import DecayComparison
@@ -137,7 +137,8 @@ def _of_findings(findings: Findings | DecayFindings) -> Summary:
     record = findings.record
     if isinstance(findings, DecayFindings):
         told, settings, notes = decay.headline(findings), decay.settings(findings), list(findings.notes)
-        estimates = (*findings.estimates, *findings.comparisons)
+        comparisons = [replace(each, status="for comparison") for each in findings.comparisons]
+        estimates = (*findings.estimates, *comparisons)
     else:
         told, settings, notes = headline(findings), _settings(findings), list(findings.notes)
         estimates = findings.estimates

@@ -46,7 +46,7 @@ def value_of(estimate: Estimate, value: float | None = None) -> str:
     if not math.isfinite(value):
         return "unknown"
     factor, text, digits = _scale(estimate)
-    return f"{factor * value:.{digits}f}{text}"
+    return f"{_rounded(factor * value, digits)}{text}"
 
 
 def interval_of(estimate: Estimate) -> str:
@@ -63,7 +63,7 @@ def interval_of(estimate: Estimate) -> str:
         and not (round(factor * low, digits) <= factor * estimate.value <= round(factor * high, digits))
     ):  # an end that is cut to fewer digits would exclude the value
         digits += 1
-    ends = f"{factor * low:.{digits}f}", f"{factor * high:.{digits}f}"
+    ends = _rounded(factor * low, digits), _rounded(factor * high, digits)
     return f"{ends[0]} to {ends[1]}{text}" if ends[0] != ends[1] else "within its last digit"
 
 
@@ -283,6 +283,11 @@ def _of_comparison(comparison: Comparison) -> Iterator[str]:
 
 def _sentence(words: str) -> str:
     return words[:1].upper() + words[1:]
+
+
+def _rounded(value: float, digits: int) -> str:
+    """With so many decimals; a zero without sign."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _sd(estimate: Estimate) -> float:
