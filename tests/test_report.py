@@ -277,7 +277,7 @@ def test_earlier_results_come_back_when_the_new_ones_can_not_take_their_place(
 def test_the_digits_of_an_interval_do_not_exclude_the_value():
     from stickslip.reports.words import interval_of
 
-    wide = ss.Estimate("dry", 1.0003e-3, (0.0005e-3, 1.0012e-3), 2.5e-4, "m", "any")
+    wide = ss.Estimate("dry, whichever motion", 1.0003e-3, (0.0005e-3, 1.0012e-3), 2.5e-4, "m", "any")
     low, _, high, unit = interval_of(wide).split()
     assert float(low) <= 1.0003 <= float(high)
     assert unit == "mm"

@@ -57,11 +57,9 @@ def interval_of(estimate: Estimate) -> str:
     if low == high:
         return "no scatter"
     factor, text, digits = _scale(estimate)
-    while (
-        digits < FIGURES
-        and low <= estimate.value <= high
-        and not (round(factor * low, digits) <= factor * estimate.value <= round(factor * high, digits))
-    ):  # an end that is cut to fewer digits would exclude the value
+    # An end cut to fewer digits than another row gives the same value would exclude it.
+    inside = "whichever" in estimate.name and low <= estimate.value <= high
+    while inside and not round(factor * low, digits) <= factor * estimate.value <= round(factor * high, digits):
         digits += 1
     ends = _rounded(factor * low, digits), _rounded(factor * high, digits)
     return f"{ends[0]} to {ends[1]}{text}" if ends[0] != ends[1] else "within its last digit"
