@@ -58,8 +58,12 @@ def interval_of(estimate: Estimate) -> str:
         return "no scatter"
     factor, text, digits = _scale(estimate)
     # An end cut to fewer digits than another row gives the same value would exclude it.
-    inside = "whichever" in estimate.name and low <= estimate.value <= high
-    while inside and not round(factor * low, digits) <= factor * estimate.value <= round(factor * high, digits):
+    inside = "whichever" in estimate.name and low < estimate.value < high
+    while (
+        inside
+        and digits < 7
+        and not round(factor * low, digits) <= factor * estimate.value <= round(factor * high, digits)
+    ):
         digits += 1
     ends = _rounded(factor * low, digits), _rounded(factor * high, digits)
     return f"{ends[0]} to {ends[1]}{text}" if ends[0] != ends[1] else "within its last digit"
