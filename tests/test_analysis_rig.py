@@ -121,10 +121,27 @@ def test_a_load_cell_at_the_end_of_its_range_is_named_and_left_out(readings: ss.
     assert any(fault.channel == "load" and fault.kind == "clipped" for fault in found.faults)
 
 
-def test_without_mass_the_load_cell_answers_and_what_is_lacking_is_said(readings: ss.Record) -> None:
-    found = ss.analyze(ss.Record.of({name: readings[name] for name in readings}, fs=readings.fs), stiffness=2310)
+@pytest.mark.parametrize("turned", ["x", "z"])
+def test_a_sensor_with_the_wrong_sign_is_named_without_a_load_cell_too(readings: ss.Record, turned: str) -> None:
+    wrong = {name: (-1.0 if name == turned else 1.0) * readings[name] for name in ("x", "z", "a")}
+    units = {"x": "m", "z": "m", "a": "m/s^2"}
+    found = ss.analyze(ss.Record.of(wrong, fs=readings.fs, units=units), mass=2.42, stiffness=2310)
+    assert found.consistency is not None
+    assert f"{turned} has the wrong sign" in found.consistency.status
+
+
+def test_a_base_that_is_not_measured_is_taken_to_be_at_rest_and_a_spring_found(readings: ss.Record) -> None:
+    alone = ss.Record.of({"x": readings["x"], "a": readings["a"]}, fs=readings.fs, units={"x": "m", "a": "m/s^2"})
+    assert "taken to be at rest" in " ".join(ss.analyze(alone, mass=2.42, stiffness=2310).notes)
+    found = ss.analyze(readings, mass=2.42)
+    assert found.settings["stiffness"] == pytest.approx(2310, rel=0.01)
+    assert "is found from how the mass slides" in " ".join(found.notes)
+
+
+def test_without_mass_and_spring_the_load_cell_answers_and_what_is_lacking_is_said(readings: ss.Record) -> None:
+    found = ss.analyze(ss.Record.of({name: readings[name] for name in readings}, fs=readings.fs))
     assert found.level is not None
-    assert found.level.value == pytest.approx(1.1, rel=0.01)
+    assert found.level.value == pytest.approx(1.1, rel=0.03)
     assert "load cell's reading is taken" in " ".join(found.notes)
 
 

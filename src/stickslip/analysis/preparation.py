@@ -83,7 +83,7 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
     comparison = None
     if is_measured(whole, "friction"):
         _tell_unused(rig, asked)
-    elif "x" in whole and rig.mass is not None and rig.stiffness is not None:
+    elif "x" in whole and _enough(whole, rig):
         if {"a", "load"} <= set(whole):
             comparison = asked.ask("Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig)))
             whole = _with_mounts(whole, comparison, asked)
@@ -97,6 +97,12 @@ def middle(record: Record, samples: int) -> Record:
     """At most so many samples, from the middle of a record."""
     first = (len(record) - samples) // 2
     return record.rows(first, first + samples) if first > 0 else record
+
+
+def _enough(record: Record, rig: RigSettings) -> bool:
+    """Whether the balance can be drawn up: one of mass and spring is found from the other where more than x is read."""
+    stated = sum(each is not None for each in (rig.mass, rig.stiffness))
+    return stated == 2 or (stated == 1 and not {"a", "load"}.isdisjoint(record))
 
 
 def _constants(rig: RigSettings) -> dict[str, Any]:
@@ -188,6 +194,12 @@ def _balanced(record: Record, rig: RigSettings, method: str, asked: Asked) -> Re
     if found is None:
         return record
     asked.notes.append(f"Friction force: by the method {method}; {why}.")
+    made = found.history[-1].arguments
+    for name, unit in (("mass", "kg"), ("stiffness", "N/m")):
+        if getattr(rig, name) is None:
+            asked.notes.append(f"No {name} was stated: {made[name]:.4g} {unit} is found from how the mass slides.")
+    if "z" not in record:
+        asked.notes.append("There is no channel z: the spring's other end is taken to be at rest.")
     if rig.damping is None:
         asked.notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
     return found

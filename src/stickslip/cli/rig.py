@@ -71,7 +71,7 @@ PRESETS = {"air-track": "air_track", "linear-bearing": "linear_bearing", "perfec
     help="Format of the record.",
 )
 @case_options
-@result_options("NAME-rig")
+@result_options("NAME-rig, or NAME-plan,")
 def rig(case: str, output: Path | None, as_json: bool, plan: bool, **options: Any) -> None:
     """Measure a simulated motion with a virtual rig, or plan an experiment on it.
 
@@ -88,7 +88,7 @@ def rig(case: str, output: Path | None, as_json: bool, plan: bool, **options: An
     """
     wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes")})
     bench = _bench(options.pop("preset"), options.pop("sensors"))
-    folder = output or (None if as_json else folder_name(wanted, "rig"))
+    folder = output or (None if as_json else folder_name(wanted, "plan" if plan else "rig"))
     needs = [pair(each, "--need") for each in options.pop("need")]
     if needs and not plan:
         raise click.BadParameter("what is needed is asked of a plan; add --plan", param_hint="--need")

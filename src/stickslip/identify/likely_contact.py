@@ -308,9 +308,9 @@ class _Search:
                 lambda c: -self.likelihood(log_stiffness, c), bounds=(-0.1 * reach, reach), method="bounded",
                 options={"xatol": min(0.1 * unsure, 1e-2 * reach)},
             )  # fmt: skip
-            return -float(found.fun)
+            return max(-float(found.fun), self.likelihood(log_stiffness, best[1]))  # the search is of one valley
 
-        top = max(self.likelihood(*best), highest(best[0]))
+        top = highest(best[0])
 
         def fallen(log_stiffness: float) -> float:
             return 2 * (top - highest(log_stiffness)) - self.scale * NORMAL_95**2

@@ -320,6 +320,10 @@ def _set_going(known: Array, rig: Balance) -> float:
 
     brentq: Any = optimize.brentq
     level, start, change, log_stiffness, damping = known
+    if level <= 0:
+        raise EstimateError(
+            f"friction of {level:.3g} N before the turns", "friction opposes the motion", "check the sensors' signs"
+        )  # fmt: skip
     stiffness = math.exp(log_stiffness)
     square, decay = stiffness / rig.mass, (damping + rig.damping) / (2 * rig.mass)
     ring = math.sqrt(square - decay**2)
