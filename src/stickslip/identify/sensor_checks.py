@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from stickslip.identify.checks import FAILS, HOLDS, Check, compared, judged, untold
 from stickslip.identify.forced_checks import Seen
 from stickslip.identify.motion import stretches
+from stickslip.record.check import find_clipping
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import Filter
@@ -29,14 +30,15 @@ SURE = 5.0  # standard deviations of what is left over, from which shifts differ
 
 def range_checks(record: Record, names: Sequence[str]) -> list[Check]:
     """Whether a sensor stands at the end of its range."""
-    ends = {f.channel: f.message for f in record.check() if f.kind == "clipped" and f.channel in names}
     found = []
     for name in names:
+        cut = find_clipping(record, name) if np.isfinite(record[name]).all() else None
         mask = saturated(record[name]) if name in NOISY else np.zeros(1, dtype=bool)
-        if not mask.any() and name not in ends:
+        if not mask.any() and cut is None:
             continue
         top = float(np.abs(record[name]).max())
-        words = ends.get(name, f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples")
+        held = f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples"
+        words = held if cut is None else cut.message
         found.append(
             Check(f"range of {name}", top, top, record.channels[name].unit, math.inf, FAILS, words.rstrip("."))
         )

@@ -262,13 +262,10 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
         faults.append(_fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")'))
         values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
     measured = name != "friction"  # what is computed as friction has no sensor that could clip or freeze
-    cut = flaws.clipped(values, plateaus=unit in SHARP_UNITS) if measured else ()
-    if cut:
-        what = _several(_count(cut), "sample", "samples") + f" clipped near {_number(values[cut[0][0]], '.4g', unit)}"
-        faults.append(
-            _fault("clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")')
-        )
-    top = flaws.rows_of(cut, len(values))
+    cut = _clipped(name, unit, values) if measured else None
+    if cut is not None:
+        faults.append(cut)
+    top = flaws.rows_of(cut.rows if cut is not None else (), len(values))
     held = tuple(run for run in flaws.frozen(values) if not top[run[0] : run[1] + 1].any()) if measured else ()
     if held:
         longest = max(last - first + 1 for first, last in held)
@@ -279,6 +276,23 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
         what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"
         faults.append(_fault("drift", name, everywhere, what, f'take it off with remove_drift(record, "{name}")'))
     return faults
+
+
+def find_clipping(record: Record, name: str) -> Fault | None:
+    """Where a channel of numbers alone stands at the end of its sensor's range; the one fault, without the others."""
+    values = record[name]
+    spikes = flaws.spikes(values)
+    if spikes:
+        values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
+    return _clipped(name, record.channels[name].unit, values)
+
+
+def _clipped(name: str, unit: str, values: Array) -> Fault | None:
+    cut = flaws.clipped(values, plateaus=unit in SHARP_UNITS)
+    if not cut:
+        return None
+    what = _several(_count(cut), "sample", "samples") + f" clipped near {_number(values[cut[0][0]], '.4g', unit)}"
+    return _fault("clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")')
 
 
 def _number(value: float, digits: str, unit: str) -> str:
