@@ -14,6 +14,7 @@ from stickslip.identify.compare_force import ForceComparison, compare_force
 from stickslip.identify.force import friction_force
 from stickslip.identify.motion import is_measured
 from stickslip.identify.sensor_delay import SensorDelay, sensor_delay
+from stickslip.record.channels import Channel
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 
@@ -169,6 +170,11 @@ def _tell_unused(rig: RigSettings, asked: Asked) -> None:
         asked.notes.append(f"The friction was measured: {' and '.join(unused)} as stated {verb} not used.")
 
 
+def _described(sensor: Channel) -> bool:
+    """Whether anything is known of what it makes of a motion."""
+    return sensor.mount is not None or sensor.discharge is not None or sensor.inertia != 0
+
+
 def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
     """By which method the friction is found, and why."""
     helps = [name for name in ("a", "load") if name in record]
@@ -177,9 +183,14 @@ def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
             "smoother",
             f"{len(record)} samples are many; the method fusion takes them all together if it is asked to",
         )
-    if helps and rig.contact == "ground":
+    known = [name for name in helps if _described(record.channels[name])]
+    if known and rig.contact == "ground":
         return "fusion", f"{' and '.join(helps)} beside x: all sensors together by a Kalman smoother"
-    why = "the contact is on the moving base" if helps else "there is neither an accelerometer nor a load cell"
+    why = "there is neither an accelerometer nor a load cell"
+    if helps:
+        why = f"of {' and '.join(helps)} no mount is stated, and none shows: state it to have all sensors put together"
+    if helps and rig.contact == "base":
+        why = "the contact is on the moving base"
     return "smoother", f"{why}: the displacement differentiated by a smoother"
 
 

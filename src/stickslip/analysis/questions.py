@@ -61,8 +61,8 @@ def analyze(
         What the damper ends on, and what the mass slides on; the ground unless stated.
     method : str
         How the friction is found: one of :func:`friction_force`'s, or "auto": all sensors together where there is an
-        accelerometer or a load cell beside x, else the displacement differentiated by a smoother. The notes say which,
-        and why.
+        accelerometer or a load cell beside x whose mount is stated or shows, else the displacement differentiated by a
+        smoother. The notes say which, and why.
 
     Returns
     -------
