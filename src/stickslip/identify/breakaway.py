@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.identify.force import FUSIONS
+from stickslip.identify.fusion import Balance
 from stickslip.identify.motion import is_measured
 from stickslip.identify.slip_ringing import ringing_of
 from stickslip.identify.strokes import FAST, Stroke, find_strokes
@@ -107,10 +107,11 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     True
     """
     strokes = find_strokes(record, contact=contact, question=QUESTION)
-    pull, rig = _pull(record)
+    balance = _balance(record)
+    pull, mass = (None, np.nan) if balance is None else (balance.pull(record), balance.mass)
     fs = record.fs
     chosen = strokes.strokes
-    borne = [(each, _borne(each, pull, rig, fs)) for each in chosen]
+    borne = [(each, _borne(each, pull, mass, fs)) for each in chosen]
     found = [(each, *answer) for each, answer in borne if answer is not None]
     if not found:
         raise EstimateError(
@@ -160,23 +161,16 @@ def _widened(estimate: Estimate, below: float, above: float) -> Estimate:
     return replace(estimate, interval=(low - below, high + above), sd=float(np.hypot(estimate.sd, (below + above) / 4)))
 
 
-def _pull(record: Record) -> tuple[Array | None, Mapping[str, Any]]:
-    """What pulls at the mass while it rests, where friction came from a balance, and no better than that."""
+def _balance(record: Record) -> Balance | None:
+    """By which friction was found, where no sensor did better than that and the mass rests on the ground."""
     told = [step.arguments for step in record.history if step.action == "friction_force"]
     made = record.channels["friction"].source == "friction_force"
     if not (made and told and told[-1].get("mass") and told[-1].get("contact") == "ground"):
-        return None, {}
-    if told[-1]["method"] in FUSIONS:
-        return None, {}
-    rig = told[-1]
-    pull = -rig["stiffness"] * record["x"]
-    if "z" in record:
-        moved = rig["damping"] * record.fs * np.gradient(record["z"]) if rig["damper"] == "base" else 0.0
-        pull = pull + rig["stiffness"] * record["z"] + moved
-    return (pull + record["force"] if "force" in record else pull), rig
+        return None
+    return None if told[-1]["method"] in FUSIONS else Balance.told(told[-1])
 
 
-def _borne(stroke: Stroke, pull: Array | None, rig: Mapping[str, Any], fs: float) -> tuple[float, float] | None:
+def _borne(stroke: Stroke, pull: Array | None, mass: float, fs: float) -> tuple[float, float] | None:
     """What the contact bears just before it slips, and by how much that changes from a sample to the next."""
     if pull is None or not stroke.rests:
         return float(stroke.friction[stroke.slip]), 0.0
@@ -188,7 +182,7 @@ def _borne(stroke: Stroke, pull: Array | None, rig: Mapping[str, Any], fs: float
     if last - first < LEAST:
         return None
     force = stroke.way * pull[stroke.first + first : stroke.first + last]
-    begins = _start(way[first:last], force, rig["mass"], fs)
+    begins = _start(way[first:last], force, mass, fs)
     if begins is None:
         return None
     rows = np.arange(max(0, int(begins) - max(4, (first + int(begins)) // BEFORE)), int(begins) + 1)

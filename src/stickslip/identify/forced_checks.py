@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.identify.checks import APART, HOLDS, UNTOLD, Check, compared, judged, untold
 from stickslip.identify.lines import Complex, Lines, find_lines
-from stickslip.identify.mixups import Balance
+from stickslip.identify.mixups import Amplitudes
 from stickslip.identify.sliding_balance import Slider
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record
@@ -102,12 +102,12 @@ class Seen:
         return math.hypot(*found) / math.sqrt(self.lines.worth)
 
     @property
-    def balance(self) -> Balance:
+    def balance(self) -> Amplitudes:
         """The strongest lines as read, for mix-ups."""
         values = {
             name: complex(read[:, self.at].mean()) for name, read in self.lines.amplitudes.items() if name not in RATES
         }
-        return Balance(values, self.angular, self.rig, self.damper, self.tolerance)
+        return Amplitudes(values, self.angular, self.rig, self.damper, self.tolerance)
 
 
 def _rates(x: Array, fs: float) -> tuple[Array, Array]:

@@ -189,7 +189,7 @@ def _told(record: Record) -> tuple[Balance, list[str], bool]:
             'give friction_force mass= or stiffness=, or take method="slope"',
         )
     named = FUSIONS.get(rig["method"], FUSIONS["fusion"])
-    balance = Balance(rig["mass"], rig["stiffness"], rig["damping"], rig["damper"])
+    balance = Balance.told(rig)
     fused = rig["method"] in FUSIONS and not is_measured(record, "v")
     return balance, [name for name in named if is_measured(record, name)], fused
 

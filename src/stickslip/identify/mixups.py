@@ -15,7 +15,7 @@ BETTER = 25.0  # times by which a slip must lower the sum of squares to be named
 
 
 @dataclass(frozen=True)
-class Balance:
+class Amplitudes:
     """Complex amplitudes of the channels at the forcing frequency, and what is known of the rig."""
 
     values: Mapping[str, complex]
@@ -46,7 +46,7 @@ class Balance:
         return total
 
 
-def mixups(balance: Balance, checks: Sequence[Check]) -> list[Check]:
+def mixups(balance: Amplitudes, checks: Sequence[Check]) -> list[Check]:
     """A check that names every slip which would make the channels agree, or that none would."""
     before = balance.misfit(balance.values)
     most = 2 * APART**2

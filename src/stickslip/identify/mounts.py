@@ -63,7 +63,7 @@ class Resonance:
 
 
 @dataclass(frozen=True, eq=False)
-class _Balance:
+class _MeanLines:
     """Mean lines of a forced motion: what the accelerometer and the load cell read, and what pulls the mass."""
 
     frequency: Array
@@ -106,7 +106,7 @@ def find_mounts(lines: Lines, record: Record, rig: Mapping[str, Any]) -> tuple[R
     return tuple(resonance for kind in shown for resonance in _named(kept, kind, balance))
 
 
-def _balance(lines: Lines, record: Record, rig: Mapping[str, Any]) -> _Balance:
+def _balance(lines: Lines, record: Record, rig: Mapping[str, Any]) -> _MeanLines:
     """The mean lines, those that stand out of the noise in both readings."""
     s = 2j * np.pi * lines.frequency
     mean = {name: values.mean(axis=0) for name, values in lines.amplitudes.items()}
@@ -123,7 +123,7 @@ def _balance(lines: Lines, record: Record, rig: Mapping[str, Any]) -> _Balance:
     heard = (np.abs(mean["a"]) > HEARD * level["a"]) & (np.abs(mean["load"]) > HEARD * level["load"])
     heard &= lines.frequency < 0.4 * record.fs
     size = int(heard.sum())
-    return _Balance(
+    return _MeanLines(
         lines.frequency[heard], mean["a"][heard], mean["load"][heard], pull[heard],
         np.full(size, math.hypot(level["a"], pulled / rig["mass"])), np.full(size, level["load"]),
         rig["mass"], record.channels["load"].inertia,
@@ -138,7 +138,7 @@ class _Fitted:
     covariance: Array
 
 
-def _fitted(balance: _Balance, kinds: str) -> _Fitted:
+def _fitted(balance: _MeanLines, kinds: str) -> _Fitted:
     """The best mounts of these kinds ("a", "l"), from a coarse search."""
     from itertools import product
 
@@ -166,7 +166,7 @@ def _fitted(balance: _Balance, kinds: str) -> _Fitted:
     return _Fitted(kinds, float(2 * best.cost), best.x, scale * np.linalg.pinv(curved))
 
 
-def _named(fit: _Fitted, kind: str, balance: _Balance) -> list[Resonance]:
+def _named(fit: _Fitted, kind: str, balance: _MeanLines) -> list[Resonance]:
     """The mount as a resonance, if its frequency lies among the lines."""
     at = 2 * fit.kinds.index(kind)
     frequency, damping = np.exp(fit.values[at : at + 2])

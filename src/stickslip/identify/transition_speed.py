@@ -18,7 +18,6 @@ from stickslip.identify.likely_contact import HELD, LEAST, LikelyContact, held_s
 from stickslip.identify.loops import Loops, friction_loops
 from stickslip.identify.transition import transition
 from stickslip.record.record import Record
-from stickslip.signals.differentiate import differentiate
 from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
@@ -183,7 +182,7 @@ def coupled_frequency(record: Record) -> Estimate:
 def _ringing(record: Record, fitted: LikelyContact, value: float, sd: float) -> tuple[str, str]:
     """What the ringing says of the frequency, and whether that is the contact's; in words."""
     rig = fitted.balance
-    balanced = (_pull(record, rig) - rig.damping * record["v"] - record["friction"]) / rig.mass
+    balanced = (rig.pull(record) - rig.damping * record["v"] - record["friction"]) / rig.mass
     bare = Record.of({"a": balanced, "v": record["v"]}, fs=record.fs, start=record.start)
     try:
         found = transition(bare)
@@ -286,7 +285,7 @@ def _exact(
 ) -> Estimate:
     """From the contact, and from the friction before, the pull at, and its change after each turn."""
     rig, found = fitted.balance, []
-    pull = _pull(record, rig) - offset  # the zero of a sensor is in both
+    pull = rig.pull(record) - offset  # the zero of a sensor is in both
     for each in branches:
         before = slice(max(0, each.first - BEFORE - 1), max(1, each.first - 1))
         rows = np.arange(each.first, each.first + len(each.force))
@@ -302,16 +301,6 @@ def _exact(
         "motion after the turn on the fitted contact",
         ("with the friction and the pull found at the turns; errors of the mass and of gains go into it",),
     )  # fmt: skip
-
-
-def _pull(record: Record, rig: Balance) -> Array:
-    """What spring, applied force and a damper to the base do to the mass, [N]; not what its own velocity does."""
-    pull = np.array(record["force"]) if "force" in record else np.zeros(len(record))
-    if "z" in record:
-        pull += rig.stiffness * record["z"]
-        if rig.damper == "base" and rig.damping:
-            pull += rig.damping * differentiate(record["z"], record.fs).values
-    return np.asarray(pull - rig.stiffness * record["x"])
 
 
 def _set_going(known: Array, rig: Balance) -> float:
