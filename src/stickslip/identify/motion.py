@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +102,11 @@ class Cycles:
         return np.interp(at, np.arange(len(values)), values)
 
 
+# several questions ask one record for its motion and its cycles
+_MOTIONS: WeakKeyDictionary[Record, dict[str, Motion]] = WeakKeyDictionary()
+_CYCLES: WeakKeyDictionary[Motion, Cycles] = WeakKeyDictionary()
+
+
 def slid_on(record: Record, contact: str | None) -> str:
     """What the mass slides on: as said, or as :func:`friction_force` was told, or the ground."""
     if contact is None:
@@ -147,6 +153,13 @@ def contact_motion(record: Record, *, contact: str | None, question: str) -> Mot
     EstimateError
         Nothing moves.
     """
+    known = _MOTIONS.setdefault(record, {})
+    if (side := slid_on(record, contact)) not in known:
+        known[side] = _contact_motion(record, contact, question)
+    return known[side]
+
+
+def _contact_motion(record: Record, contact: str | None, question: str) -> Motion:
     names = motion_channels(record, contact)
     record.require_clean(*names, question=question, samples=LEAST)
     displacement = record[names[0]]
@@ -161,13 +174,15 @@ def contact_motion(record: Record, *, contact: str | None, question: str) -> Mot
             "check the sensor and its column",
         )
     if "v" in names:
-        known = record.channels["v"].noise
-        noise, bandwidth, velocity = known or noise_level(record["v"], record.fs), record.fs / 2, record["v"]
+        stated = record.channels["v"].noise
+        noise, bandwidth, velocity = stated or noise_level(record["v"], record.fs), record.fs / 2, record["v"]
     else:
         derivative = differentiate(displacement, record.fs)
         velocity, noise, bandwidth = derivative.values, float(np.median(derivative.sd)), derivative.bandwidth
     fastest = float(np.abs(velocity).max())
     unit = "rad" if "theta" in names else "m"
+    displacement.setflags(write=False)
+    velocity.setflags(write=False)
     if fastest <= AUDIBLE * noise:
         raise EstimateError(
             f"the largest speed is {fastest:.3g} {unit}/s, its noise {noise:.3g} {unit}/s",
@@ -204,11 +219,9 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | str | None
         Not one complete cycle.
     """
     if frequency is None:
-        reference = next((name for name in ("z", "force") if name in record and _moves(record[name])), "")
-        found = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
-        cycles = _periodic(motion, found)
-        repeated = 0.0 if cycles is None else _repeated(cycles, motion.displacement)
-        return cycles if cycles is not None and repeated >= PERIODIC else _aperiodic(motion, repeated)
+        if motion not in _CYCLES:
+            _CYCLES[motion] = _cycles(record, motion)
+        return _CYCLES[motion]
     frequency, duration = parse_value(frequency, "Hz"), len(motion.displacement) / motion.fs
     cycles = None
     if 1 / duration <= frequency < motion.fs / 2:
@@ -221,6 +234,14 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | str | None
             "give it in Hz, or leave it out",
         )
     return cycles
+
+
+def _cycles(record: Record, motion: Motion) -> Cycles:
+    reference = next((name for name in ("z", "force") if name in record and _moves(record[name])), "")
+    found = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
+    cycles = _periodic(motion, found)
+    repeated = 0.0 if cycles is None else _repeated(cycles, motion.displacement)
+    return cycles if cycles is not None and repeated >= PERIODIC else _aperiodic(motion, repeated)
 
 
 def forcing_frequency(values: Array, fs: float) -> Estimate:

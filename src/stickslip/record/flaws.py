@@ -7,6 +7,8 @@ decay ends at rest: none of these is a fault.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -300,10 +302,9 @@ def _extrapolate(near: Array, level: float, floor: float, length: int) -> tuple[
     near = near[: low[0]] if len(low) else near
     if len(near) < 3:
         return None
-    along = -1.0 - np.arange(len(near))  # rows from the plateau's edge
     scale = float(max(len(near), length))
-    design = np.vander(along / scale, 3)
-    (bend, slope, value), *_ = np.linalg.lstsq(design, near - level, rcond=None)
+    design, inverse = _parabola_before(len(near), scale)
+    bend, slope, value = inverse @ (near - level)
     rest = near - level - design @ np.array([bend, slope, value])
     sd, drop = float(np.sqrt(rest @ rest / max(1, len(near) - 3))), float(level - near.min())
     if len(near) >= 12 and sd > 0.01 * drop and float(np.std(np.diff(rest))) < 0.5 * sd:
@@ -312,8 +313,16 @@ def _extrapolate(near: Array, level: float, floor: float, length: int) -> tuple[
     top = -slope / (2 * bend) if bend < 0 else np.inf
     reach = np.clip(top, 0.0, middle)
     point = np.array([reach**2, reach, 1.0])
-    error = sd * float(np.sqrt(point @ np.linalg.pinv(design.T @ design) @ point))
+    error = sd * float(np.linalg.norm(point @ inverse))
     return float(point @ (bend, slope, value)), error, drop, float(top * scale / length)
+
+
+@lru_cache(maxsize=256)
+def _parabola_before(rows: int, scale: float) -> tuple[Array, Array]:
+    """Powers 2, 1, 0 of the way from an edge back over so many rows, in units of `scale`, and their inverse."""
+    along = (-1.0 - np.arange(rows, dtype=np.float64)) / scale
+    design = np.stack([along**2, along, np.ones(rows)], axis=1)
+    return design, np.asarray(np.linalg.pinv(design))
 
 
 def drift(values: Array) -> float:
@@ -326,7 +335,7 @@ def drift(values: Array) -> float:
     if period is None or len(values) < 8 * period:
         return 0.0
     rows, slow = trend(values)
-    along = np.polynomial.Polynomial.fit(rows, slow, 2)(rows)
+    along = _parabola(slow)
     explained = float(np.var(slow - along)) < 0.1 * float(np.var(slow))
     amplitude = np.sqrt(2) * float(np.std(values[np.round(rows).astype(int)] - slow))
     rise = float(np.ptp(along)) / amplitude if amplitude > 0 and explained else 0.0
@@ -341,12 +350,20 @@ def trend(values: Array) -> tuple[Array, Array]:
     return rows, slow
 
 
+def _parabola(values: Array) -> Array:
+    """The parabola that fits equally spaced values best, from its three moments."""
+    along = np.linspace(-1, 1, len(values))
+    powers = [np.ones_like(along), along, along * along]
+    moments = np.array([[one @ other for other in powers] for one in powers])
+    value, slope, bend = np.linalg.solve(moments, [one @ values for one in powers])
+    return np.asarray(value + along * (slope + bend * along))
+
+
 def _period(values: Array) -> int | None:
     """Period in rows of the strongest oscillation about a parabola, or None where nothing oscillates."""
     if len(values) < SHORTEST_TREND or np.ptp(values) == 0:
         return None
-    along = np.linspace(-1, 1, len(values))
-    rest = values - np.polynomial.Polynomial.fit(along, values, 2)(along)
+    rest = values - _parabola(values)
     power = np.abs(np.fft.rfft(rest * np.hanning(len(rest)))) ** 2
     peak = int(np.argmax(power[4:])) + 4
     if np.sum(power[peak - 2 : peak + 3]) < 0.2 * np.sum(power):

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 LOBES = 32  # zero crossings of the sinc kept on each side
 KAISER = 9.0  # window parameter: stop band below -90 dB
 SAME = 1e-9  # samples: distances that differ by less are one
+BLOCK = 4096  # samples found at a time
 ORDER = 32  # of the autoregression that bridges lost samples
 
 
@@ -51,18 +52,18 @@ def band_limited(values: Array, times: Array, *, cutoff: float = 1.0) -> Array:
     padded = np.concatenate([2 * values[0] - values[reach:0:-1], values, 2 * values[-1] - values[-2 : -reach - 2 : -1]])
     result = np.empty(len(times))
     taps = np.arange(-reach + 1, reach + 1)
-    for first in range(0, len(times), 16_384):
-        block = times[first : first + 16_384]
+    for first in range(0, len(times), BLOCK):
+        block = times[first : first + BLOCK]
         base = np.minimum(np.floor(block).astype(int), n - 1)
         past = block - base
         if np.ptp(past) < SAME and np.all(np.diff(base) == 1):  # a plain delay: the same weights everywhere
             weights = _weights(past[:1, None] - taps, cutoff)[0]
             samples = padded[base[0] + 1 : base[-1] + 2 * reach + 1]
-            result[first : first + 16_384] = np.correlate(samples, weights, mode="valid") / np.sum(weights)
+            result[first : first + BLOCK] = np.correlate(samples, weights, mode="valid") / np.sum(weights)
             continue
         weights = _weights(past[:, None] - taps, cutoff)
         samples = padded[np.minimum(base[:, None] + taps + reach, len(padded) - 1)]
-        result[first : first + 16_384] = np.sum(weights * samples, axis=1) / np.sum(weights, axis=1)
+        result[first : first + BLOCK] = np.sum(weights * samples, axis=1) / np.sum(weights, axis=1)
     return result
 
 
