@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from stickslip.files.write import write_record as write_record
     from stickslip.analysis.findings import Findings as Findings
     from stickslip.fit.answer import DecayFit as DecayFit
+    from stickslip.fit.curves import CurveFit as CurveFit, fit_curve as fit_curve
     from stickslip.fit.decay import fit_decay as fit_decay
     from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
     from stickslip.identify.decrement import Bounds as Bounds, Decrement as Decrement, decrement as decrement
@@ -237,6 +238,7 @@ _ROOMS = {
     "decrement": "identify.decrement", "Decrement": "identify.decrement", "Bounds": "identify.decrement",
     "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
     "fit_decay": "fit.decay", "DecayFit": "fit.answer",
+    "fit_curve": "fit.curves", "CurveFit": "fit.curves",
     "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",
     "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",
     "extreme_decay": "identify.envelope", "hilbert_decay": "identify.envelope", "EnvelopeDecay": "identify.envelope",

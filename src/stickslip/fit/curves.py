@@ -1,0 +1,250 @@
+"""Which friction curve, with which numbers, do loops of friction follow?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import Estimate, Result
+from stickslip.fit import speed_curves
+from stickslip.fit.curve_data import Samples, require_reversals, require_speeds, samples_of
+from stickslip.fit.family import Family, Member, best_member
+from stickslip.identify.loops import Loops
+from stickslip.record.record import Record
+from stickslip.settings import nearest
+from stickslip.statistics import student
+
+Array = NDArray[np.float64]
+
+TIED = 0.99  # correlation of two parameters from which on they are told together alone
+POSITIVE = ("speed", "exponent")  # found by their logarithm: so is their interval
+NAMES = {
+    "kinetic": "sliding friction", "static": "static friction", "viscous": "viscous friction",
+    "offset": "constant force", "speed": "Stribeck speed", "exponent": "Stribeck exponent",
+    "kinetic_forward": "sliding friction forward", "kinetic_back": "sliding friction back",
+    "viscous_forward": "viscous friction forward", "viscous_back": "viscous friction back",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CurveFit(Result):
+    """A curve of friction, with its numbers.
+
+    Attributes
+    ----------
+    curve : str
+        Which one.
+    parameters : dict of str to Estimate
+        Its parameters by name.
+    law : Law or None
+        The friction law of these values, to simulate with; None where there is none (an uneven contact, or values
+        that no law can have: `status` says why).
+    formula : str
+        The curve, in the parameters' names.
+    residual : float
+        Root mean square [N, or N m] of what is left.
+    unexplained : float
+        Norm of what is left over the norm of the friction.
+    correlations : ndarray, shape (p, p)
+        Of the parameters, in their order.
+    along : str
+        What `at` is: "v" (velocity), "x" (displacement) or "t" (time).
+    at, measured, fitted : ndarray, shape (n,)
+        Where friction was compared, what it was, and what the curve says.
+    status : str
+        "ok", or in words what to beware of, and what experiment would tell.
+    """
+
+    curve: str
+    parameters: dict[str, Estimate]
+    law: object | None
+    formula: str
+    residual: float
+    unexplained: float
+    correlations: Array
+    along: str
+    at: Array
+    measured: Array
+    fitted: Array
+    status: str
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every number found."""
+        return tuple(self.parameters.values())
+
+    @property
+    def name(self) -> str:
+        """Of the curve, with its formula."""
+        return f"{self.curve}, {self.formula}"
+
+
+def fit_curve(
+    data: Record | Loops,
+    *,
+    curve: str = "stribeck",
+    contact: str | None = None,
+    frequency: float | str | None = None,
+    elements: int = 8,
+) -> CurveFit:
+    r"""Which numbers of a friction curve explain a measured friction best?
+
+    By least squares over every sample that slides, away from the reversals, with a constant force beside the curve
+    where motion both ways tells it:
+
+    * ``"coulomb"``: :math:`f = f_k\,\mathrm{sgn}\,v`;
+    * ``"viscous"``: :math:`f = f_k\,\mathrm{sgn}\,v + \sigma v`;
+    * ``"stribeck"``: :math:`f = (f_k + (f_s-f_k)\,e^{-(|v|/v_s)^\delta})\,\mathrm{sgn}\,v + \sigma v`
+      (Bo and Pavelescu, Wear 82, 1982), the exponent free, begun from 36 pairs of speed and exponent;
+      without :math:`\sigma` where it comes out below zero;
+    * ``"asymmetric"``: Coulomb and viscous friction of their own in each direction;
+    * ``"tabulated"``: a polygon that rises, or falls, all the way.
+
+    The intervals admit the error of the model: they are as wide as the scatter between cycles says, or as the residuals
+    along the mean cycle, which repeat, and which no scatter shows; whichever is wider.
+
+    Parameters
+    ----------
+    data : Record or Loops
+        With ``friction`` and the motion, as for :func:`friction_loops`; or its answer, whose mean cycle is then fitted.
+    curve : str
+        One of the names above.
+    contact : {"ground", "base"}, optional
+        What the mass slides on; as :func:`friction_force` was told, or the ground, when not given.
+    frequency : float or str, optional
+        Forcing frequency [Hz]; found from the record when not given.
+    elements : int
+        Points of a tabulated curve.
+
+    Returns
+    -------
+    CurveFit
+
+    Raises
+    ------
+    RecordError
+        A channel is missing, broken or too short, or the units of friction and motion do not belong together.
+    EstimateError
+        The record can not tell: no sliding, one speed alone, no reversal; or no such curve.
+
+    Examples
+    --------
+    >>> t = np.arange(20000) / 2000
+    >>> v = 0.1 * np.sin(2 * np.pi * t)
+    >>> f = np.sign(v) * (1.0 + 0.4 * np.exp(-np.abs(v) / 0.02)) + np.random.default_rng(0).normal(0, 0.02, t.size)
+    >>> found = fit_curve(Record.of({"v": v, "friction": f}, fs=2000), curve="stribeck")
+    >>> round(found.parameters["kinetic"].value, 2), found.parameters["exponent"].includes(1.0)
+    (1.0, True)
+    """
+    if curve not in CURVES:
+        raise EstimateError(f"curve = '{curve}'", f"it is one of {', '.join(CURVES)}", nearest(str(curve), CURVES))
+    if not isinstance(elements, (int, np.integer)) or not 2 <= elements <= 50:
+        raise EstimateError(f"elements = {elements}", "a table has 2 to 50 points", "leave it at 8")
+    _, sliding = samples_of(data, contact=contact, frequency=frequency)
+    family, member = best_member(CURVES[curve](sliding, curve, int(elements)), sliding)
+    return _answer(curve, family, member, sliding)
+
+
+def _coulomb(samples: Samples, curve: str, elements: int) -> Family:
+    return speed_curves.COULOMB
+
+
+def _viscous(samples: Samples, curve: str, elements: int) -> Family:
+    require_speeds(samples, curve)
+    return speed_curves.VISCOUS
+
+
+def _stribeck(samples: Samples, curve: str, elements: int) -> Family:
+    require_speeds(samples, curve)
+    return speed_curves.STRIBECK
+
+
+def _asymmetric(samples: Samples, curve: str, elements: int) -> Family:
+    require_speeds(samples, curve)
+    require_reversals(samples, curve)
+    return speed_curves.UNEVEN
+
+
+def _tabulated(samples: Samples, curve: str, elements: int) -> Family:
+    require_speeds(samples, curve)
+    return speed_curves.table(samples, elements)
+
+
+CURVES: dict[str, Callable[[Samples, str, int], Family]] = {
+    "coulomb": _coulomb, "viscous": _viscous, "stribeck": _stribeck, "asymmetric": _asymmetric,
+    "tabulated": _tabulated,
+}  # fmt: skip
+
+
+def _answer(curve: str, family: Family, member: Member, samples: Samples) -> CurveFit:
+    left = samples.friction - member.fitted
+    method = f"least squares of '{curve}'"
+    checks = (f"{len(left)} samples in {samples.cycles} cycles",)
+    found = {
+        name: _estimate(name, value, sd, freedom, samples.in_units(family.units[name]), method, checks)
+        for (name, value), sd, freedom in zip(member.values.items(), member.sd, member.freedom, strict=True)
+    }
+    worries = _worries(member, samples)
+    found, flags = _flagged(curve, found, samples)
+    try:
+        law = family.law(member.values)
+    except ModelError as refused:
+        law = None
+        flags.append(f"no law has these values: {refused.value}")
+    return CurveFit(
+        curve=curve, parameters=found, law=law, formula=family.formula,
+        residual=float(np.sqrt(np.mean(left**2))),
+        unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)),
+        correlations=member.correlations, along=family.along,
+        at={"v": samples.velocity, "x": samples.displacement, "t": samples.time}[family.along],
+        measured=samples.friction, fitted=member.fitted, status="; ".join([*worries, *flags]) or "ok",
+    )  # fmt: skip
+
+
+def _estimate(
+    name: str, value: float, sd: float, freedom: float, unit: str, method: str, checks: tuple[str, ...]
+) -> Estimate:
+    words = NAMES.get(name, name.replace("_", " "))
+    made = Estimate.normal(words, value, sd=sd, unit=unit, method=method, quantile=student(freedom), checks=checks)
+    if name not in POSITIVE:
+        return made
+    times = float(np.exp(min((made.interval[1] - value) / value, 700.0)))
+    return replace(made, interval=(value / times, value * times))
+
+
+def _worries(member: Member, samples: Samples) -> list[str]:
+    """What the samples can not bear."""
+    names, words = list(member.values), []
+    if samples.cycles < len(names):
+        words.append(f"{samples.cycles} cycles for {len(names)} parameters: give more of them")
+    if samples.noise > float(np.sqrt(np.mean(member.fitted**2))):
+        words.append("the friction's noise is above the friction: give more cycles, or a quieter sensor")
+    if not samples.reverses:
+        words.append("motion goes one way: a constant force is not told from friction; let it reverse")
+    for i, j in zip(*np.nonzero(np.triu(np.abs(member.correlations), 1) > TIED), strict=True):
+        words.append(f"{names[i]} and {names[j]} are told together alone (correlation {member.correlations[i, j]:.3f})")
+    return words
+
+
+def _flagged(curve: str, found: dict[str, Estimate], samples: Samples) -> tuple[dict[str, Estimate], list[str]]:
+    """What Stribeck's curve says where nothing slid, or where friction does not fall."""
+    if curve != "stribeck":
+        return found, []
+    slowest, flags = float(np.abs(samples.velocity).min()), []
+    if slowest > found["speed"].value:
+        word = f"the slowest sliding, {slowest:.3g} {samples.unit}/s, is above the Stribeck speed: slide slower"
+        found |= {name: replace(found[name], status=word) for name in ("static", "speed", "exponent")}
+        flags.append(word)
+    fall = found["static"].value - found["kinetic"].value
+    if fall <= found["static"].interval[1] - found["static"].value:
+        word = (
+            f"friction does not fall with speed above {slowest:.3g} {samples.unit}/s more than its scatter: "
+            "slide slower to tell a static friction and a Stribeck speed"
+        )
+        found |= {name: replace(found[name], status=word) for name in ("static", "speed", "exponent")}
+        flags.append(word)
+    return found, flags

@@ -1,0 +1,182 @@
+"""A family of curves, linear in its forces and not in its shape, and its best member for some samples."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.fit.curve_data import BLOCKS, Samples
+from stickslip.fit.nonlinear import inverse_normal, minimise, slopes
+from stickslip.statistics import FEW_CYCLES, INSEPARABLE, correlation_time, mean_uncertainty, student
+
+Array = NDArray[np.float64]
+
+SETTLED = 1e-8  # of a parameter: far below what any record tells
+MOST = 60  # steps: more are taken along a valley that has no lowest point
+FEW = 4000  # samples that a start is sought with
+QUARTERS = 4  # of a cycle: the parts whose scatter tells, where cycles are few
+
+
+@dataclass(frozen=True)
+class Family:
+    """Friction as a sum of columns, each by its coefficient; the columns' shape by logarithms of lengths and powers.
+
+    Attributes
+    ----------
+    formula : str
+        In words and letters.
+    along : str
+        What it is drawn over: "v", "x" or "t".
+    columns : callable
+        Takes samples and the shape's logarithms, gives an array (n, q).
+    parameters : callable
+        Takes the coefficients and the shape (no logarithms), gives each parameter by name.
+    units : mapping
+        Unit of each parameter along a path.
+    law : callable
+        Takes the parameters by name, gives the law, or raises ModelError where there is none of these values.
+    starts : callable
+        Takes samples, gives for each part of the shape the logarithms to begin with.
+    instead : Family or None
+        What is fitted where a parameter in `positive` comes out below zero.
+    positive : tuple of str
+        Parameters that mean nothing below zero.
+    fitted : callable or None
+        Solves for the coefficients where they are bound; None: by least squares.
+    """
+
+    formula: str
+    along: str
+    columns: Callable[[Samples, Array], Array]
+    parameters: Callable[[Array, Array], dict[str, float]]
+    units: Mapping[str, str]
+    law: Callable[[dict[str, float]], object | None]
+    starts: Callable[[Samples], Sequence[Array]] = lambda samples: ()
+    instead: Family | None = None
+    positive: tuple[str, ...] = ()
+    fitted: Callable[[Array, Array], Array] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """The best member of a family.
+
+    Attributes
+    ----------
+    values : dict
+        Parameters by name.
+    sd, freedom : ndarray, shape (p,)
+        Their standard deviations, and the degrees of freedom of these.
+    correlations : ndarray, shape (p, p)
+        Of the parameters.
+    fitted : ndarray, shape (n,)
+        The curve at the samples.
+    """
+
+    values: dict[str, float]
+    sd: Array
+    freedom: Array
+    correlations: Array
+    fitted: Array
+
+
+def best_member(family: Family, samples: Samples) -> tuple[Family, Member]:
+    """The best of a family, or of the one that stands in where its parameters come out below zero."""
+    member = _least_squares(family, samples)
+    if family.instead is not None and any(member.values[name] < 0 for name in family.positive):
+        return family.instead, _least_squares(family.instead, samples)
+    return family, member
+
+
+def _least_squares(family: Family, samples: Samples) -> Member:
+    """The least squares of a family, from the best of its starts; how sure by what the residuals do."""
+    logs = _start(family, samples)
+    columns = family.columns(samples, logs)
+    count = columns.shape[1]
+    coefficients = _coefficients(family, columns, samples.friction)
+    if len(logs):
+        start = np.concatenate([coefficients, logs])
+        found = minimise(
+            lambda raw: family.columns(samples, raw[count:]) @ raw[:count], samples.friction, start,
+            settled_at=SETTLED, most=MOST,
+        )  # fmt: skip
+        raw, jacobian, residual = found.parameters, found.jacobian, found.residual
+    else:
+        raw, jacobian, residual = coefficients, columns, samples.friction - columns @ coefficients
+
+    def physical(values: Array) -> Array:
+        return np.array(list(family.parameters(values[:count], np.exp(values[count:])).values()))
+
+    _require_separable(jacobian, family)
+    values = family.parameters(raw[:count], np.exp(raw[count:]))
+    turned = slopes(physical, raw)
+    bread = inverse_normal(jacobian) @ turned.T
+    sd, freedom = scatter((jacobian * residual[:, None]) @ bread, residual, samples)
+    covariance = turned @ bread
+    lengths = np.sqrt(np.diag(covariance))
+    return Member(values, sd, freedom, covariance / np.outer(lengths, lengths), samples.friction - residual)
+
+
+def _coefficients(family: Family, columns: Array, friction: Array) -> Array:
+    if family.fitted is not None:
+        return family.fitted(columns, friction)
+    return np.asarray(np.linalg.lstsq(columns, friction, rcond=None)[0])
+
+
+def _start(family: Family, samples: Samples) -> Array:
+    """The start whose columns leave least, of every combination."""
+    grids = family.starts(samples)
+    if not grids:
+        return np.empty(0)
+    few = samples.rows(slice(None, None, max(1, len(samples.friction) // FEW))) if family.along == "v" else samples
+    best, least = np.empty(0), np.inf
+    for logs in itertools.product(*grids):
+        columns = family.columns(few, np.array(logs))
+        left = few.friction - columns @ _coefficients(family, columns, few.friction)
+        if float(left @ left) < least:
+            best, least = np.array(logs), float(left @ left)
+    return best
+
+
+def _require_separable(jacobian: Array, family: Family) -> None:
+    lengths = np.linalg.norm(jacobian, axis=0)
+    condition = np.linalg.cond(jacobian / np.where(lengths > 0, lengths, 1.0)) if np.all(lengths > 0) else np.inf
+    if condition > INSEPARABLE:
+        raise EstimateError(
+            f"the condition number of the parameters of {family.formula.partition(',')[0]} is {condition:.3g}",
+            f"parameters that one motion tells apart have less than {INSEPARABLE:g}",
+            "choose a curve with fewer parameters, or give a record of slower and faster motion",
+        )
+
+
+def scatter(influence: Array, residual: Array, samples: Samples) -> tuple[Array, Array]:
+    """Standard deviation of each parameter, and its freedom, by what each sample does to it (n, p).
+
+    Two parts, of which the wider counts. What differs from cycle to cycle (of quarters, where cycles are few) is noise
+    and drift. What the curve can not follow repeats in every cycle: it shows in how residuals stray along the mean
+    cycle, whose neighbours are alike. Either is the long-run deviation of the influences in order.
+    """
+    parts = samples.cycle if samples.cycle.max(initial=0) + 1 >= FEW_CYCLES else _quarters(samples)
+    independent = len(residual) / correlation_time(residual)
+    terms = influence.shape[1]
+    shrinkage = np.sqrt(independent / max(1.0, independent - terms))
+    sd, freedom = np.empty(terms), np.empty(terms)
+    for index in range(terms):
+        told = [_of_parts(influence[:, index], group) for group in (parts, samples.block)]
+        widest = max(told, key=lambda each: student(each[1]) * each[0])
+        sd[index], freedom[index] = widest[0] * shrinkage, widest[1]
+    return sd, freedom
+
+
+def _quarters(samples: Samples) -> NDArray[np.intp]:
+    return samples.cycle * QUARTERS + samples.block * QUARTERS // BLOCKS
+
+
+def _of_parts(influence: Array, part: NDArray[np.intp]) -> tuple[float, float]:
+    sums = np.bincount(part, influence)[np.bincount(part) > 0]
+    return mean_uncertainty(len(sums) * sums)
