@@ -203,6 +203,25 @@ def test_what_can_not_be_checked_is_refused() -> None:
         ss.consistency(good(), tolerance=0.0)
 
 
+def test_a_sensor_that_does_not_change_is_named_and_left_out() -> None:
+    still = ss.consistency(changed(good(), a=np.full(len(good()), 0.3)), **RIG)
+    assert still["a is heard"].verdict == "fails"
+    assert "a does not change, it reads 0.3 m/s^2" in still["a is heard"].sentence
+    assert still["acceleration is that of the displacement"].verdict == "can not be told"
+    assert still["forces balance at the forcing frequency"].verdict == "holds"
+    with pytest.raises(RecordError, match="channel x does not change"):
+        ss.consistency(changed(good(), x=np.full(len(good()), 1e-3)), **RIG)
+
+
+def test_a_sensor_with_gaps_is_named_and_left_out() -> None:
+    gaps = good()["a"].copy()
+    gaps[500:600] = np.nan
+    found = ss.consistency(changed(good(), a=gaps), **RIG)
+    assert found.status == "ok"
+    assert "100 values that are not numbers" in found["a is heard"].sentence
+    assert found["a is heard"].verdict == "can not be told"
+
+
 # ---- real records
 
 

@@ -85,7 +85,7 @@ def test_a_method_without_its_channel_falls_back_and_says_what_is_lost() -> None
 @pytest.mark.parametrize("known", [{"stiffness": 2310.0}, {"mass": 2.42}, {}])
 def test_without_mass_or_stiffness_the_record_says_what_it_can(frequency: float, known: dict[str, float]) -> None:
     record, truth = measured(frequency)
-    made = ss.friction_force(told(record), method="fusion", **known)
+    made = ss.friction_force(told(record), method="fusion" if known else "motion", **known)
     name = "friction" if known else "friction_per_mass"
     true = truth[round(made.start * 4000) :][: len(made)] / (1 if known else 2.42)
     off = np.abs(made[name] - true)[200:-200]
@@ -142,3 +142,36 @@ def test_what_can_not_be_is_refused() -> None:
         ss.friction_force(record, method="F2", contact="wall")
     with pytest.raises(RecordError, match="x"):
         ss.friction_force(ss.Record.of({"a": record["a"]}, fs=4000), method="F2", **RIG)
+
+
+@pytest.mark.parametrize("name", ["a", "load"])
+def test_a_sensor_that_does_not_change_is_refused(name: str) -> None:
+    record = told(measured(8.7)[0])
+    still = record.with_channel(name, np.full(len(record), 0.3), unit=record.channels[name].unit)
+    with pytest.raises(RecordError, match=f"channel {name} does not change"):
+        ss.friction_force(still, **RIG, method="fusion")
+
+
+@pytest.mark.parametrize("frequency", list(CASES))
+def test_a_load_cell_weighs_mass_and_spring(frequency: float) -> None:
+    record, true = measured(frequency, seconds=3.0)
+    made = ss.friction_force(told(record), damping=RIG["damping"], method="fusion")
+    found = made.history[-1].arguments
+    assert found["mass"] == pytest.approx(RIG["mass"], rel=0.005)
+    assert found["stiffness"] == pytest.approx(RIG["stiffness"], rel=0.005)
+    off = np.abs(made["friction"] - true[round(made.start * 4000) :][: len(made)])[200:-200]
+    assert np.sqrt(np.mean(off**2)) < 0.013
+    assert np.mean(off < 2 * made["friction_sd"][200:-200]) > 0.9
+    turned = told(record).with_channel("z", -record["z"], unit="m")
+    with pytest.raises(EstimateError, match="correct signs"):
+        ss.friction_force(turned, method="fusion")
+
+
+@pytest.mark.parametrize("frequency", list(CASES))
+def test_a_load_cell_alone_is_heard_through_its_mount(frequency: float) -> None:
+    record, true = measured(frequency, seconds=3.0)
+    inside = slice(200, -200)
+    alone = ss.friction_force(told(record), method="load")
+    off = (alone["friction"] - true[round(alone.start * 4000) :][: len(alone)])[inside]
+    assert np.std(off) < 0.02 < np.std((record["load"] - true)[inside])
+    assert "its mount of 250 Hz" in alone.history[-1].outcome

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from stickslip.config import RigSettings
 from stickslip.errors import ModelError, StickslipError
-from stickslip.identify.compare_force import ForceComparison, compare_force
+from stickslip.identify.compare_force import UNLIKE, ForceComparison, compare_force
 from stickslip.identify.force import friction_force
+from stickslip.identify.mass import mass_and_stiffness
 from stickslip.identify.motion import is_measured
 from stickslip.identify.sensor_delay import SensorDelay, sensor_delay
 from stickslip.record.channels import Channel
+from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 
@@ -22,6 +24,7 @@ Answer = TypeVar("Answer")
 
 MOTION = ("x", "v", "theta")
 USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
+SENSED = ("v", "a", "load")  # what no rig holds still while its mass moves
 CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
 STRETCH = 1 << 14  # samples from the middle in which a delay is looked for, and the forces are compared
 AT_ONCE = 1 << 18  # samples of which all sensors are put together unasked
@@ -78,17 +81,23 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
             record = record.with_details(name, **told.model_dump(exclude_unset=True))
         else:
             asked.notes.append(f"A sensor {name} is described, but the record has no such channel.")
+    record = _without_dead(record, asked)
     record, delay = _aligned(record, asked)
     known = [name for name in USED if name in record]
     whole = (asked.ask("Stated delays", lambda: without_delays(record, *known)) if known else None) or record
     comparison = None
     if is_measured(whole, "friction"):
         _tell_unused(rig, asked)
-    elif "x" in whole and _enough(whole, rig):
-        if {"a", "load"} <= set(whole):
-            comparison = asked.ask("Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig)))
-            whole = _with_mounts(whole, comparison, asked)
-        whole = _balanced(whole, rig, method, asked)
+    else:
+        rig = _weighed(whole, rig, asked)
+        if "x" in whole and _enough(whole, rig):
+            if "load" in whole and ("a" in whole or not _base_seen(whole)):
+                comparison = asked.ask(
+                    "Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig))
+                )
+                whole = _with_mounts(whole, comparison, asked)
+            if method != "auto" or not _base_moves(whole, comparison, asked):
+                whole = _balanced(whole, rig, method, asked)
     if "friction" not in whole:
         whole = _by_load(whole, rig, asked)
     return Ready(whole, delay, comparison, _doubt(whole, delay))
@@ -104,6 +113,57 @@ def _enough(record: Record, rig: RigSettings) -> bool:
     """Whether the balance can be drawn up: one of mass and spring is found from the other where more than x is read."""
     stated = sum(each is not None for each in (rig.mass, rig.stiffness))
     return stated == 2 or (stated == 1 and not {"a", "load"}.isdisjoint(record))
+
+
+def _without_dead(record: Record, asked: Asked) -> Record:
+    """The record without sensors that read one value throughout."""
+    dead = [name for name in SENSED if name in record and constant(record[name])]
+    for name in dead:
+        level = f"{record[name][0]:.4g} {record.channels[name].unit}"
+        asked.notes.append(f"{name} does not change, it reads {level} throughout: it is left out.")
+    kept = [name for name in record if name not in dead]
+    if not dead or not kept:
+        return record
+    return replace(
+        record, samples={name: record[name] for name in kept}, channels={n: record.channels[n] for n in kept}
+    )  # fmt: skip
+
+
+def _weighed(record: Record, rig: RigSettings, asked: Asked) -> RigSettings:
+    """The rig with its mass and its spring by what the load cell feels, where neither was stated."""
+    if rig.mass is not None or rig.stiffness is not None or "friction" in record:
+        return rig
+    if not {"x", "load"} <= set(record) or not _base_seen(record):
+        return rig
+    ends = {"damper": rig.damper, "contact": rig.contact}
+    found = asked.ask(
+        "Mass and stiffness",
+        lambda: mass_and_stiffness(middle(record, STRETCH), damping=rig.damping or 0.0, **ends),
+    )
+    if found is None:
+        return rig
+    mass, stiffness = found
+    asked.notes.append(
+        f"No mass and no stiffness were stated: {mass.value:.4g} kg and {stiffness.value:.4g} N/m are found from what "
+        "the load cell feels."
+    )
+    return rig.model_copy(update={"mass": mass.value, "stiffness": stiffness.value})
+
+
+def _base_seen(record: Record) -> bool:
+    """Whether the record has a base that moves."""
+    return "z" in record and not constant(record["z"])
+
+
+def _base_moves(record: Record, comparison: ForceComparison | None, asked: Asked) -> bool:
+    """Whether a base that is not measured can not have been at rest, by the load cell."""
+    moves = not _base_seen(record) and comparison is not None and UNLIKE in comparison.status
+    if moves:
+        asked.notes.append(
+            f"{'z does not change' if 'z' in record else 'There is no channel z'}, and with the spring's other end at "
+            "rest the motion leaves another force than the load cell feels: mass and spring are not used."
+        )
+    return moves
 
 
 def _constants(rig: RigSettings) -> dict[str, Any]:
@@ -154,13 +214,16 @@ def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Aske
 
 
 def _doubt(record: Record, delay: SensorDelay | None) -> str:
-    """What is not known of the sensors of a friction force that was put together from all of them."""
+    """What is not known of the sensors behind a friction force that was not measured."""
+    if "friction" in record and record.channels["friction"].source not in ("friction_force", "load"):
+        return ""
     unknown = [
         f"the mount of {name}" for name in ("a", "load") if name in record and record.channels[name].mount is None
     ]
     if delay is not None:
-        unknown.append("the delay of x, found in this record,")
-    return f"{' and '.join(unknown)} is not stated: it may be wrong by some per cent" if unknown else ""
+        unknown.append("the delay of x (found in this record)")
+    are = "is" if len(unknown) == 1 else "are"
+    return f"{' and '.join(unknown)} {are} not stated: it may be wrong by some per cent" if unknown else ""
 
 
 def _tell_unused(rig: RigSettings, asked: Asked) -> None:
@@ -220,12 +283,17 @@ def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
     """The record with what its load cell reads as its friction, or with a note of what is lacking."""
     moves = any(name in record for name in MOTION)
     if "load" in record and "force" not in record and moves:
+        if _described(record.channels["load"]) and "x" in record:
+            return _by_cell(record, asked)
         asked.notes.append(
-            "The load cell's reading is taken as the friction force; inertia between both is part of it."
+            "The load cell's reading is taken as the friction force; inertia between both is part of it, and what "
+            "its mount adds, of which nothing is stated."
         )
         step = Step("analyze", {"friction": "load"}, "the load cell's reading taken as the friction force")
         unit = record.channels["load"].unit
         return record.with_channel("friction", record["load"], unit=unit, source="load", step=step)
+    if {"x", "a"} <= set(record) and rig.mass is None and rig.stiffness is None and "load" not in record:
+        _tell_per_mass(record, rig, asked)
     lacking = [key for key in ("mass", "stiffness") if getattr(rig, key) is None]
     lacking = lacking if "x" in record else ["a displacement x", *lacking]
     if lacking and "force" not in record and (moves or "load" not in record):
@@ -233,6 +301,23 @@ def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
             f"Friction force: without a measured friction or load it needs {' and '.join(lacking)}, not given."
         )
     return record
+
+
+def _tell_per_mass(record: Record, rig: RigSettings, asked: Asked) -> None:
+    """What can be said without mass, spring and load cell."""
+    found = asked.ask("Friction per mass", lambda: friction_force(record, contact=rig.contact, method="motion"))
+    if found is not None:
+        level = float(np.median(np.abs(found["friction_per_mass"])))
+        asked.notes.append(f"Friction per mass: {level:.4g} m/s^2 (median); {found.history[-1].outcome}.")
+
+
+def _by_cell(record: Record, asked: Asked) -> Record:
+    """The record with its friction by the load cell alone, less what is stated of it."""
+    found = asked.ask("Friction force", lambda: friction_force(record, method="load"))
+    if found is None:
+        return record
+    asked.notes.append(f"Friction force: {found.history[-1].outcome}.")
+    return found
 
 
 def normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> float | None:

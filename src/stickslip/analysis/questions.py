@@ -11,6 +11,7 @@ from stickslip.analysis.findings import Findings, record_name
 from stickslip.analysis.preparation import AT_ONCE, CONSTANTS, MOTION, Asked, middle, normal_load, ready
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, StickslipError
+from stickslip.estimate import Estimate
 from stickslip.identify.breakaway import breakaway
 from stickslip.identify.cause import lag_or_compliance
 from stickslip.identify.consistency import consistency
@@ -130,7 +131,7 @@ class Question:
     fused : bool
         Whether the friction must come from all sensors together.
     derived : bool
-        Whether it must come from a balance of forces, whose constants are known then.
+        Whether there must be a balance of forces, or a load cell to hold one against.
     """
 
     key: str
@@ -149,7 +150,7 @@ class Question:
             all(any(name in record for name in group) for group in self.needs)
             and not any(name in record for name in self.without)
             and (not self.fused or _can_be_fused(record, again=not self.follows))
-            and (not self.derived or bool(_told(record)))
+            and (not self.derived or bool(_told(record)) or "load" in record)
         )
 
 
@@ -216,9 +217,15 @@ def _can_be_fused(record: Record, *, again: bool) -> bool:
 def _doubt(answers: dict[str, Any], reason: str) -> None:
     """Flag what rests on sensors that are not known."""
     for key in ("stiffness", "contact_damping", "coupled"):
-        found = answers.get(key)
-        if reason and found is not None and found.status == "ok":
-            answers[key] = replace(found, status=reason)
+        answers[key] = _doubted(answers.get(key), reason)
+    first = answers.get("breakaway")
+    if first is not None:
+        told = {side: _doubted(getattr(first, side), reason) for side in ("forward", "back", "ratio")}
+        answers["breakaway"] = replace(first, **told)
+
+
+def _doubted(found: Estimate | None, reason: str) -> Estimate | None:
+    return replace(found, status=reason) if reason and found is not None and found.status == "ok" else found
 
 
 def _fused(record: Record) -> Record:
@@ -235,7 +242,11 @@ def _told(record: Record) -> dict[str, Any]:
     if "friction" not in record or is_measured(record, "friction"):
         return {}
     told = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
-    return {key.replace("method", "differentiation"): made[key] for made in told for key in (*CONSTANTS, "method")}
+    return {
+        key.replace("method", "differentiation"): made[key]
+        for made in told if made["mass"] is not None
+        for key in (*CONSTANTS, "method")
+    }  # fmt: skip
 
 
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:

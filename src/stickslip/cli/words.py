@@ -20,6 +20,7 @@ _SPOKEN = (
     (r'\brestoring="pendulum"', "--restoring pendulum"),
     (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
+    (r'\bfriction_force\(record, \.\.\., method="(\w+)"\)', r"--method \1"),
     (r"\b(channels|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness)=(?=\W|$)", r"--\1"),
 )
 

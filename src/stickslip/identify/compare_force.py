@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 QUESTION = "the comparison of forces"
 RATIO = 1.25  # of a band's upper edge to its lower one
 CHANCE = 0.01  # probability with which bands that have nothing in common pass for coherent
+UNLIKE = "the forces differ where they are largest"
 USED = ("x", "z", "v", "a", "force", "load")
 
 
@@ -289,7 +290,7 @@ def _status(bands: tuple[ForceBand, ...], record: Record) -> str:
     if first.verdict == "differ" and abs(abs(first.phase) - math.pi) < 0.5:
         words.append("the forces have opposite signs: one sensor is wired the wrong way round, or the sign convention")
     elif first.verdict != "agree":
-        words.append("the forces differ where they are largest: ask consistency(record) which channel it is")
+        words.append(f"{UNLIKE}: ask consistency(record) which channel it is")
     if not any(record.channels[name].delay or "delays" in str(record.history) for name in ("x", "a")):
         words.append("no delay is stated of any sensor")
     return "; ".join(words) or "ok"

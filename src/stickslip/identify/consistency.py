@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from stickslip.errors import EstimateError
 from stickslip.estimate import Result
 from stickslip.identify.checks import FAILS, Check
@@ -23,8 +21,8 @@ from stickslip.identify.forced_checks import (
     velocity_check,
 )
 from stickslip.identify.mixups import mixups
-from stickslip.identify.motion import is_measured
-from stickslip.identify.sensor_checks import cycle_checks, range_checks, sampling_check
+from stickslip.identify.motion import is_measured, require_change
+from stickslip.identify.sensor_checks import cycle_checks, range_checks, sampling_check, silence_checks, silent
 from stickslip.identify.stated import Stated, stated_checks, what_fails
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
@@ -134,10 +132,14 @@ def consistency(
         return Consistency(checks, what_fails(checks))
     rig = told_rig(record, mass=mass, stiffness=stiffness, damping=damping, damper=damper)
     record.require_clean("x", question=QUESTION)
-    names = [n for n in USED if n in record and is_measured(record, n) and np.isfinite(record[n]).all()]
+    require_change(record, "x", question=QUESTION)
+    measured = [name for name in USED if name in record and is_measured(record, name)]
+    unheard = silent(record, measured)
+    names = [name for name in measured if name not in unheard]
     record = without_delays(record, *names, question=QUESTION)
     seen = Seen.of(record, names, rig, tolerance, QUESTION)
     checks = (
+        *silence_checks(unheard),
         *range_checks(record, names),
         *(check(seen) for check in FORCED),
         sampling_check(record, seen),

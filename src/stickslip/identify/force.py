@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.identify.fusion import Balance, fuse
-from stickslip.identify.mass import stiffness_per_mass
-from stickslip.identify.motion import is_measured, require_fit
+from stickslip.identify.mass import mass_and_stiffness, stiffness_per_mass
+from stickslip.identify.motion import is_measured, require_change, require_fit
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.signals.differentiate import (
@@ -37,11 +37,13 @@ ENDS = ("ground", "base")
 FUSIONS = {"fusion": ("x", "v", "a", "load"), "motion": ("x", "v", "a"), "load": ("x", "load")}
 """Methods that know how the sensors lie, and the channels that each uses, where they are there."""
 THESIS = ("F", "F1", "F2")
+ALONE = "load cell alone"
 INSTEAD = {"load": "motion", "F2": "F1"}  # what answers where there is no load cell
 LOST = {
     "a": "without an accelerometer: reversals are seen through the displacement alone",
     "load": "without a load cell: the friction is only what is left of the motion",
 }
+BEYOND = 2.0  # times its mount's frequency up to which a load cell's reading is followed
 SPAN = 24  # samples from an end within which averages and differences feel it
 
 
@@ -93,7 +95,9 @@ def friction_force(
         mount=(125, 0.1))``, and of a load cell ``inertia`` and ``discharge``): "fusion" with x, v, a and load where
         measured, "motion" without the load cell, "load" with x and load alone. ``friction_sd`` is then that of the
         smoother: two of it hold 93 to 97 % of the samples, if the mounts are right. Where the load cell or the
-        accelerometer is missing, or at the end of its range, the others go on. The last three are the thesis's
+        accelerometer is missing, or at the end of its range, the others go on. With neither mass nor stiffness,
+        "fusion" finds both from what the load cell feels, and "load" is the load cell alone: its reading through the
+        inverse of its mount, less its flange's inertia. The last three are the thesis's
         (section 2.4): "F" is ``k z - k x - m a`` as read, "F1" its five-point average (A.1), "F2" the
         five-point average of the load cell less its flange's inertia (stated by ``with_details("load",
         inertia=0.05)``), for which neither mass nor stiffness is needed. Their ``friction_sd`` is that of noise: the
@@ -109,7 +113,8 @@ def friction_force(
     -------
     Record
         With ``friction`` [N], ``friction_sd`` [N], and ``v`` [m/s] and ``a`` [m/s^2] where they were not measured;
-        ``friction_per_mass`` and ``friction_per_mass_sd`` [m/s^2] where neither mass nor stiffness is known.
+        ``friction_per_mass`` and ``friction_per_mass_sd`` [m/s^2] where neither mass nor stiffness is known, nor
+        found.
         ``friction_sd`` is the standard deviation of each value: each channel's noise (stated for the channel, or
         estimated, varying in time where it does) through the whole filter from that channel to the force, and the
         smoothing bias (what a second pass would change). Errors of m, k, c and sensitivities are not in it.
@@ -136,11 +141,14 @@ def friction_force(
         raise EstimateError(f"method = '{method}'", f"the friction is found by one of {methods}", "choose one of them")
     record = _as_measured(record)
     asked, method = method, method if "load" in record else INSTEAD.get(method, method)
+    require_change(record, "v", "a", "load", question=QUESTION)
     unknown = [name for name, value in (("mass", mass), ("stiffness", stiffness)) if value is None]
     constants = {"mass": mass, "stiffness": stiffness, "damping": damping, **dict.fromkeys(unknown, 1.0)}
     rig = _Rig.stated(constants, damper, contact)
-    if method == "F2":
-        return _felt(record, {**asdict(rig), **dict.fromkeys(unknown)})
+    if method == "F2" or (method == "load" and len(unknown) == 2):
+        return _felt(record, {**asdict(rig), **dict.fromkeys(unknown)}, method)
+    if method == "fusion" and len(unknown) == 2 and {"z", "load"} <= set(record):
+        return _weighed(record, rig)
     if unknown:
         return _completed(record, rig, unknown, method, bandwidth)
     if method in FUSIONS:
@@ -198,27 +206,52 @@ def _balanced(record: Record, rig: _Rig, method: str, asked: str) -> Record:
     return _with_friction(_with_motion(record, derive), force, np.sqrt(variance), step)
 
 
-def _felt(record: Record, arguments: Mapping[str, Any]) -> Record:
-    """The thesis's F2: what the load cell reads, less the inertia of its flange, averaged over five points."""
-    inertia = record.channels["load"].inertia
-    source = next((name for name in ("a", "v", "x") if name in record), "") if inertia else ""
+def _felt(record: Record, arguments: Mapping[str, Any], method: str) -> Record:
+    """What the load cell feels, less the inertia of its flange: the thesis's F2, or through its mount's inverse."""
+    cell = record.channels["load"]
+    source = next((name for name in ("a", "v", "x") if name in record), "") if cell.inertia else ""
     used = ["load", *([source] if source else [])]
     record.require_clean(*used, question=QUESTION, samples=LEAST)
     record = without_delays(record, *used, question=QUESTION, samples=LEAST)
-    derive = Filter("five-point", record.fs, 0.0)
-    terms = {"load": {0: 1.0}, **({source: {"avx".index(source): -inertia}} if source else {})}
+    terms = {"load": {0: 1.0}, **({source: {"avx".index(source): -cell.inertia}} if source else {})}
+    if method == "F2":
+        derive = dict.fromkeys(terms, Filter("five-point", record.fs, 0.0))
+        words = ["the load cell, averaged over five points"]
+    else:
+        derive, words = _unmounted(record, terms)
     force, variance = np.zeros(len(record)), np.zeros(len(record))
     for name, orders in terms.items():
         noise = noise_along(record[name], record.fs, record.channels[name].noise)
-        force += five_point_average(derive.apply(record[name], orders))
-        variance += (_gain(len(record), derive, orders, five_point_average) * noise) ** 2
-    words = ["the load cell, averaged over five points"]
+        part = derive[name].apply(record[name], orders)
+        if method == "F2":
+            force += five_point_average(part)
+            variance += (_gain(len(record), derive[name], orders, five_point_average) * noise) ** 2
+        else:
+            force += part
+            variance += (derive[name].noise_gain(len(record), orders) * noise) ** 2
     if source:
-        words.append(f"less {inertia:g} kg times the acceleration from {source}")
-    elif inertia:
-        words.append(f"no motion: the inertia of {inertia:g} kg of its flange is left in")
-    step = Step("friction_force", {**arguments, "method": "F2"}, "; ".join(words))
+        words.append(f"less {cell.inertia:g} kg times the acceleration from {source}")
+    elif cell.inertia:
+        words.append(f"no motion: the inertia of {cell.inertia:g} kg of its flange is left in")
+    if cell.discharge is not None:
+        words.append(f"its discharge of {cell.discharge:g} s is left in")
+    name = ALONE if method == "load" else method  # no balance of forces stands behind it
+    step = Step("friction_force", {**arguments, "method": name}, "; ".join(words))
     return _with_friction(record, force, np.sqrt(variance), step)
+
+
+def _unmounted(record: Record, terms: dict[str, dict[int, float]]) -> tuple[dict[str, Filter], list[str]]:
+    """The filters of a load cell alone and of what its flange does; its mount's inverse is added to its terms."""
+    mount = record.channels["load"].mount
+    width = {name: best_bandwidth(record[name], record.fs) for name in terms}
+    if mount is not None:
+        angular = 2 * math.pi * mount[0]
+        terms["load"] |= {1: 2 * mount[1] / angular, 2: angular**-2}
+        width["load"] = checked_bandwidth(min(BEYOND * mount[0], 0.4 * record.fs), record.fs, len(record))
+    words = [f"the load cell alone, smoothed to {width['load']:.4g} Hz (-3 dB)"]
+    if mount is not None:
+        words.append(f"less what its mount of {mount[0]:g} Hz adds")
+    return {name: Filter("smoother", record.fs, each) for name, each in width.items()}, words
 
 
 def _gain(size: int, derive: Filter, terms: Mapping[int, float], last: Callable[[Array], Array]) -> Array:
@@ -236,6 +269,19 @@ def _with_friction(record: Record, force: Array, sd: Array, step: Step) -> Recor
     made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
     noise = float(np.median(sd))
     return made.with_channel("friction", force, unit="N", source="friction_force", noise=noise, step=step)
+
+
+def _weighed(record: Record, rig: _Rig) -> Record:
+    """The friction force by all sensors, with mass and stiffness from what the load cell feels."""
+    ends = {"damper": rig.damper, "contact": rig.contact}
+    mass, stiffness = mass_and_stiffness(record, damping=rig.damping, **ends)
+    made = friction_force(
+        record, mass=mass.value, stiffness=stiffness.value, damping=rig.damping, method="fusion", **ends
+    )
+    sd = np.sqrt(made["friction_sd"] ** 2 + (mass.sd * made["a"]) ** 2 + (stiffness.sd * _stretch(made)) ** 2)
+    words = f"m = {mass.value:.5g} kg and k = {stiffness.value:.5g} N/m from what the load cell feels"
+    step = replace(made.history[-1], outcome=f"{words}; {made.history[-1].outcome}")
+    return replace(_with_friction(made, made["friction"], sd, step), history=(*made.history[:-1], step))
 
 
 def _completed(record: Record, rig: _Rig, unknown: Sequence[str], method: str, bandwidth: float | str | None) -> Record:

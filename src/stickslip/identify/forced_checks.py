@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.identify.checks import APART, HOLDS, UNTOLD, Check, compared, judged, untold
-from stickslip.identify.lines import Complex, Lines, find_lines
+from stickslip.identify.lines import Complex, Lines, find_lines, response_of
 from stickslip.identify.mixups import Amplitudes
 from stickslip.identify.sliding_balance import Slider
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record
-from stickslip.signals.response import Response, leak, resonance
 from stickslip.statistics import mean_uncertainty
 from stickslip.units import parse_value
 
@@ -53,7 +52,7 @@ class Seen:
             lines = find_lines(whole, [*names, *RATES], contact=contact, question=question)
         known = {name: parse_value(rig[name], unit) for name, unit in UNITS.items() if name in rig}
         told = {name: record.channels[name] for name in names}
-        made = {name: lines.amplitudes[name] / _response(told[name]).at(lines.frequency) for name in names}
+        made = {name: lines.amplitudes[name] / response_of(told[name]).at(lines.frequency) for name in names}
         if "load" in made and told["load"].inertia:
             w = 2 * np.pi * lines.frequency
             made["load"] = made["load"] - told["load"].inertia * made.get("a", -(w**2) * made["x"])
@@ -127,12 +126,6 @@ def _trips(record: Record) -> float:
     return float(np.sum((force[1:] + force[:-1]) / 2 * np.diff(x))) / most if most > 0 else 0.0
 
 
-def _response(channel: Channel) -> Response:
-    """Of a sensor, as stated."""
-    mount = resonance(*channel.mount) if channel.mount is not None else Response()
-    return mount.then(leak(channel.discharge)) if channel.discharge is not None else mount
-
-
 def acceleration_check(seen: Seen) -> Check:
     """Whether a is the second derivative of x."""
     return _derivative(seen, "a", "acceleration is that of the displacement", "m/s^2")
@@ -145,7 +138,7 @@ def velocity_check(seen: Seen) -> Check:
 
 def _derivative(seen: Seen, channel: str, name: str, unit: str) -> Check:
     if channel not in seen.channels:
-        return untold(name, f"no {'accelerometer' if channel == 'a' else 'velocity'} was measured")
+        return untold(name, f"there is no {'accelerometer' if channel == 'a' else 'velocity'} to be heard")
     order = 1 if channel == "v" else 2
     read, moved = seen.strongest(channel), (1j * seen.angular) ** order * seen.strongest("x")
     if seen.lines.cycles is None:  # a window's line is no single frequency, and begins at any phase

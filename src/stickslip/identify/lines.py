@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.identify.motion import Cycles, contact_motion, find_cycles
+from stickslip.record.channels import Channel
 from stickslip.record.record import Record
 from stickslip.signals.interpolate import band_limited
+from stickslip.signals.response import Response, leak, resonance
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -97,3 +99,9 @@ def _of_windows(record: Record, channels: Sequence[str], question: str) -> Lines
         amplitudes[name] = 2 * spectrum[:, 1 : size // 2] / window.sum()
     frequency = np.arange(1, size // 2) * record.fs / size
     return Lines(frequency, amplitudes, means, WORTH, None)
+
+
+def response_of(sensor: Channel) -> Response:
+    """What a sensor makes of a motion, as far as it is stated: its mount, and its discharge."""
+    mount = resonance(*sensor.mount) if sensor.mount is not None else Response()
+    return mount.then(leak(sensor.discharge)) if sensor.discharge is not None else mount

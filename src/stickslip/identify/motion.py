@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate
-from stickslip.record.flaws import runs_of
+from stickslip.record.flaws import constant, runs_of
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import differentiate
 from stickslip.signals.noise import noise_level
@@ -115,6 +115,18 @@ def slid_on(record: Record, contact: str | None) -> str:
     if contact not in ("ground", "base"):
         raise EstimateError(f"contact = '{contact}'", "the mass slides on the ground or the base", "choose one of them")
     return contact
+
+
+def require_change(record: Record, *names: str, question: str) -> None:
+    """Refuse, in one sentence, a sensor that reads one value throughout."""
+    for name in names:
+        if name in record and constant(record[name]):
+            channel = record.channels[name]
+            raise RecordError(
+                f"channel {name} does not change: it reads {record[name][0]:.4g} {channel.unit} throughout",
+                f"{question} needs a sensor that follows the motion",
+                "look at its cable, range and column, or leave it out when reading",
+            )
 
 
 def motion_channels(record: Record, contact: str | None) -> list[str]:

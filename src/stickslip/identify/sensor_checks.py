@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.identify.checks import FAILS, HOLDS, Check, compared, judged, untold
+from stickslip.identify.checks import FAILS, HOLDS, UNTOLD, Check, compared, judged, untold
 from stickslip.identify.forced_checks import Seen
 from stickslip.identify.motion import stretches
 from stickslip.record.check import find_clipping
-from stickslip.record.flaws import saturated
+from stickslip.record.flaws import constant, saturated
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import Filter
 
 Array = NDArray[np.float64]
 
 NOISY = ("v", "a", "load", "force")  # whose noise moves every sample, unless it is held
+MAY_REST = ("z", "force")  # what may be held still while the mass moves
 CROSSED = 0.8  # of the friction's level: a reversal goes from one side of it to the other
 LEAST_SAMPLES = 4.0  # of a reversal
 SMOOTHED = 6.0  # times the forcing frequency, to which channels are smoothed before they are compared in time
@@ -26,6 +27,27 @@ FEW_CYCLES = 6
 FARTHEST = 20  # whole cycles of a lag that is looked for
 UNIQUE = 1.03  # times the least that the next best shift leaves over, if the best is to be named
 SURE = 5.0  # standard deviations of what is left over, from which shifts differ
+
+
+def silent(record: Record, names: Sequence[str]) -> dict[str, str]:
+    """Why a channel tells nothing, of those that do not."""
+    found = {}
+    for name in names:
+        values, unit = record[name], record.channels[name].unit
+        lost = int(np.sum(~np.isfinite(values)))
+        if lost:
+            found[name] = f"{name} has {lost} values that are not numbers: see record.check()"
+        elif constant(values) and name not in MAY_REST:
+            found[name] = f"{name} does not change, it reads {values[0]:.4g} {unit} throughout: look at its cable"
+    return found
+
+
+def silence_checks(why: Mapping[str, str]) -> list[Check]:
+    """That a channel tells nothing: one that does not change can not be true, of one with gaps nothing is known."""
+    return [
+        Check(f"{name} is heard", math.nan, math.nan, "1", math.nan, FAILS if "change" in words else UNTOLD, words)
+        for name, words in why.items()
+    ]
 
 
 def range_checks(record: Record, names: Sequence[str]) -> list[Check]:

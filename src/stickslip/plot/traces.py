@@ -112,8 +112,8 @@ def force_balance(record: Record) -> dict[str, Array] | None:
     ``f = k (z - x) - m a - c v + P``, with ``c (v - dz/dt)`` for a damper on the base; the constants are those in the
     history of the record, not those at hand.
     """
-    told = [step.arguments for step in record.history if step.action == "friction_force" and "mass" in step.arguments]
-    if not told or "friction" not in record or record.channels["friction"].source != "friction_force":
+    told = [step.arguments for step in record.history if step.action == "friction_force"]
+    if not told or told[-1].get("mass") is None or record.channels["friction"].source != "friction_force":
         return None
     rig = told[-1]
     stretch = record["z"] - record["x"] if "z" in record else -record["x"]

@@ -223,7 +223,7 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
         return faults
     if lost.any():
         values = flaws.held_over(values, lost)
-    if np.ptp(values) <= 1e-12 * float(np.max(np.abs(values))):
+    if flaws.constant(values):
         message = (
             f"channel {name} is constant at {_number(values[0], '.6g', unit)} throughout; "
             "look at its cable, range and column."

@@ -55,6 +55,12 @@ def held_over(values: Array, lost: Mask) -> Array:
     return held
 
 
+def constant(values: Array) -> bool:
+    """Whether a sensor reads one value throughout, where it reads at all."""
+    there = values[np.isfinite(values)]
+    return len(there) > 0 and bool(np.ptp(there) <= 1e-12 * np.max(np.abs(there)))
+
+
 def quantum(values: Array) -> float:
     """Step between the sensor's levels, or 0 where the samples lie on no common grid."""
     few = values[:: 1 + len(values) // MANY]
