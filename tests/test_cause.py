@@ -7,7 +7,7 @@ from functools import cache
 import pytest
 
 import stickslip as ss
-from rigs import CASES, LAG, RIG, SETTLED
+from rigs import CASES, LAG, RIG, SETTLED, measured, told
 from stickslip.errors import EstimateError, RecordError
 
 
@@ -61,6 +61,36 @@ def test_the_friction_alone_tells_it_less_surely() -> None:
     assert found.cause == "both"
     assert found.lag.includes(LAG)
     assert "mount is not stated" in ss.lag_or_compliance(bare.with_details("load", mount=None)).status
+
+
+@pytest.mark.parametrize("frequency", [2.5, 5.61, 8.7])
+def test_stiffness_and_give_hold_the_truth(frequency: float) -> None:
+    """By the fitted contact where friction was found by the balance of forces, else as far as a damper leaves it."""
+    give = CASES[frequency][1] / 192000
+    record = told(measured(frequency, seconds=2.0)[0])
+    fused = ss.friction_force(record, method="fusion", **RIG)
+    for each in (record, fused):
+        found = ss.lag_or_compliance(each)
+        assert found.cause == "contact compliance"
+        assert found.stiffness is not None
+        assert found.stiffness.includes(192000)
+        assert found.give.includes(give)
+        assert found.give.includes(found.give.value)
+        assert f"{1e6 * found.give.value:.3g} um" in found.reason
+    assert found.stiffness == ss.contact_stiffness(fused)
+    assert "a damper in the contact" in ss.lag_or_compliance(record).stiffness.status  # type: ignore[union-attr]
+
+
+def test_the_answer_is_printed() -> None:
+    found = ss.lag_or_compliance(seen(8.7, True, False))
+    assert str(found).startswith(f"{found.cause}: {found.reason}")
+
+
+def test_of_a_long_record_the_middle_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stickslip.identify.cause.MOST", 4000)
+    found = ss.lag_or_compliance(seen(8.7, True, False))
+    assert found.cause == "contact compliance"
+    assert "the 1 s in the middle of 2 s" in found.reason
 
 
 def test_a_rigid_contact_that_sticks_tells_nothing() -> None:

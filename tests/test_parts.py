@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,21 @@ def test_what_a_threshold_leaves_open_stays_open_in_the_mean() -> None:
     assert found.method == "speed"
     assert found.share.includes(1 / 3)
     assert found.share.interval == pytest.approx(whole.share.interval, abs=0.01)
+
+
+def test_what_keeps_a_stretch_from_being_sure_is_said_of_the_whole() -> None:
+    t = np.arange(40000) / 1000
+    drive = np.sin(2 * np.pi * t)
+    x = np.cumsum(np.maximum(np.abs(drive) - 0.5, 0) * np.sign(drive)) / 1000
+    record = ss.Record.of({"x": x + 1e-6 * np.random.default_rng(0).standard_normal(t.size)}, fs=1000)
+    found = [(each, ss.find_sticks(each.record)) for each in overlapping(record, seconds=10)]
+    stretch, sticks = found[2]
+    doubted = replace(sticks, share=replace(sticks.share, status="a doubt"))
+    joined = join_sticks([*found[:2], (stretch, doubted), *found[3:]])
+    assert joined.share.status == "a doubt (in 1 of 4 stretches)"
+    assert joined.per_cycle.status == "ok"
+    crude = replace(sticks, share=replace(sticks.share, status="only 3 cycles: the interval is crude"))
+    assert join_sticks([*found[:2], (stretch, crude), *found[3:]]).share.status == "ok"
 
 
 def test_parts_that_do_not_follow_are_refused() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from rigs import CASES, RIG, SETTLED, measured, told
+from rigs import CASES, RIG, SETTLED, measured, motion, told
 from stickslip.errors import EstimateError, RecordError
 
 METHODS = ("contact", "curve", "equation")
@@ -51,10 +51,24 @@ def test_the_others_are_biased_as_they_say(frequency: float, rough: float) -> No
     answer, truth = found(frequency, rough), true_speed(frequency, rough)
     assert answer.curve is not None
     assert answer.equation is not None
-    assert -0.01 < answer.curve.value / truth - 1 < 0.02
+    assert abs(answer.curve.value / truth - 1) < 0.01
+    assert answer.curve.includes(truth)
     assert 0.02 < answer.equation.value / truth - 1 < 0.055
     assert any("lag" in check for check in answer.curve.checks)
     assert any("damping" in check for check in answer.equation.checks)
+
+
+def test_in_stick_slip_curve_and_contact_agree() -> None:
+    """Out of sliding the contact lets go past its fastest: each turn's speed falls again before the slip begins."""
+    answer = found(2.5)
+    run = motion(2.5)
+    slips = [event.time for event in run.events if event.kind == "slip" and event.time > SETTLED]
+    fastest = max(abs(run.state(time)["v"]) for time in slips)  # after a micro-slip it is slower
+    assert answer.contact is not None
+    assert answer.curve is not None
+    assert answer.contact.value == pytest.approx(fastest, rel=2e-3)
+    assert answer.curve.includes(fastest)
+    assert answer.curve.value == pytest.approx(fastest, rel=0.02)
 
 
 def test_equation_3_4_is_the_thesis_s() -> None:

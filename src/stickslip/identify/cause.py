@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from stickslip.compiled import FAST, compiled
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.identify.likely_contact import LikelyContact, likely_contact
 from stickslip.identify.motion import is_measured, slid_on
 from stickslip.identify.sensor_delay import sensor_delay
 from stickslip.record.channels import Channel
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 QUESTION = "lag or compliance"
 CAUSES = ("sensor lag", "contact compliance", "both", "neither", "cannot be told")
 LEAST = 64  # samples
-MOST = 1 << 17  # samples that are looked at
+MOST = 1 << 17  # samples that are looked at, in the middle of a record that is longer
 FEW = 4  # reversals
 LATEST = 0.2  # of the time between two reversals: lags are looked for within
 LAGS, SLIPS = 21, 14  # of the grid
@@ -36,6 +37,7 @@ EXPLAINED = 0.05  # share of the friction's variance that the best fit may leave
 FAR = 0.15  # the same where the lag is held by the accelerometer: the smoothing moves a rigid contact's reversals
 WORSE = 1.5  # times what both leave: a single cause that leaves more does not explain it; less may be a damper's
 DAMPED = 0.08  # of a passage from one side's friction to the other's: a damper in the contact passes for such a lag
+STIFFENED = 0.12  # share by which a damper in the contact, of which the element knows nothing, makes it seem stiffer
 CERTAIN = 0.2  # samples: a lag that is smaller is none
 RIGID = 0.01  # of the least give
 NOISY = 3.0  # times the displacement's noise: a smaller give is none
@@ -56,7 +58,9 @@ class Cause(Result):
     give : Estimate
         Displacement over which the friction goes from zero to its sliding value [m].
     stiffness : Estimate or None
-        Of the contact [N/m], the sliding friction over the give; None where none is seen.
+        Of the contact [N/m], the sliding friction over the give; None where none is seen. Where the contact can be
+        fitted it is that of :func:`contact_stiffness`, else the element's, which knows of no damper in the contact:
+        its interval then reaches down by the 12 % that one may make it seem stiffer.
     mimicked : float
         What velocity the lag would put beside a reversal, as a share of the velocity at which the contact lets go
         after one (thesis, equation 3.4): so much of the transition speed would be the sensor's. NaN where
@@ -76,6 +80,9 @@ class Cause(Result):
     left: tuple[float, float, float, float]
     status: str
 
+    def __repr__(self) -> str:
+        return f"{self.cause}: {self.reason}\n{super().__repr__()}"
+
 
 def lag_or_compliance(record: Record, *, contact: str | None = None) -> Cause:
     r"""Is a sensor late, or does the contact give way?
@@ -89,7 +96,8 @@ def lag_or_compliance(record: Record, *, contact: str | None = None) -> Cause:
     .. math:: f = f_k\, y / Y, \quad \dot y = \dot x(t + \tau) \text{ within } |y| \le Y
 
     behind the load cell's mount where that is stated, with a lag :math:`\tau`, with a give Y, with both and with
-    neither. What a single cause leaves beyond what both do, and what each estimate's interval says, decide.
+    neither. What a single cause leaves beyond what both do, and what each estimate's interval says, decide. Of a
+    record of more than 131072 samples the middle is looked at; the reason says which.
 
     Parameters
     ----------
@@ -121,20 +129,37 @@ def lag_or_compliance(record: Record, *, contact: str | None = None) -> Cause:
     >>> lag_or_compliance(record.between(2, 3)).cause
     'contact compliance'
     """
-    force = "load" if is_measured(record, "load") else "friction"
+    told, force = record, "load" if is_measured(record, "load") else "friction"
     names = ["x", force, *(["z"] if slid_on(record, contact) == "base" else [])]
     record = without_delays(record, *names, question=QUESTION)
     record.require_clean(*names, question=QUESTION, samples=LEAST)
-    record = record.rows(0, MOST)
-    place = smooth(record["x"] - record["z"] if "z" in names else record["x"], record.fs)
-    blur = record.fs / (4 * math.pi * place.bandwidth)
+    seen = _middle(record)
+    place = smooth(seen["x"] - seen["z"] if "z" in names else seen["x"], seen.fs)
+    blur = seen.fs / (4 * math.pi * place.bandwidth)
     noise = NOISY * float(np.median(place.sd))
-    fit = _Fit(place.values, record[force], record.fs, record.channels[force], noise, blur)
+    fit = _Fit(place.values, seen[force], seen.fs, seen.channels[force], noise, blur)
     if len(fit.reversals) < FEW:
         raise EstimateError(
             f"{len(fit.reversals)} reversals of the motion", f"{QUESTION} is told from {FEW}", "give a longer record"
         )
-    return _answer(fit, _by_accelerometer(record))
+    found = _answer(fit, _by_accelerometer(seen), told)
+    if len(seen) < len(record):
+        words = f"told from the {seen.duration:.4g} s in the middle of {record.duration:.4g} s"
+        found = replace(found, reason=f"{found.reason}; {words}")
+    return found
+
+
+def _middle(record: Record) -> Record:
+    first = max(0, len(record) - MOST) // 2
+    return record.rows(first, first + MOST)
+
+
+def _likely(record: Record) -> LikelyContact | None:
+    """The contact under which all sensors are most likely, where friction was found by a balance of forces."""
+    try:
+        return likely_contact(record)
+    except StickslipError:
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +258,10 @@ class _Fit:
         lag, give = float(start[0]), max(self.none, math.exp(start[1]))
         return lag, give, math.sqrt(self.left(lag, give) / (self.inside.stop - self.inside.start))
 
+    def level(self, lag: float, give: float) -> float:
+        """Sliding friction [N] of the element."""
+        return abs(float(np.linalg.lstsq(self.design(lag, give), self.force[self.inside], rcond=None)[0][0]))
+
     def spread(self, lag: float, give: float) -> tuple[Array, Array]:
         """Lag and give from each of some parts of the record, from one step of Gauss and Newton."""
         design, data = self.design(lag, give), self.force[self.inside]
@@ -275,53 +304,93 @@ def _by_accelerometer(record: Record) -> Estimate | None:
     return found.delay if found.delay.status == "ok" else None
 
 
-def _answer(fit: _Fit, against: Estimate | None) -> Cause:
+def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
     """Weigh what is left by each cause."""
     late = np.linspace(-fit.latest, fit.latest, LAGS) if against is None else np.array([-against.value * fit.fs])
-    on_time = np.zeros(1)
-    fits = [fit.best(lags, gives=gives) for gives in (False, True) for lags in (on_time, late)]
-    neither, lagging, giving, both = (each[2] for each in fits)
-    lags, gives = fit.spread(*fits[3][:2])
+    fits = [fit.best(lags, gives=gives) for gives in (False, True) for lags in (np.zeros(1), late)]
+    best = fits[3]
+    lags, gives = fit.spread(*best[:2])
     sharp = float(np.median(np.abs(np.gradient(np.gradient(fit.place))[fit.reversals]))) * fit.fs**2
-    passage = math.sqrt(4 * fits[3][1] / sharp) if sharp > 0 else 0.0  # from one side's friction to the other's
+    passage = math.sqrt(4 * best[1] / sharp) if sharp > 0 else 0.0  # from one side's friction to the other's
     # a rigid contact's reversals have a corner that smoothing moves, a compliant one's have none
-    unsure = DAMPED * passage if fits[3][1] > fit.least else fit.blur / fit.fs
-    lag = _lag(lags / fit.fs, fits[3][0] / fit.fs, unsure, fit.fs, against)
-    give = mean_of_cycles("give of the contact", gives, unit="m", method="element fitted to each of some parts")
-    give = replace(give, value=fits[3][1])
-    level = abs(float(np.linalg.lstsq(fit.design(*fits[3][:2]), fit.force[fit.inside], rcond=None)[0][0]))
+    unsure = DAMPED * passage if best[1] > fit.least else fit.blur / fit.fs
+    lag = _lag(lags / fit.fs, best[0] / fit.fs, unsure, fit.fs, against)
+    give = _give(gives, best[1])
+    left = (fits[0][2], fits[1][2], fits[2][2], fits[3][2])
     spread = float(np.std(fit.force[fit.inside]))
+    is_late = not lag.includes(0.0) and (1.0 if against else WORSE) * left[3] < left[2]
+    is_soft = give.value > fit.least and give.interval[0] > 0 and WORSE * left[3] < left[1]
+    cause = _named(is_late, is_soft, left, spread, against is not None)
+    contact = _likely(record) if cause == "contact compliance" else None
+    stiffness = contact.stiffness if contact else _stiffness(fit.level(*best[:2]), give) if is_soft else None
+    give = _give_of(contact) if contact else give
+    unstated = fit.channel.name == "load" and fit.channel.mount is None
+    mimicked = abs(lag.value) / passage if is_soft and passage else math.nan
+    seen = give.value if is_soft else None, mimicked if is_late else math.nan
+    return Cause(
+        cause=cause,
+        reason=_reason(left, spread, lag, *seen),
+        lag=lag,
+        give=give,
+        stiffness=stiffness,
+        mimicked=mimicked,
+        left=left,
+        status="the load cell's mount is not stated: its own delay counts as negative lag" if unstated else "ok",
+    )
+
+
+def _named(is_late: bool, is_soft: bool, left: tuple[float, float, float, float], spread: float, held: bool) -> str:
+    """The cause, or that it can not be told: from what each leaves; `held` is a lag that the accelerometer tells."""
+    neither, lagging, _, both = left
     good = math.sqrt(EXPLAINED) * spread
-    is_late = not lag.interval[0] <= 0 <= lag.interval[1] and (1.0 if against else WORSE) * both < giving
-    is_soft = give.value > fit.least and give.interval[0] > 0 and WORSE * both < lagging
     if is_soft:
         told = both < good
-    elif against:
+    elif held:
         told = lagging < math.sqrt(FAR) * spread
     else:
         told = lagging < good and (is_late or neither < WORSE * both)
-    name = {(True, True): "both", (True, False): CAUSES[0], (False, True): CAUSES[1], (False, False): "neither"}
-    cause = name[is_late, is_soft] if told else CAUSES[-1]
-    stiffness = None
-    if is_soft:
-        slope = level / give.value
-        stiffness = Estimate.normal(
-            "contact stiffness", slope, sd=slope * give.sd / give.value, unit="N/m", method="sliding friction over give"
-        )
-    mimicked = abs(lag.value) / passage if is_soft and passage else math.nan
-    left = (neither, lagging, giving, both)
-    words = (
-        f"of {spread:.3g} N neither leaves {neither:.3g} N, a lag {lagging:.3g} N, "
-        f"compliance {giving:.3g} N, both {both:.3g} N; the displacement comes {1e3 * lag.value:.3g} ms "
+    names = {(True, True): "both", (True, False): CAUSES[0], (False, True): CAUSES[1], (False, False): "neither"}
+    return names[is_late, is_soft] if told else CAUSES[-1]
+
+
+def _reason(left: tuple[float, ...], spread: float, lag: Estimate, give: float | None, mimicked: float) -> str:
+    words = "of {:.3g} N neither leaves {:.3g} N, a lag {:.3g} N, compliance {:.3g} N, both {:.3g} N".format(
+        spread, *left
+    )
+    words += (
+        f"; the displacement comes {1e3 * lag.value:.3g} ms "
         f"(95 %: {1e3 * lag.interval[0]:.3g} to {1e3 * lag.interval[1]:.3g}) after the force, by {lag.method}"
     )
-    if is_soft:
-        words += f"; the contact gives way by {1e6 * give.value:.3g} um before it slides"
-    if math.isfinite(mimicked) and is_late:
-        words += f"; the lag would pass for {mimicked:.0%} of the transition speed"
-    unstated = fit.channel.name == "load" and fit.channel.mount is None
-    status = "the load cell's mount is not stated: its own delay counts as negative lag" if unstated else "ok"
-    return Cause(cause, words, lag, give, stiffness, mimicked, left, status)
+    if give is not None:
+        words += f"; the contact gives way by {1e6 * give:.3g} um before it slides"
+    return words + (f"; the lag would pass for {mimicked:.0%} of the transition speed" if mimicked > 0 else "")
+
+
+def _give(parts: Array, value: float) -> Estimate:
+    """The element's give about that of the whole, as unsure as its parts are, and as a damper leaves it."""
+    found = mean_of_cycles("give of the contact", parts, unit="m", method="element fitted to each of some parts")
+    half = (found.interval[1] - found.interval[0]) / 2 + abs(found.value - value)
+    high = (value + half) * (1 + STIFFENED)
+    return replace(found, value=value, interval=(value - half, high), sd=(high - value + half) / (2 * NORMAL_95))
+
+
+def _give_of(contact: LikelyContact) -> Estimate:
+    """The give of a contact that was fitted with its damper."""
+    found = contact.stiffness
+    low, high = (contact.level / end if end > 0 else math.inf for end in reversed(found.interval))
+    return Estimate(
+        "give of the contact", contact.level / found.value, (low, high), contact.level * found.sd / found.value**2,
+        "m", "sliding friction over the likeliest stiffness", found.status,
+    )  # fmt: skip
+
+
+def _stiffness(level: float, give: Estimate) -> Estimate:
+    low, high = (level / end if end > 0 else math.inf for end in reversed(give.interval))
+    unknown = f"a damper in the contact may make it seem up to {STIFFENED:.0%} stiffer: see contact_stiffness"
+    return Estimate(
+        "contact stiffness", level / give.value, (low, high), level * give.sd / give.value**2, "N/m",
+        "sliding friction over give", unknown,
+    )  # fmt: skip
 
 
 def _lag(parts: Array, value: float, open_: float, fs: float, against: Estimate | None) -> Estimate:

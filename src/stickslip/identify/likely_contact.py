@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,8 +61,17 @@ class LikelyContact:
     balance: Balance
 
 
+_FOUND: WeakKeyDictionary[Record, LikelyContact] = WeakKeyDictionary()  # several questions ask one record
+
+
 def likely_contact(record: Record) -> LikelyContact:
     """The stiffness and the damping under which everything that the sensors read of a record is most likely."""
+    if record not in _FOUND:
+        _FOUND[record] = _likeliest(record)
+    return _FOUND[record]
+
+
+def _likeliest(record: Record) -> LikelyContact:
     balance, sensors, fused = _told(record)
     parts, levels, sticks, guesses = [], [], [], []
     for rows in _looked_at(len(record)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,6 +14,7 @@ from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.identify.sticks import StickEvent, Sticks
 from stickslip.record.record import Record, Step
 
+CRUDE = "the interval is crude"  # in the status of a mean of few cycles
 TOGETHER = 0.5  # of a stretch: a rest that is shorter goes with the one before
 
 
@@ -142,7 +144,6 @@ def join_sticks(found: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
         raise EstimateError("no stretch of a record", "one at least is needed", "check the file")
     microslips = [(each.microslips, span) for each, span in zip(kept, spans, strict=True) if each.microslips]
     lost = {said: sum(said in each.lost for each in kept) for each in kept for said in each.lost}
-    bad = {said: sum(said == each.status for each in kept) for each in kept if (said := each.status) != "ok"}
     kinds = [each.kind for each in kept]
     method = "fusion" if all(each.method == "fusion" for each in kept) else "speed"
     return Sticks(
@@ -156,7 +157,7 @@ def join_sticks(found: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
         frequency=_pooled([each.frequency for each in kept], spans),
         method=method,
         lost=tuple(_often(said, count, len(kept)) for said, count in lost.items()),
-        status="; ".join(_often(said, count, len(kept)) for said, count in bad.items()) or "ok",
+        status=_together([each.status for each in kept], len(kept)),
     )
 
 
@@ -173,6 +174,12 @@ def _extend(events: list[StickEvent], more: Sequence[StickEvent], stretch: Stret
             events.append(event)
 
 
+def _together(statuses: Sequence[str], all_: int) -> str:
+    """Every status that is not ok, with how many stretches say so."""
+    bad = Counter(said for said in statuses if said != "ok")
+    return "; ".join(_often(said, count, all_) for said, count in bad.items()) or "ok"
+
+
 def _often(said: str, count: int, all_: int) -> str:
     return said if count == all_ else f"{said} (in {count} of {all_} stretches)"
 
@@ -187,8 +194,9 @@ def _pooled(parts: list[Estimate], spans: list[float], *, shared: bool = False) 
     value = float(weights @ values)
     scatter = math.sqrt(float(weights @ (values - value) ** 2) / max(1, len(parts) - 1))
     sd = max(float(np.sqrt(weights**2 @ sds**2)), scatter)
-    bad = [each.status for each in parts if each.status != "ok"]
-    status = "ok" if len(parts) > 1 and len(bad) < len(parts) else bad[0] if bad else "ok"
+    # that few cycles carry one stretch is healed by the others, unless there are few in all
+    few = len(parts) > 1 and not all(CRUDE in each.status for each in parts)
+    status = _together([each.status for each in parts if not (few and CRUDE in each.status)], len(parts))
     name, unit, method = parts[0].name, parts[0].unit, f"{parts[0].method}; mean of {len(parts)} stretches"
     if shared:
         low, high = (float(weights @ ends) for ends in np.transpose([each.interval for each in parts]))

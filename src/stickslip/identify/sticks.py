@@ -73,10 +73,13 @@ class Sticks(Result):
     Attributes
     ----------
     share : Estimate
-        Share of the time that the speed is below the threshold, as such records are commonly counted: at most so much
-        of it sticks. The interval's low end is what is left if every slip began and ended when its speed, carried on
-        to zero, did: linearly before a stick, and after it as a square (with static friction above the sliding one
-        linearly too, so that the low end errs to the low side). `sd` is that of a normal law as wide as the interval.
+        Share of the time that the contact holds. By fusion: all holds, those at a mere reversal too; a micro-slip
+        within a stick is no hold (so does a simulated record's truth count). By speed, which sees neither micro-slips
+        nor short holds: the time that the speed is below the threshold, as such records are commonly counted; at most
+        so much of it sticks. The interval's low end is then what is left if every slip began and ended when its speed,
+        carried on to zero, did: linearly before a stick, and after it as a square (with static friction above the
+        sliding one linearly too, so that the low end errs to the low side). `sd` is that of a normal law as wide as
+        the interval.
     per_cycle : Estimate
         Stops per cycle.
     microslips : Estimate or None
@@ -408,17 +411,23 @@ def _event(kind: str, begin: tuple[float, float], end: tuple[float, float], whol
 
 
 def _share_of(events: tuple[StickEvent, ...], cycles: Cycles, motion: Motion) -> Estimate:
-    """Share of each cycle's time in sticks."""
-    sticks = [event for event in events if event.kind == "stick"]
-    begins = motion.fs * np.array([event.time - motion.start for event in sticks])
-    lengths = motion.fs * np.array([event.duration for event in sticks])
+    """Share of each cycle's time in which the contact holds; a micro-slip is taken off the stick it lies in."""
+    held = _time_in(("stick", "microstick"), events, cycles, motion) - _time_in(("microslip",), events, cycles, motion)
+    return mean_of_cycles(
+        "stuck share of the time", held / np.diff(cycles.edges), unit="1",
+        method="mean of cycles; the contact holds from where the velocity turns to where the friction reaches its "
+        "limit, a micro-slip within a stick taken off",
+    )  # fmt: skip
+
+
+def _time_in(kinds: tuple[str, ...], events: tuple[StickEvent, ...], cycles: Cycles, motion: Motion) -> Array:
+    """Samples of each cycle within events of some kinds, which do not overlap."""
+    inside = [event for event in events if event.kind in kinds]
+    begins = motion.fs * np.array([event.time - motion.start for event in inside])
+    lengths = motion.fs * np.array([event.duration for event in inside])
     knots = np.column_stack([begins, begins + lengths]).ravel()
     total = np.column_stack([np.cumsum(lengths) - lengths, np.cumsum(lengths)]).ravel()
-    share = np.diff(np.interp(cycles.edges, [0.0, *knots], [0.0, *total])) / np.diff(cycles.edges)
-    return mean_of_cycles(
-        "stuck share of the time", share, unit="1",
-        method="mean of cycles; a stick lasts from where the velocity turns to where the friction reaches its limit",
-    )  # fmt: skip
+    return np.asarray(np.diff(np.interp(cycles.edges, [0.0, *knots], [0.0, *total])))
 
 
 def _microslips(events: tuple[StickEvent, ...]) -> Estimate:

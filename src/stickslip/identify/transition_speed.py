@@ -16,6 +16,7 @@ from stickslip.identify.contact import contact_stiffness
 from stickslip.identify.fusion import Balance
 from stickslip.identify.likely_contact import HELD, LEAST, LikelyContact, held_steps, likely_contact
 from stickslip.identify.loops import Loops, friction_loops
+from stickslip.identify.motion import is_measured
 from stickslip.identify.transition import transition
 from stickslip.record.record import Record
 from stickslip.statistics import mean_uncertainty, student
@@ -30,6 +31,7 @@ MONOTONE = 0.1  # of the level by which friction may fall on its way from one si
 STOPPED = 0.15  # of half a cycle: a contact that holds for longer does not turn as harmonic sliding does
 FEW = 8  # branches below which an interval is crude
 BEFORE = 5  # samples before a turn, of which the friction is taken
+ROUNDED, BLURRED = 0.015, 0.06  # share by which the curve is off where a load cell tells friction, and where none does
 LAG = 1e-3  # s, of which is said what it would do
 
 
@@ -78,11 +80,15 @@ def transition_speed(record: Record | Loops, *, method: str | None = None) -> Tr
     - "contact": the mass set going again from rest by what pulls it at the turn, against the contact's spring and
       damper, until :math:`K_y u + c\,\dot u` has grown by :math:`2 f_k`; with K_y and c of :func:`contact_stiffness`,
       and the friction and the pull of the record at its turns. Only an error of K_y, c or mass goes into it.
-    - "curve": read off the mean curve of friction against velocity as in the thesis's figure 3.15, carried on from 0.9
-      of the sliding friction to all of it. Whatever blurs or shifts velocity against friction goes into it: a lag of
-      1.26 ms that is not stated does as much as a quarter to a third of it.
+    - "curve": read off the curve of friction against velocity of each turn, as in the thesis's figure 3.15, carried on
+      from 0.9 of the sliding friction to all of it: the square of the velocity of a mass on a spring is a parabola in
+      friction, whether it gathers speed up to there, as in sliding, or loses some again, as in stick-slip. Whatever
+      blurs or shifts velocity against friction goes into it: a lag of 1.26 ms that is not stated does as much as a
+      quarter to a third of it; what the smoother rounds is in its interval.
     - "equation": the thesis's equation 3.4, :math:`V_s = 2 w \sqrt{X f_k/K_y - (f_k/K_y)^2}`, in which the contact has
       no damping; with the damping of the thesis's rig it is 3 to 5 % high.
+
+    In stick-slip these are of the turns out of sliding; after a micro-slip, which is no such turn, it is less.
 
     Parameters
     ----------
@@ -126,7 +132,8 @@ def transition_speed(record: Record | Loops, *, method: str | None = None) -> Tr
     branches = _branches(friction, velocity, loops.level.value)
     stiffness = fitted.stiffness if fitted else contact_stiffness(record, method="slope")
     exact = _exact(record, friction, loops.offset.value, branches, fitted) if fitted else None
-    return _answer(loops, branches, stiffness, exact, method or ("contact" if exact else "equation"), lost)
+    off = ROUNDED if "load" in record or is_measured(record, "friction") else BLURRED
+    return _answer(loops, branches, (stiffness, exact, off), method or ("contact" if exact else "equation"), lost)
 
 
 def coupled_frequency(record: Record) -> Estimate:
@@ -210,7 +217,7 @@ def _fitted(record: Record, method: str | None) -> tuple[LikelyContact | None, s
 
 def _of_loops(loops: Loops, method: str) -> TransitionSpeed:
     branches = _branches(loops.friction - loops.offset.value, loops.velocity, loops.level.value)
-    return _answer(loops, branches, contact_stiffness(loops), None, method, "ok")
+    return _answer(loops, branches, (contact_stiffness(loops), None, BLURRED), method, "ok")
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,9 +249,10 @@ def _branches(friction: Array, velocity: Array, level: float) -> list[Branch]:
 
 
 def _answer(
-    loops: Loops, branches: Sequence[Branch], stiffness: Estimate, exact: Estimate | None, method: str, lost: str
+    loops: Loops, branches: Sequence[Branch], found: tuple[Estimate, Estimate | None, float], method: str, lost: str
 ) -> TransitionSpeed:
-    level = loops.level
+    """All three, from the contact's stiffness, the speed by the fitted contact, and how far off the curve may be."""
+    level, (stiffness, exact, off) = loops.level, found
     amplitude = _amplitude(loops.displacement)
     turn = 2 * math.pi * loops.frequency.value
     friction = np.linspace(-HELD, HELD, LEVELS) * level.value
@@ -258,7 +266,7 @@ def _answer(
         "equation", _equation, known, doubt, "equation 3.4 of the thesis",
         ("without damping of the contact, and for harmonic sliding: 3 to 5 % high on a rig like the thesis's",),
     )  # fmt: skip
-    curve = _read(branches, level.value, lagging)
+    curve = _read(branches, level.value, lagging, off)
     told = [exact, replace(equation, status=stops) if stops != "ok" else equation]
     words = [each for each in (lost, stiffness.status, stops, curve.status) if each != "ok"]
     told = told if not math.isinf(stiffness.interval[1]) else [each and _at_most(each) for each in told]
@@ -371,25 +379,27 @@ def _stops(loops: Loops, branches: Sequence[Branch], peak: float) -> str:
     measured = float(np.median(np.abs(loops.velocity)) / np.max(np.abs(loops.velocity)))
     if held < STOPPED and measured > 0.5:  # of a sine it is 0.71
         return "ok"
-    return "it stops between its turns: the equation is for harmonic sliding, the rest for turns that pass through"
+    return "it stops between its turns: the equation is for harmonic sliding, the rest for the turns out of sliding"
 
 
-def _read(branches: Sequence[Branch], level: float, lagging: str) -> Estimate:
+def _read(branches: Sequence[Branch], level: float, lagging: str, off: float) -> Estimate:
     """Where the curve of each turn reaches the sliding friction, the square of its velocity being carried on."""
     speeds = []
     for each in branches:
-        upper = each.force > 0 if np.sum(each.force > 0) >= LEAST else each.force > -math.inf
-        slope, base = np.polyfit(each.force[upper], each.speed[upper] ** 2, 1)
-        speeds.append(math.sqrt(max(0.0, slope * level + base)))
+        degree = min(2, len(np.unique(each.force)) - 1)
+        square = np.polyval(np.polyfit(each.force, each.speed**2, degree), level)
+        speeds.append(math.sqrt(max(0.0, float(square))))
     sd, freedom = mean_uncertainty(speeds)
     scatter = float(np.std(speeds, ddof=1)) if len(speeds) > 1 else math.nan
-    return Estimate.normal(
+    found = Estimate.normal(
         f"{SPEED} by the curve", float(np.mean(speeds)), sd=sd, unit="m/s", quantile=student(freedom),
-        method="mean curve of friction against velocity, where it reaches the sliding friction",
+        method="curve of friction against velocity, where it reaches the sliding friction",
         status="ok" if len(speeds) >= FEW else f"only {len(speeds)} turns: the interval is crude",
         checks=(
             f"{len(speeds)} turns, scatter between them {1e3 * scatter:.2g} mm/s",
             lagging,
-            "on a rig like the thesis's up to 2 % high: the smoother rounds the end of the turn",
+            f"the smoother rounds the end of the turn: off by {100 * off:.2g} % at most on a rig like the thesis's",
         ),
     )  # fmt: skip
+    half = (found.interval[1] - found.interval[0]) / 2 + off * found.value
+    return replace(found, interval=(found.value - half, found.value + half), sd=half / NORMAL_95)
