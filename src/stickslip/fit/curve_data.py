@@ -48,6 +48,8 @@ class Samples:
         Standard deviation of the friction's broadband noise.
     unit : str
         Of the displacement, "m" or "rad".
+    skipped : int
+        Samples at the start that set the memory of a curve that has one, and are not compared.
     """
 
     time: Array
@@ -59,8 +61,14 @@ class Samples:
     cycles: int
     noise: float
     unit: str
+    skipped: int = 0
 
-    def rows(self, chosen: NDArray[np.bool_] | slice) -> Samples:
+    @property
+    def compared(self) -> Samples:
+        """Those that a curve is held against."""
+        return replace(self.rows(slice(self.skipped, None)), skipped=0)
+
+    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Samples:
         """Some of the samples."""
         arrays = ("time", "displacement", "velocity", "friction", "cycle", "block")
         return replace(self, **{name: getattr(self, name)[chosen] for name in arrays})
@@ -84,7 +92,7 @@ class Samples:
 
 
 def samples_of(data: Record | Loops, *, contact: str | None, frequency: float | str | None) -> tuple[Samples, Samples]:
-    """All samples of the complete cycles, and those of them that slide."""
+    """All samples of the complete cycles, the first of several to set a memory, and those of them that slide."""
     if isinstance(data, Loops):
         return _of_loops(data)
     if not isinstance(data, Record):
@@ -116,7 +124,10 @@ def samples_of(data: Record | Loops, *, contact: str | None, frequency: float | 
     fast = np.abs(motion.velocity) > max(CREEP * peak, AUDIBLE * motion.noise)
     clear = fast & away_from(~fast, motion.blur)
     sliding = clear if clear.sum() > fast.sum() / 2 else fast
-    return samples.rows(label >= 0), _require_sliding(samples.rows(sliding & (label >= 0)))
+    whole = samples.rows(label >= 0)
+    return replace(whole, skipped=int(np.argmax(whole.cycle > 0))), _require_sliding(
+        samples.rows(sliding & (label >= 0))
+    )
 
 
 def _of_loops(loops: Loops) -> tuple[Samples, Samples]:
@@ -129,7 +140,8 @@ def _of_loops(loops: Loops) -> tuple[Samples, Samples]:
         noise=float(np.median(loops.scatter)) / np.sqrt(len(loops.cycles)), unit=loops.unit,
     )  # fmt: skip
     fast = np.abs(loops.velocity) > CREEP * float(np.abs(loops.velocity).max())
-    return samples, _require_sliding(samples.rows(fast & away_from(~fast, 1)))
+    twice = samples.rows(np.tile(np.arange(count), 2))  # once round to set the memory
+    return replace(twice, skipped=count), _require_sliding(samples.rows(fast & away_from(~fast, 1)))
 
 
 def _require_sliding(samples: Samples) -> Samples:

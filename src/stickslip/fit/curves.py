@@ -2,31 +2,39 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit import speed_curves
+from stickslip.fit import presliding_curves, speed_curves
 from stickslip.fit.curve_data import Samples, require_reversals, require_speeds, samples_of
 from stickslip.fit.family import Family, Member, best_member
+from stickslip.fit.velocity_step import velocity_step
 from stickslip.identify.loops import Loops
+from stickslip.laws.base import finite
 from stickslip.record.record import Record
 from stickslip.settings import nearest
 from stickslip.statistics import student
+from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
+LOST = 7.0  # half an interval of a logarithm from which on nothing is known of its number
 TIED = 0.99  # correlation of two parameters from which on they are told together alone
-POSITIVE = ("speed", "exponent")  # found by their logarithm: so is their interval
+POSITIVE = ("speed", "exponent", "width", "distance")  # found by their logarithm: so is their interval
 NAMES = {
     "kinetic": "sliding friction", "static": "static friction", "viscous": "viscous friction",
-    "offset": "constant force", "speed": "Stribeck speed", "exponent": "Stribeck exponent",
+    "offset": "constant force", "speed": "Stribeck speed", "exponent": "exponent",
     "kinetic_forward": "sliding friction forward", "kinetic_back": "sliding friction back",
     "viscous_forward": "viscous friction forward", "viscous_back": "viscous friction back",
+    "friction": "coefficient of friction", "direct": "direct effect a", "evolution": "evolution effect b",
+    "rate_dependence": "rate dependence a - b", "distance": "way of renewal",
 }  # fmt: skip
 
 
@@ -83,6 +91,16 @@ class CurveFit(Result):
         return f"{self.curve}, {self.formula}"
 
 
+class Request(NamedTuple):
+    """What is asked: a curve by name, of all samples or of those that slide, of how many elements, under which load."""
+
+    curve: str
+    whole: Samples
+    sliding: Samples
+    elements: int
+    normal: float
+
+
 def fit_curve(
     data: Record | Loops,
     *,
@@ -90,11 +108,11 @@ def fit_curve(
     contact: str | None = None,
     frequency: float | str | None = None,
     elements: int = 8,
+    normal: float | str = 1.0,
 ) -> CurveFit:
     r"""Which numbers of a friction curve explain a measured friction best?
 
-    By least squares over every sample that slides, away from the reversals, with a constant force beside the curve
-    where motion both ways tells it:
+    By least squares. Over the velocity, of every sample that slides, away from the reversals:
 
     * ``"coulomb"``: :math:`f = f_k\,\mathrm{sgn}\,v`;
     * ``"viscous"``: :math:`f = f_k\,\mathrm{sgn}\,v + \sigma v`;
@@ -103,6 +121,18 @@ def fit_curve(
       without :math:`\sigma` where it comes out below zero;
     * ``"asymmetric"``: Coulomb and viscous friction of their own in each direction;
     * ``"tabulated"``: a polygon that rises, or falls, all the way.
+
+    Over the displacement, of all samples but those of the first cycle, which sets the contact's memory:
+
+    * ``"dahl"``: :math:`df/dx = \sigma_0 (1 - (f/f_k)\,\mathrm{sgn}\,v)^n` (Dahl 1968), n free;
+    * ``"jenkins"``: a spring that slips at :math:`f_k`; ``"iwan"``: classes of them, alike in stiffness, yielding
+      evenly up to a width; ``"maxwell"``: elements that yield at given deflections, those kept that bear something.
+
+    A constant force beside these is fitted too, where motion both ways tells it. After a step of the driving velocity,
+    where ``x`` is the drive's and friction is felt through a spring:
+
+    * ``"aging"``, ``"slip"``: :math:`f = N [\mu_0 + a \ln(v/V_1) + b \ln(V_1\theta/D_c)]`, with the age of either law
+      (Dieterich 1979, Ruina 1983), the spring's stiffness and a trend along the way.
 
     The intervals admit the error of the model: they are as wide as the scatter between cycles says, or as the residuals
     along the mean cycle, which repeat, and which no scatter shows; whichever is wider.
@@ -118,7 +148,9 @@ def fit_curve(
     frequency : float or str, optional
         Forcing frequency [Hz]; found from the record when not given.
     elements : int
-        Points of a tabulated curve.
+        Points of a tabulated curve; classes of Iwan's; elements of Maxwell's to begin with.
+    normal : float or str
+        Normal load N [N] under rate-and-state friction; 1 where the channel holds the coefficient of friction.
 
     Returns
     -------
@@ -143,44 +175,62 @@ def fit_curve(
     if curve not in CURVES:
         raise EstimateError(f"curve = '{curve}'", f"it is one of {', '.join(CURVES)}", nearest(str(curve), CURVES))
     if not isinstance(elements, (int, np.integer)) or not 2 <= elements <= 50:
-        raise EstimateError(f"elements = {elements}", "a table has 2 to 50 points", "leave it at 8")
-    _, sliding = samples_of(data, contact=contact, frequency=frequency)
-    family, member = best_member(CURVES[curve](sliding, curve, int(elements)), sliding)
-    return _answer(curve, family, member, sliding)
+        raise EstimateError(f"elements = {elements}", "points of a table, or elements, are 2 to 50", "leave it at 8")
+    load = finite("normal", parse_value(normal, "N"), unit="N", positive=True)
+    whole, sliding = samples_of(data, contact=contact, frequency=frequency)
+    family, member = best_member(*CURVES[curve](Request(curve, whole, sliding, int(elements), load)))
+    return _answer(curve, family, member)
 
 
-def _coulomb(samples: Samples, curve: str, elements: int) -> Family:
-    return speed_curves.COULOMB
+def _over_speed(family: Family) -> Callable[[Request], tuple[Family, Samples]]:
+    def chosen(asked: Request) -> tuple[Family, Samples]:
+        require_speeds(asked.sliding, asked.curve)
+        return family, asked.sliding
+
+    return chosen
 
 
-def _viscous(samples: Samples, curve: str, elements: int) -> Family:
-    require_speeds(samples, curve)
-    return speed_curves.VISCOUS
+def _uneven(asked: Request) -> tuple[Family, Samples]:
+    require_reversals(asked.sliding, asked.curve)
+    return _over_speed(speed_curves.UNEVEN)(asked)
 
 
-def _stribeck(samples: Samples, curve: str, elements: int) -> Family:
-    require_speeds(samples, curve)
-    return speed_curves.STRIBECK
+def _table(asked: Request) -> tuple[Family, Samples]:
+    return _over_speed(speed_curves.table(asked.sliding, asked.elements))(asked)
 
 
-def _asymmetric(samples: Samples, curve: str, elements: int) -> Family:
-    require_speeds(samples, curve)
-    require_reversals(samples, curve)
-    return speed_curves.UNEVEN
+def _over_way(family: Callable[[Samples, int], Family]) -> Callable[[Request], tuple[Family, Samples]]:
+    def chosen(asked: Request) -> tuple[Family, Samples]:
+        require_reversals(asked.whole, asked.curve)
+        return family(asked.whole, asked.elements), asked.whole
+
+    return chosen
 
 
-def _tabulated(samples: Samples, curve: str, elements: int) -> Family:
-    require_speeds(samples, curve)
-    return speed_curves.table(samples, elements)
+def _step(law: str) -> Callable[[Request], tuple[Family, Samples]]:
+    def chosen(asked: Request) -> tuple[Family, Samples]:
+        return velocity_step(asked.whole, law=law, normal=asked.normal), asked.whole
+
+    return chosen
 
 
-CURVES: dict[str, Callable[[Samples, str, int], Family]] = {
-    "coulomb": _coulomb, "viscous": _viscous, "stribeck": _stribeck, "asymmetric": _asymmetric,
-    "tabulated": _tabulated,
-}  # fmt: skip
+CURVES: dict[str, Callable[[Request], tuple[Family, Samples]]] = {
+    "coulomb": lambda asked: (speed_curves.COULOMB, asked.sliding),
+    "viscous": _over_speed(speed_curves.VISCOUS),
+    "stribeck": _over_speed(speed_curves.STRIBECK),
+    "asymmetric": _uneven,
+    "tabulated": _table,
+    "dahl": _over_way(lambda samples, elements: presliding_curves.DAHL),
+    "jenkins": _over_way(lambda samples, elements: presliding_curves.JENKINS),
+    "iwan": _over_way(lambda samples, elements: presliding_curves.iwan(elements)),
+    "maxwell": _over_way(presliding_curves.maxwell_slip),
+    "aging": _step("aging"),
+    "slip": _step("slip"),
+}
 
 
-def _answer(curve: str, family: Family, member: Member, samples: Samples) -> CurveFit:
+def _answer(curve: str, family: Family, member: Member) -> CurveFit:
+    samples = member.samples
     left = samples.friction - member.fitted
     method = f"least squares of '{curve}'"
     checks = (f"{len(left)} samples in {samples.cycles} cycles",)
@@ -188,20 +238,22 @@ def _answer(curve: str, family: Family, member: Member, samples: Samples) -> Cur
         name: _estimate(name, value, sd, freedom, samples.in_units(family.units[name]), method, checks)
         for (name, value), sd, freedom in zip(member.values.items(), member.sd, member.freedom, strict=True)
     }
-    worries = _worries(member, samples)
-    found, flags = _flagged(curve, found, samples)
+    worries = _worries(member, samples, family.along)
+    for names, word in family.beware(found, samples):
+        worries.append(word)
+        found |= {name: replace(found[name], status=word) for name in names}
     try:
         law = family.law(member.values)
     except ModelError as refused:
         law = None
-        flags.append(f"no law has these values: {refused.value}")
+        worries.append(f"no law has these values: {refused.value}")
     return CurveFit(
         curve=curve, parameters=found, law=law, formula=family.formula,
         residual=float(np.sqrt(np.mean(left**2))),
         unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)),
         correlations=member.correlations, along=family.along,
         at={"v": samples.velocity, "x": samples.displacement, "t": samples.time}[family.along],
-        measured=samples.friction, fitted=member.fitted, status="; ".join([*worries, *flags]) or "ok",
+        measured=samples.friction, fitted=member.fitted, status="; ".join(worries) or "ok",
     )  # fmt: skip
 
 
@@ -212,39 +264,21 @@ def _estimate(
     made = Estimate.normal(words, value, sd=sd, unit=unit, method=method, quantile=student(freedom), checks=checks)
     if name not in POSITIVE:
         return made
-    times = float(np.exp(min((made.interval[1] - value) / value, 700.0)))
+    log_half = (made.interval[1] - value) / value
+    times = math.exp(log_half) if log_half < LOST else math.inf
     return replace(made, interval=(value / times, value * times))
 
 
-def _worries(member: Member, samples: Samples) -> list[str]:
+def _worries(member: Member, samples: Samples, along: str) -> list[str]:
     """What the samples can not bear."""
     names, words = list(member.values), []
-    if samples.cycles < len(names):
+    cyclic = along != "t"
+    if cyclic and samples.cycles < len(names):
         words.append(f"{samples.cycles} cycles for {len(names)} parameters: give more of them")
     if samples.noise > float(np.sqrt(np.mean(member.fitted**2))):
         words.append("the friction's noise is above the friction: give more cycles, or a quieter sensor")
-    if not samples.reverses:
+    if cyclic and not samples.reverses:
         words.append("motion goes one way: a constant force is not told from friction; let it reverse")
     for i, j in zip(*np.nonzero(np.triu(np.abs(member.correlations), 1) > TIED), strict=True):
         words.append(f"{names[i]} and {names[j]} are told together alone (correlation {member.correlations[i, j]:.3f})")
     return words
-
-
-def _flagged(curve: str, found: dict[str, Estimate], samples: Samples) -> tuple[dict[str, Estimate], list[str]]:
-    """What Stribeck's curve says where nothing slid, or where friction does not fall."""
-    if curve != "stribeck":
-        return found, []
-    slowest, flags = float(np.abs(samples.velocity).min()), []
-    if slowest > found["speed"].value:
-        word = f"the slowest sliding, {slowest:.3g} {samples.unit}/s, is above the Stribeck speed: slide slower"
-        found |= {name: replace(found[name], status=word) for name in ("static", "speed", "exponent")}
-        flags.append(word)
-    fall = found["static"].value - found["kinetic"].value
-    if fall <= found["static"].interval[1] - found["static"].value:
-        word = (
-            f"friction does not fall with speed above {slowest:.3g} {samples.unit}/s more than its scatter: "
-            "slide slower to tell a static friction and a Stribeck speed"
-        )
-        found |= {name: replace(found[name], status=word) for name in ("static", "speed", "exponent")}
-        flags.append(word)
-    return found, flags

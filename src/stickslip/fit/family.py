@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
 from stickslip.fit.curve_data import BLOCKS, Samples
 from stickslip.fit.nonlinear import inverse_normal, minimise, slopes
 from stickslip.statistics import FEW_CYCLES, INSEPARABLE, correlation_time, mean_uncertainty, student
@@ -42,6 +43,8 @@ class Family:
         Takes the parameters by name, gives the law, or raises ModelError where there is none of these values.
     starts : callable
         Takes samples, gives for each part of the shape the logarithms to begin with.
+    beware : callable
+        Takes the estimates by name and the samples, gives which of them are not told, and why.
     instead : Family or None
         What is fitted where a parameter in `positive` comes out below zero.
     positive : tuple of str
@@ -57,6 +60,7 @@ class Family:
     units: Mapping[str, str]
     law: Callable[[dict[str, float]], object | None]
     starts: Callable[[Samples], Sequence[Array]] = lambda samples: ()
+    beware: Callable[[dict[str, Estimate], Samples], list[tuple[tuple[str, ...], str]]] = lambda found, samples: []
     instead: Family | None = None
     positive: tuple[str, ...] = ()
     fitted: Callable[[Array, Array], Array] | None = None
@@ -74,6 +78,8 @@ class Member:
         Their standard deviations, and the degrees of freedom of these.
     correlations : ndarray, shape (p, p)
         Of the parameters.
+    samples : Samples
+        What it was held against.
     fitted : ndarray, shape (n,)
         The curve at the samples.
     """
@@ -82,6 +88,7 @@ class Member:
     sd: Array
     freedom: Array
     correlations: Array
+    samples: Samples
     fitted: Array
 
 
@@ -95,31 +102,33 @@ def best_member(family: Family, samples: Samples) -> tuple[Family, Member]:
 
 def _least_squares(family: Family, samples: Samples) -> Member:
     """The least squares of a family, from the best of its starts; how sure by what the residuals do."""
-    logs = _start(family, samples)
-    columns = family.columns(samples, logs)
+    skip, compared = samples.skipped, samples.compared
+    friction, logs = compared.friction, _start(family, samples)
+    columns = family.columns(samples, logs)[skip:]
     count = columns.shape[1]
-    coefficients = _coefficients(family, columns, samples.friction)
+    coefficients = _coefficients(family, columns, friction)
     if len(logs):
-        start = np.concatenate([coefficients, logs])
         found = minimise(
-            lambda raw: family.columns(samples, raw[count:]) @ raw[:count], samples.friction, start,
-            settled_at=SETTLED, most=MOST,
+            lambda raw: family.columns(samples, raw[count:])[skip:] @ raw[:count], friction,
+            np.concatenate([coefficients, logs]), settled_at=SETTLED, most=MOST,
         )  # fmt: skip
         raw, jacobian, residual = found.parameters, found.jacobian, found.residual
     else:
-        raw, jacobian, residual = coefficients, columns, samples.friction - columns @ coefficients
+        raw, jacobian, residual = coefficients, columns, friction - columns @ coefficients
 
     def physical(values: Array) -> Array:
         return np.array(list(family.parameters(values[:count], np.exp(values[count:])).values()))
 
     _require_separable(jacobian, family)
-    values = family.parameters(raw[:count], np.exp(raw[count:]))
+    values = {name: float(value) for name, value in family.parameters(raw[:count], np.exp(raw[count:])).items()}
     turned = slopes(physical, raw)
     bread = inverse_normal(jacobian) @ turned.T
-    sd, freedom = scatter((jacobian * residual[:, None]) @ bread, residual, samples)
     covariance = turned @ bread
     lengths = np.sqrt(np.diag(covariance))
-    return Member(values, sd, freedom, covariance / np.outer(lengths, lengths), samples.friction - residual)
+    alone = lengths * float(np.sqrt(np.mean(residual**2)))
+    sd, freedom = scatter((jacobian * residual[:, None]) @ bread, alone, residual, compared)
+    correlations = covariance / np.outer(lengths, lengths)
+    return Member(values, sd, freedom, correlations, compared, friction - residual)
 
 
 def _coefficients(family: Family, columns: Array, friction: Array) -> Array:
@@ -134,12 +143,20 @@ def _start(family: Family, samples: Samples) -> Array:
     if not grids:
         return np.empty(0)
     few = samples.rows(slice(None, None, max(1, len(samples.friction) // FEW))) if family.along == "v" else samples
+    friction = few.compared.friction
     best, least = np.empty(0), np.inf
     for logs in itertools.product(*grids):
-        columns = family.columns(few, np.array(logs))
-        left = few.friction - columns @ _coefficients(family, columns, few.friction)
+        columns = family.columns(few, np.array(logs))[few.skipped :]
+        if not np.isfinite(columns).all():
+            continue
+        left = friction - columns @ _coefficients(family, columns, friction)
         if float(left @ left) < least:
             best, least = np.array(logs), float(left @ left)
+    if not len(best):
+        raise EstimateError(
+            f"no start of {family.formula.partition(',')[0]} gives finite friction", "a fit begins at one",
+            "give a record that slides more steadily",
+        )  # fmt: skip
     return best
 
 
@@ -154,22 +171,25 @@ def _require_separable(jacobian: Array, family: Family) -> None:
         )
 
 
-def scatter(influence: Array, residual: Array, samples: Samples) -> tuple[Array, Array]:
+def scatter(influence: Array, alone: Array, residual: Array, samples: Samples) -> tuple[Array, Array]:
     """Standard deviation of each parameter, and its freedom, by what each sample does to it (n, p).
 
-    Two parts, of which the wider counts. What differs from cycle to cycle (of quarters, where cycles are few) is noise
-    and drift. What the curve can not follow repeats in every cycle: it shows in how residuals stray along the mean
-    cycle, whose neighbours are alike. Either is the long-run deviation of the influences in order.
+    Of three, the widest counts. What differs from cycle to cycle (of quarters, where cycles are few) is noise and
+    drift. What the curve can not follow repeats in every cycle: it shows in how residuals stray along the mean cycle,
+    whose neighbours are alike. Both are the long-run deviation of the influences in order. Where few samples tell a
+    parameter, that knows little: no less than `alone`, the deviation if residuals were independent and alike, for as
+    many as they are worth.
     """
     parts = samples.cycle if samples.cycle.max(initial=0) + 1 >= FEW_CYCLES else _quarters(samples)
     independent = len(residual) / correlation_time(residual)
     terms = influence.shape[1]
-    shrinkage = np.sqrt(independent / max(1.0, independent - terms))
+    left = max(1.0, independent - terms)
+    shrinkage = np.sqrt(independent / left)
     sd, freedom = np.empty(terms), np.empty(terms)
     for index in range(terms):
         told = [_of_parts(influence[:, index], group) for group in (parts, samples.block)]
-        widest = max(told, key=lambda each: student(each[1]) * each[0])
-        sd[index], freedom[index] = widest[0] * shrinkage, widest[1]
+        told = [(each * shrinkage, q) for each, q in told] + [(alone[index] * np.sqrt(len(residual) / left), left)]
+        sd[index], freedom[index] = max(told, key=lambda each: student(each[1]) * each[0])
     return sd, freedom
 
 

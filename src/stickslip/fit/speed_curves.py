@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.estimate import Estimate
 from stickslip.fit.curve_data import Samples
 from stickslip.fit.family import Family
 from stickslip.laws.coulomb import Coulomb
@@ -62,6 +63,18 @@ def _stribeck_law(found: dict[str, float]) -> Stribeck:
     return Stribeck(**{name: value for name, value in found.items() if name != "offset"})
 
 
+def _beware(found: dict[str, Estimate], samples: Samples) -> list[tuple[tuple[str, ...], str]]:
+    """What Stribeck's curve says where nothing slid, or where friction does not fall."""
+    slowest, unseen = float(np.abs(samples.velocity).min()), ("static", "speed", "exponent")
+    if found["static"].value - found["kinetic"].value <= found["static"].interval[1] - found["static"].value:
+        word = f"friction does not fall with speed above {slowest:.3g} {samples.unit}/s more than its scatter"
+        return [(unseen, f"{word}: slide slower to tell a static friction and a Stribeck speed")]
+    if slowest > found["speed"].value:
+        word = f"the slowest sliding, {slowest:.3g} {samples.unit}/s, is above the Stribeck speed: slide slower"
+        return [(unseen, word)]
+    return []
+
+
 def _uneven_columns(samples: Samples, logs: Array) -> Array:
     v = samples.velocity
     return np.column_stack([v > 0, np.maximum(v, 0), -1.0 * (v < 0), np.minimum(v, 0)])
@@ -81,12 +94,12 @@ VISCOUS = Family(
 DRY_STRIBECK = Family(
     "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + offset", "v",
     _stribeck_columns, _parameters("kinetic", "static"),
-    _named("kinetic", "static", "offset", "speed", "exponent"), _stribeck_law, _stribeck_starts,
+    _named("kinetic", "static", "offset", "speed", "exponent"), _stribeck_law, _stribeck_starts, _beware,
 )  # fmt: skip
 STRIBECK = Family(
     "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + viscous v + offset", "v",
     _stribeck_viscous_columns, _parameters("kinetic", "static", "viscous"),
-    _named("kinetic", "static", "viscous", "offset", "speed", "exponent"), _stribeck_law, _stribeck_starts,
+    _named("kinetic", "static", "viscous", "offset", "speed", "exponent"), _stribeck_law, _stribeck_starts, _beware,
     instead=DRY_STRIBECK, positive=("viscous",),
 )  # fmt: skip
 UNEVEN = Family(
