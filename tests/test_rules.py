@@ -34,6 +34,7 @@ BY_PLACE = {
     "b",
     "parameter",
     "load",
+    "oscillator",
 }  # may follow the first argument without being named
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from stickslip.analysis.findings import Findings as Findings
     from stickslip.fit.answer import DecayFit as DecayFit
     from stickslip.fit.curves import CurveFit as CurveFit, fit_curve as fit_curve
+    from stickslip.fit.law import LawFit as LawFit, fit_law as fit_law
     from stickslip.fit.decay import fit_decay as fit_decay
     from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
     from stickslip.identify.decrement import Bounds as Bounds, Decrement as Decrement, decrement as decrement
@@ -239,6 +240,7 @@ _ROOMS = {
     "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
     "fit_decay": "fit.decay", "DecayFit": "fit.answer",
     "fit_curve": "fit.curves", "CurveFit": "fit.curves",
+    "fit_law": "fit.law", "LawFit": "fit.law",
     "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",
     "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",
     "extreme_decay": "identify.envelope", "hilbert_decay": "identify.envelope", "EnvelopeDecay": "identify.envelope",

@@ -11,6 +11,13 @@ from stickslip.settings import nearest
 
 Path = tuple[str, ...]
 Part = TypeVar("Part")
+UNITS = {
+    "kinetic": "N", "static": "N", "forces": "N", "error": "N", "mass": "kg", "stiffness": "N/m", "stiffnesses": "N/m",
+    "damping": "N s/m", "slope": "N s/m", "gradient": "N/m", "rate": "1/(N s)", "steepness": "s/m", "speeds": "m/s",
+    "speed": "m/s", "amplitude": "m", "frequency": "Hz", "phase": "rad", "fs": "Hz", "samples": "m",
+    "HarmonicForce.amplitude": "N", "viscous": "N s/m", "normal": "N", "distance": "m", "reference": "m/s",
+    "preload": "N", "times": "s", "lag": "s",
+}  # fmt: skip
 PARTS = ("law", "drive", "contacts")  # what holds parameters of its own
 
 

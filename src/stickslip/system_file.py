@@ -23,7 +23,7 @@ from stickslip.laws.formula import Formula
 from stickslip.laws.stribeck import Curve
 from stickslip.laws.time_delay import SpeedCurve
 from stickslip.oscillator import Oscillator
-from stickslip.parameters import PARTS, changed, find, places
+from stickslip.parameters import PARTS, UNITS, changed, find, places
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
 from stickslip.solve.automaton import System
@@ -31,13 +31,6 @@ from stickslip.solve.product import numbered
 from stickslip.structure import Contact, Structure
 
 # The unit of each parameter of a law or drive; a test holds them to the docstrings.
-UNITS = {
-    "kinetic": "N", "static": "N", "forces": "N", "error": "N", "mass": "kg", "stiffness": "N/m", "stiffnesses": "N/m",
-    "damping": "N s/m", "slope": "N s/m", "gradient": "N/m", "rate": "1/(N s)", "steepness": "s/m", "speeds": "m/s",
-    "speed": "m/s", "amplitude": "m", "frequency": "Hz", "phase": "rad", "fs": "Hz", "samples": "m",
-    "HarmonicForce.amplitude": "N", "viscous": "N s/m", "normal": "N", "distance": "m", "reference": "m/s",
-    "preload": "N", "times": "s", "lag": "s",
-}  # fmt: skip
 STATE_UNITS = {"x": "m", "v": "m/s", "stretch": "m", "u": "m/s", "theta": "N"}
 CYCLES = 20.0  # of a run where nothing is said
 MOST_CYCLES = 1e9  # more would not end, nor be counted

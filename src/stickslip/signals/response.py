@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 TURN = 1.0  # radians that no pole turns further in a stretch of the quadrature
-NODES, WEIGHTS = (np.polynomial.legendre.leggauss(6)[0] + 1) / 2, np.polynomial.legendre.leggauss(6)[1] / 2
+NODES = 6  # of Gauss in a stretch
 BLOCK = 1 << 16  # samples at a time
 CRITICAL = 1e-7  # a damping ratio as near to 1 is moved away from it: a double pole has no partial fractions
 
@@ -75,7 +75,9 @@ def leak(time_constant: float) -> Response:
     return Response((complex(-rate),), (complex(-rate),), 1.0, rate)
 
 
-def respond(values: Callable[[Array], Array], *, breaks: Array, times: Array, response: Response) -> Array:
+def respond(
+    values: Callable[[Array], Array], *, breaks: Array, times: Array, response: Response, nodes: int = NODES
+) -> Array:
     """What does a linear sensor read at equally spaced instants?
 
     Before time 0 its input was what it is at time 0, and nothing had leaked away. The convolution with each pole is
@@ -90,6 +92,8 @@ def respond(values: Callable[[Array], Array], *, breaks: Array, times: Array, re
     times : ndarray (n,)
         Equally spaced instants [s]; the input before 0 is what it is at 0.
     response : Response
+    nodes : int
+        Of the quadrature; fewer are enough where the poles turn little between two samples.
 
     Returns
     -------
@@ -106,7 +110,7 @@ def respond(values: Callable[[Array], Array], *, breaks: Array, times: Array, re
     kept = [np.zeros(1, dtype=complex) for _ in response.poles]
     for first in range(0, len(grid) - 1, BLOCK):
         part = grid[first : first + BLOCK + 1]
-        written = _convolved(values, began, breaks, part, response, kept)
+        written = _convolved(values, began, breaks, part, response, kept, nodes)
         low, high = max(first, ahead), first + len(written)
         if low < high:
             out[low - ahead : high - ahead] += written[low - first :]
@@ -120,10 +124,12 @@ def _convolved(
     grid: Array,
     response: Response,
     kept: list[NDArray[np.complex128]],
+    count: int,
 ) -> Array:
     """The poles' part of the response at ``grid[1:]``; `kept` holds their states, and is updated."""
     from scipy.signal import lfilter
 
+    roots, weights = np.polynomial.legendre.leggauss(count)
     step = grid[1] - grid[0]
     pieces = max(1, math.ceil(max(abs(pole) for pole in response.poles) * step / TURN))
     inside = breaks[(breaks > grid[0]) & (breaks < grid[-1])]
@@ -132,11 +138,11 @@ def _convolved(
     edges = edges[(edges >= max(grid[0], 0.0)) & (edges <= grid[-1])]
     total = np.zeros(len(grid) - 1)
     length = np.diff(edges)
-    nodes = edges[:-1, None] + length[:, None] * NODES
+    nodes = edges[:-1, None] + length[:, None] * (roots + 1) / 2
     changed = (
-        (values(nodes.ravel()).reshape(nodes.shape) - began) * WEIGHTS * length[:, None]
+        (values(nodes.ravel()).reshape(nodes.shape) - began) * (weights / 2) * length[:, None]
         if len(length)
-        else np.zeros((0, len(NODES)))
+        else np.zeros((0, count))
     )
     into = np.clip(np.searchsorted(grid, edges[:-1] + length / 2) - 1, 0, len(grid) - 2)
     for j, (pole, residue) in enumerate(zip(response.poles, response.residues, strict=True)):

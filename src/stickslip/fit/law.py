@@ -1,0 +1,308 @@
+"""A friction law fitted to records, with the exact engine in the loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import Estimate, Result
+from stickslip.fit.law_search import Knob, Point, Problem, descend
+from stickslip.fit.law_start import Shown, best_start, better_start, free_names, knob
+from stickslip.fit.law_stretch import channels_of
+from stickslip.fit.law_surety import Surety, surety
+from stickslip.laws.base import Law
+from stickslip.laws.curved import CurvedLaw
+from stickslip.oscillator import Oscillator
+from stickslip.parameters import UNITS
+from stickslip.record.record import Record
+
+Array = NDArray[np.float64]
+
+WORDS = {
+    "kinetic": "sliding friction", "static": "static friction", "law.stiffness": "contact stiffness",
+    "law.damping": "contact damping", "speed": "Stribeck speed", "law.mass": "contact mass",
+}  # fmt: skip
+METHOD = "least squares of what the sensors read, the motion simulated"
+MISFIT = 1.2  # times its noise that a channel's residual may be
+WORK = 60.0  # calls of progress that a fit is taken for
+
+
+@dataclass(frozen=True, eq=False)
+class Traces:
+    """What was measured and what the fitted law predicts, by channel.
+
+    Attributes
+    ----------
+    time : mapping of str to ndarray
+        Time [s] of the rows that were fitted, on the record's clock.
+    measured, fitted : mapping of str to ndarray
+        Readings, and what the sensor would have read.
+    """
+
+    time: Mapping[str, Array]
+    measured: Mapping[str, Array]
+    fitted: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LawFit(Result):
+    """A fitted law.
+
+    Attributes
+    ----------
+    oscillator : Oscillator
+        The oscillator with the fitted values.
+    parameters : mapping of str to Estimate
+        What was fitted, by the names of :meth:`Oscillator.having`; of a sensor ``x.gain`` and ``x.delay``.
+    correlations : ndarray (p, p)
+        Between the parameters, in their order.
+    noise : mapping of str to float
+        Standard deviation of each channel's noise, as stated or found.
+    residual : mapping of str to float
+        Root mean square of what is left of each channel.
+    chi2 : float
+        Sum of squares of what is left, in units of the noise.
+    samples : int
+        Number of readings.
+    count : int
+        Number of parameters, those of the starts and the sensors' offsets left out.
+    traces : tuple of Traces
+        One for each record.
+    surface : str
+        "even" or "rough", see :func:`fit_law`.
+    status : str
+        "ok", or why the fit should not be trusted.
+    checks : tuple of str
+        What was checked, with the numbers.
+    """
+
+    oscillator: Oscillator
+    parameters: Mapping[str, Estimate]
+    correlations: Array
+    noise: Mapping[str, float]
+    residual: Mapping[str, float]
+    chi2: float
+    samples: int
+    count: int
+    traces: tuple[Traces, ...]
+    surface: str
+    status: str = "ok"
+    checks: tuple[str, ...] = field(default=())
+
+    @property
+    def law(self) -> Law | CurvedLaw:
+        """The fitted law."""
+        return self.oscillator.law
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every parameter fitted."""
+        return tuple(self.parameters.values())
+
+    @property
+    def misfit(self) -> Mapping[str, float]:
+        """Residual of each channel over its noise; 1 where the law explains everything but the noise."""
+        return {name: self.residual[name] / self.noise[name] for name in self.residual}
+
+
+def fit_law(
+    record: Record | Sequence[Record],
+    oscillator: Oscillator,
+    *,
+    free: Sequence[str] | None = None,
+    nuisance: Sequence[str] = (),
+    channels: Sequence[str] | None = None,
+    surface: str | None = None,
+    intervals: bool = True,
+    progress: Callable[[float], object] | None = None,
+) -> LawFit:
+    r"""Which parameters of a friction law explain what the sensors read?
+
+    The oscillator is simulated exactly, its motion passed through the sensors as their channels state them (delay,
+    mount, inertia, discharge), and the parameters p are those for which
+
+    .. math:: \chi^2(p) = \sum_{c, t} \left(\frac{y_c(t) - \hat y_c(t; p)}{\sigma_c}\right)^2
+
+    is least over channels c and instants t, sigma the noise. Each record's displacement, velocity and memory at its
+    first slide are fitted with them, as are an offset of each channel and what its mount still rings with. Static
+    friction, Stribeck speed, contact stiffness and rate, in which chi squared has several valleys, are tried at values
+    spread over their range before the descent. The intervals are the sandwich's, which hold when what is left is
+    correlated; where a parameter is hardly seen they are the likelihood's, and may be open to one side.
+
+    Parameters
+    ----------
+    record : Record or sequence of Record
+        With x or v, and what else was measured: a, load, friction. The base's motion z drives the oscillator where it
+        was measured, or a periodic force; otherwise the oscillator's own drive does, from the first sample on.
+    oscillator : Oscillator
+        Mass, spring and damper; the law with values to start from.
+    free : sequence of str, optional
+        Parameters to fit, as :meth:`Oscillator.having` names them; all the law's that are not zero where left out.
+        Empty: only the starts are fitted, to predict another record.
+    nuisance : sequence of str
+        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay".
+    channels : sequence of str, optional
+        Channels to explain; all that were measured where left out.
+    surface : {"even", "rough"}, optional
+        "even": the friction is the same everywhere, and the motion is followed from one start.
+    intervals : bool
+        Whether to ask how sure the parameters are; without, the fit is quicker.
+    progress : callable, optional
+        Called with the share of the work that is done, 0 to 1.
+
+    Returns
+    -------
+    LawFit
+
+    Raises
+    ------
+    RecordError
+        A channel is missing or broken.
+    EstimateError
+        No motion above the noise, no sliding, or sliding at one speed alone.
+    ModelError
+        A parameter that the oscillator does not have.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(
+    ...     mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(1.1e-3, frequency=8.7)
+    ... )
+    >>> rig = ss.Rig.perfect("x", "z").having("x", white=1e-6)
+    >>> record = rig.measure(ss.simulate(slider, cycles=20), fs=2000, rng=1)
+    >>> found = fit_law(record.rows(2000, len(record)), slider.having(kinetic=1.0))
+    >>> bool(abs(found.law.kinetic / 1.1 - 1) < 0.01)
+    True
+    """
+    records = [record] if isinstance(record, Record) else list(record)
+    if not records:
+        raise EstimateError("no record", "a law is fitted to one record at least", "give one")
+    if surface not in (None, "even", "rough"):
+        raise ModelError(f"surface = '{surface}'", "a surface is 'even' or 'rough'", "choose one, or leave it out")
+    tell = _teller(progress)
+    names = free_names(oscillator, free)
+    shown = [Shown.of(each, channels_of(each, channels), oscillator) for each in records]
+    stretches = []
+    for number, each in enumerate(shown):
+        rows = each.slides()
+        _require_sliding(each, rows)
+        stretches.append(each.stretch(number, (int(rows[0]), len(each.record) - 1), oscillator))
+    fastest = max(each.fastest for each in shown)
+    if names:
+        oscillator = best_start(better_start(oscillator, names, shown), names, stretches, fastest, tell)
+    knobs = tuple(knob(oscillator, name) for name in (*names, *nuisance))
+    problem = Problem.of(oscillator, stretches, knobs)
+    point = descend(problem, problem.begin(np.zeros(len(knobs))), tell=tell)
+    if not math.isfinite(point.chi2):
+        raise EstimateError(
+            f"{oscillator.law!r} can not be simulated along this record", "the search starts from a motion that exists",
+            "start from other values of the law",
+        )  # fmt: skip
+    sure = surety(problem, point, tell) if intervals else None
+    if progress:
+        progress(1.0)
+    return _answer(problem, point, sure, shown)
+
+
+def _teller(progress: Callable[[float], object] | None) -> Callable[[], None]:
+    """Progress that comes nearer to its end with each call, as nobody knows how many there will be."""
+    calls = 0
+
+    def tell() -> None:
+        nonlocal calls
+        calls += 1
+        if progress:
+            progress(1 - math.exp(-2.5 * calls / WORK))
+
+    return tell
+
+
+def _require_sliding(shown: Shown, rows: NDArray[np.intp]) -> None:
+    if len(rows) == 0:
+        raise EstimateError(
+            "the mass does not slide away from the record's ends", "a law is fitted to sliding",
+            "give a longer record, or drive harder",
+        )  # fmt: skip
+    velocity = shown.velocity
+    cut = max(1, len(velocity) // 50)
+    inner = velocity[cut:-cut]
+    if np.min(inner) * np.max(inner) > 0 and np.abs(inner).min() > 0.2 * np.abs(inner).max():
+        raise EstimateError(
+            f"the mass slides one way at {np.abs(inner).min():.3g} to {np.abs(inner).max():.3g} m/s without a stop",
+            "friction is told from an offset where the motion stops or turns",
+            "let it turn: drive the base to and fro, or let it stick and slip",
+        )  # fmt: skip
+
+
+def _answer(problem: Problem, point: Point, sure: Surety | None, shown: Sequence[Shown]) -> LawFit:
+    system = problem.system(point.u)
+    gains = problem.sensor_knobs(point.u, "gain")
+    traces, sums, counts, noise = [], dict[str, float](), dict[str, int](), dict[str, float]()
+    for j, stretch in enumerate(problem.stretches):
+        time, measured, fitted = {}, {}, {}
+        for sensor, raw in zip(stretch.sensors, point.raw[j], strict=True):
+            name = sensor.channel.name
+            left = sensor.readings - gains.get(name, 1.0) * raw
+            left = left - sensor.known @ (sensor.known.T @ left)
+            time[name] = shown[stretch.record].record.time[sensor.rows]
+            measured[name], fitted[name] = sensor.readings, sensor.readings - left
+            sums[name] = sums.get(name, 0.0) + float(left @ left)
+            counts[name] = counts.get(name, 0) + len(left)
+            noise[name] = math.hypot(noise.get(name, 0.0), sensor.noise * math.sqrt(len(left)))
+        traces.append(Traces(time, measured, fitted))
+    residual = {name: math.sqrt(sums[name] / counts[name]) for name in sums}
+    noise = {name: noise[name] / math.sqrt(counts[name]) for name in sums}
+    parameters = _parameters(problem, point, sure, system)
+    checks = tuple(f"{name} is left with {residual[name] / noise[name]:.3g} times its noise" for name in residual)
+    worst = max(residual, key=lambda name: residual[name] / noise[name])
+    status = "ok"
+    if residual[worst] > MISFIT * noise[worst]:
+        status = (
+            f"{worst} is left with {residual[worst] / noise[worst]:.3g} times its noise: the law is not the whole of it"
+        )
+    return LawFit(
+        replace(system, drive=problem.oscillator.drive), parameters,
+        sure.correlations if sure else np.eye(len(problem.knobs)), noise, residual, point.chi2, sum(counts.values()),
+        len(problem.knobs), tuple(traces), "even", status, checks,
+    )  # fmt: skip
+
+
+def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Oscillator) -> dict[str, Estimate]:
+    found = {}
+    for k, each in enumerate(problem.knobs):
+        values = [_value(each, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
+        unit = {"gain": "1", "delay": "s"}.get(each.kind, UNITS.get(each.name.rpartition(".")[2], "1"))
+        sd = abs(_value(each, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
+        interval = (values[1], values[2]) if sure else (math.nan, math.nan)
+        found[each.name] = Estimate(
+            WORDS.get(each.name, each.name), values[0], interval, sd, unit, METHOD, _told(each, values, unit, sure)
+        )
+    return found
+
+
+def _value(knob: Knob, u: float, system: Oscillator) -> float:
+    if knob.kind == "log" and math.isinf(u):
+        return math.inf if u > 0 else 0.0
+    value = knob.value(u)
+    return float(getattr(system.law, "kinetic", 1.0)) * (1 + value) if knob.kind == "above" else value
+
+
+def _told(knob: Knob, values: Sequence[float], unit: str, sure: Surety | None) -> str:
+    """What the records can say of a parameter, in words."""
+    if sure is None:
+        return "not asked how sure"
+    _, low, high = values
+    word = WORDS.get(knob.name, knob.name)
+    if not math.isinf(high) and not math.isinf(low) and (low > 0 or knob.kind != "log"):
+        return "ok"
+    if low > 0 and math.isinf(high):
+        return f"{word} above {low:.2g} {unit} can not be told from infinite here"
+    if math.isfinite(high):
+        return f"{word} below {high:.2g} {unit} can not be told from none here"
+    return f"{word} can not be told from these records"

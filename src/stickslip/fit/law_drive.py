@@ -1,0 +1,189 @@
+"""What drove the rig: the base's measured motion, or an applied force's, as a drive that the engine follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.drives import Drive, HarmonicBase, MultiTone, RecordedBase
+from stickslip.errors import EstimateError
+from stickslip.record.record import Record
+from stickslip.signals.differentiate import LEAST, Filter, best_bandwidth
+from stickslip.signals.noise import noise_level
+
+Array = NDArray[np.float64]
+
+HARMONICS = 5
+AS_GOOD = 1.15  # times its noise that a sum of tones may stray from what was measured
+KNOTS = 6  # a period of the bandwidth, of a motion without tones
+SURE = 1e-9  # of a drive, that is never surer
+
+
+class DriveFrom(Protocol):
+    """A drive from any instant of the record on; its measurement may be off in the ways of `unsure`."""
+
+    @property
+    def unsure(self) -> tuple[float, ...]:
+        """Standard deviation of each way in which the measured drive may be off."""
+
+    def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
+        """The drive whose time 0 is `begin` [s] on the record's clock."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tones:
+    """``sum A cos(2 pi F t + phase)``, t on the record's clock; off by a share, an angle, and turns in the record."""
+
+    tones: tuple[tuple[float, float, float], ...]
+    on: str
+    contact: str
+    unsure: tuple[float, float, float]
+    middle: float
+    length: float
+
+    def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
+        """The drive whose time 0 is `begin`."""
+        share, angle, turns = np.asarray(off) if np.size(off) else (0.0, 0.0, 0.0)
+        slower = turns / self.length
+        moved = []
+        for order, (size, f, phase) in enumerate(self.tones, start=1):
+            then = phase + 2 * np.pi * (f * begin + order * slower * (begin - self.middle)) + order * angle
+            moved.append((size * (1 + share), f + order * slower, float(then % (2 * np.pi))))
+        if len(moved) == 1 and self.on == "base":
+            size, frequency, phase = moved[0]
+            return HarmonicBase(size, frequency=frequency, phase=phase, contact=self.contact)
+        return MultiTone(moved, on=self.on, contact=self.contact)
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """A motion of any shape, smoothed, at instants as dense as its bandwidth asks for."""
+
+    values: Array
+    fs: float
+    late: float
+    contact: str
+    unsure: tuple[float]
+
+    def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
+        """The drive whose time 0 is `begin`."""
+        share = float(np.sum(off))
+        from scipy.interpolate import CubicSpline
+
+        own = np.arange(len(self.values)) / self.fs - self.late
+        count = max(4, int(np.ceil((end - begin) * self.fs)) + 1)
+        step = max((end - begin) / (count - 1), 1e-12)
+        samples = (1 + share) * CubicSpline(own, self.values)(begin + step * np.arange(count + 1))
+        return RecordedBase(samples, fs=1 / step, contact=self.contact)
+
+
+def measured_drive(record: Record, given: Drive) -> DriveFrom:
+    """What moves the oscillator during a record, from any instant on.
+
+    The base's motion z, or the applied force, is a tone with its harmonics where these reach its noise; any other
+    motion of the base is smoothed and followed as it was recorded. A record of neither is driven as `given`.
+    """
+    for channel, on in (("z", "base"), ("force", "force")):
+        if channel in record and np.ptp(record[channel]) > 0:
+            return _driven(record, channel, on, getattr(given, "contact", "ground"))
+    return Known(given)
+
+
+def _driven(record: Record, channel: str, on: str, contact: str) -> DriveFrom:
+    values, late = record[channel], record.channels[channel].delay
+    record.require_clean(channel, question="a fitted law", samples=LEAST)
+    noise = record.channels[channel].noise or noise_level(values, record.fs)
+    time = np.arange(len(values)) / record.fs - late
+    tones = _tones(values, time, noise)
+    share = max(SURE, noise * np.sqrt(2 / len(values)))
+    if tones is not None:
+        share, length = share / tones[0][0], time[-1] - time[0]
+        unsure = (share, share, share * np.sqrt(12) / (2 * np.pi))
+        return Tones(tones, on, contact, unsure, float(time[0] + length / 2), length)
+    if on == "force":
+        raise EstimateError(
+            "an applied force that is no tone with harmonics", "the force on the mass is periodic",
+            "cut the record to where it is, or drive the base",
+        )  # fmt: skip
+    bandwidth = min(best_bandwidth(values, record.fs), record.fs / KNOTS)
+    smooth = Filter("smoother", record.fs, bandwidth).apply(values - values.mean(), {0: 1.0})
+    step = max(1, int(record.fs / (KNOTS * bandwidth)))
+    return Sampled(smooth[::step], record.fs / step, late, contact, (share / (2**0.5 * float(np.std(values))),))
+
+
+def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float, float], ...] | None:
+    """Amplitude, frequency and phase of a tone and as many harmonics as it needs; None where they do not suffice."""
+    from scipy.optimize import minimize_scalar
+
+    size, span = len(values), time[-1] - time[0]
+    centred = values - values.mean()
+    spectrum = np.abs(np.fft.rfft(centred * np.hanning(size), 4 * size))
+    coarse = float(np.argmax(spectrum)) / (4 * size) * size / span
+    if coarse * span < 1.0:
+        return None
+    allowed = max(AS_GOOD * noise, 1e-6 * float(np.ptp(values)))
+    for count in range(1, HARMONICS + 1):
+
+        def left(frequency: float, count: int = count) -> float:
+            return _fitted(values, time, frequency, count)[1]
+
+        best = minimize_scalar(left, bounds=(coarse - 0.5 / span, coarse + 0.5 / span), method="bounded",
+                               options={"xatol": 1e-9 * coarse})  # fmt: skip
+        found, rest = _fitted(values, time, float(best.x), count)
+        if rest <= allowed:
+            sizes, angles = np.hypot(found[1::2], found[2::2]), np.arctan2(-found[2::2], found[1::2])
+            return tuple(
+                (float(a), (j + 1) * float(best.x), float(p))
+                for j, (a, p) in enumerate(zip(sizes, angles, strict=True))
+            )
+    return None
+
+
+def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, float]:
+    angles = 2 * np.pi * frequency * np.outer(time, np.arange(1, count + 1))
+    columns = np.ones((len(time), 2 * count + 1))
+    columns[:, 1::2], columns[:, 2::2] = np.cos(angles), np.sin(angles)
+    found, *_ = np.linalg.lstsq(columns, values, rcond=None)
+    return np.asarray(found), float(np.sqrt(np.mean((values - columns @ found) ** 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """The oscillator's own drive, that nobody has measured."""
+
+    drive: Drive
+    unsure: tuple[float, ...] = ()
+
+    def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
+        """The drive whose time 0 is `begin`."""
+        return self.drive if begin == 0 else _Later(self.drive, begin)
+
+
+@dataclass(frozen=True, eq=False)
+class _Later:
+    """A drive that has gone on for `begin` seconds when the run starts."""
+
+    drive: Drive
+    begin: float
+
+    def motion(self) -> Any:
+        """The same signals from then on."""
+        motion = self.drive.motion()
+        if motion.knots is not None:
+            raise EstimateError(
+                "a drive with knots that starts before the record's first slide",
+                "a run begins with its drive", "give the base's motion as channel z",
+            )  # fmt: skip
+        values = {name: motion.start[name] for name in motion.rates}
+        turned: dict[str, float] = {}
+        for cosine, sine, omega, phase in motion.tones:
+            angle = phase + omega * self.begin
+            turned |= {cosine: float(np.cos(angle)), sine: float(np.sin(angle))}
+        for name, rate in motion.rates.items():
+            if name not in turned:
+                values[name] += self.begin * rate.get("1", 0.0)
+        tones = tuple((c, s, w, phase + w * self.begin) for c, s, w, phase in motion.tones)
+        return replace(motion, start={**values, **turned}, tones=tones)

@@ -1,0 +1,223 @@
+"""Where a fit of a law begins: what the record shows of motion and friction, and which values are tried."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError, ModelError, RecordError
+from stickslip.fit.law_drive import measured_drive
+from stickslip.fit.law_search import ABOVE, Knob, Point, Problem, descend
+from stickslip.fit.law_stretch import Sensor, Stretch
+from stickslip.oscillator import Oscillator
+from stickslip.parameters import find
+from stickslip.record.record import Record
+from stickslip.signals.differentiate import LEAST, differentiate
+from stickslip.signals.noise import noise_level
+
+Array = NDArray[np.float64]
+
+FAST = 0.5  # of the largest speed: then the contact slides for certain
+EDGE = 0.02  # of the record at its ends, where a derivative is poor
+FINEST = 1e-5  # of a channel's range: noise below it is not asked for
+AUDIBLE = 2.0  # times its noise that a motion must stray
+SHAPES = ("exponent", "printed", "rule", "seed", "error")  # of a law, that are chosen and not fitted
+GRID = {
+    "stiffness": (0.25, 1.0, 4.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0),
+}  # fmt: skip
+EXCESS = (0.04, 0.15, 0.25, 0.4)  # of static over kinetic friction
+SPEEDS = (0.03, 0.1, 0.3)  # of the largest speed
+THIN = 1000.0  # readings of a channel that a first look takes
+FINALISTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What one record shows before any law is fitted: motion, where it slides, and the friction's level."""
+
+    record: Record
+    channels: tuple[str, ...]
+    displacement: Array
+    velocity: Array
+    late: float
+    level: float
+
+    @classmethod
+    def of(cls, record: Record, channels: Sequence[str], oscillator: Oscillator) -> Shown:
+        """Displacement and velocity by x or v; the level of the load, the friction, or the balance of forces."""
+        name = next((name for name in ("x", "v") if name in record), None)
+        if name is None:
+            raise RecordError(
+                f"a record of {', '.join(record)}", "a law is fitted to a motion: displacement x or velocity v",
+                "give one, or integrate the acceleration first",
+            )  # fmt: skip
+        record.require_clean(*channels, name, question="a fitted law", samples=2 * LEAST)
+        values, late = record[name], record.channels[name].delay
+        noise = record.channels[name].noise or noise_level(values, record.fs)
+        if not np.std(values) > AUDIBLE * noise:
+            raise EstimateError(
+                f"{name} strays by {np.std(values):.3g} {record.channels[name].unit} in noise of {noise:.3g}",
+                "a law is fitted to motion above the noise", "drive harder, or measure with less noise",
+            )  # fmt: skip
+        if name == "x":
+            displacement, velocity = values - values.mean(), differentiate(values, record.fs).values
+        else:
+            velocity = values
+            displacement = np.cumsum(values - values.mean()) / record.fs
+        return cls(record, tuple(channels), displacement, velocity, late, _level(record, velocity, oscillator))
+
+    @property
+    def fastest(self) -> float:
+        """Largest speed [m/s] away from the ends."""
+        cut = max(1, int(EDGE * len(self.velocity)))
+        return float(np.abs(self.velocity[cut:-cut]).max())
+
+    def slides(self) -> NDArray[np.intp]:
+        """Rows in which the mass moves fast, away from the ends."""
+        cut = max(1, int(EDGE * len(self.velocity)))
+        rows = np.flatnonzero(np.abs(self.velocity) > FAST * self.fastest)
+        return rows[(rows >= cut) & (rows < len(self.velocity) - cut)]
+
+    def stretch(self, number: int, rows: tuple[int, int], oscillator: Oscillator) -> Stretch:
+        """The stretch between two rows, the mass sliding at the first."""
+        record = self.record
+        span = (rows[0] / record.fs - self.late, rows[1] / record.fs - self.late)
+        sensors = tuple(Sensor.of(record, name, span, self.noise(name)) for name in self.channels)
+        start = {"x": float(self.displacement[rows[0]]), "v": float(self.velocity[rows[0]])}
+        scales = np.array([np.ptp(self.displacement) / 2, self.fastest])
+        return Stretch(number, span, sensors, measured_drive(record, oscillator.drive), start, scales)
+
+    def noise(self, name: str) -> float:
+        """Standard deviation of a channel's noise, as stated or as found."""
+        stated, values = self.record.channels[name].noise, self.record[name]
+        found = noise_level(values, self.record.fs) if stated is None else stated
+        return max(found, FINEST * float(np.ptp(values)), 1e-300)
+
+
+def _level(record: Record, velocity: Array, oscillator: Oscillator) -> float:
+    """Friction [N] while the mass moves fast: as felt, or as the balance of forces has it."""
+    fast = np.abs(velocity) > FAST * np.abs(velocity).max()
+    if "load" in record or "friction" in record:
+        felt = record["load" if "load" in record else "friction"]
+    else:
+        acceleration = record["a"] if "a" in record else differentiate(velocity, record.fs).values
+        place = record["x"] if "x" in record else np.cumsum(velocity) / record.fs
+        base = record.samples.get("z", 0.0)
+        felt = oscillator.stiffness * (base - place) - oscillator.damping * velocity - oscillator.mass * acceleration
+        felt = felt + record.samples.get("force", 0.0)
+    forward, back = (felt[fast & (side * velocity > 0)] for side in (1, -1))
+    if len(forward) and len(back):
+        return float(np.median(forward) - np.median(back)) / 2
+    return float(abs(np.median(felt[fast])))
+
+
+def free_names(oscillator: Oscillator, free: Sequence[str] | None) -> tuple[str, ...]:
+    """The parameters to fit: those asked for, or all of the law that have a value."""
+    if free is not None:
+        for name in free:
+            find(oscillator, name)
+        return tuple(free)
+    found = []
+    for field in fields(oscillator.law):  # type: ignore[arg-type]
+        value = getattr(oscillator.law, field.name)
+        if isinstance(value, int | float) and not isinstance(value, bool) and value and field.name not in SHAPES:
+            alone = find(oscillator, field.name) == (("law", field.name),)
+            found.append(field.name if alone else f"law.{field.name}")
+    if not found:
+        raise ModelError(
+            f"{type(oscillator.law).__name__} has no number to fit", "a law is fitted by its parameters",
+            "name those to fit in free=, or take another law",
+        )  # fmt: skip
+    return tuple(found)
+
+
+def value_of(oscillator: Oscillator, name: str) -> float:
+    """The present value of a parameter."""
+    part = oscillator
+    for word in find(oscillator, name)[0]:
+        part = getattr(part, word)
+    return float(part)  # type: ignore[arg-type]
+
+
+def knob(oscillator: Oscillator, name: str) -> Knob:
+    """How a parameter is turned."""
+    head, _, tail = name.rpartition(".")
+    if head not in ("", "law", "drive") and tail in ("gain", "delay"):
+        return Knob(name, tail, 1.0, 0.01) if tail == "gain" else Knob(name, tail, 0.0, 1e-4)
+    value = value_of(oscillator, name)
+    if tail == "static":
+        kinetic = value_of(oscillator, f"{head}.kinetic" if head else "kinetic")
+        return Knob(name, "above", max(0.0, value / kinetic - 1), ABOVE)
+    if value > 0:
+        return Knob(name, "log", value)
+    return Knob(name, "linear", value, abs(value) or 1.0)
+
+
+def better_start(oscillator: Oscillator, names: Sequence[str], shown: Sequence[Shown]) -> Oscillator:
+    """The law with its forces scaled to the friction that the records show."""
+    level = float(np.median([each.level for each in shown]))
+    if "kinetic" not in names or not level > 0:
+        return oscillator
+    share = level / value_of(oscillator, "kinetic")
+    static = getattr(oscillator.law, "static", None)
+    changes = {"kinetic": level} | ({"static": static * share} if static is not None else {})
+    return oscillator.having(**changes)
+
+
+def trials(oscillator: Oscillator, names: Sequence[str], fastest: float) -> Iterator[Oscillator]:
+    """The values a search begins with: as given, and spread where the misfit has several valleys."""
+    choices: list[list[tuple[str, float]]] = []
+    for name in names:
+        last = name.rpartition(".")[2]
+        if name == last and name in ("mass", "stiffness", "damping"):
+            continue
+        if last in GRID:
+            choices.append([(name, factor * value_of(oscillator, name)) for factor in GRID[last]])
+        if last == "static":
+            level = value_of(oscillator, name.replace("static", "kinetic"))
+            choices.append([(name, level * (1 + excess)) for excess in EXCESS])
+        if last == "speed":
+            choices.append([(name, share * fastest) for share in SPEEDS])
+    yield oscillator
+    for chosen in itertools.product(*choices) if choices else ():
+        yield oscillator.having(**dict(chosen))
+
+
+def thinned(stretch: Stretch) -> Stretch:
+    """The stretch with fewer readings, and a drive that is taken as measured, for a first look."""
+    sensors = []
+    for sensor in stretch.sensors:
+        each = slice(None, None, max(1, int(len(sensor.time) / THIN)))
+        known, _ = np.linalg.qr(sensor.known[each])
+        sensors.append(replace(sensor, time=sensor.time[each], readings=sensor.readings[each], known=known))
+    drive = replace(stretch.drive, unsure=())  # type: ignore[type-var]
+    return replace(stretch, sensors=tuple(sensors), drive=drive)
+
+
+def best_start(
+    oscillator: Oscillator,
+    names: Sequence[str],
+    stretches: Sequence[Stretch],
+    fastest: float,
+    tell: Callable[[], None],
+) -> Oscillator:
+    """The values from which the search descends lowest, on a part of the readings."""
+    few = [thinned(stretch) for stretch in stretches]
+    looked: list[tuple[float, int, Problem, Point]] = []
+    for number, trial in enumerate(trials(oscillator, names, fastest)):
+        tell()
+        problem = Problem.of(trial, few, ())
+        point = descend(problem, problem.begin(np.zeros(0)), passes=2)
+        looked.append((point.chi2, number, problem, point))
+    looked.sort(key=lambda each: each[:2])
+    ends = []
+    for _, number, problem, point in looked[:FINALISTS]:
+        turned = replace(problem, knobs=tuple(knob(problem.oscillator, name) for name in names))
+        end = descend(turned, replace(point, u=np.zeros(len(names))), passes=12, tell=tell)
+        ends.append((end.chi2, number, turned, end))
+    _, _, problem, point = min(ends, key=lambda each: each[:2])
+    return problem.system(point.u)

@@ -1,0 +1,124 @@
+"""Laws fitted to records of the virtual rig: the truth is known."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.record.record import Step
+
+RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
+SWINGS = {2.5: 0.65e-3, 8.7: 1.1e-3, 11.1: 2e-3}
+CONTACT = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+
+
+@cache
+def measured(law: Any, frequency: float, seconds: float = 0.8, seed: int = 3) -> ss.Record:
+    """What the thesis's rig reads, its sensors stated."""
+    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(SWINGS[frequency], frequency=frequency), **RIG)
+    run = ss.simulate(slider, duration=10 / frequency + seconds, rtol=1e-9)
+    rig = ss.Rig.air_track()
+    return rig.stated(rig.measure(run, fs=4000, rng=seed, start=10 / frequency))
+
+
+def test_a_compliant_contact_is_found_from_far_away() -> None:
+    start = ss.Oscillator(law=ss.CompliantContact(2.0, stiffness=60000, damping=5.0), **RIG)
+    found = ss.fit_law(measured(CONTACT, 2.5), start)
+    assert found.status == "ok"
+    assert set(found.parameters) == {"kinetic", "law.stiffness", "law.damping"}
+    assert found.law.kinetic == pytest.approx(1.1, rel=2e-3)
+    assert found.law.stiffness == pytest.approx(192000, rel=1e-2)
+    for name, true in (("kinetic", 1.1), ("law.stiffness", 192000), ("law.damping", 23.9)):
+        each = found.parameters[name]
+        assert abs(each.value - true) < 4 * each.sd
+    assert all(0.8 < value < 1.2 for value in found.misfit.values())
+    assert np.allclose(np.diag(found.correlations), 1)
+
+
+@pytest.mark.parametrize(
+    ("law", "start"),
+    [
+        (ss.Coulomb(1.0), ss.Coulomb(1.5)),
+        (ss.Coulomb(0.95, 1.2), ss.Coulomb(1.0, 1.05)),
+        (ss.StateVariable(0.95, rate=120.0, steepness=3000.0), ss.StateVariable(1.0, rate=80.0, steepness=2000.0)),
+    ],
+    ids=["rigid", "static", "state variable"],
+)
+def test_a_law_is_found_in_three_records(law: Any, start: Any) -> None:
+    found = ss.fit_law([measured(law, frequency) for frequency in SWINGS], ss.Oscillator(law=start, **RIG))
+    assert found.status == "ok"
+    for name, each in found.parameters.items():
+        assert abs(each.value - getattr(law, name)) < 4 * each.sd
+    assert len(found.traces) == 3
+
+
+def test_another_record_is_predicted() -> None:
+    found = ss.fit_law(measured(CONTACT, 8.7), ss.Oscillator(law=CONTACT, **RIG))
+    other = ss.fit_law(measured(CONTACT, 2.5), found.oscillator, free=(), intervals=False)
+    assert not other.parameters
+    assert all(value < 1.2 for value in other.misfit.values())
+
+
+def test_a_gain_is_fitted_beside_the_law() -> None:
+    record = measured(ss.Coulomb(1.0), 8.7)
+    wrong = record.with_samples(
+        {name: record[name] * (1.02 if name == "load" else 1.0) for name in record}, Step("wrong")
+    )
+    found = ss.fit_law(wrong, ss.Oscillator(law=ss.Coulomb(1.0), **RIG), nuisance=["load.gain"])
+    assert found.parameters["load.gain"].value == pytest.approx(1.02, abs=4 * found.parameters["load.gain"].sd)
+    assert found.parameters["kinetic"].value == pytest.approx(1.0, abs=4 * found.parameters["kinetic"].sd)
+
+
+def test_a_wrong_law_is_told_by_what_it_leaves() -> None:
+    found = ss.fit_law(measured(CONTACT, 2.5), ss.Oscillator(law=ss.Coulomb(1.0), **RIG))
+    assert "times its noise" in found.status
+
+
+def test_a_free_decay_needs_no_drive() -> None:
+    slider = ss.Oscillator(law=ss.Coulomb(0.4), **RIG)
+    run = ss.simulate(slider, duration=3.0, start={"x": 5e-3})
+    record = ss.Rig.perfect("x").having("x", white=1e-6).measure(run, fs=2000, rng=2)
+    found = ss.fit_law(record, slider.having(kinetic=0.5), nuisance=["stiffness"])
+    assert found.law.kinetic == pytest.approx(0.4, rel=2e-3)
+    assert found.parameters["stiffness"].value == pytest.approx(2310, rel=1e-3)
+
+
+def test_a_base_of_any_motion_drives() -> None:
+    fs, seconds = 2000, 4.0
+    time = np.arange(int(fs * seconds)) / fs
+    base = 1e-3 * np.sin(2 * np.pi * 5.3 * time) + 0.6e-3 * np.sin(2 * np.pi * 8.1 * time + 1)
+    slider = ss.Oscillator(law=ss.Coulomb(1.0), drive=ss.RecordedBase(base, fs=fs), **RIG)
+    record = ss.Rig.perfect("x", "z").having("x", white=1e-6).measure(ss.simulate(slider, duration=3.9), fs=fs, rng=5)
+    found = ss.fit_law(record.rows(2000, 6000), ss.Oscillator(law=ss.Coulomb(0.8), **RIG))
+    assert found.law.kinetic == pytest.approx(1.0, rel=2e-3)
+
+
+def test_progress_is_told_and_ends() -> None:
+    told: list[float] = []
+    ss.fit_law(measured(ss.Coulomb(1.0), 8.7), ss.Oscillator(law=ss.Coulomb(1.0), **RIG), progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("samples", "said"),
+    [
+        ({"x": 1e-3 * np.arange(4000) / 1000}, "one way"),
+        ({"x": 1e-9 * np.random.default_rng(1).standard_normal(4000)}, "noise"),
+        ({"a": np.sin(np.arange(4000) / 50)}, "displacement"),
+    ],
+    ids=["constant velocity", "noise", "no motion channel"],
+)
+def test_what_can_not_tell_is_refused(samples: dict[str, Any], said: str) -> None:
+    record = ss.Record.of(samples, fs=1000)
+    with pytest.raises(ss.StickslipError, match=said):
+        ss.fit_law(record, ss.Oscillator(law=ss.Coulomb(1.0), **RIG))
+
+
+def test_a_name_that_is_none_is_refused() -> None:
+    with pytest.raises(ss.ModelError, match="no parameter is called 'kinetc'"):
+        ss.fit_law(measured(ss.Coulomb(1.0), 8.7), ss.Oscillator(law=ss.Coulomb(1.0), **RIG), free=["kinetc"])
