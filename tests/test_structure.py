@@ -21,6 +21,8 @@ from stickslip.laws.dahl import Dahl
 from stickslip.laws.elastoslip import ElastoSlip
 from stickslip.laws.inertial import InertialContact
 from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.state_variable import StateVariable
+from stickslip.laws.tabulated import Tabulated
 from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import automaton
 from stickslip.solve.energy import energy
@@ -196,6 +198,7 @@ def replay(structure: Structure, start: np.ndarray, duration: float) -> tuple[li
     """
     (pad,) = structure.contacts
     law, speed = pad.law, structure.drive.speed  # type: ignore[attr-defined]
+    slope = getattr(law, "slope", 0.0)
     tangential = law.stiffness if isinstance(law, CompliantContact) else 0.0  # type: ignore[attr-defined]
     kinetic, static = law.kinetic, law.static or law.kinetic  # type: ignore[attr-defined]
     inverse, damping, stiffness = (
@@ -217,7 +220,9 @@ def replay(structure: Structure, start: np.ndarray, duration: float) -> tuple[li
             return float(t @ inverse @ force(y, mode) / (t @ inverse @ t))
         if mode == "microstuck":
             return float(tangential * (t @ y[:2] - y[4]))
-        return {"forward": 1, "back": -1, "lifted": 0}[mode] * kinetic * load(y)
+        if mode == "lifted":
+            return 0.0
+        return {"forward": 1, "back": -1}[mode] * kinetic * load(y) + slope * pad.preload * float(t @ y[2:4] - speed)
 
     def rate(_: float, y: np.ndarray, mode: str) -> np.ndarray:
         a = inverse @ (force(y, mode) - t * friction(y, mode))
@@ -292,10 +297,11 @@ def replay(structure: Structure, start: np.ndarray, duration: float) -> tuple[li
     "law",
     [
         Coulomb(0.6, static=0.7),
+        LinearSlope(0.6, slope=-0.05, static=0.7),
         CompliantContact(0.6, stiffness=300.0),
         CompliantContact(0.6, stiffness=30.0, static=0.8),
     ],
-    ids=["rigid", "stiff", "soft"],
+    ids=["rigid", "falling", "stiff", "soft"],
 )
 @pytest.mark.parametrize("speed", [0.3, 0.8])
 def test_flutter_grows_to_stick_and_flight_as_scipy_has_it(law: Law, speed: float) -> None:
@@ -309,6 +315,18 @@ def test_flutter_grows_to_stick_and_flight_as_scipy_has_it(law: Law, speed: floa
     assert np.allclose([t for t, _ in own], [t for t, _ in events], rtol=0, atol=1e-10)
     assert np.allclose(run.sample([25.0], ("x", "v"))[0][:, 0], end[:4], rtol=0, atol=1e-10)
     assert np.min(run.sample(np.linspace(0, 25, 4000), ("load",))[0]) >= -1e-12
+
+
+def test_a_table_of_coefficients_is_the_line_that_it_was_cut_from() -> None:
+    start = {"x1": 0.3, "x2": -0.1, "v1": 0.0}
+    line = hoffmann(0.6, drive=Belt(0.8), preload=5.0).having(law=LinearSlope(0.6, slope=-0.05, static=0.7))
+    speeds = np.linspace(0, 20, 9)
+    table = line.having(law=Tabulated(speeds, 0.6 - 0.05 * np.minimum(speeds, 10), static=0.7))
+    runs = [simulate(structure, duration=12.0, start=start) for structure in (line, table)]
+    events, same = ([(event.time, event.mode.split()[0]) for event in run.events] for run in runs)
+    assert {"back", "stuck", "lifted"} <= {mode for _, mode in events}
+    assert [mode for _, mode in events] == [mode for _, mode in same]
+    assert np.allclose([t for t, _ in events], [t for t, _ in same], rtol=0, atol=1e-9)
 
 
 def some_structure(seed: int) -> Structure:
@@ -566,6 +584,7 @@ def test_hard_structures_never_hang(seed: int) -> None:
 
 
 GOOD = {"mass": np.eye(2), "damping": np.zeros((2, 2)), "stiffness": np.eye(2)}
+STATE = StateVariable(1.1, rate=2.0)
 
 
 @pytest.mark.parametrize(
@@ -596,8 +615,8 @@ GOOD = {"mass": np.eye(2), "damping": np.zeros((2, 2)), "stiffness": np.eye(2)}
         (lambda: Contact(Coulomb(1.0), [1, 0], stiffness=5.0), "without normal"),
         (lambda: Contact(Coulomb(1.0), [1, 0], normal=[0, 1]), "stiffness = 0"),
         (lambda: Contact(Coulomb(1.0), [1, 0], normal=[0, 1], stiffness=-1.0), "stiffness = -1"),
-        (lambda: Contact(LinearSlope(1.0, slope=-0.1), [1, 0], normal=[0, 1], stiffness=1.0), "LinearSlope"),
-        (lambda: Contact(LinearSlope(1.0, slope=-0.1), [1, 0], preload=5.0), "under a preload"),
+        (lambda: Contact(STATE, [1, 0], normal=[0, 1], stiffness=1.0), "StateVariable under a load that follows"),
+        (lambda: Contact(STATE, [1, 0], preload=5.0), "under a preload"),
         (lambda: Contact(Dahl(1.0, stiffness=100.0), [1, 0]), "Dahl in a structure"),
         (lambda: simulate(Structure(**GOOD), duration=1.0, start={"x3": 1.0}), "x3"),
         (lambda: simulate(Structure(**{**GOOD, "stiffness": np.zeros((2, 2))}), cycles=1), "no cycles"),

@@ -12,15 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.drives import Drive, Release, require_drive
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Law, Mode, finite
+from stickslip.laws.base import Exit, Law, Mode, Row, finite
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.elastoslip import ElastoSlip
 from stickslip.laws.inertial import InertialContact
+from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.tabulated import Tabulated
 from stickslip.parameters import changed
 
 Array = NDArray[np.float64]
+LOADED = (Coulomb, LinearSlope, Tabulated, CompliantContact)  # laws that may be told as a coefficient of friction
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +32,16 @@ class Contact:
 
     The load is :math:`N = N_0 + k_n\,w_n\cdot q`, and the contact pushes back with it; the preload comes from outside
     and balances it at q = 0. Every force level of the law is multiplied by N: a friction coefficient in place of a
-    force. At N = 0 the contact separates, and it closes again where N would rise above zero. Without `normal` the
+    force. Where friction depends on the speed, as a straight line :math:`\mu_0 + s v` or a table of them, it is
+    :math:`\mu_0 N + s N_0 v`: its slope keeps to the preload, for the product of load and speed is not linear. At N = 0
+    the contact separates, and it closes again where N would rise above zero. Without `normal` the
     load is the preload; as that is 1 where left out, the levels of the law are then forces [N], as in an Oscillator.
 
     Attributes
     ----------
     law : Law
-        Friction law. Under a load that follows the motion: Coulomb or CompliantContact; under a preload also ElastoSlip
-        and InertialContact; any other with linear modes where its levels are forces.
+        Friction law. Under a load that follows the motion: Coulomb, LinearSlope, Tabulated or CompliantContact; under a
+        preload also ElastoSlip and InertialContact; any other with linear modes where its levels are forces.
     tangent : array_like (n,)
         Direction of sliding, :math:`w_t`: the contact slides by :math:`w_t\cdot q` less the counter-face's motion.
     normal : array_like (n,), optional
@@ -85,11 +90,11 @@ class Contact:
                     "give normal=, or leave out stiffness=",
                 )
             if self.preload != 1:
-                self._require("under a preload", Coulomb, CompliantContact, ElastoSlip, InertialContact)
+                self._require("under a preload", *LOADED, ElastoSlip, InertialContact)
             return
         object.__setattr__(self, "normal", _direction("normal", self.normal))
         finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        self._require("under a load that follows the motion", Coulomb, CompliantContact)
+        self._require("under a load that follows the motion", *LOADED)
 
     def _require(self, where: str, *proportional: type) -> None:
         """Refuse a law whose forces are not all proportional to the load."""
@@ -106,7 +111,7 @@ class Contact:
         A load that follows the motion adds flight. Where the law starts in different modes by the sign of velocity,
         "landing" decides between them; no time passes in it.
         """
-        law, entry = self.law.modes(), self.law.entry
+        law, entry = tuple(map(self._pressed, self.law.modes())), self.law.entry
         lands = len(set(entry)) > 1
         landing = Mode(
             "landing", "landing", 0, {},
@@ -120,6 +125,14 @@ class Contact:
         every = (*law, landing) if lands else law
         closed = tuple(replace(mode, exits=(lift, *map(self._followed, mode.exits))) for mode in every)
         return (*closed[: len(law)], lifted, *closed[len(law) :])
+
+    def _pressed(self, mode: Mode) -> Mode:
+        """A mode of friction over speed: the slope of a coefficient becomes a force's, bounds on the speed stay."""
+        if not isinstance(self.law, LinearSlope | Tabulated):
+            return mode
+        if mode.friction is not None:
+            mode = replace(mode, friction={**mode.friction, "v": mode.friction["v"] * self.preload})
+        return replace(mode, exits=tuple(replace(exit_, quantity=_of_speed(exit_.quantity)) for exit_ in mode.exits))
 
     def _followed(self, exit_: Exit) -> Exit:
         """A stop at zero velocity, as it is while the load changes the deflection of a compliant contact.
@@ -264,6 +277,13 @@ class Structure:
         Structure
         """
         return changed(self, changes)
+
+
+def _of_speed(quantity: Row) -> Row:
+    """An exit's quantity in which a bound on the speed is no share of the load."""
+    if "v" not in quantity:
+        return quantity
+    return {"always" if name == "1" else name: share for name, share in quantity.items()}
 
 
 def _positive(mass: Array) -> bool:
