@@ -189,6 +189,14 @@ if TYPE_CHECKING:
     )
     from stickslip.solve.simulate import simulate as simulate
     from stickslip.solve.trajectory import Trajectory as Trajectory
+    from stickslip.squeak.stability import (
+        SlidingMode as SlidingMode,
+        Stability as Stability,
+        Threshold as Threshold,
+        critical_value as critical_value,
+        stability as stability,
+        stability_map as stability_map,
+    )
     from stickslip.structure import Contact as Contact, Structure as Structure
     from stickslip.system_file import Case as Case, read_system as read_system, scenario_case as scenario_case
     from stickslip.laws.dahl import Dahl as Dahl
@@ -258,6 +266,8 @@ _ROOMS = {
     "InSeries": "laws.series", "TimeDelay": "laws.time_delay",
     "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
+    "stability": "squeak.stability", "Stability": "squeak.stability", "SlidingMode": "squeak.stability",
+    "critical_value": "squeak.stability", "Threshold": "squeak.stability", "stability_map": "squeak.stability",
     "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",
     "Release": "drives", "HarmonicBase": "drives", "HarmonicForce": "drives", "MultiTone": "drives",
     "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives",

@@ -1,0 +1,1 @@
+"""Squeak: what a record tells of it, and which motion feeds it."""

@@ -1,0 +1,184 @@
+"""Steady sliding: thresholds of closed form, what feeds the vibration, and that the exact engine agrees."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+
+W1, W2 = 200 * math.pi, 150 * math.pi
+
+
+def inclined(friction: float = 0.3, preload: float = 10.0, **law: float) -> ss.Structure:
+    """MC-1: two inclined springs and a contact spring on a belt."""
+    pad = ss.Contact(ss.LinearSlope(friction, **{"slope": 0.0, **law}), [1, 0], normal=[0, 1], stiffness=11.0,
+                     preload=preload)  # fmt: skip
+    stiffness = [[23.25, 3.8971143170299739], [3.8971143170299739, 7.75]]
+    return ss.Structure(np.eye(2), np.zeros((2, 2)), stiffness, contacts=[pad], drive=ss.Belt(1.0))
+
+
+def block(law: Any, speed: float = 1.0) -> ss.Oscillator:
+    return ss.Oscillator(1.0, 1.0, law, ss.Belt(speed), damping=0.3)
+
+
+def crossed(eta: tuple[float, float] = (0.0, 0.0)) -> ss.Structure:
+    """MC-2: two modes that press each other's contacts."""
+    pads = [
+        ss.Contact(ss.Coulomb(0.1), [1, 0], normal=[0, 1], stiffness=W2**2, preload=1e3),
+        ss.Contact(ss.Coulomb(0.1), [0, 1], normal=[1, 0], stiffness=W1**2, preload=1e3, carried=-1.0),
+    ]
+    damping = np.diag([eta[0] * W1, eta[1] * W2])
+    return ss.Structure(np.eye(2), damping, np.zeros((2, 2)), contacts=pads, drive=ss.Belt(1.0))
+
+
+def test_the_inclined_springs_couple_at_the_closed_form() -> None:
+    found = ss.critical_value(inclined(), "kinetic", between=(0.05, 1.0))
+    assert found.value == pytest.approx(0.47237749297333017, rel=1e-13)
+    assert 2 * math.pi * found.frequency == pytest.approx(4.58257569495584, rel=1e-13)
+    assert (found.mechanism, found.stable_below) == ("mode coupling", True)
+
+
+@pytest.mark.parametrize(
+    ("eta", "critical", "frequency"),
+    [
+        ((0.0, 0.0), 0.29166666666666667, math.sqrt((100**2 + 75**2) / 2)),
+        ((0.02, 0.02), 0.2893671255228094, 86.602540378443865),
+        ((0.02, 0.06), 0.2717900338224474, 93.026050941906342),
+        ((0.001, 0.1), 0.067461045152826729, 99.711755628543196),
+    ],
+)
+def test_damping_may_lower_the_threshold_of_coupling(
+    eta: tuple[float, float], critical: float, frequency: float
+) -> None:
+    found = ss.critical_value(crossed(eta), "kinetic", between=(0.01, 1.0))
+    assert found.value == pytest.approx(critical, rel=1e-12)
+    assert found.frequency == pytest.approx(frequency, rel=1e-12)
+
+
+@pytest.mark.parametrize(("exponent", "band"), [(1.0, (0.0, 0.23025850929940457)),
+                                                (2.0, (0.0050125787690136614, 0.19084020979734697))])  # fmt: skip
+def test_a_falling_curve_feeds_motion_in_its_band(exponent: float, band: tuple[float, float]) -> None:
+    """ST-1: c + F'(V) = 0 at its ends."""
+    law = ss.Stribeck(1.0, 1.5, speed=0.1, exponent=exponent, viscous=0.2)
+    slider = block(law, speed=0.1)
+    upper = ss.critical_value(slider, "drive.speed", between=(0.05, 1.0))
+    assert (upper.value, upper.stable_below) == (pytest.approx(band[1], rel=1e-12), False)
+    assert upper.mechanism == "falling friction"
+    if band[0]:
+        lower = ss.critical_value(slider, "drive.speed", between=(1e-3, 0.05))
+        assert (lower.value, lower.stable_below) == (pytest.approx(band[0], rel=1e-12), True)
+    same = ss.steady_sliding(slider)
+    assert ss.stability(slider).growth == pytest.approx(same.eigenvalues[0].real, rel=1e-12)
+
+
+@pytest.mark.parametrize("friction", [0.3, 0.5, 0.8])
+def test_a_sprag_jams_at_its_angle(friction: float) -> None:
+    """SP-1: a strut inclined by atan(1/mu) is drawn in, whatever the load."""
+
+    def inclined_by(angle: float) -> ss.Structure:
+        law, tangent, normal = ss.Coulomb(friction), [-math.sin(angle)], [-math.cos(angle)]
+        pad = ss.Contact(law, tangent, normal=normal, stiffness=1e4, preload=10.0)
+        return ss.Structure([[1.0]], [[0.0]], [[0.0]], contacts=[pad], drive=ss.Belt(1.0))
+
+    found = ss.critical_value(inclined_by(1.0), inclined_by, between=(0.1, 1.5))
+    assert found.value == pytest.approx(math.atan(1 / friction), rel=1e-12)
+    assert (found.mechanism, found.frequency) == ("jamming", 0.0)
+
+
+def test_each_mechanism_is_told_by_switching_it_off() -> None:
+    damped = inclined().having(damping=0.05 * np.eye(2))
+    falls = {"slope": -0.02}
+    assert ss.stability(damped).mechanism == "stable"
+    assert ss.stability(damped.having(kinetic=0.6)).mechanism == "mode coupling"
+    assert ss.stability(damped.having(**falls)).mechanism == "falling friction"
+    assert ss.stability(damped.having(kinetic=0.6, **falls)).mechanism == "mode coupling, and falling friction too"
+    near = ss.critical_value(damped, "kinetic", between=(0.05, 1.0)).value
+    both = ss.stability(damped.having(kinetic=0.999 * near, slope=-0.003))
+    assert both.mechanism == "mode coupling and falling friction together"
+    assert both.without_slope < 0 < both.growth
+    assert both.without_coupling < 0
+
+
+def test_a_slope_counts_with_the_load() -> None:
+    damped = inclined(0.0, slope=-0.01).having(damping=0.05 * np.eye(2))
+    found = ss.critical_value(damped, "preload", between=(0.1, 50.0))
+    assert (found.mechanism, found.stable_below) == ("falling friction", True)
+    heavier = ss.critical_value(damped.having(slope=-0.005), "preload", between=(0.1, 50.0))
+    assert heavier.value == pytest.approx(2 * found.value, rel=1e-12)
+
+
+@pytest.mark.parametrize("change", [{"kinetic": 0.6}, {"slope": -0.02}, {"kinetic": 0.6, "slope": 0.01}])
+def test_the_exact_engine_grows_as_the_eigenvalue_says(change: dict[str, float]) -> None:
+    block = inclined().having(damping=0.05 * np.eye(2), **change)
+    found = ss.stability(block)
+    flow = ss.simulate(block, duration=1e-3, start={"v1": 0.0}).record(fs=1e4)
+    assert flow is not None
+    rest = np.linalg.solve(
+        np.array([[23.25, 3.8971143170299739], [3.8971143170299739, 18.75]])
+        + 11.0 * np.array([[0.0, -block.contacts[0].law.kinetic], [0.0, 0.0]]),
+        [-(-block.contacts[0].law.kinetic * 10.0 - block.contacts[0].law.slope * 10.0), 0.0],
+    )
+    start = dict(zip(("x1", "x2", "v1", "v2"), [rest[0] + 1e-6, rest[1], 0.0, 0.0], strict=True))
+    period = 1 / found.frequency
+    run = ss.simulate(block, duration=12 * period, start=start)
+    assert run.events == ()
+    assert found.loads[0] == pytest.approx(10.0 + 11.0 * rest[1], rel=1e-12)
+    early, late = (run.sample([n * period], ("x", "v"))[0][:, 0] - [*rest, 0, 0] for n in (11.0, 12.0))
+    grown = complex(*_share(found, late)) / complex(*_share(found, early))
+    assert math.log(abs(grown)) == pytest.approx(found.growth * period, abs=2e-2)
+
+
+def _share(found: ss.Stability, state: np.ndarray) -> tuple[float, float]:
+    """Real and imaginary part of the fastest mode's share in a state."""
+    columns = []
+    for mode in found.modes:
+        value = complex(mode.growth, 2 * math.pi * mode.frequency)
+        vector = np.concatenate([mode.shape, value * mode.shape])
+        columns += [vector.real, -vector.imag]
+    shares = np.linalg.solve(np.array(columns).T, state)
+    return float(shares[0]), float(shares[1])
+
+
+def test_a_map_says_what_ends_the_sliding() -> None:
+    block = inclined().having(damping=0.05 * np.eye(2))
+    found = ss.stability_map(block, {"kinetic": [0.3, 0.6], "slope": [-0.02, 0.0, 0.02]})
+    assert found.mechanism.sel(kinetic=0.3, slope=0.0) == "stable"
+    assert found.mechanism.sel(kinetic=0.6, slope=0.0) == "mode coupling"
+    assert found.mechanism.sel(kinetic=0.3, slope=-0.02) == "falling friction"
+    assert dict(found.growth.sizes) == {"kinetic": 2, "slope": 3}
+    one = ss.stability(block.having(kinetic=0.6, slope=0.02))
+    assert float(found.growth.sel(kinetic=0.6, slope=0.02)) == one.growth
+
+
+def test_a_contact_that_would_lift_off_is_named() -> None:
+    lifting = inclined()
+    pull = ss.Contact(ss.Coulomb(30.0), [0, -1])
+    found = ss.stability(lifting.having(contacts=[*lifting.contacts, pull]))
+    assert found.loads[0] <= 0
+    assert found.status == "contact 1 would lift off before it slides steadily"
+    assert "lift off" in repr(found)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: ss.stability(inclined().having(drive=ss.Release())), "driven by Release"),
+        (lambda: ss.stability(inclined(), speed=0.0), "speed = 0"),
+        (lambda: ss.stability(ss.Structure([[1.0]], [[0.0]], [[1.0]], drive=ss.Belt(1.0))), "without contacts"),
+        (lambda: ss.stability(block(ss.LuGre(1.0, 1.5, speed=0.1, stiffness=1e4))), "LuGre"),
+        (lambda: ss.stability(block(ss.StateVariable(1.0, rate=10.0))), "remembers"),
+        (lambda: ss.critical_value(inclined(), "kinetic", between=(0.1, 0.2)), "stable at 257 values"),
+        (lambda: ss.critical_value(inclined(), "kinetic", between=(0.2, 0.1)), "lower value comes first"),
+        (lambda: ss.critical_value(inclined(), "kinetik", between=(0.1, 0.2)), "kinetik"),
+        (lambda: ss.stability_map(inclined(), {}), "a map has values"),
+        (lambda: ss.stability_map(inclined(), {"kinetic": []}), "a map has values"),
+    ],
+)  # fmt: skip
+def test_what_has_no_answer_is_refused(call: Any, words: str) -> None:
+    with pytest.raises(ss.ModelError) as refused:
+        call()
+    assert words in str(refused.value)
