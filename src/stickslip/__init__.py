@@ -197,6 +197,7 @@ if TYPE_CHECKING:
         stability as stability,
         stability_map as stability_map,
     )
+    from stickslip.squeak.virtual_rig import squeak_rig as squeak_rig
     from stickslip.structure import Contact as Contact, Structure as Structure
     from stickslip.system_file import Case as Case, read_system as read_system, scenario_case as scenario_case
     from stickslip.laws.dahl import Dahl as Dahl
@@ -266,6 +267,7 @@ _ROOMS = {
     "InSeries": "laws.series", "TimeDelay": "laws.time_delay",
     "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
+    "squeak_rig": "squeak.virtual_rig",
     "stability": "squeak.stability", "Stability": "squeak.stability", "SlidingMode": "squeak.stability",
     "critical_value": "squeak.stability", "Threshold": "squeak.stability", "stability_map": "squeak.stability",
     "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",

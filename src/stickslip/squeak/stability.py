@@ -74,8 +74,10 @@ class Stability:
         Fastest growth [1/s].
     without_coupling, without_slope : float
         The same where friction does not follow the load, and where it does not change with the speed [1/s].
+    place : tuple of float
+        Displacements while it slides steadily [m].
     loads : tuple of float
-        Load on each contact while it slides steadily [N].
+        Load on each contact there [N].
     status : str
         "ok", or why steady sliding is not what the contacts would do.
     """
@@ -86,6 +88,7 @@ class Stability:
     growth: float
     without_coupling: float
     without_slope: float
+    place: tuple[float, ...]
     loads: tuple[float, ...]
     status: str
 
@@ -184,7 +187,7 @@ def stability(system: System, *, speed: float | None = None) -> Stability:
     >>> springs, none = [[23.25, 3.9], [3.9, 7.75]], [[0, 0], [0, 0]]
     >>> found = stability(Structure([[1, 0], [0, 1]], none, springs, contacts=[pad], drive=Belt(1.0)))
     >>> found.mechanism, round(found.frequency, 3)
-    ('mode coupling', 0.729)
+    ('mode coupling', 0.73)
     """
     mass, damping, stiffness, rubbing = _parts(system, speed)
     pressed = stiffness + sum((r.stiffness * np.outer(r.normal, r.normal) for r in rubbing), np.zeros_like(mass))
@@ -193,7 +196,7 @@ def stability(system: System, *, speed: float | None = None) -> Stability:
     whole = (mass, damping + falls, pressed + follows)
     uncoupled, unsloped = (mass, damping + falls, pressed), (mass, damping, pressed + follows)
     modes = _modes(whole)
-    loads, status = _loads(pressed + follows, rubbing)
+    place, loads, status = _rest(pressed + follows, rubbing)
     return Stability(
         stable=margin(whole) <= ROUNDING,
         modes=modes,
@@ -201,6 +204,7 @@ def stability(system: System, *, speed: float | None = None) -> Stability:
         growth=modes[0].growth,
         without_coupling=_modes(uncoupled)[0].growth,
         without_slope=_modes(unsloped)[0].growth,
+        place=place,
         loads=loads,
         status=status,
     )
@@ -277,7 +281,7 @@ def critical_value(
     return Threshold(value, frequency, beyond.mechanism, not signs[first])
 
 
-def stability_map(system: System, grid: Mapping[str, Sequence[float]], *, speed: float | None = None) -> xr.Dataset:
+def stability_map(system: System, *, grid: Mapping[str, Sequence[float]], speed: float | None = None) -> xr.Dataset:
     """Where, over two or more parameters, does steady sliding last, and what ends it?
 
     Parameters
@@ -303,7 +307,7 @@ def stability_map(system: System, grid: Mapping[str, Sequence[float]], *, speed:
     --------
     >>> from stickslip import Belt, LinearSlope, Oscillator
     >>> block = Oscillator(1.0, 100.0, LinearSlope(1.0, slope=-0.1), Belt(0.2), damping=0.3)
-    >>> found = stability_map(block, {"slope": [-0.5, -0.1], "stiffness": [50.0, 100.0]})
+    >>> found = stability_map(block, grid={"slope": [-0.5, -0.1], "stiffness": [50.0, 100.0]})
     >>> found.mechanism.values.tolist()
     [['falling friction', 'falling friction'], ['stable', 'stable']]
     """
@@ -395,16 +399,16 @@ def _mechanism(whole: Matrices, uncoupled: Matrices, unsloped: Matrices, modes: 
     return "falling friction" if grows_by_slope else "mode coupling"
 
 
-def _loads(stiffness: Array, rubbing: Sequence[_Rubbing]) -> tuple[tuple[float, ...], str]:
-    """Of steady sliding, and whether it can be."""
+def _rest(stiffness: Array, rubbing: Sequence[_Rubbing]) -> tuple[tuple[float, ...], tuple[float, ...], str]:
+    """Place and loads of steady sliding, and whether it can be."""
     if np.linalg.cond(stiffness) > 1 / np.finfo(float).eps:
-        return tuple(r.preload for r in rubbing), "no spring holds the structure: the loads are those before it slides"
+        loads = tuple(r.preload for r in rubbing)
+        return (math.nan,) * len(stiffness), loads, "no spring holds it: the loads are those before it slides"
     place = -np.linalg.solve(stiffness, sum((r.constant * r.tangent for r in rubbing), np.zeros(len(stiffness))))
     loads = tuple(float(r.preload + r.stiffness * (r.normal @ place)) for r in rubbing)
-    lifted_off = [str(j) for j, load in enumerate(loads, start=1) if load <= 0]
-    if lifted_off:
-        return loads, f"contact {', '.join(lifted_off)} would lift off before it slides steadily"
-    return loads, "ok"
+    lifting = [str(j) for j, load in enumerate(loads, start=1) if load <= 0]
+    status = f"contact {', '.join(lifting)} would lift off before it slides steadily" if lifting else "ok"
+    return tuple(map(float, place)), loads, status
 
 
 def _whole(system: System, speed: float | None) -> Matrices:

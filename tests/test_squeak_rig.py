@@ -1,0 +1,77 @@
+"""The virtual squeak rig shows the four observations of chapter 7, and why."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+import stickslip as ss
+
+CASES = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
+SQUEAKS = ("wet", 6.13)
+
+
+@cache
+def driven(surface: str, load: float) -> ss.Trajectory:
+    return ss.simulate(ss.squeak_rig(surface, load), duration=2.0)
+
+
+def normal_acceleration(run: ss.Trajectory) -> np.ndarray:
+    """Of the beam's tip over the last second, at 10 kHz."""
+    return run.sample(1.0 + np.arange(10_000) / 1e4, ("a",))[0][1]
+
+
+@pytest.mark.parametrize(("surface", "load"), CASES)
+def test_it_slides_steadily_unless_wet_and_heavily_loaded(surface: str, load: float) -> None:
+    found = [ss.stability(ss.squeak_rig(surface, load), speed=speed) for speed in (-0.1, 0.1)]
+    assert [one.mechanism == "mode coupling" for one in found] == [(surface, load) == SQUEAKS, False]
+    assert all(one.stable == (one.mechanism == "stable") and one.status == "ok" for one in found)
+
+
+def test_falling_friction_alone_does_not_squeak() -> None:
+    rig = ss.squeak_rig(*SQUEAKS)
+    assert rig.contacts[0].law.slope < 0 < ss.squeak_rig("dry", 6.13).contacts[0].law.slope
+    found = ss.stability(rig, speed=-0.1)
+    assert found.without_coupling < 0 < found.without_slope < found.growth
+    assert 475 < found.frequency < 500
+
+
+@pytest.mark.parametrize(("surface", "load"), CASES)
+def test_driven_at_five_hertz_it_sounds_as_it_should(surface: str, load: float) -> None:
+    run = driven(surface, load)
+    level = np.std(normal_acceleration(run))
+    friction = run.sample(1.0 + np.arange(10_000) / 1e4, ("friction",))[0].sum(axis=0)
+    assert (level > 30) == ((surface, load) == SQUEAKS)  # m/s^2
+    assert np.mean(np.abs(friction)) == pytest.approx({"dry": 20, "wet": 8}[surface] * load / 6.13, rel=0.15)
+
+
+def test_it_squeaks_at_the_frequency_that_bending_and_torsion_share() -> None:
+    frequencies, power = welch(normal_acceleration(driven(*SQUEAKS)), 1e4, nperseg=4096)
+    assert 475 < frequencies[np.argmax(power)] < 500
+
+
+def test_where_it_begins_to_squeak_is_where_sliding_ceases_to_be_stable() -> None:
+    critical = ss.critical_value(
+        ss.squeak_rig(), lambda load: ss.squeak_rig("wet", load), between=(1.23, 6.13), speed=-0.1
+    )
+    assert (critical.mechanism, critical.stable_below) == ("mode coupling", True)
+    for load, begins in ((0.99 * critical.value, False), (1.01 * critical.value, True)):
+        rig = ss.squeak_rig("wet", load).having(drive=ss.Belt(-0.1), acts_on=None)
+        rest = dict(zip(("x1", "x2", "x3"), ss.stability(rig).place, strict=True))
+        late = ss.simulate(rig, duration=6.0, start={**rest, "v1": 0.0, "v2": 1e-6, "v3": 0.0})
+        moments = np.array([0.5, 5.5])[:, None] + np.arange(200) / 2e4
+        swings = np.abs(late.sample(moments.ravel(), ("v",))[0][1]).reshape(2, -1)
+        assert late.events == ()
+        assert (swings[1].max() > swings[0].max()) == begins
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [({"surface": "oily"}, "surface = 'oily'"), ({"load": -1.0}, "load = -1"), ({"amplitude": 0.0}, "amplitude = 0")],
+)
+def test_what_has_no_meaning_is_refused(change: dict[str, object], words: str) -> None:
+    with pytest.raises(ss.ModelError, match=words):
+        ss.squeak_rig(**change)  # type: ignore[arg-type]
