@@ -154,6 +154,7 @@ if TYPE_CHECKING:
     )
     from stickslip.laws.compliant import CompliantContact as CompliantContact
     from stickslip.laws.coulomb import Coulomb as Coulomb
+    from stickslip.laws.export import export_law as export_law
     from stickslip.laws.elastoslip import ElastoSlip as ElastoSlip
     from stickslip.laws.inertial import InertialContact as InertialContact
     from stickslip.laws.linear_slope import LinearSlope as LinearSlope
@@ -270,6 +271,7 @@ _ROOMS = {
     "squeak_rig": "squeak.virtual_rig",
     "stability": "squeak.stability", "Stability": "squeak.stability", "SlidingMode": "squeak.stability",
     "critical_value": "squeak.stability", "Threshold": "squeak.stability", "stability_map": "squeak.stability",
+    "export_law": "laws.export",
     "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",
     "Release": "drives", "HarmonicBase": "drives", "HarmonicForce": "drives", "MultiTone": "drives",
     "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives",

@@ -1,0 +1,179 @@
+"""A friction law as C: its modes, what ends them, and a test vector."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from stickslip.errors import ModelError
+from stickslip.laws.base import Exit, Law, Mode, Row
+from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
+from stickslip.laws.written import written
+
+Modes = Sequence[Mode | CurvedMode]
+INPUTS = ("x", "v", "hold", "hold_rate", "delayed_speed")
+SPEEDS = (1e-3, 1e-2, 0.1)  # of the test vector [m/s]
+SOON = 1e-6  # s, in which memory leaves its start for the test vector
+PLACE, HOLD, HOLD_RATE = 1e-5, 0.3, 2.0  # of the test vector [m, N, N/s]
+
+HEAD = """\
+/* {formula}
+
+   Friction [N], positive against positive velocity. Motion: x [m] and v [m/s] of the mass against the counter-face;
+   hold [N] and hold_rate [N/s]: the force that keeps the mass at rest, as the rest of the model has it, and its rate;
+   a mode whose friction is hold has v = 0. delayed_speed [m/s]: the speed a lag ago, of a law with a lag.
+
+   friction_state s = friction_start(&motion);
+   each step: while (friction_leave(&s, &motion)) {{}}     (at most as often as there are modes)
+              f = friction_force(&s, &motion);
+              friction_rates(&s, &motion, rate);          (s.memory[i] += dt * rate[i], or better)
+
+   Test: cc -DFRICTION_TEST -o friction_test friction.c -lm && ./friction_test */
+#include <math.h>
+#define ROUNDING 1e-14 /* of the terms of a quantity: what goes above zero by less does not */
+
+#define FRICTION_MEMORY {memory}
+enum {{ {modes} }};
+typedef struct {{ double x, v, hold, hold_rate, delayed_speed; }} friction_motion;
+typedef struct {{ int mode; unsigned armed; double memory[{size}]; }} friction_state;
+"""
+
+
+def c_code(law: Law | CurvedLaw, formula: str) -> str:
+    """The law's friction as a function of the motion, mode by mode."""
+    modes: Modes = modes_of(law)
+    _require_writable(law, modes)
+    memory = list(law.memory)
+    names = {name: f"in->{name}" for name in INPUTS} | {name: f"s->memory[{j}]" for j, name in enumerate(memory)}
+    head = HEAD.format(
+        formula=formula, memory=len(memory), size=max(1, len(memory)),
+        modes=", ".join(f"{_token(mode.name)} = {number}" for number, mode in enumerate(modes)),
+    )  # fmt: skip
+    parts = [head, _start(law, names), _force(modes, names), _rates(modes, memory, names), _leave(modes, names)]
+    return "\n".join([*parts, _test(law, modes, memory)])
+
+
+def modes_of(law: Law | CurvedLaw) -> Modes:
+    """Its modes, linear or curved."""
+    return law.rates() if isinstance(law, CurvedLaw) else law.modes()
+
+
+def _require_writable(law: Law | CurvedLaw, modes: Modes) -> None:
+    for mode in modes:
+        forms = [*(exit_.quantity for exit_ in mode.exits), *mode.rates.values()]
+        if mode.friction is not None and any("df" in form for form in forms if not isinstance(form, Expression)):
+            raise ModelError(
+                f"the mode '{mode.name}' of {type(law).__name__} asks for the rate of its own friction",
+                "C code knows the motion and the memory alone",
+                "export the law that stands in series, and write the spring in the program around it",
+            )
+
+
+def _token(name: str) -> str:
+    return "FRICTION_" + name.upper().replace(" ", "_")
+
+
+def _text(form: Expression | Row, names: Mapping[str, str]) -> str:
+    return written(form, names=names, c=True)
+
+
+def _start(law: Law | CurvedLaw, names: Mapping[str, str]) -> str:
+    back, still, forward = (_token(name) for name in law.entry)
+    lines = [f"    s.memory[{j}] = {_text(form, names)};" for j, form in enumerate(law.memory.values())]
+    return "\n".join([
+        "friction_state friction_start(const friction_motion *in)", "{",
+        f"    friction_state s = {{ in->v < 0 ? {back} : in->v > 0 ? {forward} : {still}, 0u, {{0}} }};",
+        *lines, "    return s;", "}", "",
+    ])  # fmt: skip
+
+
+def _force(modes: Modes, names: Mapping[str, str]) -> str:
+    cases = [
+        f"    case {_token(mode.name)}: return {'in->hold' if mode.friction is None else _text(mode.friction, names)};"
+        for mode in modes
+    ]
+    return "\n".join([
+        "double friction_force(const friction_state *s, const friction_motion *in)", "{", "    (void)in;",
+        "    switch (s->mode) {", *cases, "    }", "    return 0.0;", "}", "",
+    ])  # fmt: skip
+
+
+def _rates(modes: Modes, memory: list[str], names: Mapping[str, str]) -> str:
+    named = {**names, "f": "in->hold", "df": "in->hold_rate"}
+    moves = {
+        mode.name: " ".join(f"rate[{memory.index(name)}] = {_text(form, named)};" for name, form in mode.rates.items())
+        for mode in modes
+    }
+    cases = [f"    case {_token(name)}: {each} break;" for name, each in moves.items() if each]
+    return "\n".join([
+        "void friction_rates(const friction_state *s, const friction_motion *in, double *rate)", "{",
+        "    int i;", "    (void)in;", "    for (i = 0; i < FRICTION_MEMORY; i++) rate[i] = 0.0;",
+        "    switch (s->mode) {", *cases, "    default: break;", "    }", "}", "",
+    ])  # fmt: skip
+
+
+def _leave(modes: Modes, names: Mapping[str, str]) -> str:
+    named = {**names, "f": "force", "df": "in->hold_rate"}
+    lines: list[str] = []
+    for mode in modes:
+        if mode.exits:
+            lines.append(f"    case {_token(mode.name)}:")
+            lines += [_exit(number, exit_, named) for number, exit_ in enumerate(mode.exits)]
+            lines.append("        break;")
+    return "\n".join([
+        "/* Whether the mode ends here; then the next one is set, with what it remembers. */",
+        "int friction_leave(friction_state *s, const friction_motion *in)", "{",
+        "    const double force = friction_force(s, in);", "    const friction_state before = *s;",
+        "    (void)force; (void)before;",
+        "    switch (s->mode) {", *lines, "    default: break;", "    }", "    return 0;", "}", "",
+    ])  # fmt: skip
+
+
+def _exit(number: int, exit_: Exit, names: Mapping[str, str]) -> str:
+    quantity, bit = _text(exit_.quantity, names), f"{1 << number}u"
+    terms = [_text({name: value}, names) for name, value in exit_.quantity.items() if value]
+    size = " + ".join(f"fabs({term})" for term in terms) if len(terms) > 1 else "0.0"
+    due = f"{quantity} > ROUNDING * ({size})" if len(terms) > 1 else f"{quantity} > 0"
+    first = f"        if (!({due})) s->armed |= {bit};\n" if exit_.crossing else ""
+    due = f"(s->armed & {bit}) && {due}" if exit_.crossing else due
+    old = {name: text.replace("s->", "before.") for name, text in names.items()}
+    resets = [f"{names[name]} = {_text(form, old)};" for name, form in exit_.reset.items()]
+    body = " ".join([*resets, f"s->mode = {_token(exit_.to)}; s->armed = 0u; return 1;"])
+    return f"{first}        if ({due}) {{ {body} }}"
+
+
+def _test(law: Law | CurvedLaw, modes: Modes, memory: list[str]) -> str:
+    """States in every mode with the friction that Python finds there."""
+    rows = []
+    for mode in modes:
+        for speed in SPEEDS:
+            values = {"x": PLACE, "v": (mode.side or 1) * speed, "hold": HOLD, "hold_rate": HOLD_RATE}
+            values |= {"delayed_speed": 1.5 * speed, "1": 1.0, "f": HOLD, "df": HOLD_RATE}
+            values |= {name: at(form, values) for name, form in law.memory.items()}
+            moved = {name: values[name] + SOON * at(form, values) for name, form in mode.rates.items()}
+            values |= moved
+            force = HOLD if mode.friction is None else at(mode.friction, values)
+            state = [values[name] for name in (*INPUTS, *memory)] + [force]
+            rows.append(f"    {{ {_token(mode.name)}, {', '.join(repr(float(each)) for each in state)} }}")
+    inputs = len(INPUTS)
+    return "\n".join([
+        "#ifdef FRICTION_TEST", "#include <stdio.h>",
+        "/* mode, x, v, hold, hold_rate, delayed_speed, memory, friction */",
+        f"static const double vector[{len(rows)}][{inputs + len(memory) + 2}] = {{", ",\n".join(rows), "};",
+        "int main(void)", "{", "    int i, j, wrong = 0;",
+        f"    for (i = 0; i < {len(rows)}; i++) {{",
+        "        const double *r = vector[i];",
+        "        friction_motion in = { r[1], r[2], r[3], r[4], r[5] };",
+        "        friction_state s = { (int)r[0], 0u, {0} };",
+        f"        const double wanted = r[{inputs + len(memory) + 1}];",
+        f"        for (j = 0; j < FRICTION_MEMORY; j++) s.memory[j] = r[{inputs + 1} + j];",
+        "        wrong += !(fabs(friction_force(&s, &in) - wanted) <= 1e-9 * (1e-6 + fabs(wanted)));",
+        "    }",
+        f'    printf("%d of {len(rows)} wrong\\n", wrong);', "    return wrong != 0;", "}", "#endif", "",
+    ])  # fmt: skip
+
+
+def at(form: Expression | Row, values: Mapping[str, float]) -> float:
+    """The value of a linear form or an expression."""
+    if isinstance(form, Expression):
+        return form.at(**{name: value for name, value in values.items() if name != "1"})
+    return sum(value * values[name] for name, value in form.items())

@@ -1,0 +1,246 @@
+"""A friction law for another program: as TOML, Python, C, or a block of parameters with the formula beside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from stickslip.errors import ModelError
+from stickslip.laws.base import Law
+from stickslip.laws.c_code import c_code, modes_of
+from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.curved import CurvedLaw, lifted, symbol
+from stickslip.laws.formula import Formula
+from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.rough import RoughSurface
+from stickslip.laws.stribeck import FrictionCurve
+from stickslip.laws.tabulated import Tabulated
+from stickslip.laws.time_delay import SpeedCurve
+from stickslip.laws.written import written
+from stickslip.settings import nearest
+
+TABLE = 33  # points of a curve over the speed, where a program takes a table
+WIDE, FASTEST = 10.0, 1.0  # it goes to ten times the law's own speed, or to 1 m/s where it has none
+FORMULAS = {
+    "Coulomb": "f = kinetic sign(v) while sliding, |f| <= static at rest",
+    "LinearSlope": "f = kinetic sign(v) + slope v while sliding, |f| <= static at rest",
+    "Stribeck": "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + viscous v while sliding, "
+    "|f| <= static at rest",
+    "Tabulated": "f = F(|v|) sign(v) while sliding, F a polygon through forces at speeds, level beyond the last; "
+    "|f| <= static at rest",
+    "FrictionCurve": "f = F(|v|) sign(v) while sliding, |f| <= static at rest",
+    "PositionLoad": "f = (kinetic + gradient x) sign(v) where that load is positive, else no contact",
+    "CompliantContact": "f = kinetic sign(v) while sliding; f = stiffness (x - anchor) + damping v from each reversal "
+    "until |f| = static, the anchor then kinetic/stiffness behind; by the rule 'consistent' it relaxes while sliding",
+    "InertialContact": "f = stiffness (x - y) + damping (x' - y'), mass y'' = f - kinetic sign(y')",
+    "ElastoSlip": "f = sum of elements, each a spring of its stiffness that slips at its force",
+    "StateVariable": "f = theta, theta' = -kinetic rate (theta - level sign(v)), level = kinetic, 1 where printed is "
+    "true; steepness v for sign(v) near rest where it has a steepness",
+    "SmoothStateVariable": "f = theta, theta' = -kinetic rate (theta - level tanh(steepness v)), level = kinetic, "
+    "1 where printed is true",
+    "Dahl": "f' = stiffness v (1 - (f/kinetic) sign(v))^exponent",
+    "LuGre": "f = stiffness z + damping z' + viscous v, z' = v - stiffness |v| z / g, "
+    "g = kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)",
+    "RateState": "f = direct normal asinh(v/(2 reference) exp((friction + evolution "
+    "ln(reference age/distance))/direct)), age' = 1 - |v| age/distance (aging) or "
+    "-(|v| age/distance) ln(|v| age/distance) (slip)",
+    "InSeries": "a slider without mass under the law, tied to the mass by f = stiffness (x - y) + damping (x' - y')",
+    "TimeDelay": "f = F(|v(t - lag)|) sign(v) while sliding, F of the law",
+}
+
+
+def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
+    """How is a friction law written for another program?
+
+    * ``"toml"``: the table ``[law]`` of a system's file, as :func:`read_system` reads it back;
+    * ``"python"``: an expression for each mode, and for the rates of its memory;
+    * ``"c"``: C99 code of the friction in each mode, of what ends a mode, and a test vector that it checks itself by;
+    * ``"mujoco"``, ``"modelica"``, ``"simulink"``: a block of parameters with the formula beside. Where the program has
+      friction of that kind, in its own words: MuJoCo's joints Coulomb and viscous friction, Modelica's
+      ``SupportFriction`` and Simulink's lookup table any friction over the speed.
+
+    Parameters
+    ----------
+    law : Law
+        Any of the friction laws.
+    format : str
+        One of the names above.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ModelError
+        The law has no such form, or there is no such format.
+
+    Examples
+    --------
+    >>> from stickslip.laws.coulomb import Coulomb
+    >>> print(export_law(Coulomb(1.1, static=1.3)))
+    # f = kinetic sign(v) while sliding, |f| <= static at rest
+    [law]
+    name = "Coulomb"
+    kinetic = 1.1
+    static = 1.3
+    """
+    if format not in FORMATS:
+        raise ModelError(f"format = '{format}'", f"it is one of {', '.join(FORMATS)}", nearest(str(format), FORMATS))
+    if isinstance(law, type) or not (hasattr(law, "modes") or hasattr(law, "rates")):
+        raise ModelError(f"law = {law!r}", "a law is exported with its values", "give one, as in Coulomb(1.1)")
+    if isinstance(law, RoughSurface):
+        raise ModelError(
+            "a rough surface", "its friction follows a place by chance, and has no formula",
+            "export the contact on it, law.contact",
+        )  # fmt: skip
+    return FORMATS[format](law).rstrip("\n") + "\n" * (format == "c")
+
+
+def formula_of(law: Law | CurvedLaw) -> str:
+    """The law's friction in the names of its parameters."""
+    told = FORMULAS[type(law).__name__]
+    if isinstance(law, FrictionCurve):
+        told += f", F = {_curve_text(law)}"
+    inner = getattr(law, "law", None)
+    return f"{told}; {formula_of(inner)}" if is_dataclass(inner) else told  # type: ignore[arg-type]
+
+
+def breakaway_of(law: Law | CurvedLaw) -> float | None:
+    """Largest friction at rest [N], of a law that has one."""
+    if isinstance(law, Coulomb):
+        return float(law.kinetic if law.static is None else law.static)
+    return float(law.breakaway) if isinstance(law, SpeedCurve) else None
+
+
+def _curve_text(law: FrictionCurve) -> str:
+    return law.curve.text if isinstance(law.curve, Formula) else written(law.curve(symbol("v")))
+
+
+def _values(law: object) -> Iterator[tuple[str, Any]]:
+    for field in fields(law):  # type: ignore[arg-type]
+        value = getattr(law, field.name)
+        if value is not None:
+            yield field.name, _curve_text(law) if field.name == "curve" and isinstance(law, FrictionCurve) else value
+
+
+def _toml(law: Law | CurvedLaw) -> str:
+    lines = [f"{name} = {_toml_value(value)}" for name, value in _values(law)]
+    return "\n".join([f"# {formula_of(law)}", "[law]", f'name = "{type(law).__name__}"', *lines])
+
+
+def _toml_value(value: Any) -> str:
+    if is_dataclass(value):
+        inner = ", ".join(f"{name} = {_toml_value(each)}" for name, each in _values(value))
+        return f'{{ name = "{type(value).__name__}", {inner} }}'
+    if isinstance(value, str):
+        return f'"{value}"'
+    return f"[{', '.join(map(_number, value))}]" if _listed(value) else _number(value)
+
+
+def _python(law: Law | CurvedLaw) -> str:
+    lines = [f"# {formula_of(law)}"]
+    lines.append("# friction [N] by mode; x [m], v [m/s] against the counter-face; hold [N]: what keeps it at rest")
+    modes = modes_of(law)
+    level = breakaway_of(law)
+    if level is not None and [mode.name for mode in modes] == ["back", "stuck", "forward"]:
+        back, _, forward = (written(mode.friction or {}) for mode in modes)
+        rest = f"min(max(hold, -{level!r}), {level!r})"
+        return "\n".join([*lines, f"friction = ({forward}) if v > 0 else ({back}) if v < 0 else {rest}"])
+    for mode in modes:
+        name = mode.name.replace(" ", "_")
+        lines.append(f"{name} = {'hold' if mode.friction is None else written(mode.friction)}")
+        lines += [f"{name}_{of}_rate = {written(form)}" for of, form in mode.rates.items()]
+        lines += [f"# {name} ends, and {exit_.to} begins, when {written(exit_.quantity)} > 0" for exit_ in mode.exits]
+    return "\n".join(lines)
+
+
+def _flat(law: object, within: str = "") -> Iterator[tuple[str, Any]]:
+    """Parameters by name, those of a law within it too; a curve stands in the formula."""
+    for name, value in _values(law):
+        if is_dataclass(value):
+            yield from _flat(value, f"{within}{name}_")
+        elif name != "curve":
+            yield within + name, value
+
+
+def _number(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(float(value))
+
+
+def _listed(value: Any) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str)
+
+
+def _table(law: Law | CurvedLaw) -> Tabulated | None:
+    """A law whose friction in slip follows the speed alone, as a polygon over it."""
+    if isinstance(law, Coulomb):
+        return Tabulated([0.0, FASTEST], [law.kinetic, law.kinetic], law.static)
+    if isinstance(law, Tabulated) or not isinstance(law, SpeedCurve):
+        return law if isinstance(law, Tabulated) else None
+    scale = getattr(law, "speed", FASTEST / WIDE)
+    speeds = [WIDE * scale * (number / (TABLE - 1)) ** 2 for number in range(TABLE)]
+    ((_, curve),) = law.branches()
+    return Tabulated.of(lambda speed: lifted(curve(lifted(speed))).at(), speeds, law.breakaway)
+
+
+def _mujoco(law: Law | CurvedLaw) -> str:
+    name, static = type(law).__name__, getattr(law, "static", None)
+    if isinstance(law, Coulomb | LinearSlope) and static in (None, law.kinetic) and getattr(law, "slope", 0.0) >= 0:
+        own = [f'<joint type="slide" frictionloss="{law.kinetic!r}" damping="{getattr(law, "slope", 0.0)!r}"/>']
+    else:
+        own = [
+            "<!-- no joint of MuJoCo rubs so: apply it in a callback (mjcb_passive), as in the C code -->",
+            "<custom>",
+        ]
+        for key, value in _flat(law):
+            data = " ".join(map(_number, value)) if _listed(value) else value
+            kind = "text" if isinstance(value, str) else "numeric"
+            data = data if isinstance(data, str) else repr(float(data))
+            own.append(f'  <{kind} name="{name}_{key}" data="{data}"/>')
+        own.append("</custom>")
+    return "\n".join([f"<!-- {formula_of(law)} -->", *own])
+
+
+def _modelica(law: Law | CurvedLaw) -> str:
+    lines = [f"// {formula_of(law)}", f"record {type(law).__name__}"]
+    for key, value in _flat(law):
+        if isinstance(value, str | bool):
+            kind = "String" if isinstance(value, str) else "Boolean"
+            lines.append(f"  parameter {kind} {key} = {_toml_value(value)};")
+        else:
+            data = f"{{{', '.join(map(_number, value))}}}" if _listed(value) else _number(value)
+            lines.append(f"  parameter Real {key}{'[:]' if _listed(value) else ''} = {data};")
+    lines.append(f"end {type(law).__name__};")
+    if (table := _table(law)) is not None and table.forces[0] > 0:
+        rows = "; ".join(f"{speed!r}, {force!r}" for speed, force in zip(table.speeds, table.forces, strict=True))
+        lines.append(_strays(table, "//") + "Modelica.Mechanics.Translational.Components.SupportFriction friction(")
+        lines.append(f"  f_pos = [{rows}],\n  peak = {table.breakaway / table.forces[0]!r});")
+    return "\n".join(lines)
+
+
+def _simulink(law: Law | CurvedLaw) -> str:
+    lines = [f"% {formula_of(law)}"]
+    for key, value in _flat(law):
+        data = (
+            f"'{value}'" if isinstance(value, str) else f"[{' '.join(map(_number, value))}]" if _listed(value) else ""
+        )
+        lines.append(f"{type(law).__name__}.{key} = {data or _number(value)};")
+    if (table := _table(law)) is not None:
+        told = "% for a 1-D Lookup Table over abs(v), clipped at its end, times sign(v); at rest up to breakaway"
+        lines.append(_strays(table, "%") + told)
+        for key, numbers in (("breakpoints", table.speeds), ("table", table.forces)):
+            lines.append(f"{type(law).__name__}.{key} = [{' '.join(map(_number, numbers))}];")
+        lines.append(f"{type(law).__name__}.breakaway = {_number(table.breakaway)};")
+    return "\n".join(lines)
+
+
+def _strays(table: Tabulated, comment: str) -> str:
+    return f"{comment} the table strays from the formula by {table.error:.2g} N at most\n" if table.error else ""
+
+
+FORMATS: dict[str, Callable[[Law | CurvedLaw], str]] = {
+    "toml": _toml, "python": _python, "c": lambda law: c_code(law, formula_of(law)), "mujoco": _mujoco,
+    "modelica": _modelica, "simulink": _simulink,
+}  # fmt: skip

@@ -1,0 +1,210 @@
+"""Laws written for other programs: read back, evaluated, compiled and run, and refused where there is no such form."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip import scenarios
+from stickslip.errors import ModelError
+from stickslip.laws.c_code import at, modes_of
+from stickslip.laws.curved import exp
+from stickslip.laws.export import FORMATS, FORMULAS
+from stickslip.laws.formula import Formula
+
+LAWS = {
+    "Coulomb": ss.Coulomb(1.1, static=1.3),
+    "CompliantContact": ss.CompliantContact(1.1, stiffness=192000, damping=23.9, static=1.2),
+    "consistent contact": ss.CompliantContact(1.1, stiffness=192000, damping=23.9, rule="consistent"),
+    "LinearSlope": ss.LinearSlope(1.0, slope=-0.2, static=1.5),
+    "Tabulated": ss.Tabulated([0, 0.1, 0.3], [1.5, 1.0, 1.2]),
+    "StateVariable": ss.StateVariable(1.1, rate=100.0),
+    "steep StateVariable": ss.StateVariable(1.1, rate=100.0, steepness=500.0, printed=True),
+    "InertialContact": ss.InertialContact(1.1, stiffness=192000, mass=0.01, damping=3.0),
+    "ElastoSlip": ss.ElastoSlip.iwan(1e6, width=30e-6, elements=4),
+    "PositionLoad": ss.PositionLoad(1.0, gradient=1.5),
+    "Stribeck": ss.Stribeck(1.0, 1.5, speed=0.1, exponent=1.3, viscous=0.2),
+    "Dahl": ss.Dahl(1.1, stiffness=192000, exponent=1.5),
+    "LuGre": ss.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=316.23, viscous=0.4),
+    "RateState": ss.RateState(10.0, friction=0.6, direct=0.01, evolution=0.015, distance=1e-5, reference=1e-6),
+    "slip law": ss.RateState(9.0, friction=0.6, direct=0.01, evolution=0.01, distance=1e-5, reference=1e-6, law="slip"),
+    "SmoothStateVariable": ss.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
+    "FrictionCurve": ss.FrictionCurve(Formula("3 / (1 + 1.42 * v) + 1 + 0.1 * v**2")),
+    "InSeries": ss.InSeries(ss.LinearSlope(1.0, slope=-5.0), stiffness=192000, damping=24),
+    "TimeDelay": ss.TimeDelay(ss.LinearSlope(1.0, slope=2.0), lag=1e-3),
+}  # fmt: skip
+CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+
+
+def test_every_law_is_here() -> None:
+    assert set(scenarios.LAWS) <= {type(law).__name__ for law in LAWS.values()}
+    assert set(scenarios.LAWS) == set(FORMULAS)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_toml_is_read_back(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "slider.toml"
+    path.write_text(f"system = {{ mass = 1.0, stiffness = 4.0 }}\n{ss.export_law(LAWS[name])}\n")
+    assert ss.read_system(path).system.law == LAWS[name]
+
+
+def test_a_curve_of_python_is_written_as_its_formula(tmp_path: Path) -> None:
+    law = ss.FrictionCurve(lambda v: 2.0 + 0.5 * exp(-(v / 0.1)) - v / (1 + v**2), static=3.0)
+    path = tmp_path / "slider.toml"
+    path.write_text(f"system = {{ mass = 1.0, stiffness = 4.0 }}\n{ss.export_law(law)}\n")
+    again = ss.read_system(path).system.law
+    assert again.static == 3.0
+    for speed in (0.0, 0.03, 0.7):
+        assert again.friction(speed) == pytest.approx(law.friction(speed), rel=1e-14)
+
+
+@pytest.mark.parametrize("name", ["Coulomb", "LinearSlope", "Stribeck", "FrictionCurve"])
+def test_python_of_a_law_over_the_speed_is_one_expression(name: str) -> None:
+    law = LAWS[name]
+    text = ss.export_law(law, format="python").splitlines()[-1].removeprefix("friction = ")
+    code = compile(text, name, "eval")
+    forward = next(mode for mode in modes_of(law) if mode.name == "forward").friction
+    for speed in (1e-3, 0.05, 2.0):
+        wanted = at(forward, {"v": speed, "1": 1.0})
+        names = {"exp": math.exp, "min": min, "max": max}
+        assert eval(code, names, {"v": speed, "hold": 0.0}) == pytest.approx(wanted, rel=1e-14)
+        assert eval(code, names, {"v": -speed, "hold": 0.0}) == pytest.approx(-wanted, rel=1e-14)
+    level = law.static if name in ("Coulomb", "LinearSlope", "Stribeck") else law.breakaway
+    assert eval(code, names, {"v": 0.0, "hold": 99.0}) == level
+    assert eval(code, names, {"v": 0.0, "hold": -0.1}) == -0.1
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_python_tells_each_mode_and_its_end(name: str) -> None:
+    law = LAWS[name]
+    text = ss.export_law(law, format="python")
+    compile(text, name, "exec")
+    assert text.startswith("# ")
+    if "friction =" not in text:
+        for mode in modes_of(law):
+            assert f"{mode.name.replace(' ', '_')} = " in text
+        assert text.count("begins, when") == sum(len(mode.exits) for mode in modes_of(law))
+
+
+def built(law: object, folder: Path, *more: str, main: str = "") -> Path:
+    if CC is None:
+        pytest.skip("no C compiler on this machine (cc, gcc or clang)")
+    source, program = folder / "friction.c", folder / "friction_test"
+    source.write_text(ss.export_law(law, format="c") + main)
+    flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    run = subprocess.run([CC, *flags, *more, "-o", program, source, "-lm"], capture_output=True, text=True, timeout=60)
+    assert run.returncode == 0, run.stderr
+    return program
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_c_code_meets_its_test_vector(name: str, tmp_path: Path) -> None:
+    run = subprocess.run([built(LAWS[name], tmp_path, "-DFRICTION_TEST")], capture_output=True, text=True, timeout=60)
+    assert run.returncode == 0, run.stdout
+    assert re.fullmatch(r"0 of \d+ wrong\n", run.stdout)
+
+
+def test_the_test_vector_sees_a_wrong_number(tmp_path: Path) -> None:
+    if CC is None:
+        pytest.skip("no C compiler on this machine (cc, gcc or clang)")
+    source, program = tmp_path / "friction.c", tmp_path / "friction_test"
+    source.write_text(ss.export_law(ss.Coulomb(1.1), format="c").replace("return 1.1;", "return 1.2;"))
+    subprocess.run([CC, "-DFRICTION_TEST", "-o", program, source, "-lm"], check=True, timeout=60)
+    run = subprocess.run([program], capture_output=True, text=True, timeout=60)
+    assert run.returncode == 1
+    assert run.stdout.startswith("3 of 9 wrong")
+
+
+MARCH = """
+#include <stdio.h>
+int main(void)
+{
+    double t, x, v, rate[8];
+    friction_motion in = { 0.0, 0.0, 0.0, 0.0, 0.0 };
+    friction_state s = friction_start(&in);
+    int row, fine, i;
+    scanf("%*s");
+    for (row = 0; scanf("%lf %lf %lf", &t, &x, &v) == 3; row++) {
+        const double x0 = in.x, v0 = in.v;
+        for (fine = 1; fine <= 50; fine++) {
+            const double p = fine / 50.0, h = 1e-4; /* the cubic through both places and speeds */
+            const double c = 3 * (x - x0) - h * (2 * v0 + v), d = 2 * (x0 - x) + h * (v0 + v);
+            in.x = x0 + p * (h * v0 + p * (c + p * d)); in.v = (h * v0 + p * (2 * c + 3 * p * d)) / h;
+            for (i = 0; i < 9 && friction_leave(&s, &in); i++) {}
+            friction_rates(&s, &in, rate);
+            for (i = 0; i < FRICTION_MEMORY; i++) s.memory[i] += 2e-6 * rate[i];
+        }
+        printf("%.17g\\n", friction_force(&s, &in));
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("name", ["CompliantContact", "ElastoSlip", "Dahl", "LuGre"])
+def test_c_code_along_a_motion_is_the_friction_of_the_exact_solver(name: str, tmp_path: Path) -> None:
+    """The C code is fed the displacement of a simulated slider, 500 000 steps a second, and left to itself."""
+    system = ss.Oscillator(mass=2.42, stiffness=2310, law=LAWS[name], drive=ss.HarmonicBase(2e-3, frequency=5.0))
+    record = ss.simulate(system, duration=0.4).record(fs=10000)
+    x, v, wanted = record["x"], record["v"], record["friction"]
+    rows = "\n".join(f"{t:.17g} {a:.17g} {b:.17g}" for t, a, b in zip(record.time, x, v, strict=True))
+    program = built(LAWS[name], tmp_path, main=MARCH)
+    run = subprocess.run([program], input=f"motion\n{rows}\n", capture_output=True, text=True, timeout=60, check=True)
+    found = np.array(run.stdout.split(), dtype=float)
+    assert len(found) == len(wanted)
+    assert np.sqrt(np.mean((found - wanted) ** 2)) < 0.005 * np.abs(wanted).max()
+
+
+def test_mujoco_has_coulomb_and_viscous_joints() -> None:
+    text = ss.export_law(ss.LinearSlope(1.0, slope=0.2), format="mujoco")
+    assert '<joint type="slide" frictionloss="1.0" damping="0.2"/>' in text
+    for law in LAWS.values():
+        block = ElementTree.fromstring(f"<mujoco>{ss.export_law(law, format='mujoco')}</mujoco>")
+        assert len(block) == 1
+    found = ElementTree.fromstring(f"<mujoco>{ss.export_law(LAWS['LuGre'], format='mujoco')}</mujoco>")
+    given = {each.get("name"): float(each.get("data")) for each in found.iter("numeric")}
+    assert given["LuGre_damping"] == 316.23
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("format", ["modelica", "simulink"])
+def test_blocks_hold_every_number_and_the_formula(name: str, format: str) -> None:
+    law, text = LAWS[name], ss.export_law(LAWS[name], format=format)
+    assert FORMULAS[type(law).__name__] in text.splitlines()[0]
+    for key, value in tomllib.loads(ss.export_law(law))["law"].items():
+        if isinstance(value, float):
+            assert re.search(rf"\b{key} = {re.escape(repr(value))};", text)
+
+
+def test_tables_for_lookup_blocks_follow_the_law() -> None:
+    text = ss.export_law(LAWS["Stribeck"], format="simulink")
+    numbers = {key: np.array(row.split(), dtype=float) for key, row in re.findall(r"\.(\w+) = \[(.*?)\];", text)}
+    strays = float(re.search(r"strays from the formula by (\S+) N", text)[1])
+    for speed in np.linspace(0, 1, 77):
+        wanted = LAWS["Stribeck"].friction(speed)
+        assert np.interp(speed, numbers["breakpoints"], numbers["table"]) == pytest.approx(wanted, abs=1.05 * strays)
+    assert strays < 0.01
+    assert "f_pos = [0.0, 1.1; 1.0, 1.1],\n  peak = 1.18" in ss.export_law(LAWS["Coulomb"], format="modelica")
+
+
+def test_what_has_no_form_is_refused() -> None:
+    with pytest.raises(ModelError, match=r"format = 'tmol'.*perhaps 'toml'|toml"):
+        ss.export_law(LAWS["Coulomb"], format="tmol")
+    with pytest.raises(ModelError, match="exported with its values"):
+        ss.export_law(ss.Coulomb)
+    rough = ss.RoughSurface(ss.Coulomb(1.1), share=0.03, length=1e-4, span=1e-3)
+    for format in FORMATS:
+        with pytest.raises(ModelError, match=r"has no formula; export the contact on it"):
+            ss.export_law(rough, format=format)
+    behind = ss.InSeries(ss.StateVariable(1.1, rate=100.0), stiffness=192000)
+    with pytest.raises(ModelError, match="rate of its own friction"):
+        ss.export_law(behind, format="c")
