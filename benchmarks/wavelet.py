@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import itertools
 import statistics
 import time
 from collections.abc import Callable
@@ -105,27 +106,29 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=1_000_000)
     parser.add_argument("--frequencies", type=int, default=200)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--together", type=int, help="frequencies of one call, where not all maps fit into memory")
     given = parser.parse_args()
     values = signal(given.samples)
     scales = ridge_centre(CENTRE, "energy") / (2 * np.pi * np.geomspace(HIGHEST, LOWEST, given.frequencies))
-    peers = candidates(values, scales)
-    seconds: dict[str, list[float]] = {name: [] for name in peers}
-    errors: dict[str, float] = {}
-    for number in range(given.rounds + 1):
-        for name, run in peers.items():
+    step = given.together or len(scales)
+    calls = [scales[at : at + step] for at in range(0, len(scales), step)]
+    peers = [candidates(values, some) for some in calls]
+    seconds: dict[str, list[float]] = {name: [0.0] * given.rounds for name in peers[0]}
+    errors: dict[str, float] = dict.fromkeys(peers[0], 0.0)
+    for number, (some, runs) in itertools.product(range(given.rounds + 1), zip(calls, peers, strict=True)):
+        for name, run in runs.items():
             began = time.process_time()
             found = run()
-            taken = time.process_time() - began
             if number:
-                seconds[name].append(taken)
+                seconds[name][number - 1] += time.process_time() - began
             else:
-                errors[name] = error(found, values, scales)
+                errors[name] = max(errors[name], error(found, values, some))
             del found
     base = {kind: statistics.median(seconds[f"stickslip {kind}"]) for kind in ("double", "single")}
     asked = f"{given.samples:,} samples at {FS:g} Hz by {given.frequencies} frequencies"
     print(f"\nMorlet, {asked} of {LOWEST:g} to {HIGHEST:g} Hz, one thread")
     print(f"  {'':22}{'processor':>11}{'over double':>13}{'over single':>13}{'error':>10}")
-    for name in peers:
+    for name in peers[0]:
         median = statistics.median(seconds[name])
         ratios = "".join(f"{median / base[kind]:13.1f}" for kind in ("double", "single"))
         print(f"  {name:22}{median:9.2f} s{ratios}{errors[name]:10.1g}")

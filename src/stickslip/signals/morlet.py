@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,35 +108,32 @@ def _fill(row: Complex, blocks: _Blocks, width: float, centre: float, gain: floa
     phases = blocks.phases(width, precision)
     short, margin = blocks.length // phases, blocks.margin // phases
     turns = round(centre * width * TILE / short) if phases > 1 else 0
-    first, part = _band(blocks, centre * width, width, REACH[precision], gain / phases)
-    folded = np.zeros((len(part), short), dtype=part.dtype)
-    start = (first - turns * short // TILE) % short
-    head = min(part.shape[1], short - start)
-    folded[:, start : start + head] = part[:, :head]
-    folded[:, : part.shape[1] - head] += part[:, head:]
-    samples = ifft(folded, axis=1, overwrite_x=True)
-    kept = samples[:, margin : short - margin].reshape(-1)
+    band = _band(blocks, short, turns * short // TILE, centre * width, width, REACH[precision], gain / phases)
+    samples = ifft(band, axis=1, overwrite_x=True)
+    count, inner = len(samples), short - 2 * margin
     if phases == 1:
-        row[:] = kept[: len(row)]
+        whole = len(row) // inner
+        row[: whole * inner].reshape(whole, inner)[:] = samples[:whole, margin : margin + inner]
+        row[whole * inner :] = samples[-1, margin : margin + len(row) - whole * inner]
         return
-    before = samples[0].take(np.arange(margin - LEAD, margin), mode="wrap")
-    after = samples[-1].take(np.arange(short - margin, short - margin + TAIL), mode="wrap")
+    around = np.empty(LEAD + count * inner + TAIL, dtype=row.dtype)
+    around[:LEAD] = samples[0].take(np.arange(margin - LEAD, margin), mode="wrap")
+    around[LEAD:-TAIL].reshape(count, inner)[:] = samples[:, margin : margin + inner]
+    around[-TAIL:] = samples[-1].take(np.arange(short - margin, short - margin + TAIL), mode="wrap")
     half = _half(width, short, precision)
-    upsampled(
-        np.concatenate([before, kept, after]), row, phases,
-        turns=turns, half=half, reach=REACH[precision], accuracy=ACCURACY[precision],
-    )  # fmt: skip
+    upsampled(around, row, phases, turns=turns, half=half, reach=REACH[precision], accuracy=ACCURACY[precision])
 
 
-def _band(blocks: _Blocks, middle: float, width: float, reach: float, gain: float) -> tuple[int, Complex]:
-    """First bin (negative ones are negative frequencies) and the blocks' spectra of the row from there on."""
+def _band(blocks: _Blocks, short: int, shift: int, middle: float, width: float, reach: float, gain: float) -> Complex:
+    """The blocks' spectra times the row's Gaussian, moved down by `shift` bins and folded into `short` ones."""
     size, spectra = blocks.length, blocks.spectra
     first = max(math.ceil(middle - reach * width), -((size - 1) // 2))
     last = min(math.floor(middle + reach * width), size // 2)
-    bins = np.arange(first, last + 1)
-    window = (gain * np.exp(-0.5 * ((bins - middle) / width) ** 2)).astype(spectra.real.dtype)
-    part = np.empty((len(spectra), len(bins)), dtype=spectra.dtype)
-    below = min(max(0, -first), len(bins))
-    np.multiply(spectra[:, max(first, 0) : last + 1], window[below:], out=part[:, below:])
-    np.multiply(np.conj(spectra[:, 1 : -first + 1][:, ::-1][:, :below]), window[:below], out=part[:, :below])
-    return first, part
+    window = (gain * np.exp(-0.5 * ((np.arange(first, last + 1) - middle) / width) ** 2)).astype(spectra.real.dtype)
+    band = np.zeros((len(spectra), short), dtype=spectra.dtype)
+    fold = shift + (first - shift) // short * short
+    bounds = sorted({first, last + 1, *(at for at in (0, fold + short, fold + 2 * short) if first < at <= last)})
+    for low, high in pairwise(bounds):  # neither crosses bin 0, nor a fold; negative bins are negative frequencies
+        part = spectra[:, low:high] if low >= 0 else np.conj(spectra[:, 1 - high : 1 - low][:, ::-1])
+        np.multiply(part, window[low - first : high - first], out=band[:, (low - shift) % short :][:, : high - low])
+    return band
