@@ -55,8 +55,8 @@ def measured(frequency: float, rough: float, seed: int) -> ss.Record:
 def slopes(record: ss.Record, method: str) -> list[float]:
     """The thesis's way: mean and scatter of the slopes of all branches, with its friction F1 or F2."""
     found = ss.friction_force(record, method=method, **RIG)
-    velocity = np.gradient(found["x"])
-    each = branch_slopes(found["x"], found["friction"], sliding_level(found["friction"], velocity))
+    level, middle = sliding_level(found["friction"], np.gradient(found["x"]))
+    each = branch_slopes(found["x"], found["friction"] - middle, level)
     return [float(each.mean()), float(each.std(ddof=1))]
 
 

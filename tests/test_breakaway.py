@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from rigs import RIG, measured, told
+from rigs import CASES, RIG, SETTLED, measured, told
 from stickslip.errors import EstimateError, RecordError
 
 MASS, STIFFNESS, FS = 3.08, 1191.0, 500.0
@@ -32,18 +32,79 @@ def test_static_friction_is_found_whether_it_is_higher_or_not(static: float) -> 
     assert found.status == "ok"
 
 
+def heard(
+    frequency: float, law: ss.Coulomb | ss.CompliantContact, names: str = "x z a load", fs: int = 4000
+) -> ss.Record:
+    """What some sensors of the rig read of a contact, with nothing stated of them."""
+    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(CASES[frequency][0], frequency=frequency), **RIG)
+    record = ss.Rig().measure(ss.simulate(slider, duration=SETTLED + 3), fs=4000, rng=3, start=SETTLED)
+    return ss.Record.of({name: record[name][:: 4000 // fs] for name in names.split()}, fs=fs)
+
+
+@pytest.mark.parametrize("names", ["x z", "x z a", "x z a load"])
+@pytest.mark.parametrize("method", ["smoother", "fusion"])
+@pytest.mark.parametrize("static", [1.0, 1.3])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_a_rig_of_which_nothing_is_stated_never_bears_less_than_it_slides(
+    names: str, method: str, static: float, rigid: bool
+) -> None:
+    if rigid:
+        law: ss.Coulomb | ss.CompliantContact = ss.Coulomb(1.1, static=1.1 * static)
+    else:
+        law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9, static=1.1 * static)
+    record = ss.friction_force(heard(2.5, law, names), method=method, **RIG)
+    refused = ""
+    try:
+        found = ss.breakaway(record)
+    except EstimateError as error:
+        refused = str(error)
+    if refused:
+        assert "strays" in refused
+        return
+    assert found.ratio.includes(static)
+    sure = found.ratio.interval[1] - found.ratio.interval[0] < 0.15
+    assert sure or found.status != "ok"
+
+
 def test_a_pull_on_a_mass_that_rings_on_its_contact_is_flagged() -> None:
     """The true friction is 1.1 N, at rest as in sliding; what pulls when the mass slips is 9 % less."""
     record = told(measured(2.5)[0])
     pulled = ss.breakaway(ss.friction_force(record, method="F", **RIG))
-    assert "rings on its contact" in pulled.status
+    assert "not at rest while it sticks" in pulled.status
+    assert pulled.ratio.includes(1.0)
     fused = ss.breakaway(ss.friction_force(record, method="fusion", **RIG))
     assert fused.status == "ok"
     assert fused.ratio.value == pytest.approx(1.0, abs=0.01)
+    assert fused.ratio.includes(1.0)
+    assert fused.ratio.interval[1] - fused.ratio.interval[0] < 0.1
+
+
+def test_a_hold_of_two_samples_tells_nothing() -> None:
+    record = heard(8.7, ss.CompliantContact(1.1, stiffness=192000, damping=23.9), fs=500)
+    with pytest.raises(EstimateError, match="sample faster"):
+        ss.breakaway(ss.friction_force(told(record), method="fusion", **RIG))
+
+
+def test_a_friction_whose_mounts_ring_tells_nothing_of_its_peak() -> None:
+    record = heard(8.7, ss.CompliantContact(1.1, stiffness=192000, damping=23.9), "x z a")
+    with pytest.raises(EstimateError, match=r"strays by .* state it"):
+        ss.breakaway(ss.friction_force(record, method="fusion", **RIG))
+
+
+def test_a_sensor_whose_zero_is_off_changes_neither_ratio_nor_presliding() -> None:
+    record = driven(ss.CompliantContact(1.0, stiffness=2e4, damping=20), noise=2e-7)
+    off = record.with_channel("friction", record["friction"] + 0.3, unit="N")
+    right, wrong = ss.breakaway(record), ss.breakaway(off)
+    assert wrong.ratio.value == pytest.approx(right.ratio.value, rel=2e-3)
+    assert wrong.forward is not None
+    assert right.forward is not None
+    assert wrong.forward.value == pytest.approx(right.forward.value + 0.3, rel=2e-3)
+    assert ss.presliding(off).stiffness.value == pytest.approx(ss.presliding(record).stiffness.value, rel=2e-3)  # type: ignore[union-attr]
 
 
 def test_a_slip_at_the_end_of_its_stroke_has_no_swing() -> None:
-    found = ss.breakaway(ss.friction_force(told(measured(8.7, 0.0, 3.0)[0]), method="F1", **RIG))
+    record = told(measured(8.7, 0.0, 3.0)[0])
+    found = ss.breakaway(ss.friction_force(record, method="motion", **RIG))
     for swing in (found.swing_forward, found.swing_back):
         assert swing is None or np.isfinite(swing.value)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from rigs import RIG, measured, told
+from rigs import LAG, RIG, measured, told
 from stickslip.errors import EstimateError, RecordError
 from stickslip.identify.contact import branch_slopes
 
@@ -172,3 +172,20 @@ def test_a_sensor_whose_zero_is_off_changes_no_stiffness() -> None:
         right, wrong = (ss.contact_stiffness(ss.friction_force(each, method=method, **RIG)) for each in (record, off))
         assert wrong.status == "ok"
         assert wrong.value == pytest.approx(right.value, rel=1e-4)
+
+
+def test_sensors_that_are_not_stated_leave_the_contact_as_unsure_as_it_is() -> None:
+    """An accelerometer whose mount rings unstated: the damping comes out negative, and the stiffness is less sure."""
+    for names, late in (("xza", True), ("xza", False), (("x", "z", "a", "load"), False)):
+        whole = measured(2.5, seconds=3.0)[0]
+        record = ss.Record.of({name: whole[name] for name in names}, fs=4000)
+        for name in "xz" if late else "":
+            record = record.with_details(name, delay=LAG)
+        fused = ss.friction_force(record, method="fusion", **RIG)
+        found = ss.contact_stiffness(fused)
+        assert "strays" in found.status
+        assert found.includes(192000)
+        if late:
+            assert "negative" in found.status
+            with pytest.raises(EstimateError, match="lag or mount is not accounted for"):
+                ss.contact_damping(fused)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
-from stickslip.identify.force import FUSIONS
+from stickslip.identify.force import ALONE, FUSIONS
 from stickslip.identify.fusion import Balance
 from stickslip.identify.motion import is_measured
 from stickslip.identify.slip_ringing import ringing_of
-from stickslip.identify.strokes import FAST, Stroke, find_strokes
+from stickslip.identify.strokes import FAST, Stroke, Strokes, find_strokes
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import mean_of_cycles
@@ -26,6 +26,16 @@ SIDES = ((1, "forward"), (-1, "back"))
 TRAVEL = 0.05  # of a stroke: how far the start of a slip is followed
 BEFORE = 5  # a stick's last fifth tells what it bears at its end
 ROWS = 256  # of the start of a slip that are looked at
+PULL, PEAK = "pull at the start of the slip", "peak before the slip"
+STRAYS = 1.5  # deviations of its noise by which the displacement of a mass at rest strays at most; a rig's at rest: 1.0
+FINEST = 1e-6  # of the motion: a displacement without noise
+FEW = 4  # samples from a reversal to the slip
+BLUNT = {"load": 1, "a": 4, "x": 12}  # samples in which a corner of the friction is known by the best of its sensors
+PULLED = 0.025  # share by which smoothing and lags move the level that a pull is held against, on simulated rigs
+NOTHING = 0.9  # of its level, by which a friction that tells nothing of its peak strays after a slip
+NEAR = 12  # samples before a slip in which the friction's rise is looked for
+CREEPS = 0.1  # of a stroke's largest speed, below which it does not slide for good
+RINGS = 1.5  # times what a mount's ring is after half a cycle it is at its start, at most
 LEAST = 8  # samples in which a stick's end and a slip's start can be told
 STEADY = 0.3  # of the sliding friction: one that swings by more is no friction to be quoted
 QUARTILE = 0.6744897501960817  # of the normal distribution
@@ -76,8 +86,14 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     the instant and f; the pull can not be less than f then. Static friction is the pull at that instant, from a line
     through the stick's last fifth. Of a friction that was measured, or found by all sensors together, it is the largest
     value before the contact moves, which noise makes too large by two of its deviations at most: the interval's low end
-    goes as far down. Of a contact that gives way before it slips it is the first peak once friction is near its level,
-    which the ring that follows raises.
+    goes as far down. Where the mass moves before friction is near its level it is the first peak thereafter.
+
+    A mass that is not at rest while it sticks, ringing on a contact that gives way, bears its own inertia beside the
+    pull: then it is the friction's peak, and the interval reaches from the pull on. The interval of a peak that was
+    not measured has what sensors and smoothing do to it: as much as the friction rises in a sample before it (in four
+    without a load cell, in twelve from the displacement alone), for a corner is not sharper known; as much as the
+    friction strays from its level while it slides; and where a sensor's mount is not stated one and a half times as
+    much as it strays and rings after the slip.
 
     Parameters
     ----------
@@ -107,52 +123,186 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     True
     """
     strokes = find_strokes(record, contact=contact, question=QUESTION)
-    balance = _balance(record)
-    pull, mass = (None, np.nan) if balance is None else (balance.pull(record), balance.mass)
-    fs = record.fs
-    chosen = strokes.strokes
-    borne = [(each, _borne(each, pull, mass, fs)) for each in chosen]
-    found = [(each, *answer) for each, answer in borne if answer is not None]
-    if not found:
-        raise EstimateError(
-            f"the first travel of none of {len(chosen)} slips can be followed",
-            "the start of a slip takes 4 samples at least",
-            "sample faster, or give a longer record",
-        )
-    unsure = float(np.median([change for *_, change in found]))  # the instant is known to a sample
-    above = 0.0 if pull is not None else 2 * (record.channels["friction"].noise or noise_level(record["friction"], fs))
-    rested = sum(each.rests for each, *_ in found)
-    method = "pull at the start of the slip" if pull is not None and 2 * rested > len(found) else "peak before the slip"
-    how = f"{method}, mean of strokes"
-    levels = [
-        _widened(
-            mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=how), unsure + above, unsure
-        )
-        if (values := [friction for each, friction, _ in found if each.way == way])
-        else None
-        for way, side in SIDES
-    ]
+    borne = _borne(record, strokes)
+    levels = [_level(borne, strokes, way, side) for way, side in SIDES]
+    sliding = float(np.median([each.level for each in borne.strokes]))
     ratio = mean_of_cycles(
-        "static over sliding friction", [friction / each.level for each, friction, _ in found], unit="1",
-        method=f"{method} over the median of the stroke, mean of strokes",
+        "static over sliding friction",
+        [friction / each.level for each, friction in zip(borne.strokes, borne.friction, strict=True)],
+        unit="1", method=f"{borne.method} over the median of the stroke, mean of strokes",
     )  # fmt: skip
-    sliding = float(np.median([each.level for each, *_ in found]))
-    ratio = _widened(ratio, (unsure + above) / sliding, unsure / sliding)
-    rings = ringing_of(strokes.strokes, fs) if is_measured(record, "friction") else None  # a balance rings by itself
-    heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
-    swings = [_swing([each for each, *_ in found if each.way == way], side) for way, side in SIDES]
-    gives = "the contact gives way before it slips: the first peak holds the ring that follows"
-    status = "ok" if 2 * rested > len(found) else gives
-    if status == "ok" and pull is not None and ratio.interval[1] < 1:
+    ratio = _widened(ratio, borne.below / sliding, borne.above / sliding)
+    status = borne.status
+    if status == "ok" and borne.method == PULL and ratio.interval[1] < 1:
         status = (
             "below the sliding friction: either that grows with speed, or the mass still rings on its contact when it "
             'slips, and the pull is not what it bears: take friction_force(record, ..., method="fusion")'
         )
-    flagged = [replace(each, status=status) if each is not None and each.status == "ok" else each for each in levels]
+    rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
+    heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
+    swings = [_swing([each for each in borne.strokes if each.way == way], side) for way, side in SIDES]
     return Breakaway(
-        flagged[0], flagged[1], replace(ratio, status=status) if ratio.status == "ok" else ratio, *heard,
-        swings[0], swings[1], len(found), status,
+        _flagged(levels[0], status), _flagged(levels[1], status), _flagged(ratio, status) or ratio, *heard,
+        swings[0], swings[1], len(borne.strokes), status,
     )  # fmt: skip
+
+
+def _level(borne: _Borne, strokes: Strokes, way: int, side: str) -> Estimate | None:
+    values = [
+        friction + way * strokes.offset
+        for each, friction in zip(borne.strokes, borne.friction, strict=True)
+        if each.way == way
+    ]
+    if not values:
+        return None
+    how = f"{borne.method}, mean of strokes"
+    found = mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=how)
+    return _widened(found, borne.below, borne.above)
+
+
+def _flagged(estimate: Estimate | None, status: str) -> Estimate | None:
+    return replace(estimate, status=status) if estimate is not None and estimate.status == "ok" else estimate
+
+
+@dataclass(frozen=True, eq=False)
+class _Borne:
+    """What the contact bears just before it slips [N], stroke by stroke, and how far off all of it may be."""
+
+    strokes: Sequence[Stroke]
+    friction: Sequence[float]
+    method: str
+    below: float = 0.0
+    above: float = 0.0
+    status: str = "ok"
+
+
+def _borne(record: Record, strokes: Strokes) -> _Borne:
+    """By the pull where the mass rests; else by the friction's peak, and, where the pull is known, from there on."""
+    pulled, rested = _by_pull(record, strokes), [each for each in strokes.strokes if each.rests]
+    mostly = 2 * len(rested) > len(strokes.strokes)
+    strays = _strays(rested, strokes, record.fs)
+    if pulled is not None and mostly and strays < STRAYS:
+        return pulled
+    peak = _by_peak(record, strokes)
+    if not mostly:
+        words = "the mass moves before the friction has come near its level: the first peak holds the ring that follows"
+        return replace(peak, status=_and(words, peak.status))
+    if pulled is None:
+        return peak
+    words = (
+        f"the mass is not at rest while it sticks (it strays by {strays:.2g} times its displacement's noise), so that "
+        "the pull is not what the contact bears: told from the pull to the balance of forces"
+    )
+    apart = float(np.median(peak.friction)) - float(np.median(pulled.friction))
+    return replace(
+        peak, below=max(peak.below, apart + pulled.below), above=max(peak.above, pulled.above - apart),
+        status=_and(words, peak.status),
+    )  # fmt: skip
+
+
+def _and(words: str, status: str) -> str:
+    return words if status == "ok" else f"{words}; {status}"
+
+
+def _strays(rested: Sequence[Stroke], strokes: Strokes, fs: float) -> float:
+    """How far the mass moves with its load in the middle of its sticks, in deviations of its displacement's noise."""
+    held = [each.displacement[: each.slip] for each in rested if each.slip >= 2 * LEAST]
+    if not held:
+        return 0.0
+    quarters = [np.array_split(each, 4) for each in held]
+    if np.median([last.mean() - first.mean() for first, *_, last in quarters]) < 0:
+        return 0.0  # against its load something else moves, slowly
+    found = [float(np.std(each[len(each) // 4 : 3 * len(each) // 4])) for each in held]
+    reach = float(np.median([np.ptp(each.displacement) for each in rested]))
+    return float(np.median(found)) / max(noise_level(strokes.motion.displacement, fs), FINEST * reach)
+
+
+def _by_pull(record: Record, strokes: Strokes) -> _Borne | None:
+    """What pulls when each slip begins, where friction was found by a balance of forces and no sensor did better."""
+    balance = _balance(record)
+    if balance is None:
+        return None
+    pull = balance.pull(record) - strokes.offset
+    rested = [each for each in strokes.strokes if each.rests]
+    found = [(each, *told) for each in rested if (told := _begun(each, pull, balance.mass, record.fs))]
+    if not found:
+        return None
+    chosen, friction, change = zip(*found, strict=True)
+    level = float(np.median([each.level for each in chosen]))
+    unsure = float(np.median(change)) + PULLED * level  # the instant is known to a sample
+    return _Borne(chosen, friction, PULL, unsure, unsure)
+
+
+def _by_peak(record: Record, strokes: Strokes) -> _Borne:
+    """The friction's largest value before each slip, with what sensors and smoothing do to it."""
+    chosen = strokes.strokes
+    friction = [float(each.friction[each.slip]) for each in chosen]
+    noise = 2 * (record.channels["friction"].noise or noise_level(record["friction"], record.fs))
+    if is_measured(record, "friction"):
+        return _Borne(chosen, friction, PEAK, noise)
+    rows = float(np.median([each.slip for each in chosen]))
+    if rows < FEW:
+        raise EstimateError(
+            f"{rows:g} samples from a reversal to the slip at {record.fs:g} Hz",
+            f"what the contact bears before it slips takes {FEW} at least",
+            "sample faster",
+        )
+    told = [step.arguments for step in record.history if step.action == "friction_force"]
+    method = told[-1]["method"] if told else ""
+    unknown = _unstated(record, method)
+    strays = [_stray(each, wide=bool(unknown)) for each in chosen]
+    stray = (RINGS if unknown else 1.0) * float(np.median(strays))
+    level = float(np.median([each.level for each in chosen]))
+    if stray > NOTHING * level:
+        raise EstimateError(
+            f"the friction strays by {stray:.2g} after each slip, from a level of {level:.2g}",
+            f"static friction is told where it strays by less than {NOTHING:.0%} of its level",
+            unknown or "give a record with less noise",
+        )
+    blunt = BLUNT[next(iter(_used(record, method)), "x")]
+    corner = blunt * float(np.median([_steepest(each) for each in chosen]))
+    status = unknown or ("told from the displacement alone, which blurs a peak" if blunt == BLUNT["x"] else "ok")
+    return _Borne(chosen, friction, PEAK, max(noise, corner / 4) + stray, corner + stray, status)
+
+
+def _used(record: Record, method: str) -> list[str]:
+    """The sensors behind a friction that a method found, without its displacements."""
+    asked = ("load",) if method == ALONE else FUSIONS.get(method, ("a",))
+    return [name for name in ("load", "a") if name in asked and is_measured(record, name)]
+
+
+def _unstated(record: Record, method: str) -> str:
+    """What of the sensors behind the friction is taken as it reads, in words."""
+    names = _used(record, method)
+    if method in (*FUSIONS, ALONE):
+        names = [name for name in names if record.channels[name].mount is None]
+    elif method and not names:
+        return "a balance of forces smooths and overshoots its peak"
+    if not names:
+        return ""
+    return (
+        f"the mount of {' and '.join(names)} is not stated, or not used, and its ringing is in it: state it, "
+        'record.with_details(..., mount=), and take friction_force(record, ..., method="fusion")'
+    )
+
+
+def _steepest(stroke: Stroke) -> float:
+    """By how much the friction rises in a sample at most, shortly before the slip [N]."""
+    return float(np.max(np.diff(stroke.friction[max(0, stroke.slip - NEAR) : stroke.slip + 1]), initial=0.0))
+
+
+def _stray(stroke: Stroke, *, wide: bool) -> float:
+    """How far the friction strays from its level while it slides, once it has come back to it [N].
+
+    `wide` from the slip on, with all that rings there; else from where it slides for good.
+    """
+    speed = np.gradient(stroke.displacement)
+    fast = np.flatnonzero(speed > FAST * speed.max())
+    slow = np.flatnonzero(speed[: fast[0]] < CREEPS * speed.max())
+    first = stroke.slip if wide or not len(slow) else max(stroke.slip, int(slow[-1]) + 1)
+    off = stroke.friction[first : int(fast[-1]) + 1] - stroke.level
+    back = np.flatnonzero(off <= 0)
+    return float(np.max(np.abs(off[back[0] :]))) if len(back) else 0.0
 
 
 def _widened(estimate: Estimate, below: float, above: float) -> Estimate:
@@ -170,10 +320,8 @@ def _balance(record: Record) -> Balance | None:
     return None if told[-1]["method"] in FUSIONS else Balance.told(told[-1])
 
 
-def _borne(stroke: Stroke, pull: Array | None, mass: float, fs: float) -> tuple[float, float] | None:
-    """What the contact bears just before it slips, and by how much that changes from a sample to the next."""
-    if pull is None or not stroke.rests:
-        return float(stroke.friction[stroke.slip]), 0.0
+def _begun(stroke: Stroke, pull: Array, mass: float, fs: float) -> tuple[float, float] | None:
+    """What pulls when the slip begins, and by how much that changes from a sample to the next."""
     if stroke.slip < LEAST:
         return None
     first = stroke.slip // 2

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.identify.likely_contact import HELD, LEAST, STIFFNESS, likely_contact, sliding_level
+from stickslip.identify.likely_contact import HELD, LEAST, NEGATIVE, STIFFNESS, likely_contact, sliding_level
 from stickslip.identify.loops import Loops
 from stickslip.identify.motion import stretches
 from stickslip.record.record import Record
@@ -91,7 +91,8 @@ def contact_damping(record: Record) -> Estimate:
     RecordError
         The record has no friction.
     EstimateError
-        Too few sticks, or a contact on the moving base.
+        Too few sticks, a contact on the moving base, or a damping below zero, which no contact has: a sensor's lag or
+        mount is not accounted for.
 
     Examples
     --------
@@ -104,7 +105,14 @@ def contact_damping(record: Record) -> Estimate:
     >>> bool(abs(contact_damping(record).value - 23.9) < 1)
     True
     """
-    return likely_contact(record).damping
+    found = likely_contact(record).damping
+    if NEGATIVE in found.status:
+        raise EstimateError(
+            f"a contact damping of {found.value:.3g} N s/m",
+            "a contact takes energy from the motion, so that its damping is not below zero",
+            "a sensor's lag or mount is not accounted for: state it, record.with_details(..., delay=, mount=)",
+        )
+    return found
 
 
 def _no_method(method: str | None, methods: tuple[str, ...]) -> EstimateError:

@@ -33,6 +33,7 @@ SOFTEST = 1e-3  # of the spring's stiffness
 STRAYS = 1.5  # mean square surprise of a sensor over its noise, from which it is told, and
 ABSURD = 1e3  # from which no answer is given
 CYCLE, SHORT = 8.0, 5.0  # samples of a ring's cycle, and of a stick, below which the answer hangs on what is between
+NEGATIVE = "its damping comes out negative: a sensor's lag or mount is not accounted for"
 ROUNDS = 4
 NEAR = 0.03  # of the log likelihood: how near its peak a simplex goes before a parabola takes over
 METHOD = "likeliest contact while it holds, by a Kalman filter"
@@ -97,8 +98,16 @@ def _likeliest(record: Record) -> LikelyContact:
     misfit = np.mean([part.misfit(math.exp(best[0]), best[1]) for part in parts], axis=0)
     stray, scale = _stray(misfit, sensors), max(1.0, float(misfit.max()))
     _require_spring(best, balance)
-    words = [stray] if scale > STRAYS else []
+    words = []
+    if scale > STRAYS:  # what a sensor misreads it misreads alike all through a stick
+        words.append(stray)
+        scale *= float(np.median(sticks))
     words += _unsure(best, balance, record.fs, sticks)
+    # a damping below zero shows how far off the sensors put the contact
+    below = max(1.0, -best[1] / (NORMAL_95 * math.sqrt(scale * covariance[1, 1])))
+    if below > 1 or (best[1] < 0 and scale > STRAYS):
+        words.append(f"{NEGATIVE} ({best[1]:.3g} N s/m)")
+        scale *= below**2
     if sensors == ["x"]:
         words.append("from the displacement alone, which blurs where sticks begin and end")
     level = float(np.mean(levels))

@@ -37,6 +37,8 @@ SLIPPED = 3.0  # times the speed that may be rest
 class Stroke:
     """From one reversal to the next, with friction and displacement positive in the direction that it goes.
 
+    Friction is that about the middle of both directions (see :class:`Strokes`).
+
     Attributes
     ----------
     way : int
@@ -65,11 +67,16 @@ class Stroke:
 
 @dataclass(frozen=True, eq=False)
 class Strokes:
-    """The whole strokes of a motion, and the motion."""
+    """The whole strokes of a motion, and the motion.
+
+    Their friction is told from `offset`, half-way between that of both directions: the zero of a sensor may be off, a
+    rig may slope, and a contact whose directions differ breaks away about that middle too.
+    """
 
     strokes: tuple[Stroke, ...]
     motion: Motion
     unit: str
+    offset: float
 
     def to(self, way: int) -> list[Stroke]:
         """Those that go forward (1) or back (-1)."""
@@ -84,11 +91,14 @@ def find_strokes(record: Record, *, contact: str | None, question: str) -> Strok
     require_fit(record, "friction", length=motion.unit, question=question)
     slow = max(CREEP * find_cycles(record, motion).peak, AUDIBLE * motion.noise)
     noise = record.channels["friction"].noise or 0.0
+    friction, velocity = record["friction"], motion.velocity
+    ways = _ways(velocity, definite_speed(motion), slow)
+    ways = ways[:: len(ways) // MOST // 2 * 2 + 1]  # an odd step: both directions in turn
+    offset = _middle(friction, velocity, ways)
     found = []
-    ways = _ways(motion.velocity, definite_speed(motion), slow)
-    for first, last, way in ways[:: len(ways) // MOST // 2 * 2 + 1]:  # an odd step: both directions in turn
-        force, speed = way * record["friction"][first:last], way * motion.velocity[first:last]
-        level = float(np.median(force[speed > FAST * speed.max()]))
+    for first, last, way in ways:
+        force, speed = way * (friction[first:last] - offset), way * velocity[first:last]
+        level = _level(force, speed)
         broke = _breakaway(force, speed, level, slow, max(FALL * level, AUDIBLE * noise))
         if broke is not None:
             found.append(Stroke(way, first, force, way * motion.displacement[first:last], level, *broke))
@@ -100,7 +110,19 @@ def find_strokes(record: Record, *, contact: str | None, question: str) -> Strok
         )
     travels = np.array([np.ptp(stroke.displacement) for stroke in found])
     whole = [stroke for stroke, way in zip(found, travels, strict=True) if way > SHORT * np.median(travels)]
-    return Strokes(tuple(whole), motion, record.channels["friction"].unit)
+    return Strokes(tuple(whole), motion, record.channels["friction"].unit, offset)
+
+
+def _level(force: Array, speed: Array) -> float:
+    return float(np.median(force[speed > FAST * speed.max()]))
+
+
+def _middle(friction: Array, velocity: Array, ways: list[tuple[int, int, int]]) -> float:
+    """Half-way between the sliding friction of both directions."""
+    levels: dict[int, list[float]] = {1: [], -1: []}
+    for first, last, way in ways:
+        levels[way].append(_level(friction[first:last], way * velocity[first:last]))
+    return sum(float(np.median(each)) for each in levels.values()) / 2 if all(levels.values()) else 0.0
 
 
 def _ways(velocity: Array, definite: float, slow: float) -> list[tuple[int, int, int]]:
