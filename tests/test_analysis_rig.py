@@ -78,7 +78,7 @@ def test_what_is_not_known_of_the_sensors_is_found_or_said(readings: ss.Record, 
     assert found["contact stiffness"]["status"] != "ok"
     low, high = found["delay of a behind x"]["interval"]  # type: ignore[misc]
     assert low < -0.0389 / 30.91 < high
-    assert "comes 1." in str(found["notes"]["all"])
+    assert "come 1." in str(found["notes"]["all"])
 
 
 def test_without_accelerometer_or_load_cell_it_falls_back_and_says_so(readings: ss.Record) -> None:
@@ -119,6 +119,11 @@ def test_a_load_cell_at_the_end_of_its_range_is_named_and_left_out(readings: ss.
     assert found.level is not None
     assert found.level.value == pytest.approx(1.1, rel=0.01)
     assert any(fault.channel == "load" and fault.kind == "clipped" for fault in found.faults)
+    assert found.comparison is not None
+    assert "end of the range" in found.comparison.status
+    stated = ss.Record.of(samples, fs=readings.fs).with_details("load", mount=(250.0, 0.05))
+    notes = " ".join(ss.analyze(stated, mass=2.42, stiffness=2310, damping=0).notes)
+    assert "which are left to the others" in notes
 
 
 @pytest.mark.parametrize("turned", ["x", "z"])
@@ -128,6 +133,25 @@ def test_a_sensor_with_the_wrong_sign_is_named_without_a_load_cell_too(readings:
     found = ss.analyze(ss.Record.of(wrong, fs=readings.fs, units=units), mass=2.42, stiffness=2310)
     assert found.consistency is not None
     assert f"{turned} has the wrong sign" in found.consistency.status
+    assert found.level is not None
+    assert f"{turned} has the wrong sign" in found.level.status
+    assert "not to be trusted" in " ".join(ss.summary(found).headline)
+    assert "consistency" in [plate.name for plate in ss.figures(found)]
+
+
+def test_a_delay_longer_than_a_cycle_is_said(readings: ss.Record) -> None:
+    record = ss.Record.of({name: readings[name] for name in ("x", "z")}, fs=readings.fs)
+    record = record.with_details("x", delay=1.26).with_details("z", delay=1.26)
+    found = ss.analyze(record, mass=2.42, stiffness=2310)
+    assert "x and z are stated to come 1.26 s late, 3." in " ".join(ss.summary(found).cautions)
+
+
+def test_the_page_shows_what_its_numbers_say(readings: ss.Record) -> None:
+    record = readings.with_details("x", delay=0.0389 / 30.91).with_details("z", delay=0.0389 / 30.91)
+    record = record.with_details("a", mount=(125.0, 0.1)).with_details("load", mount=(250.0, 0.05), inertia=0.05)
+    plates = {plate.name: plate for plate in ss.figures(ss.analyze(record, mass=2.42, stiffness=2310, damping=0))}
+    assert {"breakaway", "transition", "micro-slips", "force-comparison"} <= set(plates)
+    assert "not their sum" in plates["force-balance"].caption
 
 
 def test_a_base_that_is_not_measured_is_taken_to_be_at_rest_and_a_spring_found(readings: ss.Record) -> None:

@@ -100,6 +100,14 @@ def test_a_wrong_sign_and_a_lag_are_said() -> None:
     assert "no delay is stated" in late.status
 
 
+def test_a_cell_at_the_end_of_its_range_is_said() -> None:
+    record = told(measured(8.7, seconds=3.0)[0])
+    cut = record.with_channel("load", np.clip(record["load"], -1, 1), unit="N")
+    found = ss.compare_force(cut, **RIG)
+    assert "at the end of the range is load in" in found.status
+    assert found.difference.status == found.agree_up_to.status != "ok"
+
+
 def test_a_motion_that_does_not_repeat_is_compared_in_windows() -> None:
     rng = np.random.default_rng(2)
     drive = ss.MultiTone(tuple((1e-3 / n, 2.0 + 1.37 * n, 6.28 * rng.random()) for n in range(1, 6)))

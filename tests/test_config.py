@@ -103,3 +103,17 @@ def test_any_text_gives_settings_or_one_sentence(tmp_path_factory: pytest.TempPa
 def test_any_values_give_settings_or_one_sentence(values: dict[str, object]) -> None:
     refused = one_sentence(lambda: rig_settings(values))
     assert refused is None or "the settings" in refused
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[sensors.a]\nmount = ["125 Hz"]', "line 2, sets sensors.a.mount = .* 2 values are needed"),
+        ('[sensors.x]\ndelay = "1.26 mm"', "sets sensors.x.delay = '1.26 mm'; unit 'mm' is measured in m"),
+        ("[sensors.a]\nmout = 3", "has the key 'sensors.a.mout'; the keys known are delay, .*perhaps mount is meant"),
+        ('[sensors.a]\nmount = ["125 Hz", 0.1, 3]', "it should have at most 2 items"),
+    ],
+)
+def test_a_mistake_in_a_sensor_is_named_by_its_key(text: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=words):
+        read_rig(written(tmp_path, text))

@@ -74,6 +74,7 @@ def test_a_velocity_of_the_wrong_sign_is_found() -> None:
     assert ss.consistency(record, **RIG)["velocity is that of the displacement"].verdict == "holds"
     turned = ss.consistency(changed(record, v=-record["v"]), **RIG)["velocity is that of the displacement"]
     assert "opposite signs" in turned.sentence
+    assert turned.left * turned.right < 0
 
 
 @pytest.mark.parametrize("pair", [("x", "z"), ("a", "load"), ("x", "a"), ("z", "load"), ("x", "load"), ("z", "a")])
@@ -220,6 +221,20 @@ def test_a_sensor_with_gaps_is_named_and_left_out() -> None:
     assert found.status == "ok"
     assert "100 values that are not numbers" in found["a is heard"].sentence
     assert found["a is heard"].verdict == "can not be told"
+
+
+@pytest.mark.parametrize("frequency", [2.5, 8.7])
+def test_the_rate_that_is_advised_hangs_little_on_the_rate_that_was_taken(frequency: float) -> None:
+    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    drive = ss.HarmonicBase(CASES[frequency][0], frequency=frequency)
+    run = ss.simulate(ss.Oscillator(law=law, drive=drive, **RIG), duration=6.0)
+    rates = []
+    for fs in (100, 250, 500):
+        check = ss.consistency(told(ss.Rig().measure(run, fs=fs, rng=3, start=3.0)), **RIG)["samples of a reversal"]
+        assert check.verdict == "fails"
+        rates.append(float(check.sentence.partition("sample at ")[2].split()[0]))
+    assert max(rates) <= 2 * min(rates)
+    assert 10 * 45 < min(rates) < 3000  # the mass rings on its contact at 45 Hz
 
 
 # ---- real records

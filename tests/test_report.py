@@ -22,7 +22,7 @@ from stickslip.reports import folder as folder_module
 from stickslip.reports.folder import publish
 from stickslip.reports.page import report
 from stickslip.reports.summary import summary
-from stickslip.reports.words import headline, interval_of, value_of
+from stickslip.reports.words import doubts, headline, interval_of, value_of
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
 
@@ -281,3 +281,21 @@ def test_the_digits_of_an_interval_do_not_exclude_the_value():
     low, _, high, unit = interval_of(wide).split()
     assert float(low) <= 1.0003 <= float(high)
     assert unit == "mm"
+
+
+def test_few_cycles_are_told_once_and_last() -> None:
+    few = [
+        Estimate.normal(name, 1.0, sd=0.1, unit="N", method="m", status=f"only {count} cycles: the interval is crude")
+        for name, count in (("one", 6), ("two", 7), ("three", 6))
+    ]
+    wrong = Estimate.normal("four", 1.0, sd=0.1, unit="N", method="m", status="z has the wrong sign")
+    assert doubts([*few, wrong]) == [
+        "Four: z has the wrong sign.", "There are only 6 to 7 cycles: the intervals of 3 numbers are crude.",
+    ]  # fmt: skip
+    alone = replace(few[0], status="only 5 turns: the interval is crude")
+    assert doubts([alone]) == ["There are only 5 turns: the interval of one number is crude."]
+
+
+def test_rounding_is_no_number_of_nanounits() -> None:
+    assert value_of(Estimate.normal("slope", 3e-17, sd=1e-16, unit="N s/m", method="m")) == "0 N s/m"
+    assert value_of(Estimate.normal("compliance", -3e-7, sd=2e-7, unit="m/N", method="m")) == "-300 nm/N"

@@ -216,3 +216,13 @@ def test_blocks_of_an_edited_file_are_refused(tmp_path: Path) -> None:
 def test_any_unit_comes_back(tmp_path: Path, suffix: str, unit: str) -> None:
     record = ss.Record.of({"ch": [1.0, 2.0]}, fs=4.0).with_channel("ch", [1.0, 2.0], unit=unit)
     assert ss.read_record(ss.write_record(record, tmp_path / f"kept{suffix}")).equals(record)
+
+
+def test_a_channel_map_keeps_what_was_stated_of_a_sensor(tmp_path: Path) -> None:
+    record = ss.Record.of({"x": np.arange(40.0) ** 2, "a": np.sin(np.arange(40.0))}, fs=100)
+    record = record.with_details("x", delay=1e-3).with_details("a", mount=(125.0, 0.1))
+    path = ss.write_record(record, tmp_path / "run.csv")
+    found = ss.read_record(path, channels={"x": "x [m]", "a": "2 * a [m/s^2]", "z": "x [mm]"})
+    assert found.channels["x"].delay == 1e-3
+    assert found.channels["a"].mount is None  # another quantity than the one that was described
+    assert found.channels["z"].delay == 0

@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from stickslip.identify.impact import ImpactTest as ImpactTest, impact_test as impact_test
     from stickslip.identify.mounts import Resonance as Resonance
     from stickslip.plot.experiment import plot_plan as plot_plan
+    from stickslip.plot.consistency import plot_consistency as plot_consistency
     from stickslip.plot.contact import plot_transition_speed as plot_transition_speed
     from stickslip.plot.force import plot_force_comparison as plot_force_comparison
     from stickslip.identify.breakaway import Breakaway as Breakaway, breakaway as breakaway
@@ -233,7 +234,7 @@ _ROOMS = {
     "ForceBand": "identify.compare_force", "Resonance": "identify.mounts",
     "consistency": "identify.consistency", "Consistency": "identify.consistency", "Check": "identify.checks",
     "impact_test": "identify.impact", "ImpactTest": "identify.impact",
-    "plot_force_comparison": "plot.force",
+    "plot_consistency": "plot.consistency", "plot_force_comparison": "plot.force",
     "contact_stiffness": "identify.contact", "contact_damping": "identify.contact",
     "transition_speed": "identify.transition_speed", "TransitionSpeed": "identify.transition_speed",
     "coupled_frequency": "identify.transition_speed", "plot_transition_speed": "plot.contact",

@@ -61,6 +61,8 @@ class Source:
         Whom to cite.
     files : mapping of str to SetFile
         Checksum and address of each file.
+    contents : str
+        Columns, units and the rig's constants, where its owner tells them.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Source:
     licence: str
     citation: str
     files: Mapping[str, SetFile]
+    contents: str = ""
 
     @property
     def fetchable(self) -> bool:
@@ -77,7 +80,8 @@ class Source:
 
     def __str__(self) -> str:
         licence = self.licence or "none stated, so the set is not fetched"
-        return f"{self.name}: {self.title}\n  from {self.address}\n  licence {licence}\n  cite {self.citation}"
+        parts = (f"{self.name}: {self.title}", self.contents, f"from {self.address}", f"licence {licence}")
+        return "\n  ".join([*(part for part in parts if part), f"cite {self.citation}"])
 
 
 @dataclass(frozen=True)
@@ -293,6 +297,7 @@ def _catalogue() -> dict[str, Source]:
             table["licence"],
             table["citation"],
             {file: SetFile(**about) for file, about in table["files"].items()},
+            table.get("contents", ""),
         )
         for name, table in tables.items()
     }

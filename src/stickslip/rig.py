@@ -299,6 +299,12 @@ class Sensor:
                 parts[name] = value
                 continue
             owners = [part for part, thing in parts.items() if _has(thing, name)]
+            if not owners and name in {f.name for f in fields(Mount)}:
+                raise ModelError(
+                    f"the sensor for {self.channel} stands on no mount whose '{name}' could be changed",
+                    "a mount has a frequency and a damping",
+                    f'state one first: having("{self.channel}", mount=Mount(125, 0.1)), or take another preset',
+                )
             if not owners:
                 raise ModelError(f"a sensor has no '{name}'", f"it has {', '.join(sorted(own))}", "correct the name")
             parts[owners[0]] = replace(parts[owners[0]], **{name: value})

@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
@@ -27,7 +27,7 @@ def quantity(unit: str) -> BeforeValidator:
         try:
             return parse_value(value, unit)
         except RecordError as error:
-            raise ValueError(str(error).rstrip(".")) from error
+            raise ValueError(f"{error.value}; {error.rule}") from error
 
     return BeforeValidator(read)
 
@@ -87,14 +87,24 @@ def checked(
         path = [str(part) for part in first["loc"] if not str(part).startswith("function-")]
         within = [*table.split("."), *path] if table else path
         where = f"{source}{line_of(within, lines)}"
-        inner = path[:2] if isinstance(values.get(path[0]), Mapping) else path[:1]
+        inner = path[:1]
+        for part in path[1:]:  # a key of a table is named with it; an item of a list is not
+            if not isinstance(_inside(values, inner), Mapping):
+                break
+            inner = [*inner, part]
         key = ".".join([table, *inner] if table else inner)
         if first["type"] == "extra_forbidden":
-            known = model.model_fields
+            known = _model_at(model, path).model_fields
             raise ModelError(
-                f"{where} has the key '{key}'", f"the keys known are {', '.join(known)}", nearest(path[0], known)
+                f"{where} has the key '{key}'", f"the keys known are {', '.join(known)}", nearest(path[-1], known)
             ) from error
         kind = model.model_fields[path[0]].annotation if path[0] in model.model_fields else None
+        if first["type"] == "missing" and len(inner) < len(path):
+            raise ModelError(
+                f"{where} sets {key} = {_inside(values, inner)!r}",
+                f"{int(path[-1]) + 1} values are needed at least",
+                f"correct {key}",
+            ) from error
         if first["type"] == "missing":
             value = "{ name = ... }" if table else "{ ... }"
             step = f"add {path[0]} = {value if 'dict' in str(kind) else 'VALUE'}"
@@ -106,9 +116,26 @@ def checked(
         ) from error
 
 
+def _model_at(model: type[BaseModel], path: Sequence[str]) -> type[BaseModel]:
+    """The model of the table in which the last key of `path` stands."""
+    for key in path[:-1]:
+        field = model.model_fields.get(key)
+        kinds = (field.annotation, *get_args(field.annotation)) if field is not None else ()
+        model = next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), model)
+    return model
+
+
+def _inside(values: Mapping[str, Any], path: Sequence[str]) -> Any:
+    """What stands under the keys of `path`; None where nothing does."""
+    for key in path:
+        values = values.get(key) if isinstance(values, Mapping) else None  # type: ignore[assignment]
+    return values
+
+
 def _said(message: str) -> str:
     """What a model says of a value, in the words of a settings file."""
     said = message.removeprefix("Value error, ").replace("Input should", "it should")
+    said = said.replace("Tuple should", "it should").replace(" after validation", "")
     return said.replace("a valid dictionary", "a table").replace("a valid ", "a ")
 
 

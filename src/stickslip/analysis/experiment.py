@@ -21,7 +21,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
 from stickslip.rig import Rig
 from stickslip.solve.trajectory import Trajectory
-from stickslip.units import parse_value
+from stickslip.units import parse_value, prefixed
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,9 @@ class Accuracy:
     def __str__(self) -> str:
         if not self.answered:
             return "-"
-        return f"{self.error:.2g} {self.unit}" + (f" in {self.answered}" if self.refusal else "")
+        factor, unit = prefixed(self.error, self.unit)
+        two = float(f"{factor * self.error:.2g}")
+        return f"{two:.10g} {unit}" + (f" in {self.answered}" if self.refusal else "")
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,10 @@ class Setup:
     fs: float
     sensors: tuple[str, ...]
     accuracy: Mapping[str, Accuracy]
+
+    def __str__(self) -> str:
+        told = "; ".join(f"{question} {each}" for question, each in self.accuracy.items())
+        return f"{', '.join(self.sensors)} at {self.fs:g} Hz: {told}"
 
 
 @dataclass(frozen=True)

@@ -194,9 +194,9 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
     for name in ("x", "z"):
         if name in record:
             record = record.with_details(name, delay=late)
-    with_base = " and z, a sensor of its kind," if "z" in record else ""
+    late_ones = "x, and z as a sensor of its kind, come" if "z" in record else "x comes"
     asked.notes.append(
-        f"x{with_base} comes {1e3 * late:.3g} ms after a, by the phase of their lines: taken out. State what is known "
+        f"{late_ones} {1e3 * late:.3g} ms after a, by the phase of their lines: taken out. State what is known "
         "of the sensors' delays to have that taken instead."
     )
     return record, found
@@ -267,7 +267,8 @@ def _balanced(record: Record, rig: RigSettings, method: str, asked: Asked) -> Re
     )
     if found is None:
         return record
-    asked.notes.append(f"Friction force: by the method {method}; {why}.")
+    lost = [part for part in found.history[-1].outcome.split("; ") if part.endswith("left to the others")]
+    asked.notes.append(f"Friction force: {'; '.join([f'by the method {method}', why, *lost])}.")
     made = found.history[-1].arguments
     for name, unit in (("mass", "kg"), ("stiffness", "N/m")):
         if getattr(rig, name) is None:

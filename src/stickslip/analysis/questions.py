@@ -14,10 +14,11 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Estimate
 from stickslip.identify.breakaway import breakaway
 from stickslip.identify.cause import lag_or_compliance
-from stickslip.identify.consistency import consistency
+from stickslip.identify.consistency import Consistency, consistency
 from stickslip.identify.contact import contact_damping, contact_stiffness
 from stickslip.identify.force import FUSIONS, friction_force
-from stickslip.identify.loops import friction_loops
+from stickslip.identify.loops import Loops, friction_loops
+from stickslip.identify.mixups import ONE_SLIP
 from stickslip.identify.motion import is_measured, slid_on
 from stickslip.identify.presliding import presliding
 from stickslip.identify.pull import pulled_slider
@@ -99,6 +100,7 @@ def analyze(
         if led and answers.get(each.unless) is None and each.fits(whole):
             answers[each.key] = asked.ask(each.name, partial(each.ask, whole, slid))
     _doubt(answers, made.doubt)
+    answers["loops"] = _contradicted(_late(answers.get("loops"), record, rig), answers.get("consistency"))
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
     return Findings(
@@ -222,6 +224,32 @@ def _doubt(answers: dict[str, Any], reason: str) -> None:
     if first is not None:
         told = {side: _doubted(getattr(first, side), reason) for side in ("forward", "back", "ratio")}
         answers["breakaway"] = replace(first, **told)
+
+
+def _late(loops: Loops | None, record: Record, rig: RigSettings) -> Loops | None:
+    """The loops, flagged where a sensor is stated to come later than a cycle of the motion."""
+    delays = {name: channel.delay for name, channel in record.channels.items()}
+    delays |= {name: told.delay for name, told in rig.sensors.items() if "delay" in told.model_fields_set}
+    cycles = {name: abs(late) * loops.frequency.value for name, late in delays.items()} if loops is not None else {}
+    far = [name for name, count in cycles.items() if count > 1]
+    if loops is None or not far:
+        return loops
+    words = (
+        f"{' and '.join(far)} {'is' if len(far) == 1 else 'are'} stated to come {delays[far[0]]:.4g} s late, "
+        f"{cycles[far[0]]:.2g} cycles of the motion (milliseconds taken for seconds, perhaps)"
+    )
+    return replace(loops, status=words if loops.status == "ok" else f"{words}; {loops.status}")
+
+
+def _contradicted(loops: Loops | None, told: Consistency | None) -> Loops | None:
+    """The loops, their levels flagged where one slip in the channels would explain what does not add up."""
+    slips = [check.sentence for check in told.failed if check.name == ONE_SLIP] if told is not None else []
+    if loops is None or not slips:
+        return loops
+    reason = f"the channels contradict each other: perhaps {slips[0]}"
+    return replace(
+        loops, **{name: replace(getattr(loops, name), status=reason) for name in ("level", "forward", "back")}
+    )
 
 
 def _doubted(found: Estimate | None, reason: str) -> Estimate | None:

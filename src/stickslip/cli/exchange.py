@@ -52,8 +52,9 @@ def convert(file: str, out: Path, force: bool, **options: Any) -> None:
 @click.command()
 @click.argument("name", required=False)
 def datasets(name: str | None) -> None:
-    """List the public record sets, or fetch the one named."""
+    """List the public record sets, or fetch the one named and tell its columns, units and rig."""
     if name is not None:
+        click.echo(ss.datasets.info(name), err=True)
         for path in ss.datasets.fetch(name).files:
             click.echo(path)
         return

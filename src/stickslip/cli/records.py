@@ -39,7 +39,7 @@ def rig_of(
 ) -> RigSettings:
     """The settings of the file, with those of the command line in front."""
     given: dict[str, Any] = {key: value for key, value in constants.items() if value is not None}
-    base = ss.read_rig(config).model_dump() if config else {}
+    base = ss.read_rig(config).model_dump(exclude_unset=True) if config else {}
     for key, pairs in (("channels", channels), ("units", units)):
         if pairs:
             given[key] = {**base.get(key, {}), **dict(pair(text, f"--{key}") for text in pairs)}

@@ -7,7 +7,7 @@ import importlib
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType
@@ -20,16 +20,18 @@ from stickslip.errors import FormatError, RecordError
 from stickslip.files.select import Columns, Source, TimeColumn, Wanted
 from stickslip.files.table import Block, Options, supplied
 from stickslip.files.titles import titled
+from stickslip.record.channels import Channel
 from stickslip.record.clock import Clock, fit_clock, resolution
 from stickslip.record.metadata import (
     Digests,
+    channels_told,
     history_of,
     metadata_to_record,
     require_columns,
     require_rows,
     units_told,
 )
-from stickslip.record.record import Record, Step
+from stickslip.record.record import DETAILS, Record, Step
 
 Array = NDArray[np.float64]
 
@@ -330,9 +332,20 @@ class _Reading:
         outcome += f", the time stamps within {clock.wander:.2g} s of uniform" if clock.wander else ""
         outcome += "; changed since write_record wrote it" if self.told else ""
         step = Step(action, arguments, "; ".join([outcome, *self.notes]))
-        channels = {wanted.channel.name: wanted.channel for wanted in self.wanted}
         told = self.sources[0].table.record if len(self.sources) == 1 else {}
+        channels = {wanted.channel.name: _detailed(wanted, channels_told(told)) for wanted in self.wanted}
         return Record(samples, channels, clock.fs, clock.start, (*history_of(told), step), clock.stamps)
+
+
+def _detailed(wanted: Wanted, told: Mapping[str, Channel]) -> Channel:
+    """The channel, with what was stated of its sensor where it is that sensor's column as it was written."""
+    columns = [name for _, name in wanted.scales]
+    known = told.get(columns[0]) if len(columns) == 1 else None
+    if known is None or known.unit != wanted.channel.unit or wanted.offset != 0:
+        return wanted.channel
+    if wanted.scale * next(iter(wanted.scales.values())) != 1:
+        return wanted.channel
+    return replace(wanted.channel, **{name: getattr(known, name) for name in DETAILS})
 
 
 def _open(

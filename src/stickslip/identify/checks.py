@@ -47,8 +47,13 @@ class Check:
 
     def __str__(self) -> str:
         unit = "" if self.unit == "1" else f" {self.unit}"
-        sides = f" ({self.left:.4g} against {self.right:.4g}{unit}, {self.discrepancy:.1f} sd)"
+        sides = f" ({_plainly(self.left)} against {_plainly(self.right)}{unit}, {self.discrepancy:.1f} sd)"
         return f"{self.name}: {self.verdict}{sides if math.isfinite(self.discrepancy) else ''}: {self.sentence}"
+
+
+def _plainly(value: float) -> str:
+    """Four digits, without a power of ten where none is needed."""
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
 
 
 def compared(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.identify.force import friction_force, told_rig
 from stickslip.identify.lines import Complex, Lines, find_lines
 from stickslip.identify.mounts import Resonance, find_mounts
+from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 
@@ -191,18 +192,19 @@ def compare_force(
     made = balanced.with_channel("direct", direct, unit="N").with_channel("indirect", indirect, unit="N")
     names = ["direct", "indirect", *(name for name in ("x", "z", "a", "load", "force") if name in made)]
     lines = find_lines(made, names, contact=rig.get("contact"), question=QUESTION)
+    cut = _cut(record)
     bands = tuple(_bands(lines, tolerance))
     mounts = find_mounts(lines, balanced, told) if "a" in record else ()
     return ForceComparison(
-        difference=_difference(lines, direct - indirect),
-        agree_up_to=_agree_up_to(bands, tolerance, lines),
+        difference=_flagged(_difference(lines, direct - indirect), cut),
+        agree_up_to=_flagged(_agree_up_to(bands, tolerance, lines), cut),
         bands=bands,
         resonances=mounts,
         time=record.time,
         direct=direct,
         indirect=indirect,
         tolerance=tolerance,
-        status=_status(bands, record),
+        status=_status(bands, record, cut),
     )
 
 
@@ -284,8 +286,19 @@ def _crossing(frequency: Array, off: Array, tolerance: float) -> float:
     return float(frequency[at - 1] * (frequency[at] / frequency[at - 1]) ** share)
 
 
-def _status(bands: tuple[ForceBand, ...], record: Record) -> str:
-    words = []
+def _cut(record: Record) -> str:
+    """Which sensors stand at the end of their range, in words."""
+    cut = {name: int(saturated(record[name]).sum()) for name in ("a", "load") if name in record}
+    told = [f"{name} in {count} of {len(record)} samples" for name, count in cut.items() if count]
+    return f"at the end of the range is {' and '.join(told)}: what lies beyond is missing here" if told else ""
+
+
+def _flagged(estimate: Estimate, cut: str) -> Estimate:
+    return replace(estimate, status=cut) if cut else estimate
+
+
+def _status(bands: tuple[ForceBand, ...], record: Record, cut: str) -> str:
+    words = [cut] if cut else []
     first = bands[0]
     if first.verdict == "differ" and abs(abs(first.phase) - math.pi) < 0.5:
         words.append("the forces have opposite signs: one sensor is wired the wrong way round, or the sign convention")

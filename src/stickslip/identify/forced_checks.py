@@ -146,9 +146,10 @@ def _derivative(seen: Seen, channel: str, name: str, unit: str) -> Check:
         turn = np.conj(moved) / np.abs(moved)
         read, moved = read * turn, moved * turn
     left, right = abs(read.mean()), abs(moved.mean())
+    turned = -1.0 if (complex(read.mean()) * complex(moved.mean()).conjugate()).real < 0 else 1.0
     sd = math.hypot(seen.sd(read - moved), math.sqrt(2) * seen.tolerance * right)
     return judged(
-        name, float(left), float(right), abs(complex((read - moved).mean())) / sd, unit=unit,
+        name, turned * float(left), float(right), abs(complex((read - moved).mean())) / sd, unit=unit,
         holds=f"amplitude and phase of {channel} are those of x",
         fails=_off(channel, "x", complex(read.mean() / moved.mean()), seen),
     )  # fmt: skip

@@ -11,6 +11,7 @@ from stickslip.identify.checks import APART, FAILS, Check
 
 LENGTHS = {"mm": 1e-3, "inch": 0.0254}
 UNITS = {"x": LENGTHS, "z": LENGTHS, "a": {"g": 9.80665, "mm/s^2": 1e-3}, "load": {"lbf": 4.4482216152605}}
+ONE_SLIP = "one slip that explains it"
 BETTER = 25.0  # times by which a slip must lower the sum of squares to be named
 
 
@@ -55,7 +56,7 @@ def mixups(balance: Amplitudes, checks: Sequence[Check]) -> list[Check]:
     if before <= most or not cured:
         return []
     sentence = " or ".join(cured)
-    return [Check("one slip that explains it", before**0.5, tried[0][0] ** 0.5, "1", before**0.5, FAILS, sentence)]
+    return [Check(ONE_SLIP, before**0.5, tried[0][0] ** 0.5, "1", before**0.5, FAILS, sentence)]
 
 
 def _slips(values: Mapping[str, complex]) -> Iterator[tuple[str, dict[str, complex]]]:

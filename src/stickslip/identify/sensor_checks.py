@@ -22,6 +22,8 @@ NOISY = ("v", "a", "load", "force")  # whose noise moves every sample, unless it
 MAY_REST = ("z", "force")  # what may be held still while the mass moves
 CROSSED = 0.8  # of the friction's level: a reversal goes from one side of it to the other
 LEAST_SAMPLES = 4.0  # of a reversal
+FEWEST = 0.5  # samples of a reversal that is shorter than a record can tell
+RINGS = 10.0  # samples in each period of the mass on its contact
 SMOOTHED = 6.0  # times the forcing frequency, to which channels are smoothed before they are compared in time
 FEW_CYCLES = 6
 FARTHEST = 20  # whole cycles of a lag that is looked for
@@ -77,21 +79,41 @@ def sampling_check(record: Record, seen: Seen) -> Check:
     force = record[source] - np.mean(record[source])
     level = float(np.median(np.abs(force)))
     signs = np.sign(force) * (np.abs(force) > CROSSED * level)
-    counts = []
-    for first, last in zip(*stretches(signs == 0), strict=True):
-        if first > 0 and last < len(signs) and signs[first - 1] * signs[last] < 0:
-            counts.append(last - first)
+    turning = [
+        (first, last)
+        for first, last in zip(*stretches(signs == 0), strict=True)
+        if first > 0 and last < len(signs) and signs[first - 1] * signs[last] < 0
+    ]
     sides = signs[signs != 0]
     turns = int(np.sum(sides[1:] * sides[:-1] < 0))
     if not turns:
         return untold(name, "the friction never reverses")
-    mean = sum(counts) / turns
+    mean = float(sum(last - first for first, last in turning)) / turns
+    rate = max(record.fs * LEAST_SAMPLES / max(mean, FEWEST), RINGS * _coupled(record["x"], force, turning, seen))
     return compared(
         name, LEAST_SAMPLES, mean, sd=max(0.25, seen.tolerance), unit="1", bound=True,
         holds="enough to see how the friction turns round",
-        fails=f"{mean:.2g} samples are too few to see how the friction turns round: sample at "
-        f"{record.fs * LEAST_SAMPLES / max(mean, 0.5):.2g} Hz or more, or the contact is rigid",
+        fails=f"a reversal has {mean:.2g} sample{'' if mean == 1 else 's'} on the average, too few to see how the "
+        f"friction turns round: sample at {_round_up(rate):.0f} Hz or more, or the contact is rigid",
     )  # fmt: skip
+
+
+def _coupled(x: Array, force: Array, turning: Sequence[tuple[int, int]], seen: Seen) -> float:
+    """Least frequency [Hz] of the mass on its contact: the contact gives no more than x moves while it turns."""
+    if "mass" not in seen.rig:
+        return 0.0
+    moved = np.array([x[last] - x[first - 1] for first, last in turning])
+    gained = np.array([force[last] - force[first - 1] for first, last in turning])
+    if not len(moved) or not moved.any():
+        return 0.0
+    stiffness = float(np.median(np.abs(gained)) / np.median(np.abs(moved)))
+    return math.sqrt((stiffness + seen.rig.get("stiffness", 0.0)) / seen.rig["mass"]) / (2 * math.pi)
+
+
+def _round_up(rate: float) -> float:
+    """The next 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(rate))
+    return next(step * power for step in (1, 2, 5, 10) if step * power >= 0.999 * rate)
 
 
 def cycle_checks(record: Record, seen: Seen) -> list[Check]:

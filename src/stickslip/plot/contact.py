@@ -12,6 +12,7 @@ from stickslip.plot.style import (
     FAINT,
     INK,
     ORANGE,
+    SHADE,
     Array,
     axes_of,
     axis_label,
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
 
     from stickslip.analysis.findings import Findings
     from stickslip.identify.transition_speed import TransitionSpeed
+    from stickslip.record.record import Record
 
+MARGIN = 0.25  # of a stick's duration, drawn on either side of it
 MOST_CYCLES = 30
 POINTS_A_CYCLE = 300
 
@@ -151,8 +154,8 @@ def plot_transition_speed(found: TransitionSpeed, *, ax: Axes | None = None) -> 
         if speed is not None:
             ax.axvline(x_factor * speed.value, color=colour, linestyle=dashes, linewidth=1.2, label=f"by the {name}")
             ax.axvspan(*(x_factor * end for end in speed.interval), color=colour, alpha=0.15, linewidth=0)
-    for side in (-1, 1):
-        ax.axhline(side * y_factor * found.level.value, color=FAINT, linewidth=1.0)
+    for side, label in ((-1, None), (1, "sliding friction")):
+        ax.axhline(side * y_factor * found.level.value, color=FAINT, linewidth=1.0, label=label)
     ax.set(xlabel=axis_label("velocity after the turn", x_unit), ylabel=axis_label("friction", y_unit))
     _legend_above(ax)
     return ax
@@ -209,3 +212,84 @@ def _across(findings: Findings, abscissa: str) -> Array:
         return record[name]
     across: Array = getattr(contact_motion(record, contact=contact, question="the figure"), abscissa)
     return across
+
+
+@styled
+def plot_micro_slips(findings: Findings) -> Figure:
+    """Does the contact hold all the time that it sticks? One stick, with the micro-slips in it shaded.
+
+    Parameters
+    ----------
+    findings : Findings
+        With sticks that have micro-slips in them.
+
+    Returns
+    -------
+    Figure
+    """
+    assert findings.sticks is not None
+    events, record = findings.sticks.events, findings.record
+    inside = [event for event in events if event.kind == "microslip" and _seen(record, event.time)]
+    middle = inside[len(inside) // 2]
+    stick = max((e for e in events if e.kind == "stick" and e.time <= middle.time), key=lambda event: event.time)
+    margin = MARGIN * stick.duration
+    rows = np.flatnonzero(np.abs(record.time - stick.time - stick.duration / 2) < stick.duration / 2 + margin)
+    time = record.time[rows]
+    figure, axes = new_figure(2, height=3.8)
+    speed = contact_motion(record, contact=findings.settings.get("contact"), question="the figure").velocity
+    for ax, values, words, unit in (
+        (axes[0], record["friction"], "friction", record.channels["friction"].unit),
+        (axes[1], speed, "velocity", "m/s"),
+    ):
+        factor, text = prefixed(values[rows], unit)
+        ax.plot(time, factor * values[rows], color=INK, linewidth=1.2)
+        ax.axvspan(stick.time, stick.time + stick.duration, color=SHADE, alpha=0.5, linewidth=0, label="stick")
+        for number, event in enumerate(e for e in inside if stick.time <= e.time < stick.time + stick.duration):
+            label = "micro-slip" if number == 0 else None
+            ax.axvspan(event.time, event.time + event.duration, color=ORANGE, alpha=0.4, linewidth=0, label=label)
+        ax.set_ylabel(axis_label(words, text))
+    axes[1].set(xlabel="time [s]", xlim=(float(time[0]), float(time[-1])))
+    _legend_above(axes[0])
+    return figure
+
+
+def _seen(record: Record, time: float) -> bool:
+    """Whether a record holds that instant."""
+    return bool(record.time[0] < time < record.time[-1])
+
+
+@styled
+def plot_breakaway(findings: Findings, *, ax: Axes | None = None) -> Axes:
+    """What the contact bears just before it slips against what it bears while it slides, in each direction.
+
+    Parameters
+    ----------
+    findings : Findings
+        With loops and breakaway.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+    """
+    loops, found = findings.loops, findings.breakaway
+    assert loops is not None
+    assert found is not None
+    ax = axes_of(ax, height=2.4)
+    pairs = {
+        "sliding": (loops.forward, loops.back, BLUE, "o"),
+        "before it slips": (found.forward, found.back, ORANGE, "^"),
+    }
+    factor, unit = prefixed(loops.level.value, loops.level.unit)
+    for shift, (label, (forward, back, colour, marker)) in zip((0.1, -0.1), pairs.items(), strict=True):
+        for place, each in enumerate((back, forward)):
+            if each is not None:
+                ends = np.abs(np.array([[each.value - each.interval[0]], [each.interval[1] - each.value]]))
+                ax.errorbar(
+                    [factor * each.value], [place + shift], xerr=factor * ends, fmt=marker, color=colour, markersize=5,
+                    capsize=3, label=label if each is (back or forward) else None,
+                )  # fmt: skip
+    ax.set(yticks=[0, 1], yticklabels=["back", "forward"], ylim=(-0.5, 1.5), xlabel=axis_label("friction", unit))
+    _legend_above(ax)
+    return ax

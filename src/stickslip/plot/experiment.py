@@ -48,11 +48,13 @@ def plot_plan(plan: ExperimentPlan) -> Figure:
         for number, sensors in enumerate(choices):
             found = [(each.fs, each.accuracy[question].error) for each in plan.setups if each.sensors == sensors]
             rates, errors = np.array(found).T
-            style = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "markersize": 4}
+            style = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "markersize": 7 - 1.5 * number}
             panel.plot(rates, factor * errors, label=", ".join(sensors), **style)
-        panel.set(xscale="log", yscale="log", ylabel=axis_label("rms error", text))
+        panel.set(xscale="log", yscale="log", ylabel=axis_label("rms error" if plan.draws > 1 else "error", text))
         panel.yaxis.set_major_formatter("{x:g}")
-        panel.yaxis.set_minor_formatter(NullFormatter())
+        low, high = panel.get_ylim()
+        # less than a decade may hold no power of ten to be labelled
+        panel.yaxis.set_minor_formatter("{x:g}" if high < 10 * low else NullFormatter())
         panel.set_title(question, loc="left")
         panel.grid(visible=True, which="minor", color=FAINT, alpha=0.15)
     panel.set_xticks(sorted({setup.fs for setup in plan.setups}))

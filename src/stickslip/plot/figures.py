@@ -9,13 +9,26 @@ from stickslip.analysis.decay_comparison import DecayComparison
 from stickslip.analysis.decays import DecayFindings
 from stickslip.analysis.findings import Findings
 from stickslip.analysis.time_frequency import TimeFrequency
+from stickslip.identify.compare_force import UNLIKE
+from stickslip.identify.force import FUSIONS
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
-from stickslip.plot.contact import plot_displacement_loop, plot_sticks, plot_velocity_loop
+from stickslip.plot.consistency import plot_consistency
+from stickslip.plot.contact import (
+    plot_breakaway,
+    plot_displacement_loop,
+    plot_micro_slips,
+    plot_sticks,
+    plot_transition_speed,
+    plot_velocity_loop,
+)
 from stickslip.plot.decay import plates_of as decay_plates
 from stickslip.plot.decay import plates_together as together_plates
+from stickslip.plot.force import plot_force_comparison
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
+
+UNSURE = "not stated"  # in the status of what sensors that are not known may have made
 
 if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory
@@ -102,14 +115,67 @@ def _of_findings(findings: Findings) -> list[Plate]:
     if force_balance(findings.record) is not None:
         plates.append(
             plate("force-balance", plot_force_balance(findings, record=near), "Where the friction force comes from",
-                   f"At every moment the other terms add up to the friction.{stuck}")
+                   f"{_how_it_adds_up(findings)}{stuck}")
         )  # fmt: skip
+    plates += _of_contact(findings)
     if sticks:
         plates.append(
             plate("sticks", plot_sticks(findings), "How long it sticks and slips",
                    "Each mark is one stretch of sticking or slipping; the bars count how often each duration occurred.")
         )  # fmt: skip
     return plates
+
+
+def _of_contact(findings: Findings) -> list[Plate]:
+    """What the contact does at a turn and before it slips, and what the sensors say of each other."""
+    plates, found = [], findings.breakaway
+    if found is not None and findings.loops is not None and UNSURE not in found.ratio.status:
+        plates.append(
+            plate("breakaway", plot_breakaway(findings), "Before it slips, and while it slides",
+                   "Where the contact bears more before it slips than while it slides, its friction falls as slip "
+                   "begins; bars are 95 % intervals.")
+        )  # fmt: skip
+    if findings.transition is not None:
+        plates.append(
+            plate("transition", plot_transition_speed(findings.transition), "From holding to sliding",
+                   "The mean friction after a turn against the velocity: it grows with the contact's give, and slides "
+                   "from the transition speed on. Bands are 95 % intervals of each way to find that speed.")
+        )  # fmt: skip
+    events = findings.sticks.events if findings.sticks is not None else ()
+    if any(event.kind == "microslip" for event in events):
+        plates.append(
+            plate("micro-slips", plot_micro_slips(findings), "Inside one stick",
+                   "The mass rings on its contact when it comes to rest, and slips a little again where the ring is "
+                   "more than the contact bears.")
+        )  # fmt: skip
+    compared = findings.comparison
+    if compared is not None and (_is_fused(findings) or UNLIKE in compared.status):
+        plates.append(
+            plate("force-comparison", plot_force_comparison(compared), "The force felt and the force computed",
+                   "Both forces over time, their size in each band, and their ratio: above the frequency up to which "
+                   "they agree, the mounts of the sensors swing.")
+        )  # fmt: skip
+    if findings.consistency is not None and findings.consistency.failed:
+        plates.append(
+            plate("consistency", plot_consistency(findings.consistency), "What can not all be true",
+                   "Two sides of each check, and how far they are apart; to the right of the dotted line they can not "
+                   "be one. The sentences are above.")
+        )  # fmt: skip
+    return plates
+
+
+def _is_fused(findings: Findings) -> bool:
+    return findings.settings.get("differentiation") in FUSIONS
+
+
+def _how_it_adds_up(findings: Findings) -> str:
+    """What the terms of the balance have to do with the friction that is drawn."""
+    if _is_fused(findings):
+        return (
+            "The other terms are as the sensors read them, with their noise and the ring of their mounts; the friction "
+            "is the likeliest one by all sensors together, and not their sum sample by sample."
+        )
+    return "At every moment the other terms add up to the friction."
 
 
 def _of_comparison(comparison: Comparison) -> list[Plate]:

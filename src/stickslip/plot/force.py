@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from stickslip.identify.compare_force import ForceComparison
 
+NAMES = {"direct": "load cell", "indirect": "from the motion", "difference": "difference"}
 CYCLES = 3.0  # of the lowest line that are drawn
 
 
@@ -54,12 +55,16 @@ def plot_force_comparison(comparison: ForceComparison) -> Figure:
     return figure
 
 
+def _agreement(frequency: float) -> str:
+    return f"agree up to {frequency:.2g} Hz" if frequency else "agree nowhere"
+
+
 def _over_time(comparison: ForceComparison, ax: Axes) -> None:
     shown = comparison.time - comparison.time[0] < CYCLES / comparison.bands[0].low
     factor, unit = prefixed(comparison.direct, "N")
     for values, colour, label in (
-        (comparison.indirect, ORANGE, "from the motion"),
-        (comparison.direct, BLUE, "load cell"),
+        (comparison.indirect, ORANGE, NAMES["indirect"]),
+        (comparison.direct, BLUE, NAMES["direct"]),
     ):
         ax.plot(comparison.time[shown], factor * values[shown], color=colour, linewidth=1.0, label=label)
     ax.set(xlabel="time [s]", ylabel=axis_label("friction", unit))
@@ -73,8 +78,10 @@ def _middle(comparison: ForceComparison) -> Array:
 def _sizes(comparison: ForceComparison, ax: Axes) -> None:
     for name, colour in (("direct", BLUE), ("indirect", ORANGE), ("difference", INK)):
         sizes = [getattr(band, name) for band in comparison.bands]
-        ax.loglog(_middle(comparison), sizes, "o-", color=colour, markersize=3, linewidth=1.0, label=name)
+        ax.loglog(_middle(comparison), sizes, "o-", color=colour, markersize=3, linewidth=1.0, label=NAMES[name])
     ax.set(ylabel="rms in the band [N]")
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_major_formatter("{x:g}")
     ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
 
 
@@ -82,15 +89,19 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     frequency, tolerance = _middle(comparison), comparison.tolerance
     heard = np.array([band.verdict != "noise" for band in comparison.bands])
     gain, sd = (np.array([getattr(band, name) for band in comparison.bands]) for name in ("gain", "gain_sd"))
-    ax.axhspan(1 - tolerance, 1 + tolerance, color=SHADE, alpha=0.5, linewidth=0)
+    within = f"within {100 * tolerance:g} %"
+    ax.axhspan(1 - tolerance, 1 + tolerance, color=SHADE, alpha=0.5, linewidth=0, label=within)
     ax.errorbar(
         frequency[heard], gain[heard], yerr=2 * sd[heard], fmt="o-", color=INK, markersize=3, linewidth=1.0,
-        label="from the motion over load cell",
+        label="computed over felt",
     )  # fmt: skip
     coherence = [band.coherence for band in comparison.bands]
     ax.plot(frequency, coherence, color=GREEN, linewidth=1.0, label="coherence")
     ax.plot(frequency, [b.significant for b in comparison.bands], ":", color=GREEN, linewidth=1.0, label="by chance")
-    ax.axvline(max(comparison.agree_up_to.value, frequency[0]), color=BLUE, linewidth=1.0)
+    agree = max(comparison.agree_up_to.value, frequency[0])
+    ax.axvline(
+        agree, color=BLUE, linewidth=1.0, label=_agreement(agree if agree == comparison.agree_up_to.value else 0.0)
+    )
     for number, each in enumerate(comparison.resonances):
         ax.axvline(each.frequency.value, color=FAINT, linewidth=1.0, linestyle="--")
         ax.annotate(
@@ -99,4 +110,5 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
         )  # fmt: skip
     top = max(2.0, 1.1 * float(gain[heard].max(initial=0.0)))
     ax.set(xscale="log", ylim=(0, min(top, 10.0)), xlabel="frequency [Hz]", ylabel="ratio, coherence")
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))

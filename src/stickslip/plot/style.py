@@ -1,4 +1,4 @@
-"""One look for every figure: palette, sizes, unit prefixes, and fewer points than samples."""
+"""One look for every figure: palette, sizes, and fewer points than samples."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from stickslip.units import prefixed as prefixed
+from stickslip.units import spelled as spelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,9 +34,6 @@ STYLE: Any = {
     "figure.facecolor": "none", "axes.facecolor": "none", "savefig.facecolor": "none", "svg.fonttype": "none",
     "svg.hashsalt": "stickslip", "text.parse_math": False, "path.simplify": True, "axes.formatter.useoffset": False,
 }  # fmt: skip
-_PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-_PREFIXED = ("m", "m/s", "N", "N m", "N s/m", "s", "Pa", "J", "V")
-_READABLE = ("N", "N m", "N s/m", "V")  # a few hundredths of these are read more easily than thousandths
 
 
 def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
@@ -60,27 +60,6 @@ def new_figure(rows: int = 1, *, height: float = 3.4, heights: Sequence[float] |
 def axes_of(ax: Axes | None, *, height: float = 3.8) -> Axes:
     """The axes given, or those of a new figure."""
     return ax if ax is not None else new_figure(height=height)[1]
-
-
-def prefixed(values: Array | float, unit: str) -> tuple[float, str]:
-    """Factor and unit that bring the largest of `values` between 1 and 1000.
-
-    Examples
-    --------
-    >>> prefixed(np.array([0.002, -0.011]), "m")
-    (1000.0, 'mm')
-    """
-    finite = np.abs(np.atleast_1d(values)[np.isfinite(np.atleast_1d(values))])
-    peak = float(finite.max()) if finite.size else 0.0
-    if unit not in _PREFIXED or peak == 0 or (unit in _READABLE and 0.01 <= peak < 1):
-        return 1.0, spelled(unit)
-    size, prefix = next(((s, p) for s, p in _PREFIXES if peak >= s), _PREFIXES[-1])
-    return (1.0, unit) if size == 1.0 or (unit == "s" and size > 1) else (1.0 / size, prefix + unit)
-
-
-def spelled(unit: str) -> str:
-    """A unit as it is printed: "m/s²"."""
-    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def axis_label(words: str, unit: str, between: str = " ") -> str:

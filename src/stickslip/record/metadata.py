@@ -100,6 +100,12 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
         )
 
 
+def channels_told(metadata: Mapping[str, Any]) -> dict[str, Channel]:
+    """The channels that were written, by name; none without metadata."""
+    with _trusting():
+        return {entry["name"]: Channel(**_restored(entry)) for entry in metadata.get("channels", ())}
+
+
 def units_told(metadata: Mapping[str, Any]) -> dict[str, str]:
     """The columns that were written, the channels and then time, each with its unit.
 

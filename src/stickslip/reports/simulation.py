@@ -17,7 +17,6 @@ from stickslip.files.write import WRITERS, write_record
 from stickslip.laws.formula import Formula
 from stickslip.parameters import PARTS
 from stickslip.plot.figures import figures
-from stickslip.plot.style import prefixed
 from stickslip.plot.trajectory import (
     contacts_of,
     cycle_of,
@@ -35,6 +34,7 @@ from stickslip.solve.energy import energy
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.system_file import Case
+from stickslip.units import prefixed
 
 A_PERIOD = 200  # samples of the record in the shortest period of drive, system or contact
 MOST_ROWS = 200_000  # of a record whose rate was not asked for

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -16,12 +17,14 @@ from stickslip.identify.breakaway import Breakaway
 from stickslip.identify.presliding import Presliding
 from stickslip.identify.pull import Pull
 from stickslip.identify.slip_ringing import SlipRinging
-from stickslip.plot.style import prefixed
+from stickslip.units import NOTHING, prefixed
 
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
 FIGURES = 5  # significant figures at most: what is surer than that still reads well
+FEW = r"only (\d+) (\w+): the interval is crude"  # of a number that rests on few of anything
+ONLY_FEW = rf": {FEW}\.$"
 TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
 
 
@@ -76,8 +79,9 @@ def headline(result: Findings | Comparison) -> list[str]:
 
 def cautions(findings: Findings | DecayFindings) -> list[str]:
     """What should keep the reader from trusting a number."""
-    flagged = doubts(findings.estimates)
-    flagged += [_sentence(words) for words in getattr(findings, "doubts", ())]
+    flagged = _flags(findings.estimates)
+    flagged += [_sentence(words) for words in getattr(findings, "doubts", ()) if not re.search(ONLY_FEW, words)]
+    flagged += _of_few([estimate.status for estimate in findings.estimates])
     if findings.faults:
         many = len(findings.faults)
         flagged.append(f"The check-up found {many} fault{'s' * (many > 1)} in the record, listed below.")
@@ -86,11 +90,26 @@ def cautions(findings: Findings | DecayFindings) -> list[str]:
 
 def doubts(estimates: Sequence[Estimate]) -> list[str]:
     """The estimates that are flagged, with the reason, each reason once."""
+    return [*_flags(estimates), *_of_few([estimate.status for estimate in estimates])]
+
+
+def _flags(estimates: Sequence[Estimate]) -> list[str]:
     flagged: dict[str, list[str]] = {}
     for estimate in estimates:
-        if estimate.status != "ok":
+        if estimate.status != "ok" and not re.fullmatch(FEW, estimate.status):
             flagged.setdefault(estimate.status, []).append(estimate.name)
     return [_sentence(f"{_few(names)}: {status}.") for status, names in flagged.items()]
+
+
+def _of_few(statuses: Sequence[str]) -> Iterator[str]:
+    """One sentence for all intervals that few cycles leave crude."""
+    found = [match for status in statuses if (match := re.fullmatch(FEW, status))]
+    if found:
+        counts, kinds = sorted({int(each[1]) for each in found}), dict.fromkeys(each[2].rstrip("s") for each in found)
+        many = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+        plural = "" if counts[-1] == 1 else "s"
+        those = "the interval of one number is" if len(found) == 1 else f"the intervals of {len(found)} numbers are"
+        yield f"There are only {many} {' or '.join(kind + plural for kind in kinds)}: {those} crude."
 
 
 def _few(names: list[str]) -> str:
@@ -170,6 +189,8 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     loops = findings.loops
     assert loops is not None
     yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
+    if loops.level.status != "ok" and not re.fullmatch(FEW, loops.level.status):
+        yield f"That is not to be trusted: {loops.level.status}."
     if findings.coefficient is not None and findings.normal is not None:
         yield (
             f"Under a normal load of {number(findings.normal, 0.0, 'N')} that is a friction coefficient of "
@@ -257,7 +278,7 @@ def _of_presliding(found: Presliding) -> Iterator[str]:
 def _of_pull(found: Pull) -> Iterator[str]:
     if found.regime == "stick-slip":
         yield (
-            f"The slider sticks and slips {value_of(found.frequency)}: while it sticks the force rises by "
+            f"The slider sticks and slips at {value_of(found.frequency)}: while it sticks the force rises by "
             f"{value_of(found.loading_rate)} (95 % sure: {interval_of(found.loading_rate)}), to "
             f"{value_of(found.breakaway)}, and falls by {value_of(found.drop)} in a slip."
         )
@@ -299,6 +320,8 @@ def _sd(estimate: Estimate) -> float:
 
 
 def _digits(sd: float, value: float) -> int:
+    if max(abs(value), sd) < NOTHING:
+        return 0
     if sd == 0:  # a constant that was given, a count that never varied
         return max(0, len(f"{value:.4g}".partition(".")[2]))
     most = FIGURES - 1 - math.floor(math.log10(abs(value))) if value else FIGURES
