@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from stickslip.fit.answer import DecayFit as DecayFit
     from stickslip.fit.curves import CurveFit as CurveFit, fit_curve as fit_curve
     from stickslip.fit.law import LawFit as LawFit, fit_law as fit_law
+    from stickslip.fit.memory import FrictionMemory as FrictionMemory, friction_memory as friction_memory
     from stickslip.fit.decay import fit_decay as fit_decay
     from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
     from stickslip.identify.decrement import Bounds as Bounds, Decrement as Decrement, decrement as decrement
@@ -251,6 +252,7 @@ _ROOMS = {
     "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
     "fit_decay": "fit.decay", "DecayFit": "fit.answer",
     "fit_curve": "fit.curves", "CurveFit": "fit.curves",
+    "friction_memory": "fit.memory", "FrictionMemory": "fit.memory",
     "fit_law": "fit.law", "LawFit": "fit.law",
     "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",
     "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",

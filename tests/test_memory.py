@@ -1,0 +1,98 @@
+"""Which memory friction has, from loops at several frequencies, of known memories and of simulated laws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip import EstimateError, Record, friction_memory
+
+AMPLITUDE, FS = 1e-3, 8000
+
+
+def loop(kind: str, hz: float, *, noise: float = 0.0, value: float = 0.0, seed: int = 0, cycles: int = 12) -> Record:
+    """A sine of displacement and a friction with memory, run in for two cycles."""
+    t = np.arange(round((cycles + 2) / hz * FS)) / FS
+    x, v = AMPLITUDE * np.sin(2 * np.pi * hz * t), np.cos(2 * np.pi * hz * t)
+    if kind == "late":
+        f = np.sign(np.cos(2 * np.pi * hz * (t - value)))
+    elif kind == "state":
+        f = np.zeros_like(t)
+        for i in range(1, t.size):  # exact while the sign of v stands
+            f[i] = np.sign(v[i]) + (f[i - 1] - np.sign(v[i])) * np.exp(-1 / FS / value)
+    elif kind == "way":
+        f = np.zeros_like(t)
+        for i in range(1, t.size):
+            f[i] = np.clip(f[i - 1] + (x[i] - x[i - 1]) / value, -1, 1)
+    else:
+        f = np.sign(v) * (1 + 0.3 * np.exp(-np.abs(v) / 0.2))
+    f = f + np.random.default_rng(seed).normal(0, noise, t.size)
+    start = round(2 / hz * FS)
+    return Record.of({"x": x[start:], "friction": 1.3 * f[start:]}, fs=FS)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "memory", "attribute"),
+    [
+        ("late", 1e-2, "time delay", "delay"),
+        ("state", 1e-2, "state variable", "time"),
+        ("way", 5e-5, "way", "give"),
+    ],
+)
+def test_each_memory_is_told_from_the_others(kind: str, value: float, memory: str, attribute: str) -> None:
+    found = friction_memory([loop(kind, hz, value=value, noise=0.02) for hz in (2.0, 5.0, 12.0)])
+    assert found.memory == memory, found.reason
+    assert found.rotation == "anticlockwise"
+    estimate = getattr(found, attribute)
+    assert estimate.value == pytest.approx(value, rel=0.04)
+    assert estimate.includes(value)
+    assert min(found.misfit, key=found.misfit.__getitem__) == memory
+
+
+def test_a_curve_over_the_speed_has_no_memory() -> None:
+    found = friction_memory([loop("curve", hz, noise=0.02) for hz in (2.0, 8.0)])
+    assert (found.memory, found.rotation) == ("none", "none")
+    assert all(abs(phase.value) < 0.02 for phase in found.phases)
+
+
+def test_one_frequency_tells_the_rotation_alone() -> None:
+    found = friction_memory(loop("state", 5.0, value=1e-2))
+    assert (found.memory, found.rotation) == ("undecided", "anticlockwise")
+    assert "second frequency" in found.reason
+    assert found.phases[0].value == pytest.approx(np.arctan(2 * np.pi * 5.0 * 1e-2), rel=0.02)
+
+
+def test_friction_that_goes_ahead_is_gone_round_clockwise() -> None:
+    found = friction_memory([loop("late", hz, value=-3e-3) for hz in (2.0, 6.0)])
+    assert (found.memory, found.rotation) == ("undecided", "clockwise")
+    assert "clockwise" in found.reason
+    assert found.delay is None
+
+
+@pytest.mark.parametrize(
+    ("law", "memory"),
+    [(ss.StateVariable(1.1, rate=30.0), "state variable"), (ss.CompliantContact(1.1, stiffness=20000), "way")],
+)
+def test_laws_of_the_thesis_are_told(law: object, memory: str) -> None:
+    """A slider shaken near and above its resonance, sliding all the time, as the thesis has it (4.4)."""
+    records = []
+    for hz, base in ((5.6, 0.6e-3), (8.7, 1.2e-3), (11.1, 2.0e-3)):
+        slider = ss.Oscillator(mass=2.42, stiffness=2310, law=law, drive=ss.HarmonicBase(base, frequency=hz))
+        run = ss.simulate(slider, cycles=60).record(fs=4000)
+        records.append(run.rows(len(run) // 2, len(run)))
+    found = friction_memory(records)
+    assert found.memory == memory, found.reason
+    if memory == "way":
+        assert found.give.value == pytest.approx(1.1 / 20000, rel=0.03)
+    else:
+        assert found.time.value == pytest.approx(1 / (1.1 * 30.0), rel=0.03)
+
+
+def test_what_can_not_be_told_is_refused() -> None:
+    with pytest.raises(EstimateError, match="no record"):
+        friction_memory([])
+    t = np.arange(8000) / 1000
+    one_way = Record.of({"v": 1 + 0.5 * np.sin(6 * t), "friction": 1 + 0.1 * np.sin(6 * t)}, fs=1000)
+    with pytest.raises(EstimateError, match="give a record that reverses"):
+        friction_memory(one_way)
