@@ -127,13 +127,13 @@ def friction_memory(
     Examples
     --------
     >>> records = []
-    >>> for hz in (1.0, 4.0):
+    >>> for hz in (5.0, 20.0):
     ...     t = np.arange(8000) / 1000
-    ...     late = np.sign(np.cos(2 * np.pi * hz * (t - 4e-3)))
+    ...     late = np.sign(np.cos(2 * np.pi * hz * (t - 8e-3)))
     ...     records.append(Record.of({"x": np.sin(2 * np.pi * hz * t), "friction": late}, fs=1000))
     >>> found = friction_memory(records)
     >>> found.memory, found.rotation, round(found.delay.value, 4)
-    ('time delay', 'anticlockwise', 0.004)
+    ('time delay', 'anticlockwise', 0.008)
     """
     given = [records] if isinstance(records, Record) else list(records)
     if not given:
