@@ -74,3 +74,29 @@ def test_a_rubber_seal_rubs_more_under_pressure(dataset: Sets) -> None:
         assert 8e3 < found[bar]["stiffness"].value < 4e4
         assert found[bar]["stiffness"].interval[0] > 0
     assert found[1]["kinetic"].value < found[3]["kinetic"].value < found[5]["kinetic"].value
+
+
+def test_a_seals_friction_under_a_third_pressure(dataset: Sets) -> None:
+    """Pressure in the place of load: 1 and 5 bar foretell 3 bar, and each pressure the line through the other two."""
+    levels = {bar: ss.fit_curve(seal(dataset, bar), curve="coulomb").parameters["kinetic"] for bar in (1, 3, 5)}
+    line = ss.friction_over_load([levels[1], levels[5]], loads=[1.0, 5.0])
+    assert line.friction(3.0).value == pytest.approx(levels[3].value, rel=0.05)
+    assert line.friction(3.0).includes(levels[3].value)
+    assert line.adhesion.interval[0] > 0  # the seal's own squeeze: no Amontons's law
+
+
+def test_the_frames_coefficient_of_friction(dataset: Sets) -> None:
+    """Two loads alone were recorded: a third in between is foretold alike by the line and by Amontons's law."""
+    levels, loads = [], [0.250 * 9.81, 0.450 * 9.81]
+    for weight in ("250g", "450g"):
+        files = [dataset("frame_base_excited") / f"s_b_{weight}_{side}.mat" for side in "xy"]
+        record = ss.read_record(files, channels={"x": "x [mm]", "z": "y [mm]"})
+        record = ss.friction_force(record, mass=3.0799, stiffness=1191, damping=0.669, damper="base")
+        levels.append(ss.fit_curve(record, curve="coulomb").parameters["kinetic"])
+    line = ss.friction_over_load(levels, loads=loads)
+    assert line.coefficient.value == pytest.approx(0.3, abs=0.05)
+    between = 0.350 * 9.81
+    amontons = np.mean([each.value for each in line.coefficients])
+    assert line.friction(between).value == pytest.approx(amontons * between, rel=0.05)
+    for level, found in zip((0.68, 1.32), levels, strict=True):
+        assert found.value == pytest.approx(level, rel=0.05)

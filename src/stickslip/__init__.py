@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from stickslip.fit.answer import DecayFit as DecayFit
     from stickslip.fit.curves import CurveFit as CurveFit, fit_curve as fit_curve
     from stickslip.fit.law import LawFit as LawFit, fit_law as fit_law
+    from stickslip.fit.load import LoadLine as LoadLine, friction_over_load as friction_over_load
     from stickslip.fit.memory import FrictionMemory as FrictionMemory, friction_memory as friction_memory
     from stickslip.fit.decay import fit_decay as fit_decay
     from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
@@ -252,6 +253,7 @@ _ROOMS = {
     "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
     "fit_decay": "fit.decay", "DecayFit": "fit.answer",
     "fit_curve": "fit.curves", "CurveFit": "fit.curves",
+    "friction_over_load": "fit.load", "LoadLine": "fit.load",
     "friction_memory": "fit.memory", "FrictionMemory": "fit.memory",
     "fit_law": "fit.law", "LawFit": "fit.law",
     "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",

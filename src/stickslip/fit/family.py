@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 SETTLED = 1e-8  # of a parameter: far below what any record tells
 MOST = 60  # steps: more are taken along a valley that has no lowest point
-FEW = 4000  # samples that a start is sought with
+FEW, RUN = 4000, 20000  # samples that a start is sought with: of all, or in a row
 QUARTERS = 4  # of a cycle: the parts whose scatter tells, where cycles are few
 
 
@@ -142,7 +142,7 @@ def _start(family: Family, samples: Samples) -> Array:
     grids = family.starts(samples)
     if not grids:
         return np.empty(0)
-    few = samples.rows(slice(None, None, max(1, len(samples.friction) // FEW))) if family.along == "v" else samples
+    few = _few(samples, family.along)
     friction = few.compared.friction
     best, least = np.empty(0), np.inf
     for logs in itertools.product(*grids):
@@ -158,6 +158,13 @@ def _start(family: Family, samples: Samples) -> Array:
             "give a record that slides more steadily",
         )  # fmt: skip
     return best
+
+
+def _few(samples: Samples, along: str) -> Samples:
+    """Fewer samples to begin with: some of all, or, where the way is remembered, the first."""
+    if along == "v":
+        return samples.rows(slice(None, None, max(1, len(samples.friction) // FEW)))
+    return samples.rows(slice(samples.skipped + RUN)) if along == "x" else samples
 
 
 def _require_separable(jacobian: Array, family: Family) -> None:
