@@ -32,6 +32,7 @@ from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
+QUESTION = "sticks and slips"
 METHODS = ("fusion", "speed")
 SLIPPED = 3.0  # times the threshold: a motion that never gets there is creep or noise within a stick
 DWELL = 2.5  # times the duration of a passage through zero, from which on it is a stick
@@ -178,11 +179,10 @@ def find_sticks(
     >>> round(sticks.share.value, 1), round(sticks.per_cycle.value)
     (0.3, 2)
     """
-    question = "sticks and slips"
     if method not in (None, *METHODS):
         raise EstimateError(f"method = '{method}'", f"it is one of {', '.join(METHODS)}", "choose one of them")
-    record = without_delays(record, *motion_channels(record, contact), question=question)
-    motion = contact_motion(record, contact=contact, question=question)
+    record = without_delays(record, *motion_channels(record, contact), question=QUESTION)
+    motion = contact_motion(record, contact=contact, question=QUESTION)
     holds, lost = ((), ()) if method == "speed" else _fused_holds(record, contact)
     if holds:
         noise = float(np.median(record["v_sd"])) if "v_sd" in record else motion.noise
@@ -190,33 +190,46 @@ def find_sticks(
     cycles = find_cycles(record, motion, frequency=frequency)
     limit, rule = _threshold(motion, cycles, threshold)
     stuck, certain = _stuck(motion, limit)
-    noisy, status = AUDIBLE * motion.noise, cycles.status
-    if limit < noisy:
-        status = f"the threshold is within the velocity's noise ({_words(noisy, motion)} is five deviations)"
-    stated = f"the velocity's noise is {_words(motion.noise, motion)}", *_sensitivity(motion, cycles, limit)
-    share, events = _share(stuck, certain, cycles, rule, stated), _events(stuck, certain, motion)
     if holds:
         events = _events_of(holds, stuck, motion, SLIPPED * limit)
         share = _share_of(events, cycles, motion)
+    else:
+        events = _events(stuck, certain, motion)
+        stated = f"the velocity's noise is {_words(motion.noise, motion)}", *_sensitivity(motion, cycles, limit)
+        share = _share(stuck, certain, cycles, rule, stated)
     sticks = [event for event in events if event.kind == "stick"]
     microslips = _microslips(events) if holds and any(event.whole for event in sticks) else None
-    double = microslips is not None and microslips.value > 0.5
-    per_cycle = mean_of_cycles(
-        "stops per cycle", _counted(sticks, cycles, motion), unit="1", method=f"sticks begun in each cycle; {rule}"
-    )
     return Sticks(
         share=share,
-        per_cycle=per_cycle,
+        per_cycle=_per_cycle_of(sticks, cycles, motion, rule),
         microslips=microslips,
-        kind="double stick-slip" if double else "stick-slip" if sticks else "sliding",
+        kind=_kind(sticks, microslips),
         events=events,
         threshold=limit,
         noise=motion.noise,
         frequency=cycles.frequency,
         method="fusion" if holds else "speed",
         lost=lost,
-        status=status,
+        status=_within_noise(limit, motion) or cycles.status,
     )
+
+
+def _within_noise(limit: float, motion: Motion) -> str:
+    noisy = AUDIBLE * motion.noise
+    if limit >= noisy:
+        return ""
+    return f"the threshold is within the velocity's noise ({_words(noisy, motion)} is five deviations)"
+
+
+def _per_cycle_of(sticks: Sequence[StickEvent], cycles: Cycles, motion: Motion, rule: str) -> Estimate:
+    method = f"sticks begun in each cycle; {rule}"
+    return mean_of_cycles("stops per cycle", _counted(sticks, cycles, motion), unit="1", method=method)
+
+
+def _kind(sticks: Sequence[StickEvent], microslips: Estimate | None) -> str:
+    if microslips is not None and microslips.value > 0.5:
+        return "double stick-slip"
+    return "stick-slip" if sticks else "sliding"
 
 
 def _threshold(motion: Motion, cycles: Cycles, threshold: float | str | None) -> tuple[float, str]:
