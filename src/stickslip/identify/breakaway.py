@@ -161,7 +161,7 @@ def _level(borne: _Borne, strokes: Strokes, way: int, side: str) -> Estimate | N
 
 
 def _flagged(estimate: Estimate | None, status: str) -> Estimate | None:
-    return replace(estimate, status=status) if estimate is not None and estimate.status == "ok" else estimate
+    return estimate if estimate is None or status == "ok" else replace(estimate, status=status)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +201,7 @@ def _borne(record: Record, strokes: Strokes) -> _Borne:
 
 
 def _and(words: str, status: str) -> str:
+    """Words, and a status where there is one."""
     return words if status == "ok" else f"{words}; {status}"
 
 
@@ -276,14 +277,12 @@ def _unstated(record: Record, method: str) -> str:
     names = _used(record, method)
     if method in (*FUSIONS, ALONE):
         names = [name for name in names if record.channels[name].mount is None]
+        how = "is not stated, and its ringing is in it: state it, record.with_details(..., mount=)"
     elif method and not names:
         return "a balance of forces smooths and overshoots its peak"
-    if not names:
-        return ""
-    return (
-        f"the mount of {' and '.join(names)} is not stated, or not used, and its ringing is in it: state it, "
-        'record.with_details(..., mount=), and take friction_force(record, ..., method="fusion")'
-    )
+    else:
+        how = 'is not used, and its ringing is in it: state it and take friction_force(record, ..., method="fusion")'
+    return f"the mount of {' and '.join(names)} {how}" if names else ""
 
 
 def _steepest(stroke: Stroke) -> float:
