@@ -189,3 +189,11 @@ def test_sensors_that_are_not_stated_leave_the_contact_as_unsure_as_it_is() -> N
             assert "negative" in found.status
             with pytest.raises(EstimateError, match="lag or mount is not accounted for"):
                 ss.contact_damping(fused)
+
+
+@pytest.mark.parametrize("name", ["x", "z"])
+def test_a_sensor_of_the_wrong_sign_leaves_no_contact(name: str) -> None:
+    whole = measured(2.5)[0]
+    samples = {each: whole[each] * (-1 if each == name else 1) for each in "xza"}
+    with pytest.raises(EstimateError, match=r"can not tell|strays|sticks|likelier"):
+        ss.contact_stiffness(ss.friction_force(ss.Record.of(samples, fs=4000), method="fusion", **RIG))

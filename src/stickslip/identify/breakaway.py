@@ -111,7 +111,8 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     RecordError
         A channel is missing, broken or too short, or the units of friction and motion do not belong together.
     EstimateError
-        No motion, or no stroke in which the contact turns round and slides.
+        No motion, no stroke in which the contact turns round and slides, a hold of less than four samples, or a
+        friction that strays from its level by nearly as much as that after each slip, as a mount that rings makes it.
 
     Examples
     --------

@@ -334,7 +334,7 @@ class _Search:
         def fallen(log_stiffness: float) -> float:
             return 2 * (top - highest(log_stiffness)) - self.scale * NORMAL_95**2
 
-        if abs(end - best[0]) < 1e-3 or fallen(end) < 0:
+        if abs(end - best[0]) < 1e-3 or not fallen(end) > 0:  # or no number, where nothing is likely
             return -math.inf if end == self.lowest else math.inf
         return float(brentq(fallen, best[0], end, xtol=0.01))
 
