@@ -233,7 +233,7 @@ def _tell_unused(rig: RigSettings, asked: Asked) -> None:
         asked.notes.append(f"The friction was measured: {' and '.join(unused)} as stated {verb} not used.")
 
 
-def _described(sensor: Channel) -> bool:
+def described(sensor: Channel) -> bool:
     """Whether anything is known of what it makes of a motion."""
     return sensor.mount is not None or sensor.discharge is not None or sensor.inertia != 0
 
@@ -246,7 +246,7 @@ def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
             "smoother",
             f"{len(record)} samples are many; the method fusion takes them all together if it is asked to",
         )
-    known = [name for name in helps if _described(record.channels[name])]
+    known = [name for name in helps if described(record.channels[name])]
     if known and rig.contact == "ground":
         return "fusion", f"{' and '.join(helps)} beside x: all sensors together by a Kalman smoother"
     why = "there is neither an accelerometer nor a load cell"
@@ -284,7 +284,7 @@ def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
     """The record with what its load cell reads as its friction, or with a note of what is lacking."""
     moves = any(name in record for name in MOTION)
     if "load" in record and "force" not in record and moves:
-        if _described(record.channels["load"]) and "x" in record:
+        if described(record.channels["load"]) and "x" in record:
             return _by_cell(record, asked)
         asked.notes.append(
             "The load cell's reading is taken as the friction force; inertia between both is part of it, and what "

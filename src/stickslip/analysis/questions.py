@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from stickslip.analysis.findings import Findings, record_name
-from stickslip.analysis.preparation import AT_ONCE, CONSTANTS, MOTION, Asked, middle, normal_load, ready
+from stickslip.analysis.preparation import AT_ONCE, CONSTANTS, MOTION, Asked, described, middle, normal_load, ready
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Estimate
@@ -210,7 +210,7 @@ def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
 def _can_be_fused(record: Record, *, again: bool) -> bool:
     """Whether the friction comes from all sensors together; or might have, `again`, if the record were not so long."""
     method = _told(record).get("differentiation")
-    sensors = any(is_measured(record, name) for name in ("a", "load"))
+    sensors = any(is_measured(record, name) and described(record.channels[name]) for name in ("a", "load"))
     return method in FUSIONS or (
         again and method == "smoother" and len(record) > AT_ONCE and sensors and slid_on(record, None) == "ground"
     )
