@@ -1,17 +1,22 @@
-"""An hour of four channels at 4 kHz through the friction and the sticks: time and memory.
+"""An hour of four channels at 4 kHz in bounded memory: sticks minute after minute, or all of `stickslip analyze`.
 
-``python benchmarks/hour.py [--minutes 60]``: the thesis's rig in stick-slip at 2.5 Hz, the same minute again and again
-with new noise, never more than a stretch of it in memory.
+``python benchmarks/hour.py [--minutes 60] [--analyze]``: the thesis's rig in stick-slip at 2.5 Hz, the same minute
+again and again with new noise, never more than a stretch of it in memory. With ``--analyze`` it is written to Parquet
+first, and analysed by the command line in a process of its own.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import resource
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +25,29 @@ import stickslip as ss
 RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
 LAG = 0.0389 / 30.91
 FS, PART = 4000, 60.0
+CONFIG = """
+mass = 2.42
+stiffness = 2310
+damping = 0.1196
+[channels]
+x = "x [m]"
+z = "z [m]"
+a = "a [m/s^2]"
+load = "load [N]"
+[sensors]
+x = { delay = "1.2585 ms" }
+z = { delay = "1.2585 ms" }
+a = { mount = ["125 Hz", 0.1] }
+load = { mount = ["250 Hz", 0.05], inertia = "50 g", discharge = "50 s" }
+"""
+COMMAND = """
+import re, sys
+from stickslip.cli.program import main
+try:
+    main()
+finally:
+    print(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1], file=sys.stderr)
+"""
 
 
 def parts(minutes: int) -> Iterator[ss.Record]:
@@ -44,11 +72,43 @@ def parts(minutes: int) -> Iterator[ss.Record]:
         yield record.with_details("load", mount=(250.0, 0.05), inertia=0.05, discharge=50.0)
 
 
+def analyzed(minutes: int) -> None:
+    """Write it, analyse it by the command line, and print seconds, the peak of memory and some answers."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    with tempfile.TemporaryDirectory() as folder:
+        path, config = Path(folder) / "hour.parquet", Path(folder) / "rig.toml"
+        config.write_text(CONFIG)
+        schema = pa.schema([(name, pa.float64()) for name in ("x", "z", "a", "load")])
+        with pq.ParquetWriter(path, schema) as writer:
+            for part in parts(minutes):
+                writer.write_table(pa.table({name: part[name] for name in schema.names}, schema=schema))
+        options = ["--config", str(config), "--fs", str(FS), "--json", "--output", f"{folder}/results"]
+        began = time.perf_counter()
+        run = subprocess.run(
+            [sys.executable, "-c", COMMAND, "analyze", str(path), *options], capture_output=True, text=True, check=True
+        )
+        seconds = time.perf_counter() - began
+        size = path.stat().st_size / 2**20
+    found = json.loads(run.stdout)
+    values = {each["name"]: each["value"] for each in found["estimates"]}
+    print(f"{minutes * 60 * FS / 1e6:.1f} million samples of four channels, {size:.0f} MB of Parquet")
+    print(f"{seconds:.0f} s, {int(run.stderr.split()[-1]) / 1024:.0f} MB at most")
+    print({name: values[name] for name in ("sliding friction", "contact stiffness", "stuck share of the time")})
+    print(found["notes"][0])
+
+
 def main() -> None:
     """Go through it and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=int, default=60)
-    minutes = parser.parse_args().minutes
+    parser.add_argument("--analyze", action="store_true")
+    asked = parser.parse_args()
+    minutes = asked.minutes
+    if asked.analyze:
+        analyzed(minutes)
+        return
     began, used = time.perf_counter(), time.process_time()
 
     def found() -> Iterator[tuple[ss.Stretch, ss.Sticks]]:
@@ -57,7 +117,6 @@ def main() -> None:
             print(f"\r{stretch.last:6.0f} of {60 * minutes} s", end="", file=sys.stderr)
 
     sticks = ss.join_sticks(found())
-    print(sticks)
     kinds = [event.kind for event in sticks.events]
     print(sticks)
     print({kind: kinds.count(kind) for kind in sorted(set(kinds))}, sticks.kind, sticks.status, sticks.lost)

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 RATES = ("x_rate", "x_rate_rate")  # the displacement's derivatives
+ENERGY, STOPPING = "energy of whole cycles", "sliding without stops"
+MOST_ORDERS, PLACES = 40, 2000  # harmonics, and places in a cycle, of which the mean cycle is drawn
 LOUD = 5.0  # standard deviations of its mean from which a harmonic counts
 SLOW = 0.04  # share of the peak speed below which the mass rests
 FEW_TRIPS = 2.0  # times the largest force over the stroke, that a spring might have kept
@@ -214,47 +216,56 @@ def _unbalanced(rest: complex, felt: complex, acceleration: complex, stretch: co
 
 
 def energy_check(seen: Seen) -> Check:
-    name = "energy of whole cycles"
+    """Whether friction and damper take what the drive gives; with one of both alone, whether it runs the right way."""
     if seen.lines.cycles is None:
-        if abs(seen.trips) < FEW_TRIPS:
-            return untold(name, "the motion does not repeat")
-        return compared(
-            name, 0.0, seen.trips, sd=1.0, unit="1", bound=True,
-            holds="over the record friction takes energy, though no cycle is like another",
-            fails="friction gives energy: load or x has the wrong sign",
-        )  # fmt: skip
-    drives = [each for each in ("z", "force") if each in seen.channels]
+        return _energy_without_cycles(seen)
+    given = _given(seen)
     taken = seen.work(seen.channels["load"]) if "load" in seen.channels else None
-    given = np.zeros(seen.lines.count)
-    if "force" in drives:
-        given = given + seen.work(seen.channels["force"])
-    if "z" in drives and "stiffness" in seen.rig:
-        given = given + seen.work(seen.rig["stiffness"] * seen.channels["z"])
-    elif "z" in drives:
-        taken = None
-        given = given + seen.work(seen.channels["z"])
-    if taken is None or not drives:
-        only = given if drives else taken
-        if only is None:
-            return untold(name, "neither a drive nor a load cell")
-        what = "the base moves the mass" if drives else "friction takes energy"
-        unit = "J" if "stiffness" in seen.rig or not drives else "m^2"
-        return compared(
-            name, 0.0, float(only.mean()), sd=math.hypot(seen.sd(only), seen.tolerance * abs(float(only.mean()))),
-            unit=unit, bound=True, holds=what,
-            fails=f"{'the mass moves the base' if drives else 'friction gives energy'}: a channel has the wrong sign, "
-            "or two are exchanged",
-        )  # fmt: skip
-    damped = seen.work(seen.drag)
-    left, right = float(given.mean()), float((taken + damped).mean())
+    if given is None:
+        if taken is None:
+            return untold(ENERGY, "neither a drive nor a load cell")
+        return _one_way(taken, seen, "J", "friction takes energy", "friction gives energy")
+    if taken is None or ("z" in seen.channels and "stiffness" not in seen.rig):
+        unit = "J" if "stiffness" in seen.rig else "m^2"
+        return _one_way(given, seen, unit, "the base moves the mass", "the mass moves the base")
+    taken = taken + seen.work(seen.drag)
+    left, right = float(given.mean()), float(taken.mean())
     size = math.sqrt(2) * seen.tolerance * math.hypot(left, right)
     turned = min(left, right) < 0
     return compared(
-        name, left, right, sd=math.hypot(seen.sd(given - taken - damped), size), unit="J",
+        ENERGY, left, right, sd=math.hypot(seen.sd(given - taken), size), unit="J",
         holds="friction and damper take what the drive gives",
         fails="energy runs the wrong way: a channel has the wrong sign, or two are exchanged" if turned else
         f"friction and damper take {100 * abs(right / left - 1):.0f} % {'more' if right > left else 'less'} than the "
         "drive gives: a calibration, the spring or a delay is off",
+    )  # fmt: skip
+
+
+def _energy_without_cycles(seen: Seen) -> Check:
+    """Over the whole record friction takes energy, if the mass travels far enough for a spring not to have kept it."""
+    if abs(seen.trips) < FEW_TRIPS:
+        return untold(ENERGY, "the motion does not repeat")
+    return compared(
+        ENERGY, 0.0, seen.trips, sd=1.0, unit="1", bound=True,
+        holds="over the record friction takes energy, though no cycle is like another",
+        fails="friction gives energy: load or x has the wrong sign",
+    )  # fmt: skip
+
+
+def _given(seen: Seen) -> Array | None:
+    """What the drives give in each cycle [J], over the stiffness where that is not known; None where nothing drives."""
+    parts = [seen.work(seen.channels["force"])] if "force" in seen.channels else []
+    if "z" in seen.channels:
+        parts.append(seen.rig.get("stiffness", 1.0) * seen.work(seen.channels["z"]))
+    return np.sum(parts, axis=0) if parts else None
+
+
+def _one_way(energy: Array, seen: Seen, unit: str, holds: str, fails: str) -> Check:
+    """Whether an energy of each cycle is positive."""
+    mean = float(energy.mean())
+    return compared(
+        ENERGY, 0.0, mean, sd=math.hypot(seen.sd(energy), seen.tolerance * abs(mean)), unit=unit, bound=True,
+        holds=holds, fails=f"{fails}: a channel has the wrong sign, or two are exchanged",
     )  # fmt: skip
 
 
@@ -314,39 +325,50 @@ def identity_check(seen: Seen) -> Check:
 
 
 def stops_check(seen: Seen) -> Check:
-    name = "sliding without stops"
+    """Whether this friction lets the mass slide without stops, or stop, as it does."""
+    name = STOPPING
     if not seen.knows or "z" not in seen.channels or "force" in seen.channels or seen.lines.cycles is None:
         return untold(name, "mass, stiffness, whole cycles and a base that alone drives the mass are needed")
-    x = seen.channels["x"]
-    w, k, m = seen.angular, seen.rig["stiffness"], seen.rig["mass"]
+    k, m = seen.rig["stiffness"], seen.rig["mass"]
     z = abs(complex(seen.strongest("z").mean()))
-    phase = np.exp(2j * np.pi * np.outer(np.arange(1, 41)[: x.shape[1]], np.arange(2000) / 2000))
-    mean = x.mean(axis=0)[: len(phase)]
-    path, speed = (mean @ phase).real, ((1j * np.arange(1, len(mean) + 1) * mean) @ phase).real
-    amplitude = float(np.ptp(path)) / 2
+    amplitude, rests = _mean_cycle(seen)
     left = k * seen.channels["z"] - seen.drag
     source = seen.work(seen.channels.get("load", left))
     friction = float(source.mean()) / (4 * amplitude)
     if friction <= 0:
         return untold(name, "energy runs the wrong way")
-    share, least = friction / (k * z), Slider(m, k, w, seen.damping).boundary()
-    rests = float(np.mean(np.abs(speed) < SLOW * np.abs(speed).max()))
+    share, least = friction / (k * z), Slider(m, k, seen.angular, seen.damping).boundary()
     sd = math.sqrt(3) * seen.tolerance * share
-    if rests > STOPS:
-        if share > least - APART * sd:
-            return Check(name, share, least, "1", 0.0, HOLDS, "it stops, and friction makes it stop")
-        words = (
-            "it stops, though sliding on is possible too: friction at rest above that of sliding, or it was started so"
-        )
-        return Check(name, share, least, "1", (least - share) / sd, UNTOLD, words)
+    return _stopping(share, least, sd) if rests > STOPS else _sliding_on(share, least, sd, friction, k * z)
+
+
+def _mean_cycle(seen: Seen) -> tuple[float, float]:
+    """Amplitude [m] of the mean cycle, and the share of it that the mass rests."""
+    mean = seen.channels["x"].mean(axis=0)[:MOST_ORDERS]
+    order = np.arange(1, len(mean) + 1)
+    phase = np.exp(2j * np.pi * np.outer(order, np.arange(PLACES) / PLACES))
+    path, speed = (mean @ phase).real, ((1j * order * mean) @ phase).real
+    return float(np.ptp(path)) / 2, float(np.mean(np.abs(speed) < SLOW * np.abs(speed).max()))
+
+
+def _stopping(share: float, least: float, sd: float) -> Check:
+    """Of a mass that stops: whether friction makes it."""
+    if share > least - APART * sd:
+        return Check(STOPPING, share, least, "1", 0.0, HOLDS, "it stops, and friction makes it stop")
+    words = "it stops, though sliding on is possible too: friction at rest above that of sliding, or it was started so"
+    return Check(STOPPING, share, least, "1", (least - share) / sd, UNTOLD, words)
+
+
+def _sliding_on(share: float, least: float, sd: float, friction: float, drive: float) -> Check:
+    """Of a mass that does not stop: whether friction lets it slide on."""
     check = compared(
-        name, share, math.pi / 4, sd=sd, unit="1", bound=True, holds="it slides on, as this friction allows",
-        fails=f"it slides on against {friction:.3g} N, and against more than {math.pi * k * z / 4:.3g} N (pi k Z / 4) "
+        STOPPING, share, math.pi / 4, sd=sd, unit="1", bound=True, holds="it slides on, as this friction allows",
+        fails=f"it slides on against {friction:.3g} N, and against more than {math.pi * drive / 4:.3g} N (pi k Z / 4) "
         "it can not: friction, base motion or stiffness is wrong",
     )  # fmt: skip
     if check.verdict == HOLDS and share > least + APART * sd:
         words = (
             f"it slides on where a rigid contact would stop ({least:.3g} of k Z, Den Hartog): the contact is elastic"
         )
-        return Check(name, share, least, "1", (share - least) / sd, HOLDS, words)
+        return Check(STOPPING, share, least, "1", (share - least) / sd, HOLDS, words)
     return replace(check, right=least) if check.verdict == HOLDS else check
