@@ -143,8 +143,10 @@ def test_what_the_record_can_not_tell_is_refused_with_what_would() -> None:
     assert "let it reverse" in fit_curve(Record.of(one_way, fs=1000), curve="viscous").status
     with pytest.raises(RecordError, match="channel friction is missing"):
         fit_curve(Record.of({"v": one_way["v"]}, fs=1000))
+    with pytest.raises(EstimateError, match="friction never changes"):
+        fit_curve(Record.of({"v": one_way["v"], "friction": np.zeros_like(t)}, fs=1000), curve="coulomb")
     with pytest.raises(EstimateError, match="never changes"):
-        fit_curve(Record.of({"v": 0 * t, "friction": np.ones_like(t)}, fs=1000))
+        fit_curve(Record.of({"v": 0 * t, "friction": np.sin(t)}, fs=1000))
     with pytest.raises(EstimateError, match=r"curve = 'stribek'.*perhaps 'stribeck'|stribeck"):
         fit_curve(sweep(), curve="stribek")
     with pytest.raises(EstimateError, match="elements = 1"):
@@ -153,11 +155,20 @@ def test_what_the_record_can_not_tell_is_refused_with_what_would() -> None:
 
 def test_what_can_only_just_be_told_is_flagged() -> None:
     assert "cycles for 6 parameters" in fit_curve(sweep(cycles=3.1)).status
+    assert "the curve leaves" in fit_curve(sweep(noise=5.0), curve="coulomb").status
     assert "noise is above the friction" in fit_curve(sweep(noise=5.0), curve="coulomb").status
     assert "does not fall" in fit_curve(sweep(static=1.0)).status
     fast = fit_curve(sweep(noise=0.01, peak=1.0, viscous=0.0))  # slides at twice the Stribeck speed at least
     assert "slide slower" in fast.parameters["static"].status
     assert "slide slower" in fast.status
+
+
+@pytest.mark.parametrize("curve", ["coulomb", "asymmetric"])
+def test_friction_that_drives_is_told(curve: str) -> None:
+    record = sweep()
+    found = fit_curve(Record.of({"v": record["v"], "friction": -record["friction"]}, fs=FS), curve=curve)
+    assert "friction drives the motion" in found.status
+    assert found.law is None
 
 
 def test_friction_that_does_not_rise_has_a_law_without_viscosity() -> None:

@@ -71,7 +71,7 @@ def test_a_rubber_seal_rubs_more_under_pressure(dataset: Sets) -> None:
     for bar, whole in ranges.items():
         assert 2 * found[bar]["kinetic"].value == pytest.approx(whole, rel=0.06)
         assert found[bar]["kinetic"].includes(whole / 2)
-        assert 8e3 < found[bar]["stiffness"].value < 4e4
+        assert 2e4 < found[bar]["stiffness"].value < 1e5  # 11 N come and go over 0.2 to 0.4 mm
         assert found[bar]["stiffness"].interval[0] > 0
     assert found[1]["kinetic"].value < found[3]["kinetic"].value < found[5]["kinetic"].value
 

@@ -89,6 +89,12 @@ def test_laws_of_the_thesis_are_told(law: object, memory: str) -> None:
         assert found.time.value == pytest.approx(1 / (1.1 * 30.0), rel=0.03)
 
 
+def test_noise_speaks_against_no_memory() -> None:
+    found = friction_memory([loop("curve", hz, noise=30.0) for hz in (2.0, 8.0)])
+    assert found.memory == "undecided"
+    assert "less noise" in found.reason
+
+
 def test_what_can_not_be_told_is_refused() -> None:
     with pytest.raises(EstimateError, match="no record"):
         friction_memory([])

@@ -20,6 +20,7 @@ from stickslip.identify.motion import (
 )
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
+from stickslip.signals.differentiate import smooth
 from stickslip.signals.noise import noise_level
 
 Array = NDArray[np.float64]
@@ -85,14 +86,33 @@ class Samples:
         return max(spread) / float(speed.mean())
 
     @property
+    def drives(self) -> bool:
+        """Whether friction feeds the motion on the whole."""
+        return float(self.friction @ self.velocity) < 0
+
+    @property
     def reverses(self) -> bool:
         """Whether it moves both ways."""
         fastest = float(np.abs(self.velocity).max())
         return bool(min(self.velocity.max(), -self.velocity.min()) > REVERSED * fastest)
 
 
-def samples_of(data: Record | Loops, *, contact: str | None, frequency: float | str | None) -> tuple[Samples, Samples]:
-    """All samples of the complete cycles, the first of several to set a memory, and those of them that slide."""
+def require_resisting(samples: Samples) -> None:
+    """Refuse friction that drives the motion: no contact gives way so."""
+    if samples.drives:
+        raise EstimateError(
+            f"friction does {float(samples.friction @ samples.velocity) / len(samples.time):.3g} W on average",
+            "it opposes the motion", "check the sign of the force or of the displacement",
+        )  # fmt: skip
+
+
+def samples_of(
+    data: Record | Loops, *, contact: str | None, frequency: float | str | None, smoothed: bool = False
+) -> tuple[Samples, Samples]:
+    """All samples of the complete cycles, the first of several to set a memory, and those of them that slide.
+
+    A displacement that trembles by its noise makes an element give way and come back: `smoothed`, it does not.
+    """
     if isinstance(data, Loops):
         return _of_loops(data)
     if not isinstance(data, Record):
@@ -101,6 +121,8 @@ def samples_of(data: Record | Loops, *, contact: str | None, frequency: float | 
         )
     question = "the fit of a friction curve"
     data.require_clean("friction", question=question, samples=LEAST)
+    if np.ptp(data["friction"]) == 0:
+        raise EstimateError("channel friction never changes", f"{question} needs one that does", "check its column")
     record = without_delays(data, *motion_channels(data, contact), "friction", question=question)
     motion = contact_motion(record, contact=contact, question=question)
     require_fit(record, "friction", length=motion.unit, question=question)
@@ -115,9 +137,10 @@ def samples_of(data: Record | Loops, *, contact: str | None, frequency: float | 
     else:
         label, edges, peak = cycles.labels(len(friction)), cycles.edges, cycles.peak
     rows = np.arange(len(friction))
+    place = smooth(motion.displacement, record.fs).values if smoothed else motion.displacement
     share = (rows - edges[label]) / (edges[label + 1] - edges[label])
     samples = Samples(
-        time=record.start + rows / record.fs, displacement=motion.displacement, velocity=motion.velocity,
+        time=record.start + rows / record.fs, displacement=place, velocity=motion.velocity,
         friction=friction, cycle=label, block=np.clip((BLOCKS * share).astype(np.intp), 0, BLOCKS - 1),
         cycles=len(edges) - 1, noise=noise_level(friction, record.fs), unit=motion.unit,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
 from stickslip.fit import presliding_curves, speed_curves
-from stickslip.fit.curve_data import Samples, require_reversals, require_speeds, samples_of
+from stickslip.fit.curve_data import Samples, require_resisting, require_reversals, require_speeds, samples_of
 from stickslip.fit.family import Family, Member, best_member
 from stickslip.fit.velocity_step import velocity_step
 from stickslip.identify.loops import Loops
@@ -25,8 +25,10 @@ from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
+LEAVES = 0.3  # of the friction's norm: more than that is worth a word
 LOST = 7.0  # half an interval of a logarithm from which on nothing is known of its number
 TIED = 0.99  # correlation of two parameters from which on they are told together alone
+OVER_WAY = ("dahl", "jenkins", "iwan", "maxwell")
 POSITIVE = ("speed", "exponent", "width", "distance")  # found by their logarithm: so is their interval
 NAMES = {
     "kinetic": "sliding friction", "static": "static friction", "viscous": "viscous friction",
@@ -177,7 +179,7 @@ def fit_curve(
     if not isinstance(elements, (int, np.integer)) or not 2 <= elements <= 50:
         raise EstimateError(f"elements = {elements}", "points of a table, or elements, are 2 to 50", "leave it at 8")
     load = finite("normal", parse_value(normal, "N"), unit="N", positive=True)
-    whole, sliding = samples_of(data, contact=contact, frequency=frequency)
+    whole, sliding = samples_of(data, contact=contact, frequency=frequency, smoothed=curve in OVER_WAY)
     family, member = best_member(*CURVES[curve](Request(curve, whole, sliding, int(elements), load)))
     return _answer(curve, family, member)
 
@@ -202,6 +204,7 @@ def _table(asked: Request) -> tuple[Family, Samples]:
 def _over_way(family: Callable[[Samples, int], Family]) -> Callable[[Request], tuple[Family, Samples]]:
     def chosen(asked: Request) -> tuple[Family, Samples]:
         require_reversals(asked.whole, asked.curve)
+        require_resisting(asked.whole)
         return family(asked.whole, asked.elements), asked.whole
 
     return chosen
@@ -279,6 +282,11 @@ def _worries(member: Member, samples: Samples, along: str) -> list[str]:
         words.append("the friction's noise is above the friction: give more cycles, or a quieter sensor")
     if cyclic and not samples.reverses:
         words.append("motion goes one way: a constant force is not told from friction; let it reverse")
+    if cyclic and samples.drives:
+        words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
+    left = float(np.linalg.norm(samples.friction - member.fitted) / np.linalg.norm(samples.friction))
+    if left > LEAVES:
+        words.append(f"the curve leaves {100 * left:.0f} % of the friction: another one, or less noise, may leave less")
     for i, j in zip(*np.nonzero(np.triu(np.abs(member.correlations), 1) > TIED), strict=True):
         words.append(f"{names[i]} and {names[j]} are told together alone (correlation {member.correlations[i, j]:.3f})")
     return words

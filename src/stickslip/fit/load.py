@@ -84,7 +84,7 @@ class LoadLine(Result):
 def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | str]) -> LoadLine:
     r"""How does friction depend on the load?
 
-    The line :math:`F = F_0 + \mu N` by least squares, each friction by its own standard deviation; where they scatter
+    The line :math:`F = F_0 + \mu N` by least squares, each friction by the width of its interval; where they scatter
     about the line more than these allow, the intervals are wider by as much. Amontons's law is a line through zero: it
     holds where the interval of :math:`F_0` does.
 
@@ -123,7 +123,8 @@ def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | st
             f"they are above zero, and the largest is {LEAST_REACH:g} times the smallest at least",
             "give records under loads that differ",
         )
-    values, sds = (np.array([getattr(level, key) for level in levels]) for key in ("value", "sd"))
+    values = np.array([level.value for level in levels])
+    sds = np.array([(level.interval[1] - level.interval[0]) / 2 / NORMAL_95 for level in levels])
     sds = np.maximum(sds, 1e-9 * np.abs(values).max())
     columns = np.column_stack([np.ones(len(weights)), weights]) / sds[:, None]
     covariance = np.linalg.inv(columns.T @ columns)
@@ -143,7 +144,7 @@ def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | st
         )
     ]
     each = tuple(
-        level.scaled(1 / load, "1", f"friction over load of {load:.3g} N")
+        level.scaled(1 / float(load), "1", f"friction over load of {load:.3g} N")
         for level, load in zip(levels, weights, strict=True)
     )
     doubtful = [level.status for level in levels if level.status != "ok"]

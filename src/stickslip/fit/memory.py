@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 MEMORIES = ("none", "time delay", "state variable", "way", "undecided")
 LEAST_PHASE = 0.005  # rad: what smoothing and sampling leave of a phase
+UNSURE = 0.1  # rad: phases that are no surer do not speak against a memory
 REJECTED = 0.01  # chance of a misfit so large, below which a memory is ruled out
 FAR = 100.0  # logarithm beyond which no memory is
 LAGS = 40  # values of a memory to begin with
@@ -239,6 +240,9 @@ def _rotation(loops: list[_Loop]) -> str:
 
 def _verdict(loops: list[_Loop], rotation: str, misfit: dict[str, float]) -> tuple[str, str]:
     told = ", ".join(f"{loop.phase.value:.3f} rad at {loop.frequency:.3g} Hz" for loop in loops)
+    unsure = max(NORMAL_95 * _sd(loop) for loop in loops)
+    if rotation == "none" and unsure > UNSURE:
+        return "undecided", f"the phases are told to {unsure:.2g} rad alone ({told}): give more cycles, or less noise"
     if rotation == "none":
         return "none", f"friction is in phase with the velocity ({told})"
     if rotation != "anticlockwise":

@@ -140,8 +140,7 @@ def maxwell_slip(samples: Samples, elements: int) -> Family:
     kept = nnls(made - made.mean(axis=0), samples.friction - samples.friction.mean())[0] > 0
     if not kept.any():
         raise EstimateError(
-            "no element bears friction with the motion", "friction opposes the motion",
-            "check the sign of the force or of the displacement",
+            "no element bears friction with the motion", "some friction follows the way", "fit 'coulomb' or 'viscous'"
         )  # fmt: skip
     yields = yields[kept]
 
