@@ -113,7 +113,7 @@ def _coupled(x: Array, force: Array, turning: Sequence[tuple[int, int]], seen: S
 def _round_up(rate: float) -> float:
     """The next 1, 2 or 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(rate))
-    return next(step * power for step in (1, 2, 5, 10) if step * power >= 0.999 * rate)
+    return next(step * power for step in (1, 2, 5, 10) if step * power >= 0.9 * rate)
 
 
 def cycle_checks(record: Record, seen: Seen) -> list[Check]:
