@@ -13,7 +13,9 @@ from click.testing import CliRunner
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import Estimate
 from stickslip.identify.mechanism import UNTOLD
+from stickslip.identify.transition import _agreement
 
 MASS, SPRING, CONTACT, FS = 2.42, 2310.0, 192000.0, 4000.0
 
@@ -49,10 +51,10 @@ def test_the_mode_of_a_contact_without_noise() -> None:
     found = ss.transition(truth("two")[0], mass=MASS, stiffness=SPRING)
     damping = 23.8635 / (2 * np.sqrt(MASS * (SPRING + CONTACT)))
     natural = np.sqrt((SPRING + CONTACT) / MASS)
-    assert found.frequency.value == pytest.approx(natural * np.sqrt(1 - damping**2) / (2 * np.pi), rel=2e-4)
-    assert found.damping.value == pytest.approx(damping, rel=0.01)
+    assert found.frequency.value == pytest.approx(natural * np.sqrt(1 - damping**2) / (2 * np.pi), rel=1e-8)
+    assert found.damping.value == pytest.approx(damping, rel=1e-6)
     assert found.stiffness is not None
-    assert found.stiffness.value == pytest.approx(CONTACT, rel=1e-3)
+    assert found.stiffness.value == pytest.approx(CONTACT, rel=1e-7)
     assert found.loop_stiffness is not None
     assert found.loop_stiffness.value == pytest.approx(CONTACT, rel=1e-6)
 
@@ -75,7 +77,22 @@ def test_the_wavelet_reads_low_where_micro_slips_cut_in() -> None:
     """The local maximum of the simulated transition, by the thesis's wavelet: 39.0 Hz at 1.1 N."""
     found = ss.transition(truth("two")[0])
     assert found.wavelet_frequency.value == pytest.approx(39.0, rel=0.02)
-    assert "lower" in found.agreement
+    assert found.agreement.startswith("they differ: the wavelet reads 39")
+    assert "lower, less than its bandwidth resolves" in found.agreement
+
+
+def test_the_words_say_what_the_numbers_say() -> None:
+    mode = Estimate.normal("transition frequency", 45.0, sd=0.1, unit="Hz", method="")
+    told = {
+        value: _agreement(mode, Estimate.normal("by wavelet", value, sd=0.1, unit="Hz", method=""))
+        for value in (45.1, 39, 20)
+    }
+    assert told[45.1] == "they agree: the wavelet reads 45.1 Hz, within the interval"
+    assert told[39] == "they differ: the wavelet reads 39 Hz, 13.3 % lower, less than its bandwidth resolves"
+    assert told[20] == "they differ: the wavelet reads 20 Hz, 55.6 % lower, more than its bandwidth explains"
+    assert "no local maximum" in _agreement(
+        mode, Estimate.normal("by wavelet", float("nan"), sd=0.1, unit="Hz", method="")
+    )
 
 
 @pytest.mark.parametrize(("name", "count"), [("two", 2), ("one", 1), ("none", 0)])

@@ -97,8 +97,8 @@ def transition(
     A compliant contact that sticks rings with the mass, ``a = Re c exp(p t)`` about zero (thesis chapters 4 and 5),
     until the friction limit is reached and it slips by a little. Each stick is cut into rings and glides by dynamic
     programming; one mode p is fitted to the rings of all sticks together by least squares, each ring with its own
-    amplitude and phase, each stick with its own straight line for the drive. A single spectrum, or a wavelet, of the
-    whole stick reads 2 to 10 % low where micro-slips interrupt the ringing.
+    amplitude and phase, each stick with its own response to the drive, at the drive's frequency. A single spectrum, or
+    a wavelet, of the whole stick reads 2 to 10 % low where micro-slips interrupt the ringing.
 
     The frequency is ``Im p / 2 pi``, the damping ratio ``-Re p / |p|``, and the contact's stiffness
     ``K = m |p|^2 - k`` for a mass m on a spring k.
@@ -203,23 +203,25 @@ def _stretches(window: Window, pole: complex, fs: float) -> list[slice]:
     return [rows for rows in inner if rows.stop - rows.start >= max(8, LEAST_RING * cycle)]
 
 
-def _design(window: Window, rows: list[slice], pole: complex, fs: float) -> tuple[Array, Array]:
-    """Columns: cosine and sine of each ring, level and slope of the window; and the samples."""
+def _design(window: Window, rows: list[slice], pole: complex, ringing: Ringing) -> tuple[Array, Array]:
+    """Columns: cosine and sine of each ring, and of the drive, which moves the mass a little even while it sticks."""
     total = sum(part.stop - part.start for part in rows)
     design, at = np.zeros((total, 2 * len(rows) + 2)), 0
+    turn = 2 * math.pi * max(ringing.sticks.frequency.value, 0.0) / ringing.fs
     for number, part in enumerate(rows):
         count = part.stop - part.start
-        wave = np.exp(pole * np.arange(count) / fs)
+        wave = np.exp(pole * np.arange(count) / ringing.fs)
         design[at : at + count, 2 * number] = wave.real
         design[at : at + count, 2 * number + 1] = wave.imag
-        design[at : at + count, -2] = 1.0
-        design[at : at + count, -1] = (np.arange(part.start, part.stop) / len(window.values)) - 0.5
+        place = np.arange(part.start, part.stop) - len(window.values) / 2
+        design[at : at + count, -2] = np.cos(turn * place)
+        design[at : at + count, -1] = np.sinc(turn * place / np.pi) * place / len(window.values)
         at += count
     return design, np.concatenate([window.values[part] for part in rows])
 
 
 def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> _Mode | None:
-    """The mode of the windows' rings by least squares; amplitudes and lines are eliminated (variable projection)."""
+    """The mode of the windows' rings by least squares; amplitudes are eliminated (variable projection)."""
     from scipy.optimize import least_squares as nonlinear
 
     fs, start = ringing.fs, ringing.pole
@@ -231,7 +233,7 @@ def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> _Mode | None:
         pole = complex(parameters[0], parameters[1])
         rests = []
         for window, rows in used:
-            design, data = _design(window, rows, pole, fs)
+            design, data = _design(window, rows, pole, ringing)
             q, _ = np.linalg.qr(design)
             rests.append(data - q @ (q.T @ data))
         return np.concatenate(rests)
@@ -268,7 +270,7 @@ def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> _Mode | None:
 def _amplitude(window: Window, mode: _Mode, ringing: Ringing) -> tuple[float, float]:
     """Amplitude at which the window's first ring begins, and its standard deviation."""
     rows = _stretches(window, ringing.pole, ringing.fs)
-    design, data = _design(window, rows, mode.pole, ringing.fs)
+    design, data = _design(window, rows, mode.pole, ringing)
     fit = np.linalg.lstsq(design, data, rcond=None)[0]
     early = rows[0].start - next(piece.first for piece in window.rings if piece.first <= rows[0].start < piece.last)
     growth = math.exp(-mode.pole.real * early / ringing.fs)
@@ -333,11 +335,14 @@ def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: _Mode)
 def _agreement(frequency: Estimate, wavelet: Estimate) -> str:
     """In words: whether the wavelet's frequency is the mode's as nearly as a wavelet can tell."""
     apart = wavelet.value / frequency.value - 1
+    if not math.isfinite(apart):
+        return "the wavelet map has no local maximum near it"
+    if frequency.interval[0] <= wavelet.value <= frequency.interval[1]:
+        return f"they agree: the wavelet reads {wavelet.value:.4g} Hz, within the interval"
     width = math.sqrt(math.log(2)) * 2 / ridge_centre(CENTRE, "energy")  # half of the bandwidth at half power
-    told = f"the wavelet reads {wavelet.value:.4g} Hz, {abs(apart):.1%} {'lower' if apart < 0 else 'higher'}"
-    if abs(apart) < width / 2:
-        return f"they agree within the wavelet's bandwidth: {told}"
-    return f"they disagree: {told}, more than its bandwidth explains"
+    side = "lower" if apart < 0 else "higher"
+    why = "less than its bandwidth resolves" if abs(apart) < width / 2 else "more than its bandwidth explains"
+    return f"they differ: the wavelet reads {wavelet.value:.4g} Hz, {100 * abs(apart):.1f} % {side}, {why}"
 
 
 def _stiffness(mode: _Mode, mass: float | str | None, spring: float | str | None) -> Estimate | None:
