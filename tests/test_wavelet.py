@@ -237,6 +237,19 @@ def test_a_day_in_bounded_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     assert peak(80) < 1.2 * peak(20)
 
 
+def test_the_longest_wavelets_take_no_more_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a range, the lowest wavelet reaches farther than a part of the record is long."""
+    monkeypatch.setattr("stickslip.signals.wavelet.BLOCK_BYTES", 8 << 20)
+    record = of(RNG.normal(size=60000), 4000.0)
+    tracemalloc.start()
+    seen = ss.wavelet_overview((record.rows(first, first + 20000) for first in range(0, 60000, 20000)), "a", voices=8)
+    taken = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert taken < 5 * (8 << 20)
+    whole = ss.wavelet_map(record, "a", frequencies=seen.frequency.values)
+    assert float(seen.max()) == pytest.approx(float(abs(whole).max()), rel=0.01)  # the means taken off differ
+
+
 def test_the_thesis_grid() -> None:
     t = np.arange(4096) / 1000.0
     record = of(np.sin(2 * np.pi * 30 * t))

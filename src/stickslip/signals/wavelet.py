@@ -187,14 +187,13 @@ def wavelet_blocks(
     mean = float(first[channel].mean())
     margin = math.ceil(REACH["double"] * float(grid.scales.max()) * first.fs)
     if size is None:
-        size = max(margin, BLOCK_BYTES // (16 * len(grid.frequencies)) - 2 * margin, LEAST)
+        size = max(BLOCK_BYTES // (16 * len(grid.frequencies)), LEAST)
     if size < 1:
         raise RecordError(f"size = {size} samples", "a block has at least one sample", "pass a larger size=")
     begin = 0  # row of the next block's first sample, in the whole
     for kept, offset, last in _windows(first, parts, channel, size, margin):
         rows = size if not last else len(kept) - (begin - offset)
-        values = transform(kept - mean, first.fs, grid.scales, centre=grid.centre, normalisation=normalisation)
-        wanted = values[:, begin - offset : begin - offset + rows]
+        wanted = _inner(kept - mean, begin - offset, rows, first.fs, grid)
         yield _labelled(wanted, first.start + (begin + np.arange(rows)) / first.fs, grid, first, channel, mean)
         begin += rows
 
@@ -569,6 +568,22 @@ def _attributes(grid: _Grid, record: Record, channel: str, mean: float) -> dict[
         "end": record.start + (len(record) - 1) / record.fs,
         "history": [str(step) for step in record.history],
     }
+
+
+def _inner(values: Array, begin: int, count: int, fs: float, grid: _Grid) -> NDArray[np.complexfloating]:
+    """The map of some samples amid others: a few rows at once, each with as much around as its wavelet reaches."""
+    found = np.empty((len(grid.scales), count), dtype=complex)
+    row = 0
+    while row < len(found):
+        reach = math.ceil(REACH["double"] * float(grid.scales[row]) * fs)  # the later ones reach less far
+        low, high = max(0, begin - reach), min(len(values), begin + count + reach)
+        some = slice(row, row + max(1, BLOCK_BYTES // 8 // (16 * (high - low))))
+        around = transform(
+            values[low:high], fs, grid.scales[some], centre=grid.centre, normalisation=grid.normalisation
+        )  # fmt: skip
+        found[some] = around[:, begin - low : begin - low + count]
+        row = some.stop
+    return found
 
 
 def _windows(
