@@ -202,7 +202,7 @@ def _spikes_and_sticks(
         return found, notes
     ringing = asked("Sticks", lambda: find_ringing(record, name, question=QUESTION))
     if ringing is None:
-        found["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=notes[-1].partition(": ")[2])
+        found["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=notes.pop().partition(": ")[2])
         return found, notes
     found["ringing"] = ringing
     found["mechanism"] = mechanism_of(ringing)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,9 @@ Array = NDArray[np.float64]
 
 QUESTION = "the ringing after slip begins"
 SOON = 4  # after slip begins: a quarter of the stroke
-SLOW = 4  # degree of the polynomial that is not the ring
-STIFF = 8  # of the one taken off before the strongest line is looked for, which knows no ring to leave
+DEGREES = (4, 6, 8)  # of polynomials that are not the ring; the last is taken off before its line is looked for
+SLOW, STIFF = DEGREES[0], DEGREES[-1]
+MIXED = 0.02  # of the frequency: polynomials that change it by more are said to
 FASTER = 5.0  # cycles in that quarter: a slower ring is not told from the polynomial
 LEAST = 48  # samples in which a ring can be told
 SAMPLES = 5  # a cycle, at least
@@ -70,13 +71,14 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
     r"""At which frequency does a measured friction ring once a slip has begun, and is it the same in both directions?
 
     A contact that gives way, or the rig that holds it, is let go when the slip begins, and rings about the sliding
-    friction: :math:`f(t) = q(t) + \mathrm{Re}\, c\, e^{pt}`, with a polynomial q of degree 4 for the friction's own
-    course, over the quarter of the stroke after the breakaway. One pole p is fitted to all strokes of a direction by
-    least squares, with c and q of each stroke eliminated (variable projection; Golub and Pereyra 1973), from the
-    strongest line of them all; the frequency is :math:`\mathrm{Im}\, p / 2\pi`, the damping ratio
-    :math:`-\mathrm{Re}\, p / |p|`, each as sure as the answers without some of the strokes agree (jackknife). A
-    direction rings where the mode explains a quarter of the swings or more, by 3 % of the sliding friction at least.
-    The interval of the difference follows from both intervals (MOVER; Zou and Donner 2008).
+    friction: :math:`f(t) = q(t) + \mathrm{Re}\, c\, e^{pt}`, with a polynomial q for the friction's own course, in the
+    quarter of the stroke after the breakaway. One pole p is fitted to all strokes of a direction by least squares,
+    with c and q of each stroke eliminated (variable projection; Golub and Pereyra 1973), from the strongest line of
+    them all. The frequency :math:`\mathrm{Im}\, p / 2\pi` and the damping ratio :math:`-\mathrm{Re}\, p / |p|` are
+    the means of what they are beside polynomials of degree 4, 6 and 8, as sure as these agree and as the answers
+    without some of the strokes do (jackknife). A direction rings where the mode explains a quarter of the swings or
+    more, by 3 % of the sliding friction at least. The interval of the difference follows from both intervals (MOVER;
+    Zou and Donner 2008).
 
     Parameters
     ----------
@@ -182,14 +184,10 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
         _told(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
         for part in parts if len(parts) > 1
     ]  # fmt: skip
-    other = _told(_mode([_swings(values, STIFF) for values in cuts], mode.x, fs, STIFF).x)[0]
-    checks = (f"{len(cuts)} strokes", f"{other:.4g} Hz beside a polynomial of degree {STIFF}")
-    frequency, damping = _jackknifed(_told(mode.x), np.reshape(without, (-1, 2)), len(cuts), side, checks)
-    if not frequency.interval[0] <= other <= frequency.interval[1]:
-        mixed = (
-            f"the friction's own course takes part of the ring: beside a polynomial of degree {STIFF} {other:.4g} Hz"
-        )
-        frequency = replace(frequency, status=mixed)
+    degrees = np.array([
+        _told(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES
+    ])  # fmt: skip
+    frequency, damping = _told_surely(degrees, np.reshape(without, (-1, 2)), len(cuts), side)
     amplitude = mean_of_cycles(
         f"amplitude of that ringing over the friction, {side}",
         amplitudes,
@@ -199,23 +197,33 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
     return frequency, damping, amplitude
 
 
-def _jackknifed(
-    told: tuple[float, float], without: Array, count: int, side: str, checks: tuple[str, ...]
-) -> list[Estimate]:
-    """Frequency and damping ratio, as sure as the answers without some of the strokes agree."""
+def _told_surely(degrees: Array, without: Array, count: int, side: str) -> list[Estimate]:
+    """Frequency and damping ratio, as sure as the answers agree: those of the polynomials, those without some strokes.
+
+    The two parts of the interval are added in squares; the second is a jackknife's.
+    """
     parts = len(without)
     sd = np.sqrt((parts - 1) / parts * ((without - without.mean(axis=0)) ** 2).sum(axis=0)) if parts else [math.inf] * 2
-    few = f"only {count} stroke{'s' * (count > 1)} a direction: the interval is crude"
-    return [
-        Estimate.normal(
-            f"{what}, {side}", value, sd=float(each), unit=unit, quantile=student(max(parts - 1, 1)), checks=checks,
-            method="one decaying mode in all strokes, least squares; jackknife over strokes",
-            status="ok" if count >= FEW_CYCLES else few,
-        )
-        for what, unit, value, each in zip(
-            ("ringing after slip begins", "damping ratio of that ringing"), ("Hz", "1"), told, sd, strict=True
-        )
-    ]  # fmt: skip
+    told, spread = degrees.mean(axis=0), degrees.std(axis=0, ddof=1)
+    quantile = student(max(parts - 1, 1))
+    status = (
+        "ok" if count >= FEW_CYCLES else f"only {count} stroke{'s' * (count > 1)} a direction: the interval is crude"
+    )
+    low, high = degrees[:, 0].min(), degrees[:, 0].max()
+    if spread[0] > max(sd[0], MIXED * told[0]):
+        status = f"the friction's own course takes part of the ring: {low:.4g} to {high:.4g} Hz by what is taken for it"
+    checks = (f"{count} strokes", f"{low:.4g} to {high:.4g} Hz beside polynomials of degree {SLOW} to {STIFF}")
+    found = []
+    for row, (what, unit) in enumerate((("ringing after slip begins", "Hz"), ("damping ratio of that ringing", "1"))):
+        half = math.hypot(quantile * sd[row], 2 * spread[row])
+        found.append(
+            Estimate(
+                f"{what}, {side}", float(told[row]), interval=(told[row] - half, told[row] + half),
+                sd=math.hypot(sd[row], spread[row]), unit=unit, status=status, checks=checks,
+                method="one decaying mode in all strokes, least squares; jackknife over strokes, and polynomials",
+            )
+        )  # fmt: skip
+    return found
 
 
 def _told(parameters: Array) -> tuple[float, float]:
