@@ -31,6 +31,7 @@ STRAYS = 1.5  # deviations of its noise by which the displacement of a mass at r
 FINEST = 1e-6  # of the motion: a displacement without noise
 FEW = 4  # samples from a reversal to the slip
 BLUNT = {"load": 1, "a": 4, "x": 12}  # samples in which a corner of the friction is known by the best of its sensors
+ROUNDED = {"load": 0.15, "a": 0.3, "x": 0.6}  # share of a sudden fall of the friction that smoothing takes off its peak
 PULLED = 0.025  # share by which smoothing and lags move the level that a pull is held against, on simulated rigs
 NOTHING = 0.9  # of its level, by which a friction that tells nothing of its peak strays after a slip
 NEAR = 12  # samples before a slip in which the friction's rise is looked for
@@ -91,7 +92,8 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     A mass that is not at rest while it sticks, ringing on a contact that gives way, bears its own inertia beside the
     pull: then it is the friction's peak, and the interval reaches from the pull on. The interval of a peak that was
     not measured has what sensors and smoothing do to it: as much as the friction rises in a sample before it (in four
-    without a load cell, in twelve from the displacement alone), for a corner is not sharper known; as much as the
+    without a load cell, in twelve from the displacement alone) or 15 % (30 %, 60 %) of what it then falls, for a
+    corner is not sharper known; as much as the
     friction strays from its level while it slides; and where a sensor's mount is not stated one and a half times as
     much as it strays and rings after the slip.
 
@@ -261,9 +263,10 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
             f"static friction is told where it strays by less than {NOTHING:.0%} of its level",
             unknown or "give a record with less noise",
         )
-    blunt = BLUNT[next(iter(_used(record, method)), "x")]
-    corner = blunt * float(np.median([_steepest(each) for each in chosen]))
-    status = unknown or ("told from the displacement alone, which blurs a peak" if blunt == BLUNT["x"] else "ok")
+    best = next(iter(_used(record, method)), "x")
+    fall = float(np.median(friction)) - level
+    corner = max(BLUNT[best] * float(np.median([_steepest(each) for each in chosen])), ROUNDED[best] * fall)
+    status = unknown or ("told from the displacement alone, which blurs a peak" if best == "x" else "ok")
     return _Borne(chosen, friction, PEAK, max(noise, corner / 4) + stray, corner + stray, status)
 
 
