@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import json
+import weakref
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -222,6 +225,24 @@ def test_blocks_tell_what_the_whole_tells(readings: ss.Record) -> None:
     assert found.sticks.events[-1].time > len(record) / 4000 * 0.75
     assert "2 blocks" in found.notes[0]
     assert len(found.record) > 0.99 * len(record) // 2  # less what the delays take
+
+
+def test_blocks_that_were_asked_are_not_kept() -> None:
+    alive: list[weakref.ref[np.ndarray]] = []
+    kept: list[int] = []
+    time = np.arange(4000) / 500
+
+    def blocks() -> Iterator[ss.Record]:
+        for seed in range(6):
+            friction = np.sign(np.cos(6 * time)) + np.random.default_rng(seed).normal(0, 0.01, time.size)
+            block = ss.Record.of({"x": np.sin(6 * time), "friction": friction}, fs=500)
+            gc.collect()
+            kept.append(sum(each() is not None for each in alive))
+            alive.append(weakref.ref(block["friction"]))
+            yield block
+
+    assert ss.analyze_blocks(blocks()).level is not None
+    assert max(kept) <= 2  # the last one, and the one that the figures show
 
 
 def test_a_block_that_answers_nothing_is_named_and_left_out(readings: ss.Record) -> None:

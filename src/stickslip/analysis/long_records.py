@@ -84,7 +84,7 @@ def analyze_blocks(
             continue
         if number & (number - 1) == 0 or kept is None:  # of blocks 1, 2, 4, 8 ... the last is near the middle
             kept, shown = each.record, f"The figures show block {number}, from {block.start:.5g} s."
-        found.append(replace(each, record=each.record.rows(0, 1)))
+        found.append(replace(each, record=_first_row(each.record)))
     if kept is None:
         raise EstimateError(
             f"none of {number} blocks answers anything" + (f"; {refused[0]}" if refused else ""),
@@ -95,6 +95,12 @@ def analyze_blocks(
     notes = [note for note, _ in Counter(note for each in found for note in each.notes).most_common()]
     whole: Findings = _together(found)
     return replace(whole, record=kept, notes=(told, *refused, *notes))
+
+
+def _first_row(record: Record) -> Record:
+    """One row, copied: a part of an array would keep all of it in memory."""
+    row = record.rows(0, 1)
+    return replace(row, samples={name: values.copy() for name, values in row.samples.items()})
 
 
 def _together(parts: Sequence[Any]) -> Any:
