@@ -193,6 +193,8 @@ if TYPE_CHECKING:
     )
     from stickslip.solve.simulate import simulate as simulate
     from stickslip.solve.trajectory import Trajectory as Trajectory
+    from stickslip.squeak.bursts import Squeak as Squeak, Squeaks as Squeaks, find_squeaks as find_squeaks
+    from stickslip.squeak.sound import sound_pressure as sound_pressure, squeak_record as squeak_record
     from stickslip.squeak.stability import (
         SlidingMode as SlidingMode,
         Stability as Stability,
@@ -273,7 +275,8 @@ _ROOMS = {
     "InSeries": "laws.series", "TimeDelay": "laws.time_delay",
     "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
-    "squeak_rig": "squeak.virtual_rig",
+    "squeak_rig": "squeak.virtual_rig", "sound_pressure": "squeak.sound", "squeak_record": "squeak.sound",
+    "find_squeaks": "squeak.bursts", "Squeaks": "squeak.bursts", "Squeak": "squeak.bursts",
     "stability": "squeak.stability", "Stability": "squeak.stability", "SlidingMode": "squeak.stability",
     "critical_value": "squeak.stability", "Threshold": "squeak.stability", "stability_map": "squeak.stability",
     "export_law": "laws.export",

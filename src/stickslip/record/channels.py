@@ -30,6 +30,8 @@ VOCABULARY: dict[str, Quantity] = {
     "theta": Quantity("angle", ("rad",)),
     "sound": Quantity("sound pressure (unit 1: not calibrated)", ("Pa", "1")),
     "y": Quantity("displacement in the normal direction", ("m",)),
+    "normal_acceleration": Quantity("acceleration in the normal direction", ("m/s^2",)),
+    "torsion_velocity": Quantity("angular velocity in torsion", ("rad/s",)),
 }
 
 

@@ -1,0 +1,403 @@
+"""Bursts of sound or vibration: where they are, how they sound, and whether friction makes them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError, RecordError
+from stickslip.record.record import Record
+from stickslip.squeak.hearing import Hearing, Span, filtered, pulse_train
+from stickslip.squeak.sound import REFERENCES, level
+
+Array = NDArray[np.float64]
+
+HEARD = ("sound", "normal_acceleration", "a", "friction", "ch1")  # the first of these, unless told
+LOWEST = 50.0  # Hz
+GROWN = 12.0  # cycles of growth to the peak: what is struck is there within fewer
+EVEN = 0.35  # of a burst's length at which half of its energy has come: a ring that dies away has it earlier
+SUSTAINED = 0.25  # s: a squeak is shorter
+LOCKED, WEAK = 2, -35.0  # harmonics that a contact's limit cycle has, and dB below the fundamental at which they count
+TOLD = 100.0  # cycles in which partials at whole ratios are told from those of a bell
+SWINGS = 0.25  # of the friction's level: beneath a squeak it swings by a third, beneath a free ringing by a sixth
+THROUGH = 1.5  # periods of the forced motion: what sounds longer goes on through reversals
+QUIET = 45.0  # dB re 20 uPa: less is not heard beside a running rig
+PARTIALS = 0.1  # of the power in steady lines
+RISEN = 0.1  # of the largest sliding speed: slower is no sliding
+FRICTION = ("squeak", "squeal", "creak", "scrape")
+WORDS = {
+    "squeak": "intermittent and tonal", "squeal": "sustained and tonal", "creak": "a train of stick-slip pulses",
+    "scrape": "broad band", "tonal": "tonal, with no sign of friction", "noise": "broad band throughout",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Squeak:
+    """A burst.
+
+    Attributes
+    ----------
+    start, duration : float
+        When it begins, and how long it lasts [s].
+    frequency : float
+        Dominant frequency [Hz], averaged by power over the burst; of a creak that of its spectrum.
+    kind : str
+        "squeak" (intermittent and tonal), "squeal" (sustained and tonal), "creak" (stick-slip pulses), "scrape" (broad
+        band), "tonal" (tonal, with no sign of friction) or "noise".
+    friction : str
+        Whether friction makes it: "shown" by the motion beside it, "likely" by the sound alone, "not told", or "no".
+    evidence : str
+        Why it is called so, and what can not be told.
+    level : float
+        RMS [dB]: re 20 uPa of a calibrated sound, 1 um/s^2, 1 nm/s or 1 uN (ISO 1683); re 1 where the unit is none of
+        these, as :attr:`Squeaks.reference` says. NaN where it is clipped.
+    weighted_level : float
+        A-weighted level of a calibrated sound [dB]; else NaN.
+    levels : dict of str to float
+        Of every vibrating channel meanwhile [dB], with the references of ISO 1683.
+    harmonics : tuple of (float, float)
+        Frequency [Hz] and level [dB] against the dominant one of each harmonic that stands out.
+    tonality : float
+        Share of the power in the dominant frequency and its harmonics, 0 to 1.
+    rate : float
+        Pulses in a second of a creak [Hz]; else NaN.
+    phase : float
+        Where its loudest moment lies in the forcing cycle, 0 to 1 from the largest displacement on; NaN where no motion
+        is recorded.
+    speed : float
+        Velocity of sliding at that moment [m/s]; NaN where no motion is recorded.
+    status : str
+        "ok", or what is wrong with it.
+    """
+
+    start: float
+    duration: float
+    frequency: float
+    kind: str
+    friction: str
+    evidence: str
+    level: float
+    weighted_level: float
+    levels: dict[str, float]
+    harmonics: tuple[tuple[float, float], ...]
+    tonality: float
+    rate: float
+    phase: float
+    speed: float
+    status: str
+
+    @property
+    def end(self) -> float:
+        """When it ends [s]."""
+        return self.start + self.duration
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; what is not known is None."""
+        told = {**vars(self), "harmonics": [list(each) for each in self.harmonics]}
+        return {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in told.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Squeaks:
+    """The bursts of a record.
+
+    Attributes
+    ----------
+    bursts : tuple of Squeak
+        In the order of time.
+    channel : str
+        Where they were heard.
+    reference : str
+        What levels are relative to ("20 uPa").
+    forcing : float
+        Frequency of the forced motion [Hz]; NaN where none is recorded.
+    record : Record
+        Where they were found.
+    notes : tuple of str
+        What could not be told, and why.
+    """
+
+    bursts: tuple[Squeak, ...]
+    channel: str
+    reference: str
+    forcing: float
+    record: Record
+    notes: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """The kind that most of the sounding time has; "quiet" where there is no burst."""
+        time = {kind: sum(b.duration for b in self.bursts if b.kind == kind) for kind in WORDS}
+        return max(time, key=lambda kind: time[kind]) if self.bursts else "quiet"
+
+    @property
+    def squeaking(self) -> bool:
+        """Whether any burst is a squeak or a squeal."""
+        return any(burst.kind in ("squeak", "squeal") for burst in self.bursts)
+
+    def of(self, *kinds: str) -> tuple[Squeak, ...]:
+        """The bursts of some kinds."""
+        return tuple(burst for burst in self.bursts if burst.kind in kinds)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "channel": self.channel, "kind": self.kind, "squeaking": self.squeaking, "reference": self.reference,
+            "forcing": None if math.isnan(self.forcing) else self.forcing,
+            "bursts": [burst.to_dict() for burst in self.bursts], "notes": list(self.notes),
+            "history": [str(step) for step in self.record.history],
+        }  # fmt: skip
+
+    def __repr__(self) -> str:
+        rows = [
+            f"{b.start:.3f} to {b.end:.3f} s: {b.kind}, {b.frequency:.4g} Hz, {b.level:.1f} dB re {self.reference}"
+            for b in self.bursts
+        ]
+        return "\n  ".join([f"Squeaks in {self.channel}: {self.kind}", *rows])
+
+
+def find_squeaks(
+    record: Record, *, channel: str | None = None, frequencies: tuple[float, float] | None = None, span: float = 20.0
+) -> Squeaks:
+    """Does it squeak: when, at which frequency, how loudly, and does friction make the sound?
+
+    A burst is tonal where one line of the short-time spectrum stands out and goes on without a jump; it is cut where
+    its level falls by ten decibel and rises again. What remains is a creak where pulses follow each other at even
+    intervals, else broad band. Which tonal bursts are friction's is told by what is recorded beside them:
+
+    - motion and friction: those in which the contact slides and the friction force swings by more than a quarter of its
+      level at that frequency;
+    - motion alone: those that are not struck (they grow for twelve cycles, or half of their energy comes later than a
+      third of their length) while the contact slides;
+    - sound alone: those that moreover last for a hundred cycles and have two harmonics at least in whole ratios, as the
+      limit cycle of a contact has. A reed or a voice has them too; the evidence says so.
+
+    Parameters
+    ----------
+    record : Record
+        With a sound, or a vibration.
+    channel : str, optional
+        Where to listen; the first of sound, normal_acceleration, a, friction, ch1, or any other.
+    frequencies : tuple of float, optional
+        Lowest and highest that are listened to [Hz]; 50 Hz to 0.45 of the rate where left out.
+    span : float
+        Decibel below its peak where a burst begins and ends.
+
+    Returns
+    -------
+    Squeaks
+
+    Raises
+    ------
+    RecordError
+        The channel is missing or broken, or its rate too low.
+    EstimateError
+        It is silent throughout.
+
+    Examples
+    --------
+    >>> from stickslip.solve.simulate import simulate
+    >>> from stickslip.squeak.sound import squeak_record
+    >>> from stickslip.squeak.virtual_rig import squeak_rig
+    >>> found = find_squeaks(squeak_record(simulate(squeak_rig("wet", 6.13), duration=1.0), snr=30, rng=1))
+    >>> found.kind, {round(burst.frequency, -1) for burst in found.of("squeak")}
+    ('squeak', {490.0})
+    """
+    name = _chosen(record, channel)
+    record.require_clean(name, question="hearing squeaks", samples=256)
+    low, high = frequencies or (LOWEST, 0.45 * record.fs)
+    if not 0 < low < high <= 0.5 * record.fs or high < 4 * low:
+        raise RecordError(
+            f"{low:g} to {high:g} Hz at {record.fs:g} samples a second",
+            "squeaks are heard over two octaves at least, below half the rate",
+            "give frequencies=, or record at a higher rate",
+        )
+    if not span > 3:
+        raise RecordError(f"span = {span} dB", "a burst ends some decibel below its peak", "leave it out, or give 20")
+    values = record[name] - record[name].mean()
+    if not values.any():
+        raise EstimateError(f"channel {name} is silent", "a burst needs a sound", "name another channel=")
+    hearing = Hearing.of(values, record.fs, (low, high), span)
+    motion = _Motion.of(record)
+    unit = record.channels[name].unit
+    clipped = [fault.rows for fault in record.check() if (fault.kind, fault.channel) == ("clipped", name)]
+    listener = _Listener(record, name, hearing, motion, list(itertools.chain(*clipped)))
+    bursts = sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start)
+    return Squeaks(tuple(bursts), name, _reference(unit), motion.frequency, record, tuple(listener.notes(unit)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """The forced motion beside the sound: its frequency [Hz], velocity of sliding [m/s] and phase, where recorded."""
+
+    frequency: float = math.nan
+    velocity: Array | None = None
+    phase: Array | None = None
+
+    @classmethod
+    def of(cls, record: Record) -> _Motion:
+        from scipy.signal import butter, hilbert, sosfiltfilt
+
+        name = next((each for each in ("x", "v") if each in record and np.ptp(record[each]) > 0), None)
+        if name is None or not np.all(np.isfinite(record[name])):
+            return cls()
+        values = record[name] - record[name].mean()
+        power = np.abs(np.fft.rfft(values * np.hanning(len(values)))) ** 2
+        frequency = float(np.argmax(power) * record.fs / len(values))
+        if not 1.5 / record.duration < frequency < 0.02 * record.fs:
+            return cls()
+        order = butter(3, min(8 * frequency, LOWEST, 0.4 * record.fs), fs=record.fs, output="sos")
+        slow = sosfiltfilt(order, values)
+        velocity = slow if name == "v" else np.gradient(slow) * record.fs
+        place = butter(2, [0.5 * frequency, 1.5 * frequency], "bandpass", fs=record.fs, output="sos")
+        turn = np.angle(hilbert(sosfiltfilt(place, values))) / (2 * np.pi)
+        return cls(frequency, velocity, np.mod(turn - (0.25 if name == "v" else 0.0), 1.0))
+
+    def slides(self, first: int, last: int) -> bool:
+        """Whether it slides for most of the rows."""
+        if self.velocity is None:
+            return False
+        fast = RISEN * np.max(np.abs(self.velocity))
+        return bool(np.mean(np.abs(self.velocity[first:last]) > fast) > 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class _Listener:
+    """What turns a stretch of a record into a burst."""
+
+    record: Record
+    name: str
+    hearing: Hearing
+    motion: _Motion
+    clipped: list[tuple[int, int]]
+
+    def burst(self, part: Span) -> Squeak:
+        record, hearing, motion = self.record, self.hearing, self.motion
+        rows = slice(part.first, part.last)
+        values, unit = record[self.name][rows] - record[self.name].mean(), record.channels[self.name].unit
+        spoilt = any(first < part.last and last >= part.first for first, last in self.clipped)
+        frequency, harmonics, tonality = hearing.tones(part)
+        rate = pulse_train(hearing.values[rows], record.fs) if not part.tonal else math.nan
+        kind, friction, evidence = self._kind(part, rate, () if spoilt else harmonics)
+        loudest = part.first + hearing.loudest(part)
+        reference = REFERENCES.get(unit, 1.0)
+        calibrated = unit == "Pa" and not spoilt
+        return Squeak(
+            start=float(record.time[part.first]),
+            duration=(part.last - part.first) / record.fs,
+            frequency=frequency,
+            kind=kind,
+            friction=friction,
+            evidence=evidence,
+            level=math.nan if spoilt else level(values, reference, fs=record.fs),
+            weighted_level=level(values, reference, fs=record.fs, weighted=True) if calibrated else math.nan,
+            levels=self._levels(rows),
+            harmonics=() if spoilt else harmonics,
+            tonality=tonality,
+            rate=rate,
+            phase=float(motion.phase[loudest]) if motion.phase is not None else math.nan,
+            speed=float(motion.velocity[loudest]) if motion.velocity is not None else math.nan,
+            status=self._status(part, spoilt),
+        )
+
+    def _levels(self, rows: slice) -> dict[str, float]:
+        """Of every channel that vibrates, in the band that is listened to."""
+        told = {}
+        for name, channel in self.record.channels.items():
+            if channel.unit in REFERENCES and np.all(np.isfinite(self.record[name])):
+                heard = filtered(self.record[name], self.record.fs, self.hearing.band)[rows]
+                told[name] = level(heard, REFERENCES[channel.unit], fs=self.record.fs)
+        return told
+
+    def _kind(self, part: Span, rate: float, harmonics: tuple[tuple[float, float], ...]) -> tuple[str, str, str]:
+        """Its kind, whether friction makes it, and why."""
+        duration = (part.last - part.first) / self.record.fs
+        slides = self.motion.slides(part.first, part.last)
+        if not part.tonal:
+            return self._broad(part, rate, slides)
+        if self.motion.velocity is not None and not slides:
+            return "tonal", "no", "nothing slides meanwhile"
+        kind = "squeal" if duration * self.motion.frequency > THROUGH else "squeak"
+        if self.motion.velocity is not None and "friction" in self.record:
+            share = self._modulation(part)
+            words = f"the friction force swings by {100 * share:.0f} % of its level at {part.line:.0f} Hz as it slides"
+            return (kind, "shown", words) if share > SWINGS else ("tonal", "no", f"{words}: too little to feed it")
+        if part.growth < GROWN and self._cut(part):
+            return "tonal", "not told", "cut by the record: whether it grew or was struck can not be told"
+        if self.record.channels[self.name].unit == "Pa" and self._loudness(part) < QUIET:
+            return "tonal", "no", f"quieter than {QUIET:g} dB: it would not be heard"
+        if part.growth < GROWN and part.middle < EVEN:
+            return "tonal", "no", f"it is there after {part.growth:.1f} cycles and dies away: it is struck, not fed"
+        if self.motion.velocity is not None:
+            return kind, "likely", f"it grows for {part.growth:.0f} cycles while the contact slides"
+        locked = sum(strength > WEAK for _, strength in harmonics)
+        if locked < LOCKED or duration * part.line < TOLD:
+            return "tonal", "not told", "of sound alone: no harmonics in whole ratios, or too short to tell"
+        return (
+            "squeal" if duration > SUSTAINED else "squeak",
+            "likely",
+            (
+                f"{locked} harmonics in whole ratios, as a rubbing contact has; sound alone does not prove "
+                "friction: a reed or a voice has them too"
+            ),
+        )
+
+    def _broad(self, part: Span, rate: float, slides: bool) -> tuple[str, str, str]:
+        if not math.isnan(rate):
+            words = f"pulses follow each other at even intervals, {rate:.3g} in a second, as in stick-slip"
+            return "creak", "shown" if slides else "likely", words
+        if slides:
+            return "scrape", "shown", "broad band while the contact slides"
+        if self.hearing.partials(part) > PARTIALS:
+            return "tonal", "not told", "several partials that do not glide, as those of a bell"
+        if part.throughout:
+            return "noise", "not told", "broad band from end to end: what makes it can not be told"
+        words = "broad band, and it begins and ends; of sound alone it can not be told whether anything rubs"
+        return "scrape", "not told", words
+
+    def _modulation(self, part: Span) -> float:
+        """Amplitude of the friction force about the tone, over the friction's level."""
+        rows, friction = slice(part.first, part.last), self.record["friction"]
+        beats = filtered(friction, self.record.fs, (0.8 * part.line, min(1.2 * part.line, 0.49 * self.record.fs)))[rows]
+        return float(math.sqrt(2) * np.std(beats) / max(np.mean(np.abs(friction[rows])), np.finfo(float).tiny))
+
+    def _loudness(self, part: Span) -> float:
+        return level(self.hearing.values[part.first : part.last], REFERENCES["Pa"], fs=self.record.fs)
+
+    def _cut(self, part: Span) -> list[str]:
+        """Which ends of the record cut it."""
+        margin = self.hearing.hop
+        return [*["beginning"] * (part.first <= margin), *["end"] * (part.last >= len(self.record) - margin)]
+
+    def _status(self, part: Span, spoilt: bool) -> str:
+        ends = self._cut(part)
+        told = [f"cut by the {' and '.join(ends)} of the record: it may last longer"] if ends else []
+        told += ["clipped: its level and harmonics can not be told"] if spoilt else []
+        return "; ".join(told) or "ok"
+
+    def notes(self, unit: str) -> list[str]:
+        told = []
+        if unit not in REFERENCES:
+            told.append(
+                f"Channel {self.name} is not calibrated: its levels are relative to 1, and no sound pressure level is "
+                'told; state its sensitivity when reading, as in channels={"sound": "sound * 2.5 [Pa]"}.'
+            )
+        if self.motion.velocity is None:
+            told.append("No forced motion is recorded beside it: phase and sliding speed can not be told.")
+        return told
+
+
+def _chosen(record: Record, channel: str | None) -> str:
+    if channel is not None:
+        record.require(channel, question="hearing squeaks")
+        return channel
+    return next((name for name in HEARD if name in record), next(iter(record)))
+
+
+def _reference(unit: str) -> str:
+    return {"Pa": "20 uPa", "m/s^2": "1 um/s^2", "m/s": "1 nm/s", "N": "1 uN"}.get(unit, "1")

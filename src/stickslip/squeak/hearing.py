@@ -1,0 +1,270 @@
+"""The short-time spectrum of a sound cut into stretches: tonal ones along a line, and what remains."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+WINDOW = 0.0232  # s
+OVERLAP = 4  # windows that share a sample
+STANDS_OUT = 18.0  # dB of a line over the median of its neighbours: noise alone has 10
+OF_POWER = 0.3  # share of the power in the line and its harmonics
+LOBE = 2  # bins to either side of a line that are its own
+AROUND = 15  # bins to either side that are its neighbours
+JUMP = 1 / 8  # octaves from frame to frame that a gliding tone makes at most
+DIP = 10.0  # dB: two bursts of one tone have a valley between them
+SHORTEST = 10  # cycles
+AUDIBLE = 30.0  # dB below the loudest moment
+ABOVE = 6.0  # dB above the quiet level
+TOGETHER = 0.08  # s: broad bursts nearer are one
+HARMONICS = 6
+PULSE, DEEP, APART = 2e-3, 6.0, 0.25  # s, dB, and the change of the logarithm of an interval
+PULSES, SLIM = 8, 0.5  # pulses at least, and their width against their interval
+WIDE = 3.0  # rates that their spectrum is wide at least: two tones that beat are as wide as their rate
+STEADY = 5  # frames of the median that a level is taken over: no dip of two frames cuts a burst
+STILL = 0.4  # s: the window in which steady partials are told from each other
+TONAL = 0.5  # of a stretch that tones fill
+
+
+@dataclass(frozen=True)
+class Span:
+    """Rows of a burst, its line [Hz] where tonal, cycles of growth, and its share before half of its energy."""
+
+    first: int
+    last: int
+    tonal: bool
+    line: float = math.nan
+    growth: float = math.nan
+    middle: float = math.nan
+    throughout: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Hearing:
+    """A sound in its band, and the frames of its short-time spectrum."""
+
+    values: Array
+    fs: float
+    band: tuple[float, float]
+    span: float
+    frequencies: Array
+    power: Array
+    size: int
+    hop: int
+
+    @classmethod
+    def of(cls, values: Array, fs: float, band: tuple[float, float], span: float) -> Hearing:
+        from scipy.signal import stft
+
+        size = min(len(values), max(64, 2 ** round(math.log2(WINDOW * fs))))
+        hop = size // OVERLAP
+        heard = filtered(values, fs, band)
+        frequencies, _, map_ = stft(heard, fs, nperseg=size, noverlap=size - hop, boundary="even", padded=True)
+        inside = frequencies <= band[1]
+        return cls(heard, fs, band, span, frequencies[inside], np.abs(map_[inside]) ** 2, size, hop)
+
+    @cached_property
+    def lines(self) -> tuple[Array, Array, Flags]:
+        """Of each frame the strongest line [Hz], its level [dB], and whether it is a tone."""
+        power, count = self.power, len(self.frequencies)
+        peak = np.argmax(power, axis=0)
+        columns = np.arange(power.shape[1])
+        strong = power[peak, columns]
+        offsets = np.r_[-AROUND:-LOBE, LOBE + 1 : AROUND + 1]
+        around = np.clip(peak + offsets[:, None], 0, count - 1)
+        beside = np.median(power[around, columns], axis=0)
+        own = sum(
+            power[np.clip(order * peak + step, 0, count - 1), columns]
+            for order in range(1, HARMONICS + 1)
+            for step in range(-LOBE, LOBE + 1)
+        )
+        whole = np.maximum(power.sum(axis=0), np.finfo(float).tiny)
+        lobe = sum(power[np.clip(peak + step, 0, count - 1), columns] for step in range(-LOBE, LOBE + 1))
+        tonal = (_decibel(strong) - _decibel(beside) > STANDS_OUT) & (np.minimum(own / whole, 1) > OF_POWER)
+        return self._refined(peak), _decibel(np.asarray(lobe)), tonal & (strong > 0)
+
+    @cached_property
+    def spans(self) -> tuple[Span, ...]:
+        """The bursts: creaks and broad ones where the sound is not tonal, tonal ones elsewhere."""
+        active = self._active()
+        tonal = [part for part in self._tonal_spans() if active[self._frame(part.first) : self._frame(part.last)].any()]
+        covered = np.zeros(len(active), dtype=bool)
+        for part in tonal:
+            covered[self._frame(part.first) : self._frame(part.last) + 1] = True
+        broad = []
+        for first, last in _joined(_runs(active), round(TOGETHER * self.fs / self.hop)):
+            rows = self._rows(first, last)
+            creaks = not math.isnan(pulse_train(self.values[rows[0] : rows[1]], self.fs))
+            if creaks or (covered[first:last].mean() < TONAL and last - first > OVERLAP):
+                broad.append(Span(*rows, False, throughout=bool(active.mean() > 0.97)))
+        outside = [p for p in tonal if not any(b.first <= (p.first + p.last) / 2 < b.last for b in broad)]
+        return (*outside, *broad)
+
+    def tones(self, part: Span) -> tuple[float, tuple[tuple[float, float], ...], float]:
+        """Dominant frequency [Hz], the harmonics that stand out, and the share of the power in both."""
+        values = self.values[part.first : part.last]
+        size = 4 * 2 ** math.ceil(math.log2(max(len(values), 16)))
+        power = np.abs(np.fft.rfft(values * np.hanning(len(values)), size)) ** 2
+        step = self.fs / size
+        line = part.line if part.tonal else float(np.argmax(power)) * step
+        frequency = _centre(power, step, 0.9 * line, 1.1 * line)
+        wide = max(4 * self.fs / len(values), 0.02 * frequency)
+        lobe = power[_bins(step, frequency, wide, len(power))]
+        strength, own, found, inside = lobe.max(), lobe.sum(), [], 0.0
+        for order in range(2, HARMONICS + 1):
+            if order * frequency + wide > self.band[1]:
+                break
+            place = _bins(step, order * frequency, order * wide, len(power))
+            beside = _bins(step, order * frequency, 8 * order * wide, len(power))
+            if _decibel(power[place].max()) - _decibel(np.median(power[beside])) > STANDS_OUT:
+                found.append((order * frequency, float(_decibel(power[place].max()) - _decibel(strength))))
+                inside += power[place].sum()
+        return frequency, tuple(found), float(min(1.0, (own + inside) / max(power.sum(), np.finfo(float).tiny)))
+
+    def partials(self, part: Span) -> float:
+        """Share of the power in lines that stay where they are: those of a long window that stand out."""
+        from scipy.ndimage import median_filter
+        from scipy.signal import welch
+
+        values = self.values[part.first : part.last]
+        _, power = welch(values, self.fs, nperseg=min(len(values), round(STILL * self.fs)))
+        apart = power > 10 ** (STANDS_OUT / 10) * median_filter(power, 2 * AROUND + 1)
+        return float(power[apart].sum() / max(power.sum(), np.finfo(float).tiny))
+
+    def loudest(self, part: Span) -> int:
+        """Row of its loudest moment, counted from its first."""
+        return int(np.argmax(_smooth(self.values[part.first : part.last] ** 2, self.size // 2)))
+
+    def _active(self) -> Flags:
+        """Frames in which something sounds."""
+        loud = _decibel(self.power.sum(axis=0))
+        quiet = float(np.quantile(loud, 0.1))
+        if loud.max() - quiet < 2 * ABOVE + 3:  # it sounds from end to end
+            return np.ones(len(loud), dtype=bool)
+        return np.asarray(loud > max(loud.max() - AUDIBLE, quiet + ABOVE))
+
+    def _tonal_spans(self) -> list[Span]:
+        from scipy.ndimage import median_filter
+        from scipy.signal import find_peaks
+
+        line, strength, tonal = self.lines
+        octaves = np.abs(np.diff(np.log2(np.maximum(line, 1e-9))))
+        bins = np.abs(np.diff(line)) / self.frequencies[1]
+        joined = tonal[1:] & tonal[:-1] & ((octaves < JUMP) | (bins < 2))
+        found = []
+        for first, last in _runs(joined):
+            stretch = median_filter(strength[first : last + 1], STEADY, mode="nearest")
+            padded = np.concatenate([[stretch.min() - DIP], stretch, [stretch.min() - DIP]])
+            peaks, _ = find_peaks(padded, prominence=DIP)
+            peaks = peaks - 1
+            cuts = [int(a + np.argmin(stretch[a:b])) for a, b in itertools.pairwise(peaks)]
+            for begin, end, peak in zip([0, *cuts], [*cuts, len(stretch)], peaks, strict=False):
+                near = np.flatnonzero(stretch[begin:end] < stretch[peak] - self.span) + begin
+                begin = int(max(near[near < peak].max(initial=-1) + 1, begin))
+                end = int(min(near[near > peak].min(initial=len(stretch)), end))
+                found.append(self._tonal(first + begin, first + end, line[first + begin : first + end]))
+        return [part for part in found if (part.last - part.first) * part.line > SHORTEST * self.fs]
+
+    def _tonal(self, begin: int, end: int, line: Array) -> Span:
+        """A stretch of frames as a burst, with how it grew."""
+        first, last = self._rows(begin, end)
+        middle = float(np.median(line))
+        before = max(0, first - self.size)
+        near = self.values[before : last + self.size]
+        around = filtered(near, self.fs, (0.7 * middle, min(1.4 * middle, 0.49 * self.fs)))[first - before :]
+        around = around[: last - first]
+        energy = _smooth(around**2, max(3, round(2 * self.fs / middle)))
+        peak = int(np.argmax(energy))
+        low = np.flatnonzero(energy[:peak] < energy[peak] / 100)
+        grown = (np.flatnonzero(energy[: peak + 1] > 0.8 * energy[peak])[0] - low.max(initial=0)) * middle / self.fs
+        total = np.cumsum(energy)
+        half = float(np.searchsorted(total, total[-1] / 2) / max(1, len(total)))
+        return Span(first, last, True, middle, float(max(grown, 0.0)), half)
+
+    def _rows(self, begin: int, end: int) -> tuple[int, int]:
+        """Samples of frames: each is centred on a multiple of the hop."""
+        return max(0, begin * self.hop - self.hop // 2), min(len(self.values), (end - 1) * self.hop + self.hop // 2 + 1)
+
+    def _frame(self, row: int) -> int:
+        return int(min(self.power.shape[1], round(row / self.hop)))
+
+    def _refined(self, peak: NDArray[np.intp]) -> Array:
+        inner = np.clip(peak, 1, len(self.frequencies) - 2)
+        columns = np.arange(len(peak))
+        low, middle, high = (_decibel(self.power[inner + side, columns]) for side in (-1, 0, 1))
+        bend = low - 2 * middle + high
+        shift = np.where(bend < 0, 0.5 * (low - high) / np.where(bend < 0, bend, -1.0), 0.0)
+        return np.asarray((inner + np.clip(shift, -0.5, 0.5)) * self.frequencies[1])
+
+
+def pulse_train(values: Array, fs: float) -> float:
+    """Rate [Hz] of pulses that follow each other at intervals that change slowly; NaN where they do not."""
+    from scipy.signal import find_peaks, hilbert, peak_widths
+
+    if len(values) < 64:
+        return math.nan
+    level = _decibel(_smooth(np.abs(hilbert(values)) ** 2, max(3, round(PULSE * fs))))
+    peaks, _ = find_peaks(level, prominence=DEEP, height=level.max() - AUDIBLE)
+    if len(peaks) < PULSES:
+        return math.nan
+    intervals = np.diff(peaks) / fs
+    change = np.abs(np.diff(np.log(intervals)))
+    width = float(np.median(peak_widths(10 ** (level / 10), peaks, rel_height=0.5)[0][:-1] / fs / intervals))
+    rate = float(1 / np.median(intervals))
+    power = np.abs(np.fft.rfft(values)) ** 2
+    lines = np.fft.rfftfreq(len(values), 1 / fs)
+    spread = math.sqrt(np.average((lines - np.average(lines, weights=power)) ** 2, weights=power))
+    return math.nan if np.median(change) > APART or width > SLIM or spread < WIDE * rate else rate
+
+
+def filtered(values: Array, fs: float, band: tuple[float, float]) -> Array:
+    """What lies between two frequencies [Hz], without delay."""
+    from scipy.signal import butter, sosfiltfilt
+
+    order = butter(4, [band[0], min(band[1], 0.499 * fs)], "bandpass", fs=fs, output="sos")
+    return np.asarray(sosfiltfilt(order, values - values.mean(), padlen=min(len(values) - 1, int(fs / band[0]))))
+
+
+def _smooth(values: Array, width: int) -> Array:
+    from scipy.ndimage import uniform_filter1d
+
+    return np.asarray(uniform_filter1d(uniform_filter1d(values, width), width))
+
+
+def _decibel(power: Array | float) -> Array:
+    return np.asarray(10 * np.log10(np.maximum(power, 1e-300)))
+
+
+def _runs(flags: Flags) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _joined(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
+    found: list[tuple[int, int]] = []
+    for first, last in runs:
+        if found and first - found[-1][1] <= gap:
+            found[-1] = (found[-1][0], last)
+        else:
+            found.append((first, last))
+    return found
+
+
+def _bins(step: float, centre: float, reach: float, count: int) -> slice:
+    last = math.ceil((centre + reach) / step) + 1
+    return slice(max(0, math.floor((centre - reach) / step)), max(1, min(count, last)))
+
+
+def _centre(power: Array, step: float, low: float, high: float) -> float:
+    """Mean frequency by power of the line between two, where it stands out."""
+    part = _bins(step, (low + high) / 2, (high - low) / 2, len(power))
+    weights = np.where(power[part] > power[part].max() / 100, power[part], 0.0)
+    return float(np.average(np.arange(part.start, part.stop), weights=weights) * step)

@@ -1,0 +1,212 @@
+"""Sound: how loud a vibrating surface is at a distance, levels, and what a squeaking rig would have recorded."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.errors import ModelError, RecordError
+from stickslip.laws.base import finite
+from stickslip.record.channels import Channel, described
+from stickslip.record.record import Record, Step
+from stickslip.structure import Structure
+
+if TYPE_CHECKING:
+    from stickslip.solve.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+AIR, SPEED_OF_SOUND = 1.204, 343.2  # kg/m^3 and m/s, dry air at 20 C and 101.325 kPa
+REFERENCES = {"Pa": 20e-6, "m/s^2": 1e-6, "m/s": 1e-9, "N": 1e-6}  # ISO 1683
+TIP = 2e-3  # m^2: chosen, the radiating area of the pinching beam's tip
+MICROPHONE = 0.1  # m: chosen; the thesis's stood an inch away, nearer than a point source of this area allows
+A_POLES = (20.598997, 107.65265, 737.86223, 12194.217)  # Hz, IEC 61672-1
+
+
+def sound_pressure(
+    run: Trajectory | Record, *, fs: float | None = None, area: float = TIP, distance: float = MICROPHONE,
+    normal: ArrayLike | str | None = None,
+) -> Record:  # fmt: skip
+    r"""How loud is a vibrating surface at a distance?
+
+    A small surface in a free field is a point source (Morse and Ingard, "Theoretical Acoustics", 1968, section 7.1):
+
+    .. math:: p(t) = \frac{\rho\,S\,a_n(t - r/c)}{4\pi r}
+
+    with S its area, a_n its acceleration towards the outside, r the distance, and air of 20 C: 1.204 kg/m^3, 343.2 m/s.
+    Nothing is heard before the first wave arrives.
+
+    Parameters
+    ----------
+    run : Trajectory or Record
+        What vibrates; a Trajectory is sampled when the sound left it, a Record is delayed by its spectrum.
+    fs : float, optional
+        Sampling rate of the sound [Hz]; of a Trajectory alone, and needed there.
+    area : float
+        S [m^2].
+    distance : float
+        r [m].
+    normal : array_like or str, optional
+        Of a Trajectory: the share of each degree of freedom in a_n; the second alone of a structure where left out. Of
+        a Record: the channel, "normal_acceleration" or "a" where left out.
+
+    Returns
+    -------
+    Record
+        With "sound" [Pa]: alone, or beside the channels of the Record given.
+
+    Raises
+    ------
+    ModelError
+        An area, distance or direction without meaning, or a surface so near or so large that it is no point.
+    RecordError
+        No rate for a Trajectory, or a Record without the acceleration.
+
+    Examples
+    --------
+    A surface of 10 cm^2 that shakes with 100 m/s^2 (amplitude), heard one metre away:
+
+    >>> t = np.arange(2000) / 8000
+    >>> shaken = Record.of({"a": 100 * np.sin(2 * np.pi * 400 * t)}, fs=8000)
+    >>> heard = sound_pressure(shaken, area=1e-3, distance=1.0)
+    >>> round(float(np.abs(heard["sound"][400:1600]).max()), 5), round(1.204 * 1e-3 * 100 / (4 * np.pi), 5)
+    (0.00958, 0.00958)
+    """
+    finite("area", area, unit="m^2", positive=True)
+    finite("distance", distance, unit="m", positive=True)
+    if distance < math.sqrt(area / math.pi):
+        raise ModelError(
+            f"distance = {distance:g} m from a surface of {area:g} m^2",
+            "a point source is heard from farther away than its radius",
+            "give a larger distance= or a smaller area=",
+        )
+    gain, lag = AIR * area / (4 * math.pi * distance), distance / SPEED_OF_SOUND
+    step = Step("sound_pressure", {"area": area, "distance": distance}, f"{lag * 1e3:.3g} ms later")
+    if isinstance(run, Record):
+        name = normal if isinstance(normal, str) else "normal_acceleration" if "normal_acceleration" in run else "a"
+        run.require_clean(name, question="the sound of a surface")
+        return run.with_channel("sound", gain * _later(run[name], lag * run.fs), unit="Pa", source=name, step=step)
+    if fs is None or not (math.isfinite(fs) and fs > 0):
+        raise RecordError(f"fs = {fs}", "the sound of a simulated run is sampled at a positive rate", "give fs= in Hz")
+    times = np.arange(int(np.floor(run.duration * fs * (1 + 1e-12))) + 1) / fs
+    samples = {"sound": gain * _leaving(run, times - lag, _share(run, normal))}
+    channels = {"sound": Channel("sound", "Pa", described("sound", "Pa"), source="sound_pressure")}
+    return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(run.system)})
+
+
+def squeak_record(
+    run: Trajectory, *, fs: float = 10_000.0, snr: float = math.inf,
+    rng: int | np.random.Generator | None = None, area: float = TIP, distance: float = MICROPHONE,
+) -> Record:  # fmt: skip
+    """What the sensors of a squeak rig would have written of a run of :func:`squeak_rig`.
+
+    The channels of the thesis's section 7.2 (2): displacement, velocity and acceleration of the mass, the base,
+    friction, normal acceleration and angular velocity of the beam's tip, and the sound.
+
+    Parameters
+    ----------
+    run : Trajectory
+        Of a Structure of three degrees of freedom: tangential, normal, rotational.
+    fs : float
+        Sampling rate [Hz].
+    snr : float
+        Signal to noise [dB]: each channel's RMS about its mean over that of its white noise; none where infinite.
+    rng : int or Generator, optional
+        Where the noise comes from.
+    area, distance : float
+        As in :func:`sound_pressure`.
+
+    Returns
+    -------
+    Record
+        Channels x, v, a, z, friction, normal_acceleration, torsion_velocity, sound.
+
+    Raises
+    ------
+    ModelError
+        A run of something else, or as in :func:`sound_pressure`.
+
+    Examples
+    --------
+    >>> from stickslip.solve.simulate import simulate
+    >>> from stickslip.squeak.virtual_rig import squeak_rig
+    >>> record = squeak_record(simulate(squeak_rig(), duration=0.4), snr=30, rng=1)
+    >>> list(record)
+    ['x', 'v', 'a', 'z', 'friction', 'normal_acceleration', 'torsion_velocity', 'sound']
+    """
+    if not isinstance(run.system, Structure) or run.system.size != 3 or not run.table.motion.base:
+        raise ModelError(
+            f"a run of {type(run.system).__name__}",
+            "the rig's record is of a tangential, a normal and a rotational motion on a moving base",
+            "simulate squeak_rig()",
+        )
+    if math.isnan(snr):
+        raise ModelError("snr = nan", "a signal-to-noise ratio is a number of decibel", "give snr= in dB")
+    heard = sound_pressure(run, fs=fs, area=area, distance=distance)
+    times = np.minimum(heard.time, run.duration)
+    motion, _ = run.sample(times, ("x", "v", "a", "friction", "z"))
+    rows = {
+        "x": (motion[0], "m"), "v": (motion[3], "m/s"), "a": (motion[6], "m/s^2"), "z": (motion[-1], "m"),
+        "friction": (motion[9:-1].sum(axis=0), "N"), "normal_acceleration": (motion[7], "m/s^2"),
+        "torsion_velocity": (motion[5], "rad/s"), "sound": (heard["sound"], "Pa"),
+    }  # fmt: skip
+    generator = np.random.default_rng(rng)
+    samples, channels = {}, {}
+    for name, (values, unit) in rows.items():
+        noise = float(np.std(values)) * 10 ** (-snr / 20)
+        samples[name] = values + noise * generator.standard_normal(len(values))
+        channels[name] = Channel(name, unit, described(name, unit), "squeak_record", noise=noise)
+    step = Step("squeak_record", {"fs": fs, "snr": str(snr), "area": area, "distance": distance}, "virtual sensors")
+    return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(run.system)})
+
+
+def a_weighting(frequency: ArrayLike) -> Array:
+    """The A-weighting of IEC 61672-1 as a factor of the amplitude; 1 at 1 kHz."""
+
+    def weight(f: Array) -> Array:
+        first, second, third, fourth = (pole * pole for pole in A_POLES)
+        square = f * f
+        root = np.sqrt((square + second) * (square + third))
+        return np.asarray(fourth * square**2 / ((square + first) * root * (square + fourth)))
+
+    return weight(np.asarray(frequency, dtype=float)) / weight(np.asarray(1000.0))
+
+
+def level(values: Array, reference: float, *, fs: float, weighted: bool = False) -> float:
+    """RMS in dB re `reference`; A-weighted if asked."""
+    power = float(np.mean(values**2))
+    if weighted:
+        spectrum = np.abs(np.fft.rfft(values)) ** 2
+        gain = a_weighting(np.fft.rfftfreq(len(values), 1 / fs)) ** 2
+        power *= float(gain @ spectrum / max(spectrum.sum(), np.finfo(float).tiny))
+    return 10 * math.log10(max(power, np.finfo(float).tiny) / reference**2)
+
+
+def _share(run: Trajectory, normal: ArrayLike | str | None) -> Array:
+    size = run.rows("a").shape[1]
+    share = np.zeros(size)
+    share[min(1, size - 1)] = 1.0
+    given = share if normal is None or isinstance(normal, str) else np.asarray(normal, dtype=float)
+    if given.shape != (size,) or not np.all(np.isfinite(given)) or isinstance(normal, str):
+        raise ModelError(f"normal = {normal!r}", f"it has {size} finite numbers", "correct normal=")
+    return given
+
+
+def _leaving(run: Trajectory, times: Array, share: Array) -> Array:
+    """Normal acceleration at instants, 0 before the run begins."""
+    begun = times >= 0
+    values = np.zeros(len(times))
+    values[begun] = share @ run.sample(np.minimum(times[begun], run.duration), ("a",))[0]
+    return values
+
+
+def _later(values: Array, samples: float) -> Array:
+    """`values` delayed by a number of samples that need not be whole; zero before."""
+    whole, part = divmod(samples, 1.0)
+    padded = np.concatenate([values, np.zeros(len(values))])
+    spectrum = np.fft.rfft(padded) * np.exp(-2j * np.pi * part * np.fft.rfftfreq(len(padded)))
+    shifted = np.fft.irfft(spectrum, len(padded))
+    return np.concatenate([np.zeros(int(whole)), shifted])[: len(values)]
