@@ -28,7 +28,7 @@ TOGETHER = 0.08  # s: broad bursts nearer are one
 HARMONICS = 6
 PULSE, DEEP, APART = 2e-3, 6.0, 0.25  # s, dB, and the change of the logarithm of an interval
 PULSES, SLIM = 8, 0.5  # pulses at least, and their width against their interval
-WIDE = 3.0  # rates that their spectrum is wide at least: two tones that beat are as wide as their rate
+WIDE, BROAD = 3.0, 0.3  # rates, and share of the middle frequency, that a pulse's spectrum is wide: beats are narrow
 STEADY = 5  # frames of the median that a level is taken over: no dip of two frames cuts a burst
 STILL = 0.4  # s: the window in which steady partials are told from each other
 TONAL = 0.5  # of a stretch that tones fill
@@ -219,10 +219,10 @@ def pulse_train(values: Array, fs: float) -> float:
     change = np.abs(np.diff(np.log(intervals)))
     width = float(np.median(peak_widths(10 ** (level / 10), peaks, rel_height=0.5)[0][:-1] / fs / intervals))
     rate = float(1 / np.median(intervals))
-    power = np.abs(np.fft.rfft(values)) ** 2
-    lines = np.fft.rfftfreq(len(values), 1 / fs)
-    spread = math.sqrt(np.average((lines - np.average(lines, weights=power)) ** 2, weights=power))
-    return math.nan if np.median(change) > APART or width > SLIM or spread < WIDE * rate else rate
+    share = np.cumsum(np.abs(np.fft.rfft(values)) ** 2)
+    low, middle, high = np.searchsorted(share, np.array([0.1, 0.5, 0.9]) * share[-1]) * fs / len(values)
+    broad = high - low > max(WIDE * rate, BROAD * middle)
+    return rate if broad and np.median(change) < APART and width < SLIM else math.nan
 
 
 def filtered(values: Array, fs: float, band: tuple[float, float]) -> Array:
