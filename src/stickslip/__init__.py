@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from stickslip.fit.load import LoadLine as LoadLine, friction_over_load as friction_over_load
     from stickslip.fit.memory import FrictionMemory as FrictionMemory, friction_memory as friction_memory
     from stickslip.fit.decay import fit_decay as fit_decay
+    from stickslip.fit.which_law import LawComparison as LawComparison, compare_laws as compare_laws
     from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
     from stickslip.identify.decrement import Bounds as Bounds, Decrement as Decrement, decrement as decrement
     from stickslip.identify.envelope import (
@@ -97,6 +98,11 @@ if TYPE_CHECKING:
         from_xarray as from_xarray,
     )
     from stickslip.record.record import Record as Record, Step as Step
+    from stickslip.reports.fit import (
+        fit_numbers as fit_numbers,
+        fit_summary as fit_summary,
+        publish_fit as publish_fit,
+    )
     from stickslip.reports.folder import publish as publish
     from stickslip.reports.page import report as report
     from stickslip.reports.rig import publish_rig as publish_rig
@@ -258,6 +264,8 @@ _ROOMS = {
     "friction_over_load": "fit.load", "LoadLine": "fit.load",
     "friction_memory": "fit.memory", "FrictionMemory": "fit.memory",
     "fit_law": "fit.law", "LawFit": "fit.law",
+    "publish_fit": "reports.fit", "fit_summary": "reports.fit", "fit_numbers": "reports.fit",
+    "compare_laws": "fit.which_law", "LawComparison": "fit.which_law",
     "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",
     "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",
     "extreme_decay": "identify.envelope", "hilbert_decay": "identify.envelope", "EnvelopeDecay": "identify.envelope",

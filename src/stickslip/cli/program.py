@@ -10,6 +10,7 @@ import stickslip as ss
 from stickslip.cli.analyze import analyze, demo
 from stickslip.cli.decay import decay
 from stickslip.cli.exchange import check, convert, datasets
+from stickslip.cli.fit import fit
 from stickslip.cli.rig import rig
 from stickslip.cli.simulate import INTERRUPTED, simulate
 from stickslip.cli.wavelet import wavelet
@@ -43,5 +44,5 @@ def main() -> None:
     """
 
 
-for _command in (analyze, check, convert, datasets, decay, demo, rig, simulate, wavelet):
+for _command in (analyze, check, convert, datasets, decay, demo, fit, rig, simulate, wavelet):
     main.add_command(_command)

@@ -207,7 +207,7 @@ def fit_law(
     sure = surety(problem, point, tell) if intervals else None
     if progress:
         progress(1.0)
-    return _answer(problem, point, sure, shown)
+    return answered(problem, point, sure, shown)
 
 
 def _teller(progress: Callable[[float], object] | None) -> Callable[[], None]:
@@ -240,7 +240,8 @@ def _require_sliding(shown: Shown, rows: NDArray[np.intp]) -> None:
         )  # fmt: skip
 
 
-def _answer(problem: Problem, point: Point, sure: Surety | None, shown: Sequence[Shown]) -> LawFit:
+def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequence[Shown]) -> LawFit:
+    """What is told of the point at which a search has ended."""
     system = problem.system(point.u)
     gains = problem.sensor_knobs(point.u, "gain")
     traces, sums, counts, noise = [], dict[str, float](), dict[str, int](), dict[str, float]()

@@ -1,0 +1,115 @@
+"""stickslip fit"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.progress import progress
+from stickslip.cli.records import default_folder, groups_of, name_of, read, rig_of
+from stickslip.cli.show import table
+from stickslip.cli.words import spoken
+
+if TYPE_CHECKING:
+    from stickslip import CurveFit, LawComparison, Record, RigSettings
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("250 g").')
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
+@click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
+@click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
+@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+@click.option(
+    "--laws",
+    default="Coulomb,static,Stribeck,compliant,state variable,LuGre",
+    show_default=True,
+    help="The laws to compare, with commas.",
+)
+@click.option("--calibration", type=float, default=0.01, show_default=True, help="By what part gains may be wrong.")
+@click.option(
+    "--curve",
+    metavar="NAME",
+    help="Fit a curve over velocity or displacement instead: coulomb, viscous, stribeck, asymmetric, tabulated, dahl, "
+    "jenkins, iwan, maxwell. The choice where a file holds friction and velocity but no motion of the mass.",
+)
+@result_options("FILE-stickslip")
+@reading_options
+def fit(
+    files: tuple[str, ...], output: Path | None, as_json: bool, laws: str, calibration: float, curve: str | None,
+    **options: Any,
+) -> None:  # fmt: skip
+    """Find which friction law it is, with its parameters.
+
+    FILES are records of one rig, best at several excitations: displacement or velocity of the mass, the base's motion
+    z, and what else was measured (acceleration, load cell). Each law is simulated exactly and fitted to all records at
+    once; told is which laws the records leave possible, how sure that is, and the best law's parameters.
+
+    Results go into a folder: report.html to open in a browser, results.json, and the figures.
+
+    \b
+    stickslip fit run_2.5Hz.csv run_8.7Hz.csv --mass 2.42 --stiffness 2310 --laws "Coulomb,compliant,LuGre"
+    stickslip fit sweep.csv --channels "v=speed [mm/s]" --channels "friction=F [N]" --curve stribeck
+    """
+    rig = rig_of(**options)
+    groups = [group for argument in files for group in groups_of(argument)]
+    folder = output or (None if as_json else default_folder(groups))
+    with progress(3) as tell:
+        tell("reading", 0)
+        records = [read(group, rig) for group in groups]
+        result = _answer(records, rig, laws, calibration, curve, tell)
+        tell("drawing and writing", 2)
+        name = name_of(groups[0]) if len(groups) == 1 else f"{len(groups)} records"
+        written = ss.publish_fit(result, folder=folder, records=records, name=name) if folder else None
+    _show(result, records, name, written, as_json=as_json)
+
+
+def _answer(
+    records: list[Record], rig: RigSettings, laws: str, calibration: float, curve: str | None, tell: Any
+) -> LawComparison | CurveFit:
+    if curve is not None or not {"x", "v"} & set(records[0]) or ("x" not in records[0] and "friction" in records[0]):
+        if len(records) > 1:
+            raise ss.ModelError("a curve of several files", "a curve is fitted to one record", "name one file")
+        tell("fitting", 1)
+        return ss.fit_curve(records[0], curve=curve or "stribeck", contact=rig.contact)
+    constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
+    if missing := [name for name, value in constants.items() if value is None]:
+        raise ss.ModelError(
+            f"no {' and no '.join(missing)}", "a law is fitted by simulating the oscillator",
+            f"give {' and '.join(f'{name}=' for name in missing)}",
+        )  # fmt: skip
+    drive = ss.HarmonicBase(0.0, frequency=1.0, contact=rig.contact) if rig.contact == "base" else ss.Release()
+    slider = ss.Oscillator(**constants, damping=rig.damping or 0.0, damper=rig.damper, law=ss.Coulomb(1.0), drive=drive)
+    names = [name for name in laws.split(",") if name.strip()]
+    return ss.compare_laws(
+        records, slider, laws=names, calibration=calibration,
+        progress=lambda share: tell(f"fitting and comparing {len(names)} laws, {share:.0%}", 1 + share),
+    )  # fmt: skip
+
+
+def _show(
+    result: LawComparison | CurveFit, records: list[Record], name: str, written: Path | None, *, as_json: bool
+) -> None:
+    if as_json:
+        click.echo(json.dumps(ss.fit_numbers(result), indent=2, ensure_ascii=False, allow_nan=False))
+        return
+    from rich.console import Console
+    from rich.markup import escape
+
+    summary = ss.fit_summary(result, records=records, name=name)
+    console = Console(highlight=False, soft_wrap=False)
+    console.print(f"\n[bold]{escape(summary.title)}[/bold]")
+    for sentence in (*summary.headline, *summary.cautions):
+        console.print(escape(spoken(sentence)))
+    rows = [[line.name, line.value, line.interval, line.status] for line in summary.lines]
+    console.print(table(("quantity", "value", "95 % interval", "how sure"), rows))
+    if summary.verdicts:
+        console.print(table(("law tried", "verdict"), summary.verdicts))
+    if written is not None:
+        click.echo(f"Report: {written / 'report.html'}")

@@ -1,0 +1,172 @@
+"""Which of several fitted laws the records leave possible, where none of them leaves noise alone.
+
+What a law leaves over is mostly error of the model: a gain that is 1 % off, a surface that is not even. Its variance is
+taken from what is left of each channel of each record, and what lies between two reversals counts as one story, so that
+no sample is taken for a proof of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.estimate import Estimate
+from stickslip.statistics import correlation_time
+
+Array = NDArray[np.float64]
+Key = tuple[str, int]
+"""A channel, and the number of its record."""
+
+SEPARATED = 2.0  # times the misfit of the best law, from which on another family is rejected
+CALIBRATIONS = 3.0  # times the calibration's error, below which an effect is not to be told from it
+CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
+SHARPNESS = 4.0  # power of the ratio of misfits that the odds between two families follow
+FAMILIES = {"Coulomb": "rigid", "static": "rigid", "Stribeck": "rigid"}
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """What a law leaves of the records.
+
+    Attributes
+    ----------
+    name : str
+        The law.
+    count : int
+        Its parameters.
+    squares : mapping of (str, int) to float
+        Mean square of what is left of each channel of each record [unit of the channel, squared].
+    predicted : mapping of (str, int) to float, or None
+        The same where each record is predicted by a fit to the others.
+    """
+
+    name: str
+    count: int
+    squares: Mapping[Key, float]
+    predicted: Mapping[Key, float] | None = None
+
+    @property
+    def family(self) -> str:
+        """Rigid laws are one family; each other law is its own."""
+        return FAMILIES.get(self.name, self.name)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a law stands among those tried.
+
+    Attributes
+    ----------
+    name, family : str
+        The law.
+    misfit : float
+        Mean square of what it leaves over that of the best law, the mean over channels and records; 1 is the best.
+    criterion : float
+        Schwarz's information criterion less that of the best law; more is worse.
+    prediction : float
+        As the misfit, where each record is predicted by a fit to the others; nan where it was not asked.
+    kept : bool
+        Whether the records leave it possible.
+    verdict : str
+        In words.
+    """
+
+    name: str
+    family: str
+    misfit: float
+    criterion: float
+    prediction: float
+    kept: bool
+    verdict: str
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """How much each channel counts: samples that tell a story of their own, and the noise [unit of the channel]."""
+
+    counts: Mapping[Key, float]
+    noise: Mapping[Key, float]
+
+    def criterion(self, squares: Mapping[Key, float], count: int) -> float:
+        """Schwarz's, the variance of each channel unknown but for its noise: ``sum n log S + p log(sum n)``."""
+        likely = math.fsum(n * math.log(max(squares[name], self.noise[name] ** 2)) for name, n in self.counts.items())
+        return likely + count * math.log(max(2.0, math.fsum(self.counts.values())))
+
+    def over(self, squares: Mapping[Key, float], best: Mapping[Key, float]) -> float:
+        """What is left over what the best law leaves, the mean over channels and records."""
+        floors = {name: noise**2 for name, noise in self.noise.items()}
+        return float(np.mean([max(squares[n], low) / max(best[n], low) for n, low in floors.items()]))
+
+
+def independent(residual: Array) -> float:
+    """How many samples that tell each a story of their own a residual holds."""
+    return len(residual) / correlation_time(residual)
+
+
+def standings(
+    misfits: Sequence[Misfit], evidence: Evidence, *, excess: Estimate | None, calibration: float
+) -> tuple[list[Standing], float]:
+    """The laws, the best one first, those kept that the records leave possible; and the confidence in that."""
+    order = sorted(misfits, key=lambda each: evidence.criterion(each.squares, each.count))
+    best = order[0]
+    ratios = {each.name: evidence.over(each.squares, best.squares) for each in order}
+    forecasts = _forecasts(order, evidence)
+    inner, sure = _within([each for each in order if each.family == best.family], evidence, excess, calibration)
+    others = {each.name for each in order if each.family != best.family}
+    near = {name for name in others if ratios[name] <= SEPARATED}
+    level = evidence.criterion(best.squares, best.count)
+    told = []
+    for each in order:
+        kept = each.name in (near if each.name in others else inner)
+        words = inner.get(each.name) or ("not rejected" if kept else f"rejected: misfit {times(ratios[each.name])}")
+        worse = evidence.criterion(each.squares, each.count) - level
+        told.append(Standing(each.name, each.family, ratios[each.name], worse, forecasts[each.name], kept, words))
+    odds = math.fsum(ratio**-SHARPNESS for ratio in _nearest(order, ratios, best.family))
+    return told, min(CERTAIN, sure / (1 + odds))
+
+
+def times(ratio: float) -> str:
+    """ "2.31 times", "40 times"."""
+    return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.0f} times"
+
+
+def _forecasts(order: Sequence[Misfit], evidence: Evidence) -> dict[str, float]:
+    """What the predictions of each law leave over those of the best one."""
+    best = order[0].predicted
+    return {
+        each.name: math.nan if each.predicted is None or best is None else evidence.over(each.predicted, best)
+        for each in order
+    }
+
+
+def _nearest(order: Sequence[Misfit], ratios: Mapping[str, float], best: str) -> list[float]:
+    """The least misfit of each other family."""
+    families = {each.family for each in order} - {best}
+    return [min(ratios[each.name] for each in order if each.family == family) for family in families]
+
+
+def _within(
+    family: Sequence[Misfit], evidence: Evidence, excess: Estimate | None, calibration: float
+) -> tuple[dict[str, str], float]:
+    """The laws of one family that are not rejected, with words; from the simplest on, a richer one has to earn it."""
+    steps = sorted(family, key=lambda each: each.count)
+    low, high = excess.interval if excess is not None else (0.0, math.inf)
+    least = CALIBRATIONS * calibration
+    chosen, doubted, sure = steps[0], list[Misfit](), 1.0
+    for richer in steps[1:]:
+        gain = evidence.criterion(chosen.squares, chosen.count) - evidence.criterion(richer.squares, richer.count)
+        odds = math.exp(max(-50.0, min(50.0, gain / 2)))
+        better = odds / (1 + odds)
+        if gain > 0 and low > 0 and excess is not None and excess.value > least:
+            chosen, doubted, sure = richer, [], sure * better
+        elif (gain > 0 or chosen is steps[0]) and high > least:
+            doubted.append(richer)
+            sure = min(sure, 0.5)
+        else:
+            sure *= 1 - better
+    words = {chosen.name: "not rejected" if doubted else "best"}
+    return words | {each.name: "not rejected" for each in doubted}, sure

@@ -1,0 +1,258 @@
+"""Laws tried on the same stretches of the same records: each searched, each asked for records that it has not seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.fit.law_choice import Evidence, Key, independent
+from stickslip.fit.law_search import Knob, Point, Problem, descend, rows_of
+from stickslip.fit.law_start import Shown, free_names, knob, thinned
+from stickslip.fit.law_stretch import Stretch
+from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.stribeck import Stribeck
+from stickslip.oscillator import Oscillator
+
+Array = NDArray[np.float64]
+Left = dict[Key, Array]
+Tell = Callable[[], None]
+
+FINALISTS = 2  # starts that are followed
+CONTENDING = 10.0  # times the least misfit of the others: a law beyond is not followed to its end
+PASSES, FEW = 12, 3  # of a descent: of a law, and of one that stands near its end
+EXCESSES = (0.0, 0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.32, 0.5)
+FALLS = (0.01, 0.05)  # of the largest speed, within which a Stribeck curve falls
+TURNED = 0.1  # of the largest speed, beyond which a motion has turned
+DETUNED = tuple(1 + 0.0025 * step for step in range(-10, 11))  # a mount, against what is stated
+HALVINGS = 2  # of the way to the neighbours of the best excess
+STILL = 1e-12  # scale of a knob that is not turned
+RISE = 3.84  # of minus twice the logarithm of the likelihood, at the ends of a 95 % interval
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A law at the end of its search."""
+
+    name: str
+    problem: Problem
+    point: Point
+
+    @property
+    def system(self) -> Oscillator:
+        """The oscillator with the law's values."""
+        return self.problem.system(self.point.u)
+
+    @property
+    def count(self) -> int:
+        """Parameters of the law."""
+        return len(free_names(self.problem.oscillator, None))
+
+    @property
+    def left(self) -> Left:
+        """What is left of each channel of each record [unit of the channel]."""
+        return left_of(self.problem, self.point)
+
+
+def left_of(problem: Problem, point: Point) -> Left:
+    """What is left of each channel of each record [unit of the channel]."""
+    return {
+        (sensor.channel.name, stretch.record): values[rows] * sensor.noise
+        for stretch, values in zip(problem.stretches, point.residuals, strict=True)
+        for sensor, rows in zip(stretch.sensors, rows_of(stretch.sensors), strict=True)
+    }
+
+
+def squares(left: Left) -> dict[Key, float]:
+    """Mean square of each channel of each record."""
+    return {key: float(np.mean(values**2)) for key, values in left.items()}
+
+
+def weighed(shown: Shown, number: int, oscillator: Oscillator, calibration: float, *, whole: bool = False) -> Stretch:
+    """What a record shows from its first slide on, each channel counted by its noise and its calibration's error."""
+    rows = shown.slides()
+    if len(rows) == 0:
+        raise EstimateError(
+            "the mass does not slide away from the record's ends", "laws are told apart by sliding and stopping",
+            "give a longer record, or drive harder",
+        )  # fmt: skip
+    every = shown.stretch(number, (int(rows[0]), len(shown.record) - 1), oscillator)
+    stretch = every if whole else thinned(every)
+    sensors = tuple(
+        replace(each, noise=math.hypot(each.noise, calibration * float(np.std(each.readings))))
+        for each in stretch.sensors
+    )
+    return replace(stretch, sensors=sensors)
+
+
+def searched(
+    name: str,
+    starts: Sequence[Any],
+    oscillator: Oscillator,
+    stretches: Sequence[Stretch],
+    known: Sequence[str],
+    least: float,
+    passes: int,
+    tell: Tell,
+) -> Trial | None:
+    """The law from the start from which it descends lowest; None where the engine refuses all of them.
+
+    Of many starts those are followed whose first look is best, and a law that stays far above the `least` misfit of
+    the others not to its very end.
+    """
+    looks = []
+    for number, law in enumerate(starts):
+        system = replace(oscillator, law=law)
+        problem = Problem.of(system, stretches, ())
+        looks.append((descend(problem, problem.begin(np.zeros(0)), passes=2, tell=tell), number, problem))
+    looks = sorted((each for each in looks if math.isfinite(each[0].chi2)), key=lambda each: (each[0].chi2, each[1]))
+    ends = []
+    for begun, _, still in looks[:FINALISTS]:
+        names = (*free_names(still.oscillator, None), *known)
+        problem = replace(still, knobs=tuple(knob(still.oscillator, each) for each in names))
+        point = descend(problem, problem.at(np.zeros(len(names)), begun.starts), passes=FEW, tell=tell)
+        if point.chi2 < CONTENDING * least:
+            point = descend(problem, point, passes=passes, tell=tell)
+        if math.isfinite(point.chi2):
+            ends.append((problem, point))
+            least = min(least, point.chi2)
+    return Trial(name, *min(ends, key=lambda each: each[1].chi2)) if ends else None
+
+
+def from_simpler(name: str, trials: Mapping[str, Trial]) -> list[Any]:
+    """Starts of a law at the end of a simpler one's search: with what it adds tried at several sizes."""
+    if name == "Stribeck" and "static" in trials:
+        law: Any = trials["static"].system.law
+        fastest = max(float(each.scales[1]) for each in trials["static"].problem.stretches)
+        static = max(law.static, 1.02 * law.kinetic)
+        return [Stribeck(law.kinetic, static, speed=share * fastest) for share in FALLS]
+    return []
+
+
+def predicted(trial: Trial, tell: Tell) -> Left:
+    """What is left of each record by a fit to the others; its own start alone is found anew."""
+    found: Left = {}
+    for number in range(len(trial.problem.stretches)):
+        others = [j for j in range(len(trial.problem.stretches)) if j != number]
+        fitted = descend(*_part(trial.problem, trial.point, others), passes=FEW, tell=tell)
+        held, begun = _part(trial.problem, replace(trial.point, u=fitted.u), [number])
+        sensors = [(k, u) for k, u in zip(held.knobs, fitted.u, strict=True) if k.kind in ("gain", "delay")]
+        knobs = tuple(stopped(k, u) for k, u in sensors)
+        still = replace(held, oscillator=held.system(fitted.u), knobs=knobs)
+        point = descend(still, still.at(np.zeros(len(still.knobs)), begun.starts), passes=FEW, tell=tell)
+        if not math.isfinite(point.chi2):
+            point = replace(begun, residuals=tuple(np.full_like(r, np.inf) for r in begun.residuals))
+        found |= left_of(still, point)
+    return found
+
+
+def stopped(turned: Knob, u: float) -> Knob:
+    """The knob where it stands, turned no more."""
+    return turned._replace(origin=turned.value(u), scale=STILL)
+
+
+def _part(problem: Problem, point: Point, rows: Sequence[int]) -> tuple[Problem, Point]:
+    """Some stretches of a problem, at the same point."""
+    part = replace(
+        problem, stretches=tuple(problem.stretches[j] for j in rows), entries=tuple(problem.entries[j] for j in rows),
+        scales=tuple(problem.scales[j] for j in rows),
+    )  # fmt: skip
+    return part, part.at(point.u, tuple(point.starts[j] for j in rows))
+
+
+def static_of(coulomb: Trial, evidence: Evidence, tell: Tell) -> tuple[Trial, Estimate]:
+    """The static friction, searched and not descended to, for the misfit jumps with it; and by what part it exceeds.
+
+    At each excess over the kinetic friction all else is fitted anew; where the misfit leaves the 95 % of its likelihood
+    the excess has its ends.
+    """
+    tried = {share: _held(coulomb, share, tell) for share in EXCESSES}
+    for _ in range(HALVINGS):
+        places = sorted(tried)
+        at = min(range(len(places)), key=lambda i: _worth(tried[places[i]], evidence))
+        for near in (at - 1, at + 1):
+            if 0 <= near < len(places):
+                share = (places[at] + places[near]) / 2
+                tried[share] = _held(coulomb, share, tell)
+    worth = {share: _worth(trial, evidence) for share, trial in tried.items()}
+    low, high = _ends(worth)
+    best = min(worth, key=lambda share: worth[share])
+    sd = (high - low) / (2 * NORMAL_95) if math.isfinite(high) else math.nan
+    words = "profile of the misfit, the sensors' gains free"
+    return tried[best], Estimate("excess of static friction", best, (low, high), sd, "1", words)
+
+
+def _held(coulomb: Trial, share: float, tell: Tell) -> Trial:
+    """The law whose static friction exceeds the kinetic by a share, all else fitted anew."""
+    system = coulomb.system
+    level = system.law.kinetic  # type: ignore[union-attr]
+    system = replace(system, law=Coulomb(level, static=level * (1 + share)))
+    knobs = [k._replace(origin=k.value(u)) for k, u in zip(coulomb.problem.knobs, coulomb.point.u, strict=True)]
+    held = replace(coulomb.problem, oscillator=system, knobs=(*knobs, Knob("static", "above", share, STILL)))
+    start = held.at(np.zeros(len(held.knobs)), coulomb.point.starts)
+    return Trial("static", held, descend(held, start, passes=FEW, tell=tell) if math.isfinite(start.chi2) else start)
+
+
+def _worth(trial: Trial, evidence: Evidence) -> float:
+    return evidence.criterion(squares(trial.left), 0) if math.isfinite(trial.point.chi2) else math.inf
+
+
+def _ends(tried: Mapping[float, float]) -> tuple[float, float]:
+    """Where the likelihood, straight between the values tried, leaves the interval; infinite where it does not."""
+    values = np.array(sorted(tried))
+    rises = np.array([tried[each] for each in values])
+    rises = rises - rises.min()
+    inside = np.flatnonzero(rises <= RISE)
+
+    def crossing(a: int, b: int) -> float:
+        share = (RISE - rises[a]) / (rises[b] - rises[a])
+        return float(values[a] + share * (values[b] - values[a]))
+
+    low = float(values[0]) if inside[0] == 0 else crossing(int(inside[0]), int(inside[0]) - 1)
+    high = math.inf if inside[-1] == len(values) - 1 else crossing(int(inside[-1]), int(inside[-1]) + 1)
+    return low, high
+
+
+def evidence_of(trial: Trial, shown: Sequence[Shown]) -> Evidence:
+    """How much each channel counts: the error of a model tells at most one story from one reversal to the next."""
+    left = trial.left
+    counts = {key: min(float(reversals(shown[key[1]])), independent(values)) for key, values in left.items()}
+    return Evidence(counts, {key: shown[key[1]].noise(key[0]) for key in left})
+
+
+def reversals(shown: Shown) -> int:
+    """How often the motion turns."""
+    moving = np.sign(shown.velocity[np.abs(shown.velocity) > TURNED * shown.fastest])
+    return max(1, int(np.count_nonzero(np.diff(moving))))
+
+
+def tuned(shown: Sequence[Shown], trial: Trial, stretch: Callable[[Shown, int], Stretch], tell: Tell) -> list[Shown]:
+    """The records with each mount's resonance where a law leaves least, within what a calibration is off."""
+    mounts = {
+        name: each.record.channels[name].mount for each in shown for name in each.channels
+        if each.record.channels[name].mount
+    }  # fmt: skip
+    best = list(shown)
+    for name, mount in mounts.items():
+        assert mount is not None
+        tries = []
+        for share in DETUNED:
+            tell()
+            moved = [_remounted(each, name, (share * mount[0], mount[1])) for each in best]
+            problem = replace(trial.problem, stretches=tuple(stretch(each, j) for j, each in enumerate(moved)))
+            left = squares(left_of(problem, problem.at(trial.point.u, trial.point.starts)))
+            tries.append((math.fsum(square for key, square in left.items() if key[0] == name), share, moved))
+        best = min(tries, key=lambda each: each[:2])[2]
+    return best
+
+
+def _remounted(shown: Shown, name: str, mount: tuple[float, float]) -> Shown:
+    if name not in shown.record:
+        return shown
+    return replace(shown, record=shown.record.with_details(name, mount=mount))

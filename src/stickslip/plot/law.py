@@ -1,0 +1,158 @@
+"""Fitted laws: how they stand against each other, and what is measured over what the best one predicts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stickslip.fit.curves import CurveFit
+from stickslip.fit.law_choice import SEPARATED
+from stickslip.fit.which_law import LawComparison
+from stickslip.plot.plate import Plate, plate
+from stickslip.plot.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    SKY,
+    axes_of,
+    axis_label,
+    envelope,
+    new_figure,
+    prefixed,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WORDS = {
+    "x": ("displacement", "m"), "v": ("velocity", "m/s"), "a": ("acceleration", "m/s^2"), "load": ("load cell", "N"),
+    "friction": ("friction", "N"),
+}  # fmt: skip
+ALONG = {"v": ("velocity", "m/s"), "x": ("displacement", "m"), "t": ("time", "s")}
+COLOURS = (BLUE, GREEN, PURPLE, SKY, ORANGE)
+SHOWN = 0.4  # s of a record that are drawn: more can not be told apart on a page
+
+
+@styled
+def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
+    """The misfit of each law over that of the best one, and from where on a family is rejected.
+
+    Parameters
+    ----------
+    comparison : LawComparison
+        What :func:`~stickslip.compare_laws` returned.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+    """
+    told = [each.standing for each in comparison.candidates]
+    ax, places = axes_of(ax, height=1.3 + 0.32 * len(told)), np.arange(len(told))
+    for kept, colour, words in ((True, BLUE, "not rejected"), (False, FAINT, "rejected")):
+        rows = [j for j, each in enumerate(told) if each.kept == kept]
+        if rows:
+            ax.plot([told[j].misfit for j in rows], places[rows], "o", color=colour, markersize=7, label=words)
+    forecast = [(each.prediction, j) for j, each in enumerate(told) if np.isfinite(each.prediction)]
+    if forecast:
+        ax.plot(*zip(*forecast, strict=True), "D", color=ORANGE, markersize=4, label="of records left out")
+    ax.axvline(SEPARATED, color=GREEN, linewidth=1.0, linestyle=":", label="families are told apart from here")
+    ax.set_xscale("log")
+    ax.set_yticks(places, [each.name for each in told])
+    ax.set_ylim(len(told) - 0.4, -0.6)
+    ax.set_xlabel("misfit, over that of the best law")
+    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    return ax
+
+
+@styled
+def plot_fit(comparison: LawComparison, *, record: int = 0) -> Figure:
+    """What was measured, what the best law predicts, and what is left, over the first part of a record.
+
+    Parameters
+    ----------
+    comparison : LawComparison
+        What :func:`~stickslip.compare_laws` returned.
+    record : int
+        Which of several records, from 0.
+
+    Returns
+    -------
+    Figure
+    """
+    traces = comparison.fit.traces[record]
+    names = list(traces.measured)
+    figure, axes = new_figure(len(names) + 1, height=1.6 * len(names) + 1.8)
+    below = axes[-1]
+    for ax, name, colour in zip(axes, names, COLOURS, strict=False):
+        time, measured, fitted = traces.time[name], traces.measured[name], traces.fitted[name]
+        near = time <= time[0] + SHOWN
+        words, unit = WORDS.get(name, (name, ""))
+        factor, unit = prefixed(measured[near] - measured[near].mean(), unit)
+        ax.plot(*envelope(time[near], factor * measured[near]), color=INK, linewidth=1.4, label="measured")
+        ax.plot(*envelope(time[near], factor * fitted[near]), color=ORANGE, linewidth=1.0, linestyle="--",
+                label=f"fitted: {comparison.best.name}")  # fmt: skip
+        ax.set_ylabel(axis_label(words, unit, "\n"))
+        size = float(np.std(measured)) or 1.0
+        share = 100 * (measured - fitted)[near] / size
+        below.plot(*envelope(time[near], share), color=colour, linewidth=0.8, label=words)
+    axes[0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    below.axhline(0, color=FAINT, linewidth=0.8)
+    below.set(xlabel="time [s]", ylabel="left over\n[% of size]")
+    below.legend(ncols=len(names), loc="upper right")
+    figure.align_ylabels(list(axes))
+    return figure
+
+
+@styled
+def plot_curve(found: CurveFit, *, ax: Axes | None = None) -> Axes:
+    """A measured friction and the fitted curve.
+
+    Parameters
+    ----------
+    found : CurveFit
+        What :func:`~stickslip.fit_curve` returned.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+    """
+    ax = axes_of(ax)
+    words, unit = ALONG[found.along]
+    factor, unit = prefixed(found.at, unit)
+    order = np.argsort(found.at, kind="stable") if found.along == "v" else np.arange(len(found.at))
+    force, force_unit = prefixed(found.measured, "N")
+    ax.plot(
+        factor * found.at, force * found.measured, ".", color=FAINT, markersize=2, label="measured", rasterized=True
+    )
+    ax.plot(factor * found.at[order], force * found.fitted[order], color=ORANGE, linewidth=1.4,
+            label=f"fitted: {found.curve}")  # fmt: skip
+    ax.set(xlabel=axis_label(words, unit), ylabel=axis_label("friction", force_unit))
+    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    return ax
+
+
+def law_plates(result: LawComparison | CurveFit) -> list[Plate]:
+    """The figures of a fit, in reading order."""
+    if isinstance(result, CurveFit):
+        return [plate("curve", plot_curve(result), "Measured and fitted", "The curve over all samples that were used.")]
+    told = (
+        "Mean square of what a law leaves over that of the best one, the mean over channels and records. Diamonds: "
+        "each record predicted by a fit to the others."
+    )
+    plates = [plate("laws", plot_laws(result), "How the laws stand", told)] if len(result.candidates) > 1 else []
+    count = len(result.fit.traces)
+    for record in range(count):
+        title = "Measured and fitted" + (f", record {record + 1} of {count}" if count > 1 else "")
+        words = "Top: each sensor, and what it would have read of the fitted law. Bottom: what is left between them."
+        plates.append(plate(f"fit-{record + 1}", plot_fit(result, record=record), title, words))
+    return plates

@@ -1,0 +1,149 @@
+"""A fitted law, or several compared, in sentences, on a page and in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from stickslip.fit.curves import CurveFit
+from stickslip.fit.which_law import LawComparison
+from stickslip.plot.law import law_plates
+from stickslip.record.record import Record
+from stickslip.reports.folder import check_folder, results_folder, write_figures
+from stickslip.reports.page import Section, render
+from stickslip.reports.summary import Line, Summary
+from stickslip.reports.words import doubts, interval_of, number, value_of
+
+UNITS = {"kinetic": "N", "static": "N", "speed": "m/s", "stiffness": "N/m", "damping": "N s/m", "steepness": "s/m"}
+
+
+def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], name: str) -> Summary:
+    """What is told of a fit: the verdict, the parameters, how each law stands.
+
+    Parameters
+    ----------
+    result : LawComparison or CurveFit
+        What :func:`compare_laws` or :func:`fit_curve` returned.
+    records : sequence of Record
+        What it was fitted to.
+    name : str
+        Title of the page.
+
+    Returns
+    -------
+    Summary
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
+    >>> fit_summary(ss.fit_curve(record, curve="coulomb"), records=[record], name="demo").headline[0]
+    'The friction follows the curve "coulomb": kinetic sgn(v).'
+    """
+    lines = [
+        Line(each.name, value_of(each), interval_of(each), None, each.method, each.status, each.checks)
+        for each in result.estimates
+    ]
+    first = records[0]
+    settings = {
+        "records": str(len(records)), "sampling rate": f"{first.fs:g} Hz",
+        "length": ", ".join(f"{record.duration:g} s" for record in records),
+    }  # fmt: skip
+    cautions = [*([f"{result.status}."] if result.status != "ok" else []), *doubts(result.estimates)]
+    if isinstance(result, CurveFit):
+        headline = [
+            f'The friction follows the curve "{result.curve}": {result.formula}.',
+            f"It leaves {result.unexplained:.1%} of the friction, {number(result.residual, result.residual / 100, 'N')}"
+            " root mean square.",
+        ]
+        return Summary(name, headline, cautions, lines=lines, settings=settings,
+                       channels=list(first.channels.values()), history=first.history)  # fmt: skip
+    verdicts = [(each.name, f"{each.standing.verdict} ({_values(each.oscillator.law)})") for each in result.candidates]
+    return Summary(
+        name, [result.verdict], cautions, lines=lines, notes=[*result.checks, *result.fit.checks], settings=settings,
+        verdicts=verdicts, channels=list(first.channels.values()), history=result.history,
+    )  # fmt: skip
+
+
+def _values(law: object) -> str:
+    told = {key: value for key, value in vars(law).items() if isinstance(value, float)}
+    return ", ".join(f"{key} {number(value, abs(value) / 1000, UNITS.get(key, '1'))}" for key, value in told.items())
+
+
+def publish_fit(
+    result: LawComparison | CurveFit, *, folder: str | Path, records: Sequence[Record], name: str = "Fit"
+) -> Path:
+    """Write ``report.html``, ``results.json`` and the figures of a fit into a folder.
+
+    The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else is
+    left alone.
+
+    Parameters
+    ----------
+    result : LawComparison or CurveFit
+        What :func:`compare_laws` or :func:`fit_curve` returned.
+    folder : path
+        The folder to make.
+    records : sequence of Record
+        What it was fitted to.
+    name : str
+        Title of the page.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ModelError
+        The folder holds something that is not ours.
+    RecordError
+        The folder can not be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import stickslip as ss
+    >>> record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
+    >>> found = ss.fit_curve(record, curve="coulomb")
+    >>> folder = publish_fit(found, folder=Path(tempfile.mkdtemp()) / "fit", records=[record])
+    >>> sorted(path.name for path in folder.iterdir())
+    ['figures', 'report.html', 'results.json']
+    """
+    folder = Path(folder)
+    check_folder(folder)
+    plates = law_plates(result)
+    summary = fit_summary(result, records=records, name=name)
+    with results_folder(folder, fit_numbers(result)) as draft:
+        (draft / "report.html").write_text(render([Section(summary, plates)]), encoding="utf-8")
+        (draft / "figures").mkdir()
+        write_figures(draft / "figures", "", plates)
+    return folder
+
+
+def fit_numbers(result: LawComparison | CurveFit) -> dict[str, object]:
+    """A fit as plain data for JSON: SI numbers, None where a number does not exist.
+
+    Parameters
+    ----------
+    result : LawComparison or CurveFit
+        What :func:`compare_laws` or :func:`fit_curve` returned.
+
+    Returns
+    -------
+    dict
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
+    >>> fit_numbers(ss.fit_curve(record, curve="coulomb"))["curve"]
+    'coulomb'
+    """
+    if isinstance(result, LawComparison):
+        return result.to_dict()
+    return {
+        "curve": result.curve, "formula": result.formula, "residual": result.residual,
+        "unexplained": result.unexplained, "status": result.status,
+        "estimates": [each.to_dict() for each in result.estimates],
+    }  # fmt: skip

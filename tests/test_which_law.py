@@ -1,0 +1,182 @@
+"""Which friction law it is: families told apart on simulated rigs, and nothing said that the records do not say."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import stickslip as ss
+from stickslip.cli.program import main
+from stickslip.fit.guess import GUESSES, Seen
+from stickslip.fit.law_choice import CERTAIN, Evidence, Misfit, standings
+from stickslip.plot.law import law_plates
+
+RIG: dict[str, Any] = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12}
+FS = 2500  # Hz: more readings than a search looks at
+TRUE = {
+    "Coulomb": ss.Coulomb(0.95),
+    "static": ss.Coulomb(0.95, static=1.2),
+    "Stribeck": ss.Stribeck(0.95, 1.2, speed=5e-3),
+    "compliant": ss.CompliantContact(0.95, stiffness=192000, damping=24),
+    "state variable": ss.SmoothStateVariable(0.95, rate=120.0, steepness=3000.0),
+    "LuGre": ss.LuGre(0.95, 1.2, speed=5e-3, stiffness=192000, damping=24),
+}
+
+
+@cache
+def record(name: str, frequency: float = 8.7, amplitude: float = 1.1e-3) -> ss.Record:
+    """Half a second of a rig with noise alone, its load cell and its base's motion measured."""
+    slider = ss.Oscillator(law=TRUE[name], drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
+    rig = ss.Rig.perfect("x", "z", "load").having("x", white=1e-6).having("z", white=1e-6).having("load", white=2e-3)
+    return rig.measure(ss.simulate(slider, duration=2.5, rtol=1e-9), fs=FS, rng=3, start=2.0)
+
+
+def slider() -> ss.Oscillator:
+    return ss.Oscillator(law=ss.Coulomb(1.0), **RIG)
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_a_search_begins_near_the_truth(name: str) -> None:
+    """The level within 15 %, stiffnesses and rates within a factor of three."""
+    starts = GUESSES[name](Seen.of([record(name)], slider()))
+    for key, value in vars(TRUE[name]).items():
+        if isinstance(value, float) and key in ("kinetic", "stiffness", "rate") and value:
+            ratios = [getattr(start, key) / value for start in starts]
+            allowed = 1.15 if key == "kinetic" else 3.0
+            assert any(1 / allowed < ratio < allowed for ratio in ratios), key
+
+
+def test_a_compliant_contact_is_told_from_a_rigid_one() -> None:
+    shares: list[float] = []
+    found = ss.compare_laws(
+        [record("compliant"), record("compliant", 11.1, 2e-3)], slider(), laws=["Coulomb", "compliant"],
+        progress=shares.append,
+    )  # fmt: skip
+    assert (found.law, found.family, found.kept) == ("compliant", "compliant", ("compliant",))
+    assert found.confidence > 0.95
+    assert found.status == "ok"
+    assert found.candidates[1].standing.misfit > 10
+    assert found.candidates[0].standing.prediction == 1.0
+    assert found.fit.parameters["law.stiffness"].value == pytest.approx(192000, rel=0.03)
+    assert "compliant contact" in found.verdict
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["law"] == "compliant"
+    assert [plate.name for plate in law_plates(found)] == ["laws", "fit-1", "fit-2"]
+
+
+def test_a_comparison_is_cancelled_by_its_progress() -> None:
+    def stop(share: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        ss.compare_laws(record("Coulomb"), slider(), laws=["Coulomb"], progress=stop)
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "words"),
+    [
+        ({"laws": ["cheese"]}, ss.ModelError, "laws are Coulomb, static"),
+        ({"laws": []}, ss.ModelError, "no law"),
+        ({"laws": [ss.Dahl]}, ss.ModelError, "values to start from"),
+        ({"calibration": 2.0}, ss.ModelError, "part of 1"),
+    ],
+)
+def test_what_can_not_be_asked_is_said(given: dict[str, Any], error: type[Exception], words: str) -> None:
+    with pytest.raises(error, match=words):
+        ss.compare_laws(record("Coulomb"), slider(), **given)
+
+
+def test_no_records_are_refused() -> None:
+    with pytest.raises(ss.EstimateError, match="one record"):
+        ss.compare_laws([], slider())
+
+
+# ---- the statistics
+
+EVIDENCE = Evidence({("x", 0): 30.0, ("load", 0): 30.0}, {("x", 0): 1e-6, ("load", 0): 1e-3})
+
+
+def misfit(name: str, count: int, size: float) -> Misfit:
+    return Misfit(name, count, {("x", 0): size * 1e-10, ("load", 0): size * 1e-4})
+
+
+def excess(low: float, high: float) -> ss.Estimate:
+    return ss.Estimate("excess", (low + high) / 2, (low, high), (high - low) / 4, "1", "")
+
+
+def kept(*misfits: Misfit, share: ss.Estimate | None = None) -> tuple[set[str], float]:
+    told, confidence = standings(misfits, EVIDENCE, excess=share, calibration=0.01)
+    return {each.name for each in told if each.kept}, confidence
+
+
+def test_a_family_is_rejected_at_twice_the_misfit() -> None:
+    assert kept(misfit("Coulomb", 1, 2.1), misfit("compliant", 3, 1.0))[0] == {"compliant"}
+    assert kept(misfit("Coulomb", 1, 1.9), misfit("compliant", 3, 1.0))[0] == {"Coulomb", "compliant"}
+
+
+def test_confidence_grows_with_the_misfit_of_the_others() -> None:
+    levels = [kept(misfit("Coulomb", 1, size), misfit("compliant", 3, 1.0))[1] for size in (1.2, 2.1, 4.0, 100.0)]
+    assert levels == sorted(levels)
+    assert levels[0] < 0.7
+    assert levels[-1] <= CERTAIN
+
+
+def test_a_misfit_within_the_noise_decides_nothing() -> None:
+    quiet = Evidence({("x", 0): 30.0}, {("x", 0): 1e-6})
+    told, _ = standings(
+        [Misfit("Coulomb", 1, {("x", 0): 1e-14}), Misfit("compliant", 3, {("x", 0): 1e-15})], quiet, excess=None,
+        calibration=0.01,
+    )  # fmt: skip
+    assert all(each.kept for each in told)
+    assert told[0].name == "Coulomb"
+
+
+def test_a_richer_rigid_law_has_to_earn_its_parameter() -> None:
+    plain, rich = misfit("Coulomb", 1, 1.0), misfit("static", 2, 0.5)
+    assert kept(plain, rich, share=excess(0.15, 0.25))[0] == {"static"}
+    assert kept(plain, rich, share=excess(0.005, 0.035))[0] == {"Coulomb", "static"}  # three calibrations hide it
+    assert kept(plain, misfit("static", 2, 1.0), share=excess(0.0, 0.02))[0] == {"Coulomb"}
+    assert kept(plain, misfit("static", 2, 0.99), share=excess(0.0, 0.2)) == ({"Coulomb", "static"}, 0.5)
+
+
+# ---- the command
+
+
+def test_the_command_fits_and_writes_a_page(tmp_path: Path) -> None:
+    file = ss.write_record(record("compliant"), tmp_path / "run.csv")
+    answer = CliRunner().invoke(
+        main, ["fit", str(file), "--mass", "2.42", "--stiffness", "2310", "--damping", "0.12", "--laws",
+               "Coulomb, compliant", "--output", str(tmp_path / "out")],
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.output
+    assert "compliant contact" in answer.output
+    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
+    assert told["law"] == "compliant"
+    assert set(told["files"]) >= {"report.html", "results.json", "figures/fit-1.svg"}
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "How the laws stand" in page
+
+
+def test_the_command_fits_a_curve_where_no_motion_is_measured(tmp_path: Path) -> None:
+    speed = 0.02 * np.sin(2 * np.pi * np.arange(4000) / 1000)
+    force = (1.0 + 0.3 * np.exp(-((speed / 4e-3) ** 2))) * np.sign(speed)
+    told = ss.Record.of({"v": speed, "friction": force + 1e-3 * np.random.default_rng(1).normal(size=4000)}, fs=1000)
+    file = ss.write_record(told, tmp_path / "sweep.csv")
+    answer = CliRunner().invoke(main, ["fit", str(file), "--json"])
+    assert answer.exit_code == 0, answer.output
+    found = {each["name"]: each["value"] for each in json.loads(answer.output)["estimates"]}
+    assert found["sliding friction"] == pytest.approx(1.0, rel=0.02)
+
+
+def test_the_command_says_what_it_lacks(tmp_path: Path) -> None:
+    file = ss.write_record(record("Coulomb"), tmp_path / "run.csv")
+    answer = CliRunner().invoke(main, ["fit", str(file)])
+    assert answer.exit_code == 2
+    assert "--mass" in answer.output
