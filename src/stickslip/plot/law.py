@@ -54,6 +54,8 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
     """
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
     told = [each.standing for each in comparison.candidates]
     ax, places = axes_of(ax, height=1.3 + 0.32 * len(told)), np.arange(len(told))
     for kept, colour, words in ((True, BLUE, "not rejected"), (False, FAINT, "rejected")):
@@ -65,6 +67,8 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
         ax.plot(*zip(*forecast, strict=True), "D", color=ORANGE, markersize=4, label="of records left out")
     ax.axvline(SEPARATED, color=GREEN, linewidth=1.0, linestyle=":", label="families are told apart from here")
     ax.set_xscale("log")
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set_yticks(places, [each.name for each in told])
     ax.set_ylim(len(told) - 0.4, -0.6)
     ax.set_xlabel("misfit, over that of the best law")

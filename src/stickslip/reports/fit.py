@@ -38,7 +38,7 @@ def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], 
     >>> import stickslip as ss
     >>> record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
     >>> fit_summary(ss.fit_curve(record, curve="coulomb"), records=[record], name="demo").headline[0]
-    'The friction follows the curve "coulomb": kinetic sgn(v).'
+    'The friction follows the curve "coulomb": f = kinetic sign(v) + offset.'
     """
     lines = [
         Line(each.name, value_of(each), interval_of(each), None, each.method, each.status, each.checks)
