@@ -121,6 +121,15 @@ def test_a_family_is_rejected_at_twice_the_misfit() -> None:
     assert kept(misfit("Coulomb", 1, 1.9), misfit("compliant", 3, 1.0))[0] == {"Coulomb", "compliant"}
 
 
+def test_a_family_that_predicts_better_is_not_rejected() -> None:
+    ahead = {("x", 0): 0.8e-10, ("load", 0): 0.8e-4}
+    best = Misfit("compliant", 3, misfit("", 3, 1.0).squares, {key: 2 * value for key, value in ahead.items()})
+    rival = Misfit("Coulomb", 1, misfit("", 1, 3.0).squares, ahead)
+    left, confidence = kept(best, rival)
+    assert left == {"compliant", "Coulomb"}
+    assert confidence < 0.5
+
+
 def test_confidence_grows_with_the_misfit_of_the_others() -> None:
     levels = [kept(misfit("Coulomb", 1, size), misfit("compliant", 3, 1.0))[1] for size in (1.2, 2.1, 4.0, 100.0)]
     assert levels == sorted(levels)

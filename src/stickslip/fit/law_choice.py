@@ -117,7 +117,7 @@ def standings(
     forecasts = _forecasts(order, evidence)
     inner, sure = _within([each for each in order if each.family == best.family], evidence, excess, calibration)
     others = {each.name for each in order if each.family != best.family}
-    near = {name for name in others if ratios[name] <= SEPARATED}
+    near = {name for name in others if ratios[name] <= SEPARATED or forecasts[name] < 1}
     level = evidence.criterion(best.squares, best.count)
     told = []
     for each in order:
@@ -125,7 +125,8 @@ def standings(
         words = inner.get(each.name) or ("not rejected" if kept else f"rejected: misfit {times(ratios[each.name])}")
         worse = evidence.criterion(each.squares, each.count) - level
         told.append(Standing(each.name, each.family, ratios[each.name], worse, forecasts[each.name], kept, words))
-    odds = math.fsum(ratio**-SHARPNESS for ratio in _nearest(order, ratios, best.family))
+    nearest = {name: min(ratio, forecasts[name]) if forecasts[name] < 1 else ratio for name, ratio in ratios.items()}
+    odds = math.fsum(ratio**-SHARPNESS for ratio in _nearest(order, nearest, best.family))
     return told, min(CERTAIN, sure / (1 + odds))
 
 
