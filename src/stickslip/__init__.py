@@ -200,6 +200,7 @@ if TYPE_CHECKING:
     from stickslip.solve.simulate import simulate as simulate
     from stickslip.solve.trajectory import Trajectory as Trajectory
     from stickslip.squeak.bursts import Squeak as Squeak, Squeaks as Squeaks, find_squeaks as find_squeaks
+    from stickslip.squeak.coupling import Coupling as Coupling, Pair as Pair, coupling as coupling
     from stickslip.squeak.sound import sound_pressure as sound_pressure, squeak_record as squeak_record
     from stickslip.squeak.stability import (
         SlidingMode as SlidingMode,
@@ -285,6 +286,7 @@ _ROOMS = {
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
     "squeak_rig": "squeak.virtual_rig", "sound_pressure": "squeak.sound", "squeak_record": "squeak.sound",
     "find_squeaks": "squeak.bursts", "Squeaks": "squeak.bursts", "Squeak": "squeak.bursts",
+    "coupling": "squeak.coupling", "Coupling": "squeak.coupling", "Pair": "squeak.coupling",
     "stability": "squeak.stability", "Stability": "squeak.stability", "SlidingMode": "squeak.stability",
     "critical_value": "squeak.stability", "Threshold": "squeak.stability", "stability_map": "squeak.stability",
     "export_law": "laws.export",

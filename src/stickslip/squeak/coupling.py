@@ -1,0 +1,263 @@
+"""Which motions move together while it squeaks, which leads, and how much energy friction gives and takes."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
+from stickslip.record.record import Record
+from stickslip.squeak.bursts import Squeak, Squeaks
+from stickslip.squeak.hearing import filtered
+from stickslip.statistics import student
+
+Array = NDArray[np.float64]
+Waves = NDArray[np.complex128]
+
+MOTIONS = ("a", "normal_acceleration", "torsion_velocity", "friction", "sound")
+CYCLES = 8.0  # of the tone in a segment: its line is an eighth of its frequency wide
+FEWEST = 4  # segments
+LEVEL = 0.05  # of chance: what coherence exceeds by chance once in twenty
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two channels at the frequency of the squeak.
+
+    Attributes
+    ----------
+    first, second : str
+        The channels.
+    inside, outside : float
+        Coherence in the bursts and outside of them, 0 to 1; outside NaN where too little lies there.
+    significant : float
+        Coherence that channels that have nothing to do with each other exceed once in twenty times.
+    phase : Estimate
+        By which the second lags the first [rad], -pi to pi.
+    delay : Estimate
+        The same as a time [s], within half a period; positive where the first leads.
+    """
+
+    first: str
+    second: str
+    inside: float
+    outside: float
+    significant: float
+    phase: Estimate
+    delay: Estimate
+
+    @property
+    def coupled(self) -> bool:
+        """Whether they move together in the bursts beyond chance."""
+        return self.inside > self.significant
+
+    @property
+    def leads(self) -> str:
+        """The channel that leads, within half a period; "neither" where the delay's interval holds zero."""
+        low, high = self.delay.interval
+        return "neither" if low <= 0 <= high or not self.coupled else self.first if low > 0 else self.second
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "first": self.first, "second": self.second, "inside": self.inside,
+            "outside": None if math.isnan(self.outside) else self.outside, "significant": self.significant,
+            "coupled": self.coupled, "leads": self.leads,
+            "phase": self.phase.to_dict(), "delay": self.delay.to_dict(),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """How the motions of a squeak hang together.
+
+    Attributes
+    ----------
+    frequency : float
+        Of the squeak [Hz].
+    pairs : tuple of Pair
+        Each two channels.
+    energy_per_cycle : Estimate or None
+        Work of the friction force on the tangential vibration in a cycle of the squeak [J]: positive where friction
+        feeds it, negative where it takes energy from it; None without velocity and friction.
+    dissipated_per_cycle : Estimate or None
+        What the friction force takes from the whole motion meanwhile, in a cycle of the squeak [J].
+    segments : int
+        Stretches in the bursts that were averaged.
+    """
+
+    frequency: float
+    pairs: tuple[Pair, ...]
+    energy_per_cycle: Estimate | None
+    dissipated_per_cycle: Estimate | None
+    segments: int
+
+    def of(self, first: str, second: str) -> Pair:
+        """The pair of two channels, in this order."""
+        found = next((pair for pair in self.pairs if (pair.first, pair.second) == (first, second)), None)
+        if found is None:
+            known = ", ".join(f"{pair.first} and {pair.second}" for pair in self.pairs)
+            raise EstimateError(f"no pair of {first} and {second}", f"there are {known}", "choose one of them")
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        energies = {"energy_per_cycle": self.energy_per_cycle, "dissipated_per_cycle": self.dissipated_per_cycle}
+        return {
+            "frequency": self.frequency,
+            "segments": self.segments,
+            "pairs": [pair.to_dict() for pair in self.pairs],
+            **{name: None if each is None else each.to_dict() for name, each in energies.items()},
+        }
+
+    def __repr__(self) -> str:
+        rows = [
+            f"{p.first} and {p.second}: coherence {p.inside:.2f} ({p.outside:.2f} outside), leads: {p.leads}"
+            for p in self.pairs
+        ]
+        return "\n  ".join([f"Coupling at {self.frequency:.4g} Hz", *rows])
+
+
+def coupling(record: Record, squeaks: Squeaks) -> Coupling:
+    r"""Which motions move together while it squeaks, and does friction feed them?
+
+    The tone of each channel is taken from segments of eight cycles, Hann's window, without overlap: one complex number
+    a segment. Coherence is :math:`|\sum X Y^*|^2/(\sum|X|^2\,\sum|Y|^2)`; of n segments of independent noise it exceeds
+    :math:`1 - 0.05^{1/(n-1)}` once in twenty times (Carter, Knapp and Nuttall, "Estimation of the magnitude-squared
+    coherence function", 1973). The phase is that of the sum, with the variance
+    :math:`(1-\gamma^2)/(2 n \gamma^2)` (Bendat and Piersol, "Random Data", 9.2.4). A tone has no beginning, so a delay
+    is told within half a period alone: which leads is a convention there, not a cause.
+
+    Friction opposes positive velocity (m a = ... - f), so its work on the vibration is minus the mean of f v in the
+    band of the squeak.
+
+    Parameters
+    ----------
+    record : Record
+        With two at least of a, normal_acceleration, torsion_velocity, friction, sound.
+    squeaks : Squeaks
+        What :func:`find_squeaks` found in it.
+
+    Returns
+    -------
+    Coupling
+
+    Raises
+    ------
+    RecordError
+        A channel is broken.
+    EstimateError
+        No squeak, one channel alone, or bursts too short.
+
+    Examples
+    --------
+    >>> from stickslip.solve.simulate import simulate
+    >>> from stickslip.squeak.bursts import find_squeaks
+    >>> from stickslip.squeak.sound import squeak_record
+    >>> from stickslip.squeak.virtual_rig import squeak_rig
+    >>> record = squeak_record(simulate(squeak_rig(), duration=1.2), snr=30, rng=1)
+    >>> found = coupling(record, find_squeaks(record))
+    >>> found.of("normal_acceleration", "torsion_velocity").coupled
+    True
+    """
+    bursts = squeaks.of("squeak", "squeal")
+    if not bursts:
+        raise EstimateError("no squeak was found", "coupling is told inside of squeaks", "see find_squeaks(record)")
+    names = [name for name in MOTIONS if name in record and np.ptp(record[name]) > 0]
+    record.require_clean(*names, question="coupling")
+    if len(names) < 2:
+        raise EstimateError(
+            f"only {', '.join(names) or 'none'} of {', '.join(MOTIONS)}",
+            "coupling is told between two channels at least",
+            "name more channels when reading",
+        )
+    frequency = float(np.average([b.frequency for b in bursts], weights=[b.duration for b in bursts]))
+    size = math.ceil(CYCLES * record.fs / frequency)
+    within, beyond = _segments(record, bursts, size)
+    if len(within) < FEWEST:
+        raise EstimateError(
+            f"{len(within)} segments of {CYCLES:g} cycles in the squeaks",
+            f"coherence is averaged over {FEWEST} at least",
+            "give a record with more or longer squeaks",
+        )
+    inside = {name: _tones(record[name], within, size, frequency / record.fs) for name in names}
+    outside = {name: _tones(record[name], beyond, size, frequency / record.fs) for name in names}
+    pairs = [
+        _pair(one, other, inside, outside if len(beyond) >= FEWEST else None, frequency)
+        for one, other in itertools.combinations(names, 2)
+    ]
+    return Coupling(frequency, tuple(pairs), *_energies(record, bursts, frequency), len(within))
+
+
+def _segments(record: Record, squeaks: tuple[Squeak, ...], size: int) -> tuple[list[int], list[int]]:
+    """First rows of the segments in the squeaks, and of those outside of them."""
+    inside, sounds = [], np.zeros(len(record) + 1, dtype=int)
+    for burst in squeaks:
+        first, last = np.searchsorted(record.time, [burst.start, burst.end])
+        sounds[first:last] = 1
+        inside += list(range(first, last - size, size))
+    quiet = np.concatenate([[0], np.cumsum(sounds)])
+    outside = [row for row in range(0, len(record) - size, size) if quiet[row + size] == quiet[row]]
+    return inside, outside
+
+
+def _tones(values: Array, rows: list[int], size: int, frequency: float) -> Waves:
+    """The tone of a frequency [1/sample] in each segment."""
+    time = np.arange(size)
+    wave = np.hanning(size) * np.exp(-2j * np.pi * frequency * time)
+    parts = np.array([values[row : row + size] for row in rows]).reshape(len(rows), size)
+    return np.asarray((parts - parts.mean(axis=1, keepdims=True)) @ wave)
+
+
+def _pair(one: str, other: str, inside: dict[str, Waves], outside: dict[str, Waves] | None, frequency: float) -> Pair:
+    count = len(inside[one])
+    coherence, angle = _coherence(inside[one], inside[other])
+    sd = math.sqrt(max(1 - coherence, 1e-12) / (2 * count * max(coherence, 1e-12)))
+    phase = Estimate.normal(
+        f"phase of {other} behind {one}", angle, sd=sd, unit="rad",
+        method=f"cross spectrum of {count} segments", quantile=student(count - 1),
+        status="ok" if coherence > _chance(count) else "no coherence beyond chance: the phase means nothing",
+    )  # fmt: skip
+    delay = phase.scaled(1 / (2 * math.pi * frequency), "s", f"delay of {other} behind {one}")
+    beyond = math.nan if outside is None else _coherence(outside[one], outside[other])[0]
+    return Pair(one, other, coherence, beyond, _chance(count), phase, delay)
+
+
+def _coherence(one: Waves, other: Waves) -> tuple[float, float]:
+    cross = np.sum(one * np.conj(other))
+    power = float(np.sum(np.abs(one) ** 2) * np.sum(np.abs(other) ** 2))
+    return (float(np.abs(cross) ** 2 / power) if power else 0.0), float(np.angle(cross))
+
+
+def _chance(count: int) -> float:
+    return float(1 - LEVEL ** (1 / (count - 1)))
+
+
+def _energies(record: Record, squeaks: tuple[Squeak, ...], frequency: float) -> tuple[Estimate | None, Estimate | None]:
+    """Work of the friction force in a cycle of the squeak: on the vibration, and minus that on the whole motion."""
+    if "friction" not in record or "v" not in record:
+        return None, None
+    band = (0.7 * frequency, min(1.4 * frequency, 0.49 * record.fs))
+    shaken, beating = filtered(record["v"], record.fs, band), filtered(record["friction"], record.fs, band)
+    rows = [slice(*np.searchsorted(record.time, [burst.start, burst.end])) for burst in squeaks]
+    given = [float(-np.mean(beating[part] * shaken[part]) / frequency) for part in rows]
+    taken = [float(np.mean(record["friction"][part] * record["v"][part]) / frequency) for part in rows]
+    return _mean("energy that friction gives the vibration in a cycle", given), _mean(
+        "energy that friction takes from the motion in a cycle", taken
+    )
+
+
+def _mean(name: str, values: list[float]) -> Estimate:
+    count = len(values)
+    status = "ok" if count > 2 else f"only {count} bursts: the interval is crude"
+    sd = float(np.std(values, ddof=1) / math.sqrt(count)) if count > 1 else math.inf
+    return Estimate.normal(
+        name, float(np.mean(values)), sd=sd, unit="J", method=f"mean of {count} bursts",
+        quantile=student(max(1, count - 1)), status=status,
+    )  # fmt: skip

@@ -1,0 +1,100 @@
+"""Coupling: coherence, phase, delay and energy against closed forms and the virtual rig."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+
+
+@cache
+def virtual() -> tuple[ss.Record, ss.Coupling]:
+    record = ss.squeak_record(ss.simulate(ss.squeak_rig(), duration=1.6), snr=30, rng=1)
+    return record, ss.coupling(record, ss.find_squeaks(record))
+
+
+def tones(lag: float, *, noise: float = 0.1, seed: int = 0) -> tuple[ss.Record, ss.Squeaks]:
+    """Two channels with one tone at 500 Hz between 0.3 and 0.7 s, the second `lag` seconds later, and their noise."""
+    t = np.arange(10_000) / 10_000
+    rng = np.random.default_rng(seed)
+    inside = np.exp(-((np.maximum(0, np.abs(t - 0.5) - 0.2) / 0.01) ** 2))
+    sound = inside * sum(np.sin(2 * np.pi * k * 500 * (t - lag)) / k**2 for k in (1, 2, 3))
+    shaken = inside * np.sin(2 * np.pi * 500 * t)
+    channels = {"a": shaken, "sound": sound}
+    record = ss.Record.of({n: v + noise * rng.standard_normal(len(t)) for n, v in channels.items()}, fs=10_000)
+    return record, ss.find_squeaks(record)
+
+
+@pytest.mark.parametrize("lag", [-3e-4, 0.0, 2e-4, 8e-4])
+def test_a_delay_is_found_with_its_interval(lag: float) -> None:
+    pair = ss.coupling(*tones(lag)).of("a", "sound")
+    assert pair.delay.value == pytest.approx(lag, abs=2e-5)
+    assert pair.phase.value == pytest.approx(2 * math.pi * 500 * lag, abs=0.06)
+    assert lag == 0 or pair.leads == ("a" if lag > 0 else "sound")
+    assert pair.inside > 0.95
+    assert pair.coupled
+
+
+def test_intervals_hold_the_delay_as_often_as_they_say() -> None:
+    held = [ss.coupling(*tones(2e-4, seed=seed)).of("a", "sound").delay.includes(2e-4) for seed in range(40)]
+    assert sum(held) >= 34
+
+
+def test_outside_of_squeaks_noise_does_not_cohere() -> None:
+    pair = ss.coupling(*tones(0.0)).of("a", "sound")
+    assert pair.outside < 0.3 < pair.inside
+
+
+def test_channels_that_have_nothing_to_do_with_each_other_are_not_coupled() -> None:
+    record, found = tones(0.0)
+    coupled = []
+    for seed in range(40):
+        noise = np.random.default_rng(seed).standard_normal(len(record))
+        coupled.append(ss.coupling(record.with_channel("a", noise, unit="m/s^2"), found).of("a", "sound").coupled)
+    assert sum(coupled) <= 6  # 2 of 40 by chance
+
+
+def test_the_sound_comes_after_the_surface_by_its_way_through_the_air() -> None:
+    _, found = virtual()
+    assert found.of("normal_acceleration", "sound").delay.value == pytest.approx(0.1 / 343.2, rel=0.01)
+
+
+def test_friction_is_against_the_mass_that_it_accelerates() -> None:
+    pair = virtual()[1].of("a", "friction")  # m a = ... - f
+    assert abs(pair.phase.value) == pytest.approx(math.pi, abs=0.02)
+    assert pair.inside > 0.99
+
+
+def test_normal_and_torsional_motion_couple_while_it_squeaks() -> None:
+    pair = virtual()[1].of("normal_acceleration", "torsion_velocity")
+    assert pair.coupled
+    assert pair.leads == "torsion_velocity"
+
+
+def test_friction_takes_energy_from_the_sliding_motion() -> None:
+    record, found = virtual()
+    taken = np.mean(record["friction"] * record["v"]) / found.frequency
+    assert found.dissipated_per_cycle is not None
+    assert found.dissipated_per_cycle.value == pytest.approx(taken, rel=0.2)
+
+
+def test_it_is_plain_data() -> None:
+    import json
+
+    told = json.loads(json.dumps(virtual()[1].to_dict(), allow_nan=False))
+    assert len(told["pairs"]) == 10
+
+
+def test_what_holds_no_coupling_is_refused() -> None:
+    record, found = tones(0.0)
+    with pytest.raises(ss.EstimateError, match="between two channels"):
+        ss.coupling(ss.Record.of({"sound": record["sound"]}, fs=record.fs), found)
+    quiet = ss.find_squeaks(ss.Record.of({"sound": np.random.default_rng(0).standard_normal(5000)}, fs=10_000))
+    with pytest.raises(ss.EstimateError, match="no squeak"):
+        ss.coupling(record, quiet)
+    with pytest.raises(ss.EstimateError, match="no pair"):
+        ss.coupling(record, found).of("x", "v")
