@@ -14,7 +14,7 @@ import stickslip as ss
 @cache
 def virtual() -> tuple[ss.Record, ss.Coupling]:
     record = ss.squeak_record(ss.simulate(ss.squeak_rig(), duration=1.6), snr=30, rng=1)
-    return record, ss.coupling(record, ss.find_squeaks(record))
+    return record, ss.coupling(record)
 
 
 def tones(lag: float, *, noise: float = 0.1, seed: int = 0) -> tuple[ss.Record, ss.Squeaks]:
@@ -29,9 +29,13 @@ def tones(lag: float, *, noise: float = 0.1, seed: int = 0) -> tuple[ss.Record, 
     return record, ss.find_squeaks(record)
 
 
+def joined(record: ss.Record, found: ss.Squeaks) -> ss.Coupling:
+    return ss.coupling(record, squeaks=found)
+
+
 @pytest.mark.parametrize("lag", [-3e-4, 0.0, 2e-4, 8e-4])
 def test_a_delay_is_found_with_its_interval(lag: float) -> None:
-    pair = ss.coupling(*tones(lag)).of("a", "sound")
+    pair = joined(*tones(lag)).of("a", "sound")
     assert pair.delay.value == pytest.approx(lag, abs=2e-5)
     assert pair.phase.value == pytest.approx(2 * math.pi * 500 * lag, abs=0.06)
     assert lag == 0 or pair.leads == ("a" if lag > 0 else "sound")
@@ -40,12 +44,12 @@ def test_a_delay_is_found_with_its_interval(lag: float) -> None:
 
 
 def test_intervals_hold_the_delay_as_often_as_they_say() -> None:
-    held = [ss.coupling(*tones(2e-4, seed=seed)).of("a", "sound").delay.includes(2e-4) for seed in range(40)]
+    held = [joined(*tones(2e-4, seed=seed)).of("a", "sound").delay.includes(2e-4) for seed in range(40)]
     assert sum(held) >= 34
 
 
 def test_outside_of_squeaks_noise_does_not_cohere() -> None:
-    pair = ss.coupling(*tones(0.0)).of("a", "sound")
+    pair = joined(*tones(0.0)).of("a", "sound")
     assert pair.outside < 0.3 < pair.inside
 
 
@@ -54,7 +58,9 @@ def test_channels_that_have_nothing_to_do_with_each_other_are_not_coupled() -> N
     coupled = []
     for seed in range(40):
         noise = np.random.default_rng(seed).standard_normal(len(record))
-        coupled.append(ss.coupling(record.with_channel("a", noise, unit="m/s^2"), found).of("a", "sound").coupled)
+        coupled.append(
+            ss.coupling(record.with_channel("a", noise, unit="m/s^2"), squeaks=found).of("a", "sound").coupled
+        )
     assert sum(coupled) <= 6  # 2 of 40 by chance
 
 
@@ -92,9 +98,9 @@ def test_it_is_plain_data() -> None:
 def test_what_holds_no_coupling_is_refused() -> None:
     record, found = tones(0.0)
     with pytest.raises(ss.EstimateError, match="between two channels"):
-        ss.coupling(ss.Record.of({"sound": record["sound"]}, fs=record.fs), found)
+        ss.coupling(ss.Record.of({"sound": record["sound"]}, fs=record.fs), squeaks=found)
     quiet = ss.find_squeaks(ss.Record.of({"sound": np.random.default_rng(0).standard_normal(5000)}, fs=10_000))
     with pytest.raises(ss.EstimateError, match="no squeak"):
-        ss.coupling(record, quiet)
+        ss.coupling(record, squeaks=quiet)
     with pytest.raises(ss.EstimateError, match="no pair"):
-        ss.coupling(record, found).of("x", "v")
+        ss.coupling(record, squeaks=found).of("x", "v")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.record.record import Record
-from stickslip.squeak.bursts import Squeak, Squeaks
+from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
 from stickslip.squeak.hearing import filtered
 from stickslip.statistics import student
 
@@ -124,7 +124,7 @@ class Coupling:
         return "\n  ".join([f"Coupling at {self.frequency:.4g} Hz", *rows])
 
 
-def coupling(record: Record, squeaks: Squeaks) -> Coupling:
+def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
     r"""Which motions move together while it squeaks, and does friction feed them?
 
     The tone of each channel is taken from segments of eight cycles, Hann's window, without overlap: one complex number
@@ -141,8 +141,8 @@ def coupling(record: Record, squeaks: Squeaks) -> Coupling:
     ----------
     record : Record
         With two at least of a, normal_acceleration, torsion_velocity, friction, sound.
-    squeaks : Squeaks
-        What :func:`find_squeaks` found in it.
+    squeaks : Squeaks, optional
+        What :func:`find_squeaks` found in it; found where left out.
 
     Returns
     -------
@@ -158,15 +158,14 @@ def coupling(record: Record, squeaks: Squeaks) -> Coupling:
     Examples
     --------
     >>> from stickslip.solve.simulate import simulate
-    >>> from stickslip.squeak.bursts import find_squeaks
     >>> from stickslip.squeak.sound import squeak_record
     >>> from stickslip.squeak.virtual_rig import squeak_rig
     >>> record = squeak_record(simulate(squeak_rig(), duration=1.2), snr=30, rng=1)
-    >>> found = coupling(record, find_squeaks(record))
+    >>> found = coupling(record)
     >>> found.of("normal_acceleration", "torsion_velocity").coupled
     True
     """
-    bursts = squeaks.of("squeak", "squeal")
+    bursts = (find_squeaks(record) if squeaks is None else squeaks).of("squeak", "squeal")
     if not bursts:
         raise EstimateError("no squeak was found", "coupling is told inside of squeaks", "see find_squeaks(record)")
     names = [name for name in MOTIONS if name in record and np.ptp(record[name]) > 0]
