@@ -104,9 +104,10 @@ def _coupled(x: Array, force: Array, turning: Sequence[tuple[int, int]], seen: S
         return 0.0
     moved = np.array([x[last] - x[first - 1] for first, last in turning])
     gained = np.array([force[last] - force[first - 1] for first, last in turning])
-    if not len(moved) or not moved.any():
+    way = float(np.median(np.abs(moved))) if len(moved) else 0.0
+    if way == 0:
         return 0.0
-    stiffness = float(np.median(np.abs(gained)) / np.median(np.abs(moved)))
+    stiffness = float(np.median(np.abs(gained))) / way
     return math.sqrt((stiffness + seen.rig.get("stiffness", 0.0)) / seen.rig["mass"]) / (2 * math.pi)
 
 
