@@ -159,7 +159,8 @@ def wavelet_blocks(
     channel, frequencies, voices, wavelet_frequency, normalisation, corrected
         As in :func:`wavelet_map`; without `frequencies`, the range follows from the first part.
     size : int, optional
-        Samples of each block; such that a block's map takes 256 MiB when not given.
+        Samples of each block; such that a block's map takes 256 MiB, or an eighth of what the longest wavelet
+        reaches, when not given.
 
     Returns
     -------
@@ -187,7 +188,7 @@ def wavelet_blocks(
     mean = float(first[channel].mean())
     margin = math.ceil(REACH["double"] * float(grid.scales.max()) * first.fs)
     if size is None:
-        size = max(BLOCK_BYTES // (16 * len(grid.frequencies)), LEAST)
+        size = max(BLOCK_BYTES // (16 * len(grid.frequencies)), margin // 8, LEAST)
     if size < 1:
         raise RecordError(f"size = {size} samples", "a block has at least one sample", "pass a larger size=")
     begin = 0  # row of the next block's first sample, in the whole
@@ -577,7 +578,7 @@ def _inner(values: Array, begin: int, count: int, fs: float, grid: _Grid) -> NDA
     while row < len(found):
         reach = math.ceil(REACH["double"] * float(grid.scales[row]) * fs)  # the later ones reach less far
         low, high = max(0, begin - reach), min(len(values), begin + count + reach)
-        some = slice(row, row + max(1, BLOCK_BYTES // 8 // (16 * (high - low))))
+        some = slice(row, row + max(1, BLOCK_BYTES // 2 // (16 * (high - low))))
         around = transform(
             values[low:high], fs, grid.scales[some], centre=grid.centre, normalisation=grid.normalisation
         )  # fmt: skip
