@@ -78,6 +78,29 @@ def test_a_wrong_law_is_told_by_what_it_leaves() -> None:
     assert "times its noise" in found.status
 
 
+def test_a_rough_surface_is_fitted_with_its_profile() -> None:
+    rough = ss.RoughSurface(CONTACT, share=0.03, length=2e-4, span=2e-3, seed=4)
+    record = measured(rough, 8.7, 0.5)
+    start = ss.Oscillator(law=ss.CompliantContact(1.2, stiffness=150000, damping=15.0), **RIG)
+    found = ss.fit_law(record, start, surface="rough")
+    assert found.surface == "rough"
+    assert found.law.stiffness == pytest.approx(192000, rel=1e-2)
+    kinetic = found.parameters["kinetic"]
+    assert kinetic.sd > 0.005  # as unsure as the mean of a few places is
+    assert kinetic.includes(1.1)
+
+
+def test_a_stiffness_that_can_not_be_told_has_an_open_interval() -> None:
+    record = measured(ss.Coulomb(1.0), 11.1)
+    record = ss.Record.of({name: record[name] for name in "xz"}, fs=record.fs)
+    start = ss.Oscillator(law=ss.CompliantContact(1.0, stiffness=1e6, damping=30.0), **RIG)
+    found = ss.fit_law(record, start, free=["kinetic", "law.stiffness"])
+    each = found.parameters["law.stiffness"]
+    assert np.isinf(each.interval[1])
+    assert each.interval[0] > 1e4
+    assert "can not be told from infinite here" in each.status
+
+
 def test_a_free_decay_needs_no_drive() -> None:
     slider = ss.Oscillator(law=ss.Coulomb(0.4), **RIG)
     run = ss.simulate(slider, duration=3.0, start={"x": 5e-3})

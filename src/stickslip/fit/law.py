@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
 from stickslip.fit.law_search import Knob, Point, Problem, descend
-from stickslip.fit.law_start import Shown, best_start, better_start, free_names, knob
+from stickslip.fit.law_start import Shown, best_start, better_start, free_names, knob, seen_profile, thinned, value_of
 from stickslip.fit.law_stretch import channels_of
 from stickslip.fit.law_surety import Surety, surety
 from stickslip.laws.base import Law
@@ -20,6 +20,7 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import UNITS
 from stickslip.record.record import Record
+from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
 
@@ -60,7 +61,7 @@ class LawFit(Result):
     parameters : mapping of str to Estimate
         What was fitted, by the names of :meth:`Oscillator.having`; of a sensor ``x.gain`` and ``x.delay``.
     correlations : ndarray (p, p)
-        Between the parameters, in their order.
+        Between the parameters, in their order; of a rough surface without its sliding friction.
     noise : mapping of str to float
         Standard deviation of each channel's noise, as stated or found.
     residual : mapping of str to float
@@ -117,7 +118,7 @@ def fit_law(
     free: Sequence[str] | None = None,
     nuisance: Sequence[str] = (),
     channels: Sequence[str] | None = None,
-    surface: str | None = None,
+    surface: str = "even",
     intervals: bool = True,
     progress: Callable[[float], object] | None = None,
 ) -> LawFit:
@@ -148,8 +149,10 @@ def fit_law(
         What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay".
     channels : sequence of str, optional
         Channels to explain; all that were measured where left out.
-    surface : {"even", "rough"}, optional
-        "even": the friction is the same everywhere, and the motion is followed from one start.
+    surface : {"even", "rough"}
+        "even": the friction is the same everywhere. "rough": the friction forces are multiplied by a profile along the
+        surface, which is fitted too; the law is Coulomb's or the CompliantContact, and its sliding friction the mean of
+        the profile, as sure as that mean is for another part of the surface.
     intervals : bool
         Whether to ask how sure the parameters are; without, the fit is quicker.
     progress : callable, optional
@@ -183,7 +186,7 @@ def fit_law(
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise EstimateError("no record", "a law is fitted to one record at least", "give one")
-    if surface not in (None, "even", "rough"):
+    if surface not in ("even", "rough"):
         raise ModelError(f"surface = '{surface}'", "a surface is 'even' or 'rough'", "choose one, or leave it out")
     tell = _teller(progress)
     names = free_names(oscillator, free)
@@ -194,11 +197,23 @@ def fit_law(
         _require_sliding(each, rows)
         stretches.append(each.stretch(number, (int(rows[0]), len(each.record) - 1), oscillator))
     fastest = max(each.fastest for each in shown)
+    oscillator, profile = better_start(oscillator, names, shown), None
     if names:
-        oscillator = best_start(better_start(oscillator, names, shown), names, stretches, fastest, tell)
-    knobs = tuple(knob(oscillator, name) for name in (*names, *nuisance))
-    problem = Problem.of(oscillator, stretches, knobs)
-    point = descend(problem, problem.begin(np.zeros(len(knobs))), tell=tell)
+        oscillator = best_start(oscillator, names, stretches, fastest, tell)
+    if surface == "rough":
+        profile = seen_profile(shown, value_of(oscillator, "kinetic"))
+        names = tuple(name for name in names if name != "kinetic")
+    knobs = [knob(oscillator, name) for name in (*names, *nuisance)]
+    if profile:
+        knobs += [Knob(f"profile {j}", "profile", value, 0.01) for j, value in enumerate(profile.values)]
+    problem = Problem.of(oscillator, stretches, knobs, profile)
+    point = problem.begin(np.zeros(len(knobs)))
+    if profile:
+        few = replace(problem, stretches=tuple(map(thinned, stretches)))
+        first = descend(few, few.begin(point.u), tell=tell)
+        states = zip(first.starts, point.starts, strict=True)
+        point = problem.at(first.u, tuple(np.append(a, b[len(a) :]) for a, b in states))
+    point = descend(problem, point, tell=tell)
     if not math.isfinite(point.chi2):
         raise EstimateError(
             f"{oscillator.law!r} can not be simulated along this record", "the search starts from a motion that exists",
@@ -241,8 +256,8 @@ def _require_sliding(shown: Shown, rows: NDArray[np.intp]) -> None:
 
 
 def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequence[Shown]) -> LawFit:
-    """What is told of the point at which a search has ended."""
-    system = problem.system(point.u)
+    """What a search has found, as it is told."""
+    system = replace(problem, profile=None).system(point.u)
     gains = problem.sensor_knobs(point.u, "gain")
     traces, sums, counts, noise = [], dict[str, float](), dict[str, int](), dict[str, float]()
     for j, stretch in enumerate(problem.stretches):
@@ -260,23 +275,45 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
     residual = {name: math.sqrt(sums[name] / counts[name]) for name in sums}
     noise = {name: noise[name] / math.sqrt(counts[name]) for name in sums}
     parameters = _parameters(problem, point, sure, system)
+    if problem.profile:
+        level = _mean_friction(problem, point, value_of(system, "kinetic"))
+        parameters = {"kinetic": level, **parameters}
+        system = system.having(kinetic=level.value)
     checks = tuple(f"{name} is left with {residual[name] / noise[name]:.3g} times its noise" for name in residual)
     worst = max(residual, key=lambda name: residual[name] / noise[name])
     status = "ok"
     if residual[worst] > MISFIT * noise[worst]:
-        status = (
-            f"{worst} is left with {residual[worst] / noise[worst]:.3g} times its noise: the law is not the whole of it"
-        )
+        times = residual[worst] / noise[worst]
+        status = f"{worst} is left with {times:.3g} times its noise: the law is not the whole of it"
     return LawFit(
-        replace(system, drive=problem.oscillator.drive), parameters,
-        sure.correlations if sure else np.eye(len(problem.knobs)), noise, residual, point.chi2, sum(counts.values()),
-        len(problem.knobs), tuple(traces), "even", status, checks,
+        replace(system, drive=problem.oscillator.drive), parameters, _between(problem, sure), noise, residual,
+        point.chi2, sum(counts.values()), len(problem.knobs), tuple(traces), "rough" if problem.profile else "even",
+        status, checks,
+    )  # fmt: skip
+
+
+def _between(problem: Problem, sure: Surety | None) -> Array:
+    """Correlations of what is reported."""
+    told = [k for k, knob in enumerate(problem.knobs) if knob.kind != "profile"]
+    return sure.correlations[np.ix_(told, told)] if sure else np.eye(len(told))
+
+
+def _mean_friction(problem: Problem, point: Point, level: float) -> Estimate:
+    """The mean of the profile; how sure, by how the profile varies along the surface."""
+    values = level * np.array([k.value(u) for k, u in zip(problem.knobs, point.u, strict=True) if k.kind == "profile"])
+    sd, freedom = mean_uncertainty(values[1:-1])
+    return Estimate.normal(
+        WORDS["kinetic"], float(values[1:-1].mean()), sd=sd, unit="N", quantile=student(freedom),
+        method="mean of the friction along the surface",
+        checks=(f"it varies by {100 * np.std(values[1:-1]) / values[1:-1].mean():.2g} % along the surface",),
     )  # fmt: skip
 
 
 def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Oscillator) -> dict[str, Estimate]:
     found = {}
     for k, each in enumerate(problem.knobs):
+        if each.kind == "profile":
+            continue
         values = [_value(each, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
         unit = {"gain": "1", "delay": "s"}.get(each.kind, UNITS.get(each.name.rpartition(".")[2], "1"))
         sd = abs(_value(each, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -18,7 +19,8 @@ Array = NDArray[np.float64]
 
 HARMONICS = 5
 AS_GOOD = 1.15  # times its noise that a sum of tones may stray from what was measured
-KNOTS = 6  # a period of the bandwidth, of a motion without tones
+COARSE = (128, 64, 32, 16, 8, 4, 2)  # samples from knot to knot of a motion without tones, tried in turn
+NEAR = 0.3  # of its noise by which the knots may miss it
 SURE = 1e-9  # of a drive, that is never surer
 
 
@@ -108,10 +110,23 @@ def _driven(record: Record, channel: str, on: str, contact: str) -> DriveFrom:
             "an applied force that is no tone with harmonics", "the force on the mass is periodic",
             "cut the record to where it is, or drive the base",
         )  # fmt: skip
-    bandwidth = min(best_bandwidth(values, record.fs), record.fs / KNOTS)
+    bandwidth = best_bandwidth(values, record.fs)
     smooth = Filter("smoother", record.fs, bandwidth).apply(values - values.mean(), {0: 1.0})
-    step = max(1, int(record.fs / (KNOTS * bandwidth)))
-    return Sampled(smooth[::step], record.fs / step, late, contact, (share / (2**0.5 * float(np.std(values))),))
+    knots, rate = _knots(smooth, record.fs, noise)
+    return Sampled(knots, rate, late, contact, (share / (2**0.5 * float(np.std(values))),))
+
+
+def _knots(smooth: Array, fs: float, noise: float) -> tuple[Array, float]:
+    """As few instants as follow a smooth motion within a part of its noise, and their rate [Hz]."""
+    from scipy.interpolate import CubicSpline
+
+    time, allowed = np.arange(len(smooth)) / fs, max(NEAR * noise, 1e-6 * float(np.ptp(smooth)))
+    for step in COARSE:
+        at = np.linspace(0.0, time[-1], max(4, math.ceil(len(smooth) / step) + 1))
+        knots = np.interp(at, time, smooth)
+        if np.sqrt(np.mean((CubicSpline(at, knots)(time) - smooth) ** 2)) <= allowed:
+            return knots, (len(at) - 1) / float(time[-1])
+    return smooth, fs
 
 
 def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float, float], ...] | None:

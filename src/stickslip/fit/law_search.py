@@ -6,13 +6,14 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.fit.law_stretch import Sensor, Stretch, attempted, remembered
+from stickslip.laws.rough import RoughSurface
 from stickslip.oscillator import Oscillator
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ SETTLED = 1e-2  # of chi squared, and of its share, by which a step that is the 
 SHARE = 1e-6
 BOLDEST, FURTHEST = 0.7, 7.0  # of a logarithm, in one step and in all
 BOLDER = 2.0  # of static friction's tenths, in one step
-TRUSTED = {"gain": 0.02, "delay": 5e-5}  # of a sensor: how far off a calibration is
+TRUSTED = {"gain": 0.02, "delay": 5e-5, "profile": 0.1}  # how far off a calibration is, or a surface from its mean
 ABOVE = 0.1  # static friction counts by its excess over the kinetic, in tenths of that
 
 
@@ -33,7 +34,7 @@ class Knob(NamedTuple):
     """A parameter that is turned: its name, how a coordinate makes its value, and from where."""
 
     name: str
-    kind: str  # "log", "linear", "above" (the kinetic level), or a sensor's "gain" or "delay"
+    kind: str  # "log", "linear", "above" (the kinetic level), a sensor's "gain" or "delay", or of the "profile"
     origin: float
     scale: float = 1.0
 
@@ -48,6 +49,20 @@ class Knob(NamedTuple):
     def least(self) -> float:
         """The least coordinate that has a meaning."""
         return -self.origin / self.scale if self.kind == "above" else -math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Friction along the surface over its level, at equal distances [m] around the middle of the motion."""
+
+    values: Sequence[float]
+    length: float
+
+    def under(self, law: Any, values: Sequence[float]) -> RoughSurface:
+        """A law on this surface, of other values."""
+        return RoughSurface(
+            law, share=0.0, length=self.length, span=self.length * len(values), values=tuple(map(float, values))
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,28 +111,40 @@ class Problem:
     knobs: tuple[Knob, ...]
     entries: tuple[Start, ...]  # mode and memory at each start
     scales: tuple[Array, ...]  # of displacement, velocity and memory at each start
+    profile: Profile | None = None
 
     @classmethod
-    def of(cls, oscillator: Oscillator, stretches: Sequence[Stretch], knobs: Sequence[Knob]) -> Problem:
+    def of(
+        cls,
+        oscillator: Oscillator,
+        stretches: Sequence[Stretch],
+        knobs: Sequence[Knob],
+        profile: Profile | None = None,
+    ) -> Problem:
         """The start's memory is that of steady sliding."""
         entries, scales = [], []
+        law = profile.under(oscillator.law, profile.values) if profile else oscillator.law
         for stretch in stretches:
             slip = stretch.start["v"] - stretch.face_speed(oscillator)
-            entry = remembered(oscillator.law, slip, stretch.start["x"])
+            entry = remembered(law, slip, stretch.start["x"])
             entries.append(entry)
             memory = [abs(float(value)) or 1.0 for name, value in entry.items() if name != "mode"]
             scales.append(np.array([*stretch.scales, *memory]))
-        return cls(oscillator, tuple(stretches), tuple(knobs), tuple(entries), tuple(scales))
+        return cls(oscillator, tuple(stretches), tuple(knobs), tuple(entries), tuple(scales), profile)
 
     def system(self, u: Array) -> Oscillator:
         """The oscillator at coordinates of the knobs."""
-        changes = {k.name: k.value(c) for k, c in zip(self.knobs, u, strict=True) if k.kind not in ("gain", "delay")}
+        changes = {k.name: k.value(c) for k, c in zip(self.knobs, u, strict=True) if k.kind not in TRUSTED}
         for knob in self.knobs:
             if knob.kind == "above":
                 excess = changes.pop(knob.name)
                 kinetic = knob.name.replace("static", "kinetic")
                 changes[knob.name] = (1 + excess) * changes.get(kinetic, getattr(self.oscillator.law, "kinetic", 1.0))
-        return self.oscillator.having(**changes)
+        system = self.oscillator.having(**changes)
+        if self.profile is None:
+            return system
+        values = [knob.value(c) for knob, c in zip(self.knobs, u, strict=True) if knob.kind == "profile"]
+        return replace(system, law=self.profile.under(system.law, values or self.profile.values))
 
     def sensor_knobs(self, u: Array, kind: str) -> dict[str, float]:
         """Gains or delays by channel."""
@@ -159,8 +186,11 @@ class Problem:
 
     def _trust(self) -> Array:
         """Rows that hold sensors to their calibration, over the coordinates."""
-        rows = [k.scale / TRUSTED[k.kind] * (np.arange(len(self.knobs)) == j)
-                for j, k in enumerate(self.knobs) if k.kind in TRUSTED]  # fmt: skip
+        rows = [
+            k.scale / TRUSTED[k.kind] * (np.arange(len(self.knobs)) == j)
+            for j, k in enumerate(self.knobs)
+            if k.kind in TRUSTED
+        ]
         return np.array(rows).reshape(len(rows), len(self.knobs))
 
     def start(self, j: int, coordinates: Array) -> Start:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.fit.law_drive import measured_drive
-from stickslip.fit.law_search import ABOVE, Knob, Point, Problem, descend
+from stickslip.fit.law_search import ABOVE, Knob, Point, Problem, Profile, descend
 from stickslip.fit.law_stretch import Sensor, Stretch
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import find
@@ -33,6 +34,7 @@ EXCESS = (0.04, 0.15, 0.25, 0.4)  # of static over kinetic friction
 SPEEDS = (0.03, 0.1, 0.3)  # of the largest speed
 THIN = 1000.0  # readings of a channel that a first look takes
 FINALISTS = 3
+KNOTS, BENT = 17, 0.03  # of a surface's profile, and how stiff it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,7 @@ class Shown:
     displacement: Array
     velocity: Array
     late: float
+    felt: Array
     level: float
 
     @classmethod
@@ -64,11 +67,13 @@ class Shown:
                 "a law is fitted to motion above the noise", "drive harder, or measure with less noise",
             )  # fmt: skip
         if name == "x":
-            displacement, velocity = values - values.mean(), differentiate(values, record.fs).values
+            velocity = differentiate(values, record.fs).values
+            displacement = values - _middle(record, values, velocity)
         else:
             velocity = values
             displacement = np.cumsum(values - values.mean()) / record.fs
-        return cls(record, tuple(channels), displacement, velocity, late, _level(record, velocity, oscillator))
+        felt = _felt(record, velocity, oscillator)
+        return cls(record, tuple(channels), displacement, velocity, late, felt, _level(felt, velocity))
 
     @property
     def fastest(self) -> float:
@@ -98,17 +103,26 @@ class Shown:
         return max(found, FINEST * float(np.ptp(values)), 1e-300)
 
 
-def _level(record: Record, velocity: Array, oscillator: Oscillator) -> float:
-    """Friction [N] while the mass moves fast: as felt, or as the balance of forces has it."""
-    fast = np.abs(velocity) > FAST * np.abs(velocity).max()
+def _middle(record: Record, values: Array, velocity: Array) -> float:
+    """Where the spring is at rest: about the middle of a motion to and fro; of one that creeps one way, as measured."""
+    fast = velocity[np.abs(velocity) > FAST * np.abs(velocity).max()]
+    if np.min(fast) < 0 < np.max(fast):
+        return float(values.mean())
+    return float(np.mean(record.samples.get("z", 0.0)))
+
+
+def _felt(record: Record, velocity: Array, oscillator: Oscillator) -> Array:
+    """Friction [N] as a sensor feels it, or as the balance of forces has it."""
     if "load" in record or "friction" in record:
-        felt = record["load" if "load" in record else "friction"]
-    else:
-        acceleration = record["a"] if "a" in record else differentiate(velocity, record.fs).values
-        place = record["x"] if "x" in record else np.cumsum(velocity) / record.fs
-        base = record.samples.get("z", 0.0)
-        felt = oscillator.stiffness * (base - place) - oscillator.damping * velocity - oscillator.mass * acceleration
-        felt = felt + record.samples.get("force", 0.0)
+        return record["load" if "load" in record else "friction"]
+    acceleration = record["a"] if "a" in record else differentiate(velocity, record.fs).values
+    place = record["x"] if "x" in record else np.cumsum(velocity) / record.fs
+    pull = oscillator.stiffness * (record.samples.get("z", 0.0) - place) + record.samples.get("force", 0.0)
+    return np.asarray(pull - oscillator.damping * velocity - oscillator.mass * acceleration)
+
+
+def _level(felt: Array, velocity: Array) -> float:
+    fast = np.abs(velocity) > FAST * np.abs(velocity).max()
     forward, back = (felt[fast & (side * velocity > 0)] for side in (1, -1))
     if len(forward) and len(back):
         return float(np.median(forward) - np.median(back)) / 2
@@ -221,3 +235,20 @@ def best_start(
         ends.append((end.chi2, number, turned, end))
     _, _, problem, point = min(ends, key=lambda each: each[:2])
     return problem.system(point.u)
+
+
+def seen_profile(shown: Sequence[Shown], level: float) -> Profile:
+    """The friction along the surface, as it was felt in sliding forward and back."""
+    span = max(float(np.abs(each.displacement).max()) for each in shown)
+    places = np.linspace(-span, span, KNOTS)
+    columns, values = [], []
+    for each in shown:
+        rows = each.slides()
+        side = np.sign(each.velocity[rows])
+        columns.append(np.maximum(0.0, 1 - np.abs(each.displacement[rows, None] - places) / (places[1] - places[0])))
+        values.append((each.felt[rows] - np.mean(each.felt)) * side / level)
+    design, told = np.vstack(columns), np.concatenate(values)
+    # where no slide was fast the profile goes on as it is beside
+    bends = np.diff(np.eye(KNOTS), 2, axis=0) * BENT * math.sqrt(len(told))
+    found = np.linalg.lstsq(np.vstack([design, bends]), np.append(told, np.zeros(len(bends))), rcond=None)[0]
+    return Profile(tuple(np.clip(found, 0.5, 2.0).tolist()), float(places[1] - places[0]))

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 UNSURE = 0.25  # of a coordinate: a wider deviation is looked at by the likelihood itself
 REACH = (0.7, 1.6, 3.2, 7.0)  # steps of the coordinate that the look takes, to three decades away
 FAINT = 1e-12  # of the sharpest direction: below it a direction is not seen at all
-HALVINGS = 5
+HALVINGS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,21 +41,26 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
     if slopes is None:
         wide = np.full(size, math.inf)
         return Surety(wide, np.ones(size), np.column_stack([-wide, wide]), np.eye(size))
-    covariance, sd, freedom = _sandwich(problem, point, slopes)
-    widths = np.sqrt(np.diag(covariance))
-    correlations = covariance / np.outer(widths, widths)
+    seen = sum((np.sum(s.shared**2, axis=0) for s in slopes), np.zeros(size)) > 0
+    sd, freedom, widths, correlations = np.full(size, math.inf), np.ones(size), np.ones(size), np.eye(size)
+    if seen.any():
+        few = [Slopes(s.shared[:, seen], s.own) for s in slopes]
+        covariance, sd[seen], freedom[seen] = _sandwich(problem, point, few)
+        widths[seen] = np.sqrt(np.diag(covariance))
+        correlations[np.ix_(seen, seen)] = covariance / np.outer(widths[seen], widths[seen])
     quantile = np.array([student(max(1.0, f)) for f in freedom])
     ends = point.u[:, None] + np.outer(quantile * sd, [-1.0, 1.0])
-    excess = max(1.0, point.chi2 / sum(map(len, point.residuals)), float(np.median((sd / widths) ** 2)))
+    strays = float(np.median((sd[seen] / widths[seen]) ** 2)) if seen.any() else 1.0
+    excess = max(1.0, point.chi2 / sum(map(len, point.residuals)), strays)
     for k, knob in enumerate(problem.knobs):
         if sd[k] > UNSURE and knob.kind in ("log", "above"):
-            ends[k] = [_end(problem, point, k, side, excess, tell) for side in (-1.0, 1.0)]
+            ends[k] = [_end(problem, point, k, side, 3.84 * excess, tell) for side in (-1.0, 1.0)]
     return Surety(sd, freedom, ends, correlations)
 
 
 def _sandwich(problem: Problem, point: Point, slopes: Sequence[Slopes]) -> tuple[Array, Array, Array]:
     left = without_starts(slopes)
-    normal = sum((a.T @ a for a in left), np.zeros((len(problem.knobs),) * 2))
+    normal = sum((a.T @ a for a in left), np.zeros((left[0].shape[1],) * 2))
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     values = np.maximum(values, FAINT)
@@ -81,7 +86,7 @@ def _over_time(sensors: Sequence[object], scores: Array) -> Array:
     return total
 
 
-def _end(problem: Problem, point: Point, k: int, side: float, excess: float, tell: Callable[[], None]) -> float:
+def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, tell: Callable[[], None]) -> float:
     """Where the likelihood, the others fitted anew, leaves the 95 % interval; infinite where it does not."""
     others = tuple(knob for j, knob in enumerate(problem.knobs) if j != k)
     least = problem.knobs[k].least
@@ -91,9 +96,9 @@ def _end(problem: Problem, point: Point, k: int, side: float, excess: float, tel
         held = _held(problem, k, u)
         rest = np.delete(point.u, k)
         start = replace(held.at(rest, point.starts), u=rest)
-        return descend(replace(held, knobs=others), start, passes=4).chi2 - point.chi2 if start.raw else math.inf
+        return descend(replace(held, knobs=others), start, passes=3).chi2 - point.chi2 if start.raw else math.inf
 
-    inside, allowed = float(point.u[k]), 3.84 * excess
+    inside = float(point.u[k])
     for reach in REACH:
         outside = max(least, float(point.u[k]) + side * reach)
         if rise(outside) > allowed:

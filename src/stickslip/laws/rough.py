@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,6 +46,8 @@ class RoughSurface:
         Half the length [m] of the surface, around x = 0.
     seed : int
         Which surface: one of the same seed is the same.
+    values : sequence of float, optional
+        The profile 1 + r itself, at equal distances of `length` around x = 0, where it is known.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class RoughSurface:
     length: float
     span: float
     seed: int = 0
+    values: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         finite("share", self.share, unit="(ratio)")
@@ -78,6 +81,10 @@ class RoughSurface:
                 "it is laid under Coulomb or the CompliantContact of the literal rule",
                 "use one of the two",
             )
+        if self.values is not None and not (len(self.values) >= 2 and np.all(np.isfinite(self.values))):
+            raise ModelError(
+                f"values = {self.values}", "a profile has two finite values or more", "correct them, or leave them out"
+            )
         if self.share > 0.3 or self.span / self.length > CELLS:
             raise ModelError(
                 f"share = {self.share}, span = {self.span} m of {self.length} m each",
@@ -88,8 +95,10 @@ class RoughSurface:
     @cached_property
     def knots(self) -> NDArray[np.float64]:
         """Places [m] and values of the profile (n, 2)."""
-        cells = 2 * math.ceil(self.span / self.length)
+        cells = 2 * math.ceil(self.span / self.length) if self.values is None else len(self.values) - 1
         places = self.length * (np.arange(cells + 1) - cells / 2)
+        if self.values is not None:
+            return np.column_stack([places, np.maximum(0.0, self.values)])
         chance = np.random.default_rng(self.seed).standard_normal(cells + 1)
         # between two knots a polygon has 2/3 of their variance
         return np.column_stack([places, np.maximum(0.0, 1 + math.sqrt(1.5) * self.share * chance)])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -201,12 +201,17 @@ class _Builder:
                 flow[self.names.index(name)] = rate + self.moved(name, 1)
             frictions.append(friction)
             flows.append(flow)
-        cells = np.array([_cell(flow) for flow in flows])
         rows, targets, resets, first = [], [], [], [0]
+        cells, hops = [], []
         for mode, flow, friction in zip(self.modes, flows, frictions, strict=True):
+            slope = friction @ flow
+            quantities = np.array([self.relative(exit_.quantity, friction, slope) for exit_ in mode.exits])
+            cell, hop, series = _mode_tables(flow.tobytes(), quantities.tobytes(), self.size)
+            cells.append(cell)
+            hops.append(hop)
+            rows += list(series)
             for exit_ in mode.exits:
                 target = order[exit_.to]
-                rows.append(derivatives(self.relative(exit_.quantity, friction, friction @ flow), flow))
                 targets.append(target)
                 # an exit at zero velocity leaves exactly none: rounding must not decide what follows
                 stopped = set(exit_.quantity) == {"v"}
@@ -221,8 +226,8 @@ class _Builder:
             names=self.names,
             modes=self.modes,
             flow=np.array(flows),
-            cell=cells,
-            hop=np.array([halved(exponential(flow, cell)) for flow, cell in zip(flows, cells, strict=True)]),
+            cell=np.array(cells),
+            hop=np.array(hops),
             series=np.array(rows).reshape(len(rows), DEGREE + 1, self.size),
             target=np.array(targets, dtype=np.int64),
             crossing=np.array([e.crossing for mode in self.modes for e in mode.exits], dtype=np.bool_),
@@ -244,11 +249,21 @@ class _Builder:
         )
 
 
+@lru_cache(maxsize=512)
+def _mode_tables(flow_: bytes, quantities_: bytes, size: int) -> tuple[float, Array, Array]:
+    """Cell, hop and series of a mode: systems that differ a little, as those of a fit, share most of theirs."""
+    flow, quantities = (np.frombuffer(data).reshape(-1, size) for data in (flow_, quantities_))
+    cell = _cell(flow)
+    series = np.stack(derivatives(quantities, flow), axis=1)
+    return cell, halved(exponential(flow, cell)), series
+
+
 def derivatives(quantity: Any, flow: Any) -> list[Any]:
-    """q A^k of an exit; where terms cancel but for their rounding, nothing is left."""
+    """q A^k of an exit, or of several as rows; where terms cancel but for their rounding, nothing is left."""
     rows = [quantity]
+    sizes = np.abs(flow)
     for _ in range(DEGREE):
-        row, size = rows[-1] @ flow, np.abs(rows[-1]) @ np.abs(flow)
+        row, size = rows[-1] @ flow, np.abs(rows[-1]) @ sizes
         rows.append(np.where(np.abs(row) > CANCELLED * size, row, 0.0))
     return rows
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -136,6 +137,7 @@ def blank_past() -> tuple[NDArray[Any], ...]:
             np.ones(HISTORY, np.int64), np.zeros(3, np.int64))  # fmt: skip
 
 
+@lru_cache(maxsize=256)
 def _nodes(rate: complex, period: float) -> NDArray[np.complex128] | None:
     """e^{rate t} at distances that the polynomial bridges, over one period."""
     count = int(period * abs(rate) / (2 * HALF_STEP)) + 3
