@@ -17,7 +17,8 @@ from stickslip.fit.curve_data import Samples, require_resisting, require_reversa
 from stickslip.fit.family import Family, Member, best_member
 from stickslip.fit.velocity_step import velocity_step
 from stickslip.identify.loops import Loops
-from stickslip.laws.base import finite
+from stickslip.laws.base import Law, finite
+from stickslip.laws.curved import CurvedLaw
 from stickslip.record.record import Record
 from stickslip.settings import nearest
 from stickslip.statistics import student
@@ -71,7 +72,7 @@ class CurveFit(Result):
 
     curve: str
     parameters: dict[str, Estimate]
-    law: object | None
+    law: Law | CurvedLaw | None
     formula: str
     residual: float
     unexplained: float

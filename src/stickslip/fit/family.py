@@ -13,6 +13,8 @@ from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.fit.curve_data import BLOCKS, Samples
 from stickslip.fit.nonlinear import inverse_normal, minimise, slopes
+from stickslip.laws.base import Law
+from stickslip.laws.curved import CurvedLaw
 from stickslip.statistics import FEW_CYCLES, INSEPARABLE, correlation_time, mean_uncertainty, student
 
 Array = NDArray[np.float64]
@@ -58,7 +60,7 @@ class Family:
     columns: Callable[[Samples, Array], Array]
     parameters: Callable[[Array, Array], dict[str, float]]
     units: Mapping[str, str]
-    law: Callable[[dict[str, float]], object | None]
+    law: Callable[[dict[str, float]], Law | CurvedLaw | None]
     starts: Callable[[Samples], Sequence[Array]] = lambda samples: ()
     beware: Callable[[dict[str, Estimate], Samples], list[tuple[tuple[str, ...], str]]] = lambda found, samples: []
     instead: Family | None = None

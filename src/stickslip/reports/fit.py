@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from stickslip.errors import ModelError
 from stickslip.fit.curves import CurveFit
 from stickslip.fit.which_law import LawComparison
+from stickslip.laws.base import Law
+from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.export import export_law
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Record
 from stickslip.reports.folder import check_folder, results_folder, write_figures
@@ -14,6 +18,10 @@ from stickslip.reports.page import Section, render
 from stickslip.reports.summary import Line, Summary
 from stickslip.reports.words import doubts, interval_of, number, value_of
 
+FILES = {
+    "toml": "law.toml", "python": "friction.py", "c": "friction.c", "mujoco": "mujoco.xml", "modelica": "friction.mo",
+    "simulink": "friction.m",
+}  # fmt: skip
 UNITS = {"kinetic": "N", "static": "N", "speed": "m/s", "stiffness": "N/m", "damping": "N s/m", "steepness": "s/m"}
 
 
@@ -73,7 +81,7 @@ def _values(law: object) -> str:
 def publish_fit(
     result: LawComparison | CurveFit, *, folder: str | Path, records: Sequence[Record], name: str = "Fit"
 ) -> Path:
-    """Write ``report.html``, ``results.json`` and the figures of a fit into a folder.
+    """Write ``report.html``, ``results.json``, the figures and the law for other programs into a folder.
 
     The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else is
     left alone.
@@ -108,7 +116,7 @@ def publish_fit(
     >>> found = ss.fit_curve(record, curve="coulomb")
     >>> folder = publish_fit(found, folder=Path(tempfile.mkdtemp()) / "fit", records=[record])
     >>> sorted(path.name for path in folder.iterdir())
-    ['figures', 'report.html', 'results.json']
+    ['figures', 'law', 'report.html', 'results.json']
     """
     folder = Path(folder)
     check_folder(folder)
@@ -118,7 +126,21 @@ def publish_fit(
         (draft / "report.html").write_text(render([Section(summary, plates)]), encoding="utf-8")
         (draft / "figures").mkdir()
         write_figures(draft / "figures", "", plates)
+        _write_law(draft, result.law if isinstance(result, CurveFit) else result.fit.law)
     return folder
+
+
+def _write_law(draft: Path, law: Law | CurvedLaw | None) -> None:
+    """The law in every form that it has."""
+    if law is None:
+        return
+    (draft / "law").mkdir()
+    for form, file in FILES.items():
+        try:
+            text = export_law(law, format=form)
+        except ModelError:  # this law has no such form
+            continue
+        (draft / "law" / file).write_text(text, encoding="utf-8")
 
 
 def fit_numbers(result: LawComparison | CurveFit) -> dict[str, object]:
