@@ -24,12 +24,14 @@ Answer = TypeVar("Answer")
 
 MOTION = ("x", "v", "theta")
 USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
-SENSED = ("v", "a", "load")  # what no rig holds still while its mass moves
+SENSED = ("x", "v", "theta", "a", "load")  # what no rig holds still while its mass moves
 CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
 STRETCH = 1 << 14  # samples from the middle in which a delay is looked for, and the forces are compared
 AT_ONCE = 1 << 18  # samples of which all sensors are put together unasked
 REPEATS = "the motion repeats itself"  # so that other delays would do as well, the shortest being taken
 STRANGE = "differ by more than noise"
+LEFT_OUT = "it may be wrong by some per cent, which the interval leaves out"
+FOUND = " (found in this record)"
 SURE = 3.0  # standard deviations from which a delay is taken out
 
 
@@ -81,7 +83,8 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
             record = record.with_details(name, **told.model_dump(exclude_unset=True))
         else:
             asked.notes.append(f"A sensor {name} is described, but the record has no such channel.")
-    record = _without_dead(record, asked)
+    record, stated = _without_dead(record, asked), rig
+    given = record
     record, delay = _aligned(record, asked)
     known = [name for name in USED if name in record]
     whole = (asked.ask("Stated delays", lambda: without_delays(record, *known)) if known else None) or record
@@ -96,11 +99,13 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
                     "Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig))
                 )
                 whole = _with_mounts(whole, comparison, asked)
-            if method != "auto" or not _base_moves(whole, comparison, asked):
+            if method == "auto" and _base_moves(whole, comparison, asked):
+                whole, comparison = without(whole, "z"), None
+            else:
                 whole = _balanced(whole, rig, method, asked)
     if "friction" not in whole:
         whole = _by_load(whole, rig, asked)
-    return Ready(whole, delay, comparison, _doubt(whole, delay))
+    return Ready(whole, delay, comparison, _doubt(whole, given, delay, stated))
 
 
 def middle(record: Record, samples: int) -> Record:
@@ -118,11 +123,19 @@ def _enough(record: Record, rig: RigSettings) -> bool:
 def _without_dead(record: Record, asked: Asked) -> Record:
     """The record without sensors that read one value throughout."""
     dead = [name for name in SENSED if name in record and constant(record[name])]
-    for name in dead:
-        level = f"{record[name][0]:.4g} {record.channels[name].unit}"
-        asked.notes.append(f"{name} does not change, it reads {level} throughout: it is left out.")
-    kept = [name for name in record if name not in dead]
-    if not dead or not kept:
+    asked.notes.extend(f"{unmoved(record, name)}: it is left out." for name in dead)
+    return without(record, *dead)
+
+
+def unmoved(record: Record, name: str) -> str:
+    """That a channel does not change, in words."""
+    return f"{name} does not change, it reads {record[name][0]:.4g} {record.channels[name].unit} throughout"
+
+
+def without(record: Record, *names: str) -> Record:
+    """The record without these channels, unless nothing else is in it."""
+    kept = [name for name in record if name not in names]
+    if not kept or len(kept) == len(record.samples):
         return record
     return replace(
         record, samples={name: record[name] for name in kept}, channels={n: record.channels[n] for n in kept}
@@ -213,17 +226,26 @@ def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Aske
     return record
 
 
-def _doubt(record: Record, delay: SensorDelay | None) -> str:
-    """What is not known of the sensors behind a friction force that was not measured."""
+def _doubt(record: Record, given: Record, delay: SensorDelay | None, rig: RigSettings) -> str:
+    """What is not known of the rig and its sensors behind a friction force that was not measured."""
     if "friction" in record and record.channels["friction"].source not in ("friction_force", "load"):
         return ""
     unknown = [
-        f"the mount of {name}" for name in ("a", "load") if name in record and record.channels[name].mount is None
+        f"the mount of {name}{FOUND if record.channels[name].mount is not None else ''}"
+        for name in ("a", "load")
+        if is_measured(record, name) and given.channels[name].mount is None
     ]
     if delay is not None:
-        unknown.append("the delay of x (found in this record)")
-    are = "is" if len(unknown) == 1 else "are"
-    return f"{' and '.join(unknown)} {are} not stated: it may be wrong by some per cent" if unknown else ""
+        unknown.append(f"the delay of x{FOUND}")
+    told = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
+    unknown += [
+        f"the {name}{FOUND}"
+        for name in ("mass", "stiffness")
+        if getattr(rig, name) is None and told and told[0].get(name) is not None
+    ]
+    if not unknown:
+        return ""
+    return f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated: {LEFT_OUT}"
 
 
 def _tell_unused(rig: RigSettings, asked: Asked) -> None:
@@ -251,7 +273,7 @@ def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
         return "fusion", f"{' and '.join(helps)} beside x: all sensors together by a Kalman smoother"
     why = "there is neither an accelerometer nor a load cell"
     if helps:
-        why = f"of {' and '.join(helps)} no mount is stated, and none shows: state it to have all sensors put together"
+        why = f"of {' and '.join(helps)} no mount is stated: state it to have all sensors put together"
     if helps and rig.contact == "base":
         why = "the contact is on the moving base"
     return "smoother", f"{why}: the displacement differentiated by a smoother"

@@ -7,24 +7,34 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from stickslip.analysis.doubts import doubted
 from stickslip.analysis.findings import Findings, record_name
-from stickslip.analysis.preparation import AT_ONCE, CONSTANTS, MOTION, Asked, described, middle, normal_load, ready
+from stickslip.analysis.preparation import (
+    AT_ONCE,
+    CONSTANTS,
+    MOTION,
+    Asked,
+    described,
+    middle,
+    normal_load,
+    ready,
+    unmoved,
+)
 from stickslip.config import RigSettings
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Estimate
 from stickslip.identify.breakaway import breakaway
 from stickslip.identify.cause import lag_or_compliance
-from stickslip.identify.consistency import Consistency, consistency
+from stickslip.identify.consistency import consistency
 from stickslip.identify.contact import contact_damping, contact_stiffness
 from stickslip.identify.force import FUSIONS, friction_force
 from stickslip.identify.loops import Loops, friction_loops
-from stickslip.identify.mixups import ONE_SLIP
 from stickslip.identify.motion import is_measured, slid_on
 from stickslip.identify.presliding import presliding
 from stickslip.identify.pull import pulled_slider
 from stickslip.identify.regression import regress_friction
 from stickslip.identify.sticks import find_sticks
 from stickslip.identify.transition_speed import coupled_frequency, transition_speed
+from stickslip.record.flaws import constant
 from stickslip.record.record import Record
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
@@ -99,8 +109,8 @@ def analyze(
         led = not each.follows or answers.get(each.follows) is not None
         if led and answers.get(each.unless) is None and each.fits(whole):
             answers[each.key] = asked.ask(each.name, partial(each.ask, whole, slid))
-    _doubt(answers, made.doubt)
-    answers["loops"] = _contradicted(_late(answers.get("loops"), record, rig), answers.get("consistency"))
+    answers = doubted(answers, whole, unknown=made.doubt, refusals=asked.refusals)
+    answers["loops"] = _late(answers.get("loops"), record, rig)
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
     return Findings(
@@ -216,16 +226,6 @@ def _can_be_fused(record: Record, *, again: bool) -> bool:
     )
 
 
-def _doubt(answers: dict[str, Any], reason: str) -> None:
-    """Flag what rests on sensors that are not known."""
-    for key in ("stiffness", "contact_damping", "coupled"):
-        answers[key] = _doubted(answers.get(key), reason)
-    first = answers.get("breakaway")
-    if first is not None:
-        told = {side: _doubted(getattr(first, side), reason) for side in ("forward", "back", "ratio")}
-        answers["breakaway"] = replace(first, **told)
-
-
 def _late(loops: Loops | None, record: Record, rig: RigSettings) -> Loops | None:
     """The loops, flagged where a sensor is stated to come later than a cycle of the motion."""
     delays = {name: channel.delay for name, channel in record.channels.items()}
@@ -239,21 +239,6 @@ def _late(loops: Loops | None, record: Record, rig: RigSettings) -> Loops | None
         f"{cycles[far[0]]:.2g} cycles of the motion (milliseconds taken for seconds, perhaps)"
     )
     return replace(loops, status=words if loops.status == "ok" else f"{words}; {loops.status}")
-
-
-def _contradicted(loops: Loops | None, told: Consistency | None) -> Loops | None:
-    """The loops, their levels flagged where one slip in the channels would explain what does not add up."""
-    slips = [check.sentence for check in told.failed if check.name == ONE_SLIP] if told is not None else []
-    if loops is None or not slips:
-        return loops
-    reason = f"the channels contradict each other: perhaps {slips[0]}"
-    return replace(
-        loops, **{name: replace(getattr(loops, name), status=reason) for name in ("level", "forward", "back")}
-    )
-
-
-def _doubted(found: Estimate | None, reason: str) -> Estimate | None:
-    return replace(found, status=reason) if reason and found is not None and found.status == "ok" else found
 
 
 def _fused(record: Record) -> Record:
@@ -279,6 +264,13 @@ def _told(record: Record) -> dict[str, Any]:
 
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:
     value = f"{name} answers no question about friction"
+    still = [each for each in MOTION if each in record and constant(record[each])]
+    if still:
+        return EstimateError(
+            f"{value}: {unmoved(record, still[0])}",
+            "friction is found from a contact that moves",
+            "look at its cable, range and column",
+        )
     if refusals:
         return EstimateError(f"{value}: {refusals[0].value}", refusals[0].rule, refusals[0].next_step)
     return EstimateError(

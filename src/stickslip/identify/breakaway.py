@@ -281,7 +281,7 @@ def _unstated(record: Record, method: str) -> str:
     names = _used(record, method)
     if method in (*FUSIONS, ALONE):
         names = [name for name in names if record.channels[name].mount is None]
-        how = "is not stated, and its ringing is in it: state it, record.with_details(..., mount=)"
+        how = "is not stated, and its ringing is in it: state it, by with_details or under [sensors] in the rig file"
     elif method and not names:
         return "a balance of forces smooths and overshoots its peak"
     else:

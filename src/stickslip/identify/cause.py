@@ -354,8 +354,11 @@ def _named(is_late: bool, is_soft: bool, left: tuple[float, float, float, float]
 
 
 def _reason(left: tuple[float, ...], spread: float, lag: Estimate, give: float | None, mimicked: float) -> str:
-    words = "of {:.3g} N neither leaves {:.3g} N, a lag {:.3g} N, compliance {:.3g} N, both {:.3g} N".format(
-        spread, *left
+    neither, lagging, soft, both = left
+    words = (
+        f"of the friction's {spread:.3g} N (rms) a rigid contact read without lag leaves {neither:.3g} N unexplained, "
+        f"a lag alone {lagging:.3g} N, a contact that gives way {soft:.3g} N, "
+        f"both together {min(both, soft, lagging):.3g} N"
     )
     words += (
         f"; the displacement comes {1e3 * lag.value:.3g} ms "

@@ -194,7 +194,7 @@ def compare_force(
     lines = find_lines(made, names, contact=rig.get("contact"), question=QUESTION)
     cut = _cut(record)
     bands = tuple(_bands(lines, tolerance))
-    mounts = find_mounts(lines, balanced, told) if "a" in record else ()
+    mounts = find_mounts(lines, balanced, told) if "a" in record and bands[0].verdict != "differ" else ()
     return ForceComparison(
         difference=_flagged(_difference(lines, direct - indirect), cut),
         agree_up_to=_flagged(_agree_up_to(bands, tolerance, lines), cut),
@@ -304,6 +304,7 @@ def _status(bands: tuple[ForceBand, ...], record: Record, cut: str) -> str:
         words.append("the forces have opposite signs: one sensor is wired the wrong way round, or the sign convention")
     elif first.verdict != "agree":
         words.append(f"{UNLIKE}: ask consistency(record) which channel it is")
-    if not any(record.channels[name].delay or "delays" in str(record.history) for name in ("x", "a")):
+    stated = any(record.channels[name].delay for name in ("x", "a") if name in record)
+    if not stated and "delays" not in str(record.history):
         words.append("no delay is stated of any sensor")
     return "; ".join(words) or "ok"

@@ -110,7 +110,7 @@ def contact_damping(record: Record) -> Estimate:
         raise EstimateError(
             f"a contact damping of {found.value:.3g} N s/m",
             "a contact takes energy from the motion, so that its damping is not below zero",
-            "a sensor's lag or mount is not accounted for: state it, record.with_details(..., delay=, mount=)",
+            "state the sensors' lags and mounts, by with_details or under [sensors] in the rig file",
         )
     return found
 

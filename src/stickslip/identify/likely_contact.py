@@ -31,6 +31,7 @@ UNSURE = 0.1  # relative deviation above which the likelihood is no parabola, an
 SLIGHT, ALMOST = 0.015, 0.95  # of the critical damping: where the search starts, and from where there is no ringing
 SOFTEST = 1e-3  # of the spring's stiffness
 STRAYS = 1.5  # mean square surprise of a sensor over its noise, from which it is told, and
+STRAYING = "strays from the likeliest contact by"  # said of a sensor
 ABSURD = 1e3  # from which no answer is given
 CYCLE, SHORT = 8.0, 5.0  # samples of a ring's cycle, and of a stick, below which the answer hangs on what is between
 NEGATIVE = "its damping comes out negative: a sensor's lag or mount is not accounted for"
@@ -127,12 +128,12 @@ def _likeliest(record: Record) -> LikelyContact:
 def _stray(misfit: Array, sensors: Sequence[str]) -> str:
     """How far the worst sensor is from what it should read, in words, if it is not absurd."""
     worst = int(np.argmax(misfit))
-    words = f"{sensors[worst]} strays from the likeliest contact by {math.sqrt(misfit[worst]):.3g} times its noise"
+    words = f"{sensors[worst]} {STRAYING} {math.sqrt(misfit[worst]):.3g} times its noise"
     if misfit[worst] > ABSURD:
         raise EstimateError(
             words,
             "a contact that holds is a spring and a damper, and every sensor reads it as stated",
-            "check signs, and state gains, delays and mounts: record.with_details(..., delay=, mount=)",
+            "check signs, and state gains, delays and mounts, by with_details or under [sensors] in the rig file",
         )
     return words
 

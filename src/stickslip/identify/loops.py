@@ -29,6 +29,7 @@ from stickslip.statistics import least_squares, mean_of_cycles, mean_uncertainty
 Array = NDArray[np.float64]
 
 LEAST_SPREAD = 0.1  # of the sliding speed about its mean, below which no slope against speed can be told
+DRIVES = "friction drives the motion: the sign of the force or of the displacement is wrong, or a drive is not read"
 BRANCHES = ("back, slowing down", "forward, slowing down", "back, speeding up", "forward, speeding up")
 BRANCH_BINS, FEW_BINS = 50, 8  # means of equal count along the speed, in which a branch's line is sought
 
@@ -206,7 +207,11 @@ def _magnitudes(
         "offset": ("friction offset", (forward - back) / 2),
     }
     how = "speed-weighted median, mean of cycles"
-    return {key: mean_of_cycles(name, values, unit=unit, method=how) for key, (name, values) in wanted.items()}
+    found = {key: mean_of_cycles(name, values, unit=unit, method=how) for key, (name, values) in wanted.items()}
+    for key in ("forward", "back", "level"):
+        if found[key].value < 0:
+            found[key] = replace(found[key], status=DRIVES)
+    return found
 
 
 def _levels(
@@ -321,9 +326,9 @@ def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.in
 
 
 def _status(cycles: Cycles, found: dict[str, Estimate], energy: Estimate) -> str:
-    words = [] if found["forward"].status == "ok" else [found["forward"].status]
+    words = [] if found["forward"].status in ("ok", DRIVES) else [found["forward"].status]
     if cycles.status != "ok":
         words.append(cycles.status)
     if found["level"].value < 0 or energy.value < 0:
-        words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
+        words.append(DRIVES)
     return "; ".join(words) or "ok"

@@ -19,6 +19,7 @@ from stickslip.identify.pull import Pull
 from stickslip.identify.slip_ringing import SlipRinging
 from stickslip.units import NOTHING, prefixed
 
+NEVER = "The contact never sticks."
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
@@ -210,7 +211,9 @@ def _of_sticks(findings: Findings) -> Iterator[str]:
     sticks = findings.sticks
     assert sticks is not None
     if not any(event.kind == "stick" for event in sticks.events):
-        yield "The contact never sticks."
+        brief = sticks.share.value >= RARELY
+        share = value_of(sticks.share)
+        yield f"The contact rests only briefly as it turns round, {share} of the time in all." if brief else NEVER
         return
     if sticks.share.value < RARELY:
         yield "The contact hardly ever sticks."

@@ -1,0 +1,125 @@
+"""What a record does not tell is said in the status of every number that rests on it."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from rigs import LAG, RIG, measured, told
+
+
+@cache
+def settled(frequency: float = 8.7) -> ss.Record:
+    """Three seconds of the rig, its sensors stated."""
+    return told(measured(frequency, seconds=3.0)[0])
+
+
+def of(*names: str, stated: bool = False, **instead: np.ndarray) -> ss.Record:
+    """Some of the channels; of the sensors' mounts nothing known unless `stated`."""
+    whole = settled()
+    record = ss.Record.of({name: instead.get(name, whole[name]) for name in names}, fs=whole.fs)
+    for name in names:
+        if name in "xz":
+            record = record.with_details(name, delay=LAG)
+        elif stated:
+            record = record.with_details(name, mount=whole.channels[name].mount, inertia=whole.channels[name].inertia)
+    return record
+
+
+def words(found: ss.Findings) -> str:
+    told = ss.summary(found)
+    return " ".join([*told.headline, *told.cautions, *told.notes])
+
+
+def test_a_displacement_and_a_load_cell_are_enough() -> None:
+    bare = ss.Record.of({name: settled()[name] for name in ("x", "load")}, fs=4000)
+    found = ss.analyze(bare, **RIG)
+    assert found.level is not None
+    assert found.level.value == pytest.approx(1.1, rel=0.05)
+    assert "nothing is stated" in words(found)
+
+
+def test_a_displacement_that_does_not_change_is_named() -> None:
+    still = of("x", "z", "a", "load", x=np.full(len(settled()), 1e-3))
+    with pytest.raises(ss.EstimateError, match=r"x does not change, it reads 0\.001 m throughout"):
+        ss.analyze(still, **RIG)
+
+
+def test_no_mount_is_told_by_forces_that_differ_from_the_start() -> None:
+    still = of("x", "z", "a", "load", stated=True, z=np.full(len(settled()), 1e-8))
+    found = ss.analyze(still, **RIG)
+    assert found.comparison is None
+    assert "z does not change" in words(found)
+    assert not [each.name for each in found.estimates if "mount" in each.name]
+    assert "wrong sign" not in words(found)
+    assert ss.compare_force(still, **RIG).resonances == ()
+
+
+def test_a_contact_that_holds_at_its_turns_alone_does_not_never_stick() -> None:
+    found = ss.analyze(settled(), **RIG)
+    assert found.sticks is not None
+    assert found.sticks.share.value == pytest.approx(0.0638, abs=0.001)
+    assert not [each for each in found.sticks.events if each.kind == "stick"]
+    assert re.search(r"rests only briefly as it turns round, 6\.\d+ % of the time", words(found))
+    assert "never sticks" not in words(found)
+    assert "a rigid contact read without lag leaves" in words(found)
+
+
+def test_a_mount_that_is_not_stated_is_told_beside_the_friction() -> None:
+    for names in (("x", "z", "a", "load"), ("x", "z", "a")):
+        found = ss.analyze(of(*names), **RIG)
+        assert found.level is not None
+        assert "not stated" in found.level.status
+        assert "which the interval leaves out" in found.level.status
+        assert "none shows" not in words(found)
+
+
+def test_sensors_that_are_not_there_or_left_out_are_not_missed() -> None:
+    for names in (("x", "z"), ("x", "z", "load")):
+        found = ss.analyze(of(*names, stated=True), **RIG)
+        assert "mount of a" not in words(found)
+        assert found.level is not None
+        assert found.level.status == "ok"
+
+
+def test_a_mass_that_contradicts_the_record_is_told_in_the_headline() -> None:
+    found = ss.analyze(settled(), **{**RIG, "mass": 2.9})
+    assert found.level is not None
+    assert re.search(r"a mass of 2\.4\d* kg", found.level.status)
+    assert "not to be trusted" in " ".join(ss.summary(found).headline)
+    assert found.sticks is not None
+    assert found.sticks.share.status != "ok"
+
+
+def test_micro_slips_are_not_sure_where_the_load_strays_from_every_contact() -> None:
+    found = ss.analyze(told(measured(2.5, seconds=3.0)[0]), **{**RIG, "mass": 2.9})
+    assert found.sticks is not None
+    assert found.sticks.microslips is not None
+    assert "likeliest contact" in found.sticks.microslips.status
+
+
+def test_a_base_that_is_not_measured_is_told_and_negative_friction_is_never_sure() -> None:
+    found = ss.analyze(of("x", "a"), **RIG)
+    assert found.level is not None
+    assert "no channel z" in found.level.status
+    alone = ss.friction_loops(ss.friction_force(of("x", "a"), **RIG))
+    assert (alone.level.value < 0) == ("friction drives the motion" in alone.level.status)
+    time = np.arange(4000) / 1000
+    driven = ss.Record.of({"x": np.sin(30 * time), "friction": -np.sign(np.cos(30 * time))}, fs=1000)
+    assert "friction drives the motion" in ss.analyze(driven).level.status  # type: ignore[union-attr]
+
+
+def test_a_mass_found_in_the_record_is_told_beside_the_contact() -> None:
+    found = ss.analyze(settled(2.5), stiffness=2310, damping=RIG["damping"])
+    assert found.stiffness is not None
+    assert "the mass (found in this record) is not stated" in found.stiffness.status
+
+
+def test_advice_holds_on_the_page_too() -> None:
+    found = ss.analyze(settled(), **{**RIG, "mass": 2.9})
+    assert "record.with_details(" not in words(found)
+    assert "[sensors]" in words(found)
