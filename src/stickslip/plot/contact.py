@@ -154,6 +154,11 @@ def plot_transition_speed(found: TransitionSpeed, *, ax: Axes | None = None) -> 
         if speed is not None:
             ax.axvline(x_factor * speed.value, color=colour, linestyle=dashes, linewidth=1.2, label=f"by the {name}")
             ax.axvspan(*(x_factor * end for end in speed.interval), color=colour, alpha=0.15, linewidth=0)
+    reached = found.curve
+    if reached is not None:  # where its line meets the sliding friction, beyond what is drawn of the turns
+        ends = x_factor * np.array([found.velocity[-1], reached.value])
+        heights = y_factor * np.array([found.friction[-1], found.level.value])
+        ax.plot(ends, heights, "--", color=ORANGE, marker="o", markersize=4, markevery=[1], label="carried on")
     for side, label in ((-1, None), (1, "sliding friction")):
         ax.axhline(side * y_factor * found.level.value, color=FAINT, linewidth=1.0, label=label)
     ax.set(xlabel=axis_label("velocity after the turn", x_unit), ylabel=axis_label("friction", y_unit))
