@@ -85,7 +85,7 @@ def row(name: str, level: float, draws: int) -> str:
         named["right" if answer == NAMED[name] else "untold" if answer.startswith("cannot") else "wrong"] += 1
         if name not in DAMPING:
             continue
-        found = transition_of(ringing, record, "a", None, None).frequency
+        found = transition_of(ringing, None, None).frequency
         ratio = DAMPING[name] / (2 * math.sqrt(MASS * (SPRING + CONTACT)))
         frequency = math.sqrt((SPRING + CONTACT) / MASS * (1 - ratio**2)) / (2 * math.pi)
         off.append(found.value / frequency - 1)

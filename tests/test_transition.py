@@ -227,3 +227,13 @@ def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert refused.exit_code == 1
     assert "nothing is known above half the rate" in refused.output
     assert CliRunner().invoke(main, ["wavelet", "run.csv", "--frequencies", "5-9"]).exit_code == 2
+
+
+def test_a_record_too_short_for_sticks_is_mapped_where_its_wavelets_fit() -> None:
+    short = ss.Record.of({"a": np.sin(np.arange(30) / 6)}, fs=2000)
+    with pytest.raises(RecordError, match=r"the lowest frequency that it allows is \d+\.\d Hz"):
+        ss.time_frequency(short, frequencies=(50, 800))
+    found = ss.time_frequency(short, frequencies=(200, 800))
+    assert found.ridges == ()
+    assert found.mechanism is None
+    assert found.notes == ("30 samples are mapped, and too few to ask about spikes and sticks: give 256.",)

@@ -30,6 +30,7 @@ Answer = TypeVar("Answer")
 
 CHOSEN = ("a", "sound", "force", "load", "friction", "v", "x")  # the channel that is looked at, the first that is there
 LONG = 400_000  # samples, from which on the largest moduli of each stretch of time are kept
+LEAST = 256  # samples, below which there is a map alone
 QUESTION = "time and frequency"
 
 
@@ -184,6 +185,8 @@ def _spikes_and_sticks(
     record: Record, name: str, mass: float | str | None, stiffness: float | str | None
 ) -> tuple[dict[str, Any], list[str]]:
     """What is asked beside the map, and why some of it has no answer."""
+    if len(record) < LEAST:
+        return {}, [f"{len(record)} samples are mapped, and too few to ask about spikes and sticks: give {LEAST}."]
     found: dict[str, Any] = {"spikes": find_spikes(record, name)}
     notes: list[str] = []
 
@@ -200,13 +203,13 @@ def _spikes_and_sticks(
     if record.channels[name].unit != "m/s^2":
         notes.append(f"Channel {name} is no acceleration: what the sticks tell was not asked.")
         return found, notes
-    ringing = asked("Sticks", lambda: find_ringing(record, name, question=QUESTION))
+    ringing = asked("Sticks", lambda: find_ringing(record, name, question=QUESTION, mass=mass, stiffness=stiffness))
     if ringing is None:
         found["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=notes.pop().partition(": ")[2])
         return found, notes
     found["ringing"] = ringing
     found["mechanism"] = mechanism_of(ringing)
-    found["transition"] = asked("Transition", lambda: transition_of(ringing, record, name, mass, stiffness))
+    found["transition"] = asked("Transition", lambda: transition_of(ringing, mass, stiffness))
     found["microslips"] = asked("Micro-slips", lambda: microslips_of(ringing))
     return found, notes
 

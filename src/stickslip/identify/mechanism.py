@@ -19,11 +19,12 @@ from stickslip.record.record import Record
 
 QUESTION = "the mechanism"
 UNTOLD = "cannot be told from this record"
+SWINGING = "non-sinusoidal oscillation"
 MEANINGS = {
     "bare spikes": "the acceleration jumps and rests: a rigid contact",
     "oscillation without micro-slip": "one mode rings through each stick: a compliant contact, strongly damped",
     "double stick-slip": "one mode rings, cut off by micro-slips: a compliant contact",
-    "non-sinusoidal oscillation": "the sticks swing, but not as one mode: friction with a memory (a state variable)",
+    SWINGING: "the sticks swing, but not as one mode: friction with a memory (a state variable)",
     UNTOLD: "no mechanism stands out",
 }
 SURE = 0.7  # probability that a verdict has at least
@@ -72,7 +73,9 @@ class Mechanism:
         return f"{self.name}{sure}: {self.reason}"
 
 
-def mechanism(record: Record, *, channel: str = "a") -> Mechanism:
+def mechanism(
+    record: Record, *, channel: str = "a", mass: float | str | None = None, stiffness: float | str | None = None
+) -> Mechanism:
     """Do the sticks show a rigid contact, a compliant one with or without micro-slips, or friction with a memory?
 
     What the thesis read from wavelet maps by eye (chapter 5). The sticks are cut into rings of one mode and glides,
@@ -86,6 +89,8 @@ def mechanism(record: Record, *, channel: str = "a") -> Mechanism:
         With an acceleration; see :func:`transition`.
     channel : str
         The acceleration.
+    mass, stiffness : float or str, optional
+        Oscillating mass [kg] and spring [N/m]: with ``x`` and ``z``, to take a stated mount out of the acceleration.
 
     Returns
     -------
@@ -105,7 +110,7 @@ def mechanism(record: Record, *, channel: str = "a") -> Mechanism:
     'bare spikes'
     """
     try:
-        return mechanism_of(find_ringing(record, channel, question=QUESTION))
+        return mechanism_of(find_ringing(record, channel, question=QUESTION, mass=mass, stiffness=stiffness))
     except EstimateError as error:
         return Mechanism(UNTOLD, math.nan, reason=f"{error.value}; {error.rule}")
 
@@ -113,6 +118,8 @@ def mechanism(record: Record, *, channel: str = "a") -> Mechanism:
 def mechanism_of(ringing: Ringing) -> Mechanism:
     """The mechanism of sticks that are cut into pieces already."""
     found, table = features(ringing), _learnt()
+    if ringing.doubt:
+        return Mechanism(UNTOLD, math.nan, features=found, reason=ringing.doubt)
     if found["frequency"] >= FASTEST and not ringing.silent:
         reason = f"what rings in the sticks is faster than {FASTEST:g} cycles in each, and was not looked for"
         return Mechanism(UNTOLD, math.nan, features=found, reason=reason)
@@ -131,6 +138,10 @@ def mechanism_of(ringing: Ringing) -> Mechanism:
     elif probability[best] < SURE:
         likely = sorted(probabilities, key=lambda each: -probabilities[each])[:2]
         name, reason = UNTOLD, f"{likely[0]} or {likely[1]}"
+    if name == SWINGING and ringing.blurred:
+        name, reason = UNTOLD, f"{SWINGING}, or what a smoother leaves of a mount where no load cell helps it"
+    if name == SWINGING and ringing.record.channels[ringing.channel].mount is None and "x" not in ringing.record:
+        reason += "; an accelerometer whose mount rings looks alike, state its mount if it has one"
     return Mechanism(name, float(probability[best]), probabilities, found, reason)
 
 

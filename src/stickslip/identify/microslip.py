@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
@@ -57,7 +57,9 @@ class MicroSlips(Result):
     status: str
 
 
-def find_microslips(record: Record, *, channel: str = "a") -> MicroSlips:
+def find_microslips(
+    record: Record, *, channel: str = "a", mass: float | str | None = None, stiffness: float | str | None = None
+) -> MicroSlips:
     """How many times does the contact slip by a little within each stick, when, and for how long?
 
     While a compliant contact sticks it rings with the mass; where the friction limit cuts a swing off, the mass slips
@@ -72,6 +74,8 @@ def find_microslips(record: Record, *, channel: str = "a") -> MicroSlips:
         With an acceleration; see :func:`transition`.
     channel : str
         The acceleration.
+    mass, stiffness : float or str, optional
+        Oscillating mass [kg] and spring [N/m]: with ``x`` and ``z``, to take a stated mount out of the acceleration.
 
     Returns
     -------
@@ -93,7 +97,7 @@ def find_microslips(record: Record, *, channel: str = "a") -> MicroSlips:
     >>> found.kind, round(found.per_stick.value)
     ('double stick-slip', 2)
     """
-    return microslips_of(find_ringing(record, channel, question=QUESTION))
+    return microslips_of(find_ringing(record, channel, question=QUESTION, mass=mass, stiffness=stiffness))
 
 
 def microslips_of(ringing: Ringing) -> MicroSlips:
@@ -116,4 +120,6 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
         "micro-slips per stick", [float(count) for count in counts], unit="1",
         method="cuts between rings of one mode, by dynamic programming",
     )  # fmt: skip
-    return MicroSlips(per_stick, events, counts, kind, ringing.sticks.status)
+    blurred = "without a load cell whose mount is stated, one may be missed or seen twice" if ringing.blurred else ""
+    status = "; ".join(word for word in (ringing.status, blurred) if word not in ("", "ok")) or "ok"
+    return MicroSlips(replace(per_stick, status=status), events, counts, kind, status)

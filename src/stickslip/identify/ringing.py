@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
+from stickslip.identify.accelerometer import acceleration_of_mass
 from stickslip.identify.motion import forcing_frequency
 from stickslip.identify.sticks import Sticks, find_sticks
 from stickslip.record.record import Record
@@ -79,8 +80,14 @@ class Ringing:
         The same, were the mass at rest where it rings.
     sticks : Sticks
         When it sticks, as the velocity tells.
-    fs, start : float
-        Of the acceleration.
+    record : Record
+        What was cut: its acceleration is less what a stated mount adds, where that could be taken out.
+    channel : str
+        The acceleration.
+    doubt : str
+        What speaks against it, in words; "" where nothing does.
+    blurred : bool
+        Whether a smoother made it without a load cell: what that leaves may look like a micro-slip.
     """
 
     windows: tuple[Window, ...]
@@ -89,8 +96,22 @@ class Ringing:
     excess: float
     rest: float
     sticks: Sticks
-    fs: float
-    start: float
+    record: Record
+    channel: str
+    doubt: str
+    blurred: bool
+
+    @property
+    def fs(self) -> float:
+        """Samples a second."""
+        return self.record.fs
+
+    @property
+    def status(self) -> str:
+        """ "ok", or what to beware of."""
+        return (
+            "; ".join(filter(None, [self.doubt, *([] if self.sticks.status == "ok" else [self.sticks.status])])) or "ok"
+        )
 
     @property
     def loudness(self) -> float:
@@ -106,23 +127,32 @@ class Ringing:
 
     def time(self, window: Window, row: float) -> float:
         """Time [s] of a row of a window."""
-        return self.start + (window.first + row) / self.fs
+        return self.record.start + (window.first + row) / self.fs
 
 
-def find_ringing(record: Record, channel: str, *, question: str) -> Ringing:
+def find_ringing(
+    record: Record,
+    channel: str,
+    *,
+    question: str,
+    mass: float | str | None = None,
+    stiffness: float | str | None = None,
+) -> Ringing:
     """Cut the acceleration around each stick into glides and rings of one mode.
 
     Sticks come from ``x`` or ``v`` where the record has them, else from the acceleration's integral. The mode is
     searched on a grid and refined for the least cost of all windows together.
     """
     record.require_clean(channel, question=question, samples=256)
-    values = record[channel]
-    if np.ptp(values) == 0:
+    if np.ptp(record[channel]) == 0:
         raise EstimateError(f"{channel} is constant", f"{question} needs sticks and slips", "choose another channel")
+    seen = acceleration_of_mass(record, channel, mass=mass, stiffness=stiffness, question=question)
+    record = seen.record
+    values, stated = record[channel], record.channels[channel].noise
     moving = record if any(name in record for name in ("x", "v")) else with_velocity(record, channel, question)
     sticks = _sticks(moving, question)
     spans = _spans(sticks, record, values)
-    noise = noise_level(values, record.fs)
+    noise = noise_level(values, record.fs) if stated is None else stated
     trusted = max(noise, MISFIT * float(values.std()))
     centred = values - _zero(values, sticks, record)
     windows = [centred[first:last] for first, last in spans]
@@ -135,7 +165,7 @@ def find_ringing(record: Record, channel: str, *, question: str) -> Ringing:
         left += float(splitter.cost(pole / record.fs, shortest).sum()) - PENALTY * sum(map(len, found))
         rest += float(splitter.cost(0.0, shortest).sum()) - PENALTY * sum(map(len, splitter.split(0.0, shortest)))
     cut = tuple(Window(first, v, p) for (first, _), v, p in zip(spans, windows, pieces, strict=True))
-    return Ringing(cut, pole, noise, left / count, rest / count, sticks, record.fs, record.start)
+    return Ringing(cut, pole, noise, left / count, rest / count, sticks, record, channel, seen.doubt, seen.blurred)
 
 
 def with_velocity(record: Record, channel: str, question: str) -> Record:

@@ -135,13 +135,13 @@ def transition(
     >>> round(found.frequency.value, 1), round(found.damping.value, 3), round(found.stiffness.value / 1000)
     (45.1, 0.017, 192)
     """
-    return transition_of(find_ringing(record, channel, question=QUESTION), record, channel, mass, stiffness)
+    ringing = find_ringing(record, channel, question=QUESTION, mass=mass, stiffness=stiffness)
+    return transition_of(ringing, mass, stiffness)
 
 
-def transition_of(
-    ringing: Ringing, record: Record, channel: str, mass: float | str | None, stiffness: float | str | None
-) -> Transition:
+def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float | str | None) -> Transition:
     """The transition of sticks that are cut into pieces already."""
+    record, channel = ringing.record, ringing.channel
     pooled = _fitted(ringing.windows, ringing)
     if pooled is None:
         raise _none("the sticks hold no stretch of ringing", "ringing lasts a third of a cycle at least")
@@ -155,21 +155,24 @@ def transition_of(
     sticks = _stick_by_stick(record, channel, ringing, pooled)
     unit = record.channels[channel].unit
     frequency, damping = pooled.frequency, pooled.damping
-    wavelet = mean_of_cycles(
-        "transition frequency by wavelet", [stick.wavelet_frequency for stick in sticks] or [math.nan], unit="Hz",
-        method="local maximum of the Morlet map in each stick, mean of sticks",
+    wavelet = _by_wavelet([stick.wavelet_frequency for stick in sticks])
+    amplitude = mean_of_cycles(
+        "transition amplitude", [stick.amplitude.value for stick in sticks], unit=unit,
+        method="of the first ring of each stick, at its begin; mean of sticks",
     )  # fmt: skip
+
+    def told(estimate: Estimate) -> Estimate:
+        return replace(estimate, status=ringing.doubt) if ringing.doubt else estimate
+
+    contact, loop = _stiffness(pooled, mass, stiffness), _loop_stiffness(record, ringing, pooled)
     return Transition(
-        frequency=frequency,
-        damping=damping,
-        amplitude=mean_of_cycles(
-            "transition amplitude", [stick.amplitude.value for stick in sticks], unit=unit,
-            method="of the first ring of each stick, at its begin; mean of sticks",
-        ),
-        wavelet_frequency=wavelet,
+        frequency=told(frequency),
+        damping=told(damping),
+        amplitude=told(amplitude),
+        wavelet_frequency=told(wavelet),
         agreement=_agreement(frequency, wavelet),
-        stiffness=_stiffness(pooled, mass, stiffness),
-        loop_stiffness=_loop_stiffness(record, ringing, pooled),
+        stiffness=told(contact) if contact is not None else None,
+        loop_stiffness=told(loop) if loop is not None else None,
         sticks=sticks,
         status=_status(ringing, pooled),
     )  # fmt: skip
@@ -332,6 +335,15 @@ def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: _Mode)
     return found
 
 
+def _by_wavelet(peaks: list[float]) -> Estimate:
+    """Mean of the sticks' local maxima; without a number where the map has none."""
+    name, method = "transition frequency by wavelet", "local maximum of the Morlet map in each stick, mean of sticks"
+    if np.isfinite(peaks).any():
+        return mean_of_cycles(name, peaks, unit="Hz", method=method)
+    nowhere = (-math.inf, math.inf)
+    return Estimate(name, math.nan, nowhere, math.inf, "Hz", method, status="the map has no local maximum in any stick")
+
+
 def _agreement(frequency: Estimate, wavelet: Estimate) -> str:
     """In words: whether the wavelet's frequency is the mode's as nearly as a wavelet can tell."""
     apart = wavelet.value / frequency.value - 1
@@ -385,7 +397,7 @@ def _loop_stiffness(record: Record, ringing: Ringing, mode: _Mode) -> Estimate |
 
 
 def _status(ringing: Ringing, pooled: _Mode) -> str:
-    words = [] if ringing.sticks.status == "ok" else [ringing.sticks.status]
+    words = [] if ringing.status == "ok" else [ringing.status]
     silent = len(ringing.windows) - len(pooled.windows)
     if silent:
         words.append(f"{silent} of {len(ringing.windows)} sticks hold no ringing long enough")

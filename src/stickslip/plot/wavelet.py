@@ -119,15 +119,15 @@ def plot_stick(found: TimeFrequency) -> Figure:
     """
     ringing = found.ringing
     assert ringing is not None
-    window = ringing.windows[len(ringing.windows) // 2]
+    record, window = ringing.record, ringing.windows[len(ringing.windows) // 2]
     margin = len(window.values) // 2
-    first, last = max(0, window.first - margin), min(len(found.record), window.first + len(window.values) + margin)
+    first, last = max(0, window.first - margin), min(len(record), window.first + len(window.values) + margin)
     lowest = 0.4 * ringing.pole.imag / (2 * np.pi)
     reach = int(2 * CENTRE / (2 * np.pi * lowest) * ringing.fs) + 1
-    around = found.record.rows(max(0, first - reach), min(len(found.record), last + reach))
+    around = record.rows(max(0, first - reach), min(len(record), last + reach))
     wavelets = wavelet_map(around, found.channel, frequencies=(lowest, 0.4 * ringing.fs))
-    shown = wavelets.sel(time=slice(found.record.time[first], found.record.time[last - 1]))
-    figure = plot_wavelet(shown, record=found.record)
+    shown = wavelets.sel(time=slice(record.time[first], record.time[last - 1]))
+    figure = plot_wavelet(shown, record=record)
     top = figure.axes[0]
     for number, piece in enumerate(window.pieces):
         begin, end = ringing.time(window, piece.first), ringing.time(window, piece.last)

@@ -128,6 +128,8 @@ def find_ridges(wavelets: xr.DataArray, *, span: float = 40.0, cycles: float = 3
     crest = np.zeros(modulus.shape, dtype=bool)
     crest[1:-1] = (level[1:-1] >= level[:-2]) & (level[1:-1] > level[2:])
     crest &= level > level.max() - span * math.log(10) / 20
+    if not crest.any():
+        return ()
     found = []
     for rows, columns in _chains(crest, level):
         place, height = _refined(level, rows, columns)

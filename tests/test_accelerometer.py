@@ -1,0 +1,91 @@
+"""Sticks as real sensors write them: a mount that rings, noise, sensors that come late. Right, or undecided."""
+
+from __future__ import annotations
+
+import functools
+import re
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.identify.mechanism import UNTOLD
+
+RIG = {"mass": 2.42, "stiffness": 2310.0}
+TRUE = 45.0914  # Hz: sqrt((k + K)/m (1 - zeta^2)) / 2 pi
+PERFECT = ss.Rig.perfect()
+
+
+@functools.cache
+def motion() -> ss.Trajectory:
+    contact = ss.CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9)
+    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+    return ss.simulate(ss.Oscillator(law=contact, drive=drive, damping=0.12, **RIG), cycles=11)
+
+
+def measured(rig: ss.Rig, seed: int = 1) -> ss.Record:
+    return rig.measure(motion(), fs=4000, rng=seed, start=2.0)
+
+
+@pytest.mark.parametrize(
+    "rig",
+    [
+        ss.Rig(),
+        ss.Rig(tuple(sensor for sensor in ss.Rig().sensors if sensor.channel != "load")),
+        PERFECT.having("a", mount=ss.Mount(125, 0.1)),
+        PERFECT.having("a", mount=ss.Mount(1000, 0.02)),
+        PERFECT.having("a", white=0.04),
+    ],
+    ids=["the thesis's", "without its load cell", "mount of 125 Hz", "mount of 1000 Hz", "noise alone"],
+)
+def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
+    record = rig.stated(measured(rig))
+    assert ss.mechanism(record, **RIG).name == "double stick-slip"
+    slips, mode = ss.find_microslips(record, **RIG), ss.transition(record, **RIG)
+    assert mode.status == "ok"
+    assert (slips.status == "ok") == (record.channels["load"].mount is not None if "load" in record else False)
+    assert slips.per_stick.value == pytest.approx(2, abs=0.3)
+    assert mode.frequency.value == pytest.approx(TRUE, abs=3 * mode.frequency.sd)
+    assert mode.stiffness is not None
+    assert mode.stiffness.value == pytest.approx(192000, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    ("rig", "told", "why"),
+    [
+        (PERFECT.having("a", mount=ss.Mount(125, 0.1)), {}, "a mount of 126.* Hz shows in a, and none is stated"),
+        (PERFECT.having("a", mount=ss.Mount(1000, 0.02)), {}, "a mount of 100. Hz shows in a, and none is stated"),
+        (PERFECT.having("a", white=0.04), {}, "the noise of a is 1.% of its standard deviation"),
+        (ss.Rig(), RIG, "x comes 1.* ms after a: state the delays.*; a mount of 12.* Hz shows in a"),
+    ],
+    ids=["mount of 125 Hz", "mount of 1000 Hz", "noise", "the thesis's"],
+)
+def test_what_is_not_stated_is_named_and_nothing_told_surely(rig: ss.Rig, told: dict[str, float], why: str) -> None:
+    found = ss.time_frequency(measured(rig), frequencies=np.array([20.0, 40.0, 80.0]), **told)
+    assert found.mechanism is not None
+    assert found.mechanism.name == UNTOLD
+    assert np.isnan(found.mechanism.probability)
+    assert re.match(why, found.mechanism.reason)
+    assert found.estimates
+    assert all(each.status != "ok" for each in found.estimates)
+
+
+def test_a_stated_mount_is_not_taken_for_the_contact_where_it_can_not_be_taken_out() -> None:
+    record = ss.Rig().stated(measured(ss.Rig()))
+    found = ss.mechanism(record)
+    assert found.name == UNTOLD
+    assert found.reason.startswith("a stands on a mount of 125 Hz")
+    assert ss.find_microslips(record).per_stick.status.startswith("a stands on a mount of 125 Hz")
+
+
+def test_a_mount_faster_than_the_record_is_none() -> None:
+    record = measured(PERFECT)
+    same = ss.transition(record.with_details("a", mount=(3500.0, 0.02)), **RIG)
+    assert same.status == "ok"
+    assert same.frequency.value == ss.transition(record, **RIG).frequency.value
+
+
+def test_an_acceleration_alone_that_swings_may_be_its_mount() -> None:
+    record = measured(PERFECT.having("a", mount=ss.Mount(125, 0.1)))
+    found = ss.mechanism(ss.Record.of({"a": record["a"]}, fs=record.fs))
+    assert found.name == UNTOLD or "an accelerometer whose mount rings looks alike" in found.reason
