@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,12 +30,14 @@ APART = 0.1e-3  # s between x and a, taken for one instant, that spoils what bot
 class Acceleration:
     """A record whose acceleration can be asked about rings, and what speaks against it, "" where nothing does.
 
-    `blurred` is true where a smoother made it without a load cell: what it leaves may look like a micro-slip.
+    `blurred` is true where a smoother made it without a load cell: what it leaves may look like a micro-slip, or, above
+    `fastest` [Hz], like a mode.
     """
 
     record: Record
     doubt: str = ""
     blurred: bool = False
+    fastest: float = math.inf
 
 
 def acceleration_of_mass(
@@ -78,8 +81,10 @@ def _fused(record: Record, rig: dict[str, Any], question: str) -> Acceleration:
     )  # fmt: skip
     made = kept.with_channel("a", values, unit="m/s^2", source="acceleration_of_mass", noise=noise, step=step)
     unstated = "" if record.channels["a"].mount is not None else _mount_of(compared, record.fs)
-    doubts = [_late(compared), unstated, _too_loud("a", noise / float(values.std()))]
-    return Acceleration(made, "; ".join(filter(None, doubts)), blurred=not load)
+    doubt = "; ".join(filter(None, [_late(compared), unstated])) or _too_loud("a", noise / float(values.std()))
+    mount = record.channels["a"].mount
+    fastest = mount[0] / 2 if mount is not None and not load else math.inf
+    return Acceleration(made, doubt, not load, fastest)
 
 
 def _noise_share(record: Record, channel: str) -> float:
@@ -92,7 +97,7 @@ def _too_loud(channel: str, share: float) -> str:
         return ""
     return (
         f"the noise of {channel} is {share:.0%} of its standard deviation, and from {LOUD:.0%} on hides rings and "
-        "micro-slips: give x, z, mass and stiffness, or take a quieter record"
+        "micro-slips: give x, z, mass and stiffness where they lack, or take a quieter record"
     )
 
 

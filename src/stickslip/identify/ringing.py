@@ -30,6 +30,7 @@ PENALTY = 30.0  # what a piece must spare, in variances of the noise
 MISFIT = 0.005  # of the acceleration's standard deviation: how well parabolas and one mode are trusted to fit
 QUIET = 1.05  # times the mean square that rings leave: then rest explains as much
 FAINT = 0.02  # of the acceleration's range, root mean square: rings that are smaller are none
+FORBIDDEN = 1e30  # cost outside of the search, finite since costs are subtracted
 SETTLED = 0.2  # of a cycle: a ring lasts longer
 
 
@@ -164,8 +165,11 @@ def find_ringing(
         pieces += found
         left += float(splitter.cost(pole / record.fs, shortest).sum()) - PENALTY * sum(map(len, found))
         rest += float(splitter.cost(0.0, shortest).sum()) - PENALTY * sum(map(len, splitter.split(0.0, shortest)))
+    doubt, rings = seen.doubt, pole.imag / (2 * math.pi)
+    if rings > seen.fastest:
+        doubt = doubt or f"what rings at {rings:.3g} Hz may be left of a mount, where no load cell helps to take it out"
     cut = tuple(Window(first, v, p) for (first, _), v, p in zip(spans, windows, pieces, strict=True))
-    return Ringing(cut, pole, noise, left / count, rest / count, sticks, record, channel, seen.doubt, seen.blurred)
+    return Ringing(cut, pole, noise, left / count, rest / count, sticks, record, channel, doubt, seen.blurred)
 
 
 def with_velocity(record: Record, channel: str, question: str) -> Record:
@@ -246,7 +250,7 @@ def _pole(windows: list[Array], fs: float, noise: float, sticks: Sticks) -> comp
 
     def cost(splitter: Splitter, frequency: float, damping: float) -> float:
         if not (lowest <= frequency <= highest and 0 <= damping < 0.9):
-            return math.inf
+            return FORBIDDEN
         shortest = max(3, round(SETTLED / frequency * rate))
         return float(splitter.cost(_mode(frequency, damping) / rate, shortest).sum())
 
