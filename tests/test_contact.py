@@ -187,7 +187,7 @@ def test_sensors_that_are_not_stated_leave_the_contact_as_unsure_as_it_is() -> N
         assert found.includes(192000)
         if late:
             assert "negative" in found.status
-            with pytest.raises(EstimateError, match="lag or mount is not accounted for"):
+            with pytest.raises(EstimateError, match="state the sensors' lags and mounts"):
                 ss.contact_damping(fused)
 
 
