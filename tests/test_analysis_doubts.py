@@ -123,3 +123,20 @@ def test_advice_holds_on_the_page_too() -> None:
     found = ss.analyze(settled(), **{**RIG, "mass": 2.9})
     assert "record.with_details(" not in words(found)
     assert "[sensors]" in words(found)
+
+
+def test_a_sound_record_of_sensors_that_are_not_described_is_trusted_with_a_caution() -> None:
+    demo = ss.datasets.demo()
+    found = ss.analyze(demo, **{name: demo.truth[name] for name in ("mass", "stiffness", "damping")})
+    told = ss.summary(found)
+    assert "not to be trusted" not in " ".join(told.headline)
+    assert "which the interval leaves out" in " ".join(told.cautions)
+    assert found.level is not None
+    assert "delay" not in found.level.status  # one was looked for, and none was taken out
+
+
+def test_how_far_a_contact_gives_is_told_in_readable_units() -> None:
+    demo = ss.datasets.demo()
+    found = ss.analyze(demo, **{name: demo.truth[name] for name in ("mass", "stiffness", "damping")})
+    assert re.search(r"up to 1\.1\d* N it moves -?\d+(\.\d+)? [µn]?m forward", words(found))
+    assert "e-0" not in words(found).split("it moves", 1)[1].split("would be felt", 1)[0]

@@ -105,7 +105,7 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
                 whole = _balanced(whole, rig, method, asked)
     if "friction" not in whole:
         whole = _by_load(whole, rig, asked)
-    return Ready(whole, delay, comparison, _doubt(whole, given, delay, stated))
+    return Ready(whole, delay, comparison, _doubt(whole, given, stated, aligned=record is not given))
 
 
 def middle(record: Record, samples: int) -> Record:
@@ -226,7 +226,7 @@ def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Aske
     return record
 
 
-def _doubt(record: Record, given: Record, delay: SensorDelay | None, rig: RigSettings) -> str:
+def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) -> str:
     """What is not known of the rig and its sensors behind a friction force that was not measured."""
     if "friction" in record and record.channels["friction"].source not in ("friction_force", "load"):
         return ""
@@ -235,7 +235,7 @@ def _doubt(record: Record, given: Record, delay: SensorDelay | None, rig: RigSet
         for name in ("a", "load")
         if is_measured(record, name) and given.channels[name].mount is None
     ]
-    if delay is not None:
+    if aligned:
         unknown.append(f"the delay of x{FOUND}")
     told = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
     unknown += [

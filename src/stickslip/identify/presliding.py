@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
+from stickslip.identify.motion import FORCES
 from stickslip.identify.strokes import Stroke, Strokes, find_strokes
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import mean_of_cycles
+from stickslip.units import prefixed
 
 Array = NDArray[np.float64]
 
@@ -174,13 +176,14 @@ def _backlash(strokes: Strokes) -> Estimate | None:
 def _verdict(found: Sequence[Estimate], level: float, least: float, length: str) -> tuple[str, str]:
     """Whether the contact gives way, and why."""
     ways = [each.value * level for each in found]
-    said = " and ".join(f"{way:.2g} {length} {side}" for way, (_, side) in zip(ways, SIDES, strict=True))
-    moves = f"while friction builds up to {level:.3g} it moves {said}"
+    factor, unit = prefixed(np.array([*ways, least * level]), length)
+    said = " and ".join(f"{factor * way:.2g} {unit} {side}" for way, (_, side) in zip(ways, SIDES, strict=True))
+    moves = f"while friction builds up to {level:.3g} {FORCES[length]} it moves {said}"
     against = [each for each in found if each.interval[1] < 0 and abs(each.value) > least]
     if against:
         return "can not be told", f"{moves}, against its load: something else moves than the contact"
     if all(abs(each.value) < least or each.includes(0.0) for each in found):
-        return "rigid", f"{moves}; {least * level:.2g} {length} would be felt"
+        return "rigid", f"{moves}; {factor * least * level:.2g} {unit} would be felt"
     if any(each.value < least or each.interval[0] <= 0 for each in found):
         return "can not be told", f"{moves}: not in both directions"
     small, large = sorted(each.value for each in found)

@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.analysis.comparison import Comparison
 from stickslip.analysis.decays import DecayFindings
 from stickslip.analysis.findings import Findings
+from stickslip.analysis.preparation import LEFT_OUT
 from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.estimate import NORMAL_95, Estimate, decimals
 from stickslip.identify.breakaway import Breakaway
@@ -190,7 +191,8 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     loops = findings.loops
     assert loops is not None
     yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
-    if loops.level.status != "ok" and not re.fullmatch(FEW, loops.level.status):
+    lesser = re.fullmatch(FEW, loops.level.status) or loops.level.status.endswith(LEFT_OUT)  # said among the cautions
+    if loops.level.status != "ok" and not lesser:
         yield f"That is not to be trusted: {loops.level.status}."
     if findings.coefficient is not None and findings.normal is not None:
         yield (
