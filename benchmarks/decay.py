@@ -19,9 +19,9 @@ from functools import cache
 import numpy as np
 
 import stickslip as ss
-from stickslip.fit.decay import fit_decay
-from stickslip.fit.search import Search, weights
-from stickslip.fit.waveform import sample_motion
+from stickslip.decay.fit_decay import fit_decay
+from stickslip.decay.search import Search, weights
+from stickslip.decay.waveform import sample_motion
 from stickslip.statistics import student
 
 OMEGA, REST = 2 * math.pi, 0.1

@@ -18,9 +18,9 @@ import time
 import numpy as np
 from scipy.special import ndtr
 
-from stickslip.fit.candidates import EXPONENT, NUMBERS, BlockMeans, fit_motion
-from stickslip.fit.choice import choose
-from stickslip.fit.motions import MOTIONS, PARAMETERS, free_decay
+from stickslip.decay.candidates import EXPONENT, NUMBERS, BlockMeans, fit_motion
+from stickslip.decay.choice import choose
+from stickslip.decay.motions import MOTIONS, PARAMETERS, free_decay
 
 W, FS, NOISE = 2 * math.pi, 40.0, 1e-3
 TIMES = np.arange(480) / FS

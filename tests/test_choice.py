@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.fit.candidates import NUMBERS
-from stickslip.fit.choice import Choice, choose, white_noise_test
-from stickslip.fit.motions import MOTIONS, PARAMETERS, free_decay
+from stickslip.decay.candidates import NUMBERS
+from stickslip.decay.choice import Choice, choose, white_noise_test
+from stickslip.decay.motions import MOTIONS, PARAMETERS, free_decay
 
 W, FS = 2 * math.pi, 40.0
 TRUTHS: dict[str, dict[str, float]] = {

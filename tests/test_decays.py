@@ -291,7 +291,7 @@ def test_every_release_of_a_record_counts_for_the_interval_of_any_motion():
 
 
 def test_the_headline_names_the_motion_that_the_record_leaves():
-    from stickslip.fit.motions import free_decay as any_decay
+    from stickslip.decay.motions import free_decay as any_decay
 
     t = np.arange(4000) / 500
     w, damping, quadratic, length = 20.0, 0.01, 20.0, 0.03
@@ -311,7 +311,7 @@ def test_the_headline_names_the_motion_that_the_record_leaves():
 
 
 def test_a_pendulum_read_with_a_straight_spring_is_told_so():
-    from stickslip.fit.motions import free_decay as any_decay
+    from stickslip.decay.motions import free_decay as any_decay
 
     t = np.arange(1000) / 100
     x = any_decay(t, [6, 0.005, 0.01, 0, 1.2, 0, 0, 0, 0, 0, 0.5, 0], restoring="pendulum")[0]

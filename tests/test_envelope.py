@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.fit.motions import free_decay
+from stickslip.decay.motions import free_decay
 from test_check import read_pendulum
 
 W, TIMES = 2 * np.pi, np.arange(4000) / 200

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.fit.motions import free_decay
-from stickslip.fit.search import Search
-from stickslip.fit.waveform import normal_equations, sample_motion
+from stickslip.decay.motions import free_decay
+from stickslip.decay.search import Search
+from stickslip.decay.waveform import normal_equations, sample_motion
 
 OMEGA, DAMPING, DRY, REST, AMPLITUDE, RELEASE = 2 * math.pi, 0.0316, 0.02, 0.1, 1.0, 0.26
 TRUTH = np.array([OMEGA, DAMPING, DRY, REST, AMPLITUDE, RELEASE])

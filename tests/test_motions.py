@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import stickslip as ss
-from stickslip.fit.motions import ALWAYS, MOTIONS, PARAMETERS, free_decay
+from stickslip.decay.motions import ALWAYS, MOTIONS, PARAMETERS, free_decay
 
 W, TIMES = 6.0, np.linspace(0.0, 9.0, 500)
 CASES = {

@@ -13,8 +13,8 @@ from click.testing import CliRunner
 
 import stickslip as ss
 from stickslip.cli.program import main
+from stickslip.fit.choice import CERTAIN, Evidence, Misfit, standings
 from stickslip.fit.guess import GUESSES, Seen
-from stickslip.fit.law_choice import CERTAIN, Evidence, Misfit, standings
 from stickslip.plot.law import law_plates
 
 RIG: dict[str, Any] = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12}

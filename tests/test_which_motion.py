@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.fit.motions import free_decay
+from stickslip.decay.motions import free_decay
 
 TIMES = np.arange(3000) / 200
 

@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
     from stickslip.files.write import write_record as write_record
     from stickslip.analysis.findings import Findings as Findings
-    from stickslip.fit.answer import DecayFit as DecayFit
-    from stickslip.fit.curves import CurveFit as CurveFit, fit_curve as fit_curve
+    from stickslip.decay.answer import DecayFit as DecayFit
+    from stickslip.curves.fit_curve import CurveFit as CurveFit, fit_curve as fit_curve
     from stickslip.fit.law import LawFit as LawFit, fit_law as fit_law
-    from stickslip.fit.load import LoadLine as LoadLine, friction_over_load as friction_over_load
-    from stickslip.fit.memory import FrictionMemory as FrictionMemory, friction_memory as friction_memory
-    from stickslip.fit.decay import fit_decay as fit_decay
+    from stickslip.curves.load import LoadLine as LoadLine, friction_over_load as friction_over_load
+    from stickslip.curves.memory import FrictionMemory as FrictionMemory, friction_memory as friction_memory
+    from stickslip.decay.fit_decay import fit_decay as fit_decay
     from stickslip.fit.which_law import LawComparison as LawComparison, compare_laws as compare_laws
-    from stickslip.fit.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
+    from stickslip.decay.which_motion import DecayMotion as DecayMotion, choose_motion as choose_motion
     from stickslip.identify.decrement import Bounds as Bounds, Decrement as Decrement, decrement as decrement
     from stickslip.identify.envelope import (
         EnvelopeDecay as EnvelopeDecay,
@@ -260,14 +260,14 @@ _ROOMS = {
     "sensor_delay": "identify.sensor_delay", "SensorDelay": "identify.sensor_delay",
     "decrement": "identify.decrement", "Decrement": "identify.decrement", "Bounds": "identify.decrement",
     "find_releases": "identify.release", "Releases": "identify.release", "RingDown": "identify.release",
-    "fit_decay": "fit.decay", "DecayFit": "fit.answer",
-    "fit_curve": "fit.curves", "CurveFit": "fit.curves",
-    "friction_over_load": "fit.load", "LoadLine": "fit.load",
-    "friction_memory": "fit.memory", "FrictionMemory": "fit.memory",
+    "fit_decay": "decay.fit_decay", "DecayFit": "decay.answer",
+    "fit_curve": "curves.fit_curve", "CurveFit": "curves.fit_curve",
+    "friction_over_load": "curves.load", "LoadLine": "curves.load",
+    "friction_memory": "curves.memory", "FrictionMemory": "curves.memory",
     "fit_law": "fit.law", "LawFit": "fit.law",
     "publish_fit": "reports.fit", "fit_summary": "reports.fit", "fit_numbers": "reports.fit",
     "compare_laws": "fit.which_law", "LawComparison": "fit.which_law",
-    "choose_motion": "fit.which_motion", "DecayMotion": "fit.which_motion",
+    "choose_motion": "decay.which_motion", "DecayMotion": "decay.which_motion",
     "log_decrement": "identify.envelope", "linear_decrement": "identify.envelope",
     "extreme_decay": "identify.envelope", "hilbert_decay": "identify.envelope", "EnvelopeDecay": "identify.envelope",
     "plan_experiment": "analysis.experiment", "ExperimentPlan": "analysis.experiment",

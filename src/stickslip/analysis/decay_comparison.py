@@ -9,11 +9,11 @@ from typing import Any
 
 from stickslip.analysis.decays import DecayFindings
 from stickslip.analysis.findings import plain
+from stickslip.decay.answer import DecayFit
+from stickslip.decay.fit_decay import fit_decay
+from stickslip.decay.which_motion import whichever
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit.answer import DecayFit
-from stickslip.fit.decay import fit_decay
-from stickslip.fit.which_motion import whichever
 from stickslip.statistics import disagreement, weighted_mean
 
 SHARED = ("damping_ratio", "dry_displacement", "frequency")

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
 import numpy as np
 
 from stickslip.analysis.findings import plain, record_name
+from stickslip.decay.answer import DecayFit
+from stickslip.decay.fit_decay import fit_decay
+from stickslip.decay.motions import Restoring
+from stickslip.decay.which_motion import DecayMotion, choose_motion
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit.answer import DecayFit
-from stickslip.fit.decay import fit_decay
-from stickslip.fit.motions import Restoring
-from stickslip.fit.which_motion import DecayMotion, choose_motion
 from stickslip.identify.decrement import Decrement, decrement
 from stickslip.identify.envelope import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
 from stickslip.identify.release import SEEN, Releases, find_releases

@@ -1,1 +1,1 @@
-"""Questions that need the motion itself: the whole waveform against a record."""
+"""Friction laws against a record, with the exact engine in the loop."""

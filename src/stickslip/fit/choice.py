@@ -1,471 +1,173 @@
-"""Which motion was it? Candidates fitted to one free decay, tested against each other, and what is left undecided."""
+"""Which of several fitted laws the records leave possible, where none of them leaves noise alone.
+
+What a law leaves over is mostly error of the model: a gain that is 1 % off, a surface that is not even. Its variance is
+taken from what is left of each channel of each record, and what lies between two reversals counts as one story, so that
+no sample is taken for a proof of its own.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate
-from stickslip.fit.candidates import (
-    EXPONENT,
-    HIGHEST,
-    HOPELESS,
-    NUMBERS,
-    STRIBECK_SPEEDS,
-    BlockMeans,
-    Fitted,
-    first_speed,
-    fit_candidates,
-    fit_motion,
-)  # fmt: skip
-from stickslip.fit.motions import MOTIONS, Restoring
-from stickslip.statistics import mean_uncertainty, student
+from stickslip.estimate import Estimate
+from stickslip.statistics import correlation_time
 
 Array = NDArray[np.float64]
+Key = tuple[str, int]
+"""A channel, and the number of its record."""
 
-SIZE = 0.05  # of each candidate's test: how often a true one is rejected
-COLOURED = 0.01  # p-value of the best residual's whiteness below which its correlation counts
-DRAWS = 20000  # of the greatest of correlated Student variables
-NEAR = 2.0  # times the least residual: what counts where no candidate is true
-APART = 1e-4  # share of a direction that the fitted parameters must leave for it to be seen
-SEEN = {
-    "damping_ratio": "viscous damping",
-    "dry_displacement": "dry friction",
-    "quadratic": "quadratic (air) damping",
-    "rise": "friction that rises towards rest (Stribeck)",
-    "micro_slip": "a joint in micro-slip",
-    "curvature": "a spring that is not straight",
-    "static": "static above kinetic friction",
-}
+SEPARATED = 2.0  # times the misfit of the best law, from which on another family is rejected
+CALIBRATIONS = 3.0  # times the calibration's error, below which an effect is not to be told from it
+CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
+SHARPNESS = 4.0  # power of the ratio of misfits that the odds between two families follow
+FAMILIES = {"Coulomb": "rigid", "static": "rigid", "Stribeck": "rigid"}
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
-    """What the residual of the best fit says about the noise.
+class Misfit:
+    """What a law leaves of the records.
 
     Attributes
     ----------
-    residual : ndarray, shape (n,)
-        Of the candidate that leaves least.
-    terms : int
-        Parameters that it freed.
-    floor : float
-        Below which a residual is rounding.
+    name : str
+        The law.
+    count : int
+        Its parameters.
+    squares : mapping of (str, int) to float
+        Mean square of what is left of each channel of each record [unit of the channel, squared].
+    predicted : mapping of (str, int) to float, or None
+        The same where each record is predicted by a fit to the others.
     """
 
-    residual: Array
-    terms: int
-    floor: float
+    name: str
+    count: int
+    squares: Mapping[Key, float]
+    predicted: Mapping[Key, float] | None = None
 
-    @cached_property
-    def whiteness(self) -> float:
-        """p-value of its being white."""
-        return _whiteness(self.residual, self.floor)
+    @property
+    def family(self) -> str:
+        """Rigid laws are one family; each other law is its own."""
+        return FAMILIES.get(self.name, self.name)
 
-    def along(self, row: Array) -> tuple[float, float]:
-        """Standard deviation of the noise's product with a row, and its degrees of freedom."""
-        count = len(self.residual)
-        freedom = max(1, count - self.terms)
-        if self.whiteness >= COLOURED:
-            variance = max(float(self.residual @ self.residual) / freedom, self.floor**2)
-            return math.sqrt(variance * float(row @ row)), float(freedom)
-        sd, effective = mean_uncertainty(count * row * self.residual)
-        return sd * math.sqrt(count / freedom), effective
+
+@dataclass(frozen=True)
+class Standing:
+    """How a law stands among those tried.
+
+    Attributes
+    ----------
+    name, family : str
+        The law.
+    misfit : float
+        Mean square of what it leaves over that of the best law, the mean over channels and records; 1 is the best.
+    criterion : float
+        Schwarz's information criterion less that of the best law; more is worse.
+    prediction : float
+        As the misfit, where each record is predicted by a fit to the others; nan where it was not asked.
+    kept : bool
+        Whether the records leave it possible.
+    verdict : str
+        In words.
+    """
+
+    name: str
+    family: str
+    misfit: float
+    criterion: float
+    prediction: float
+    kept: bool
+    verdict: str
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """One motion tried on a free decay, and whether the record speaks against it.
+class Evidence:
+    """How much each channel counts: samples that tell a story of their own, and the noise [unit of the channel]."""
 
-    Attributes
-    ----------
-    fitted : Fitted
-        Its least squares.
-    noise : Noise
-        Of the record.
-    p_value : float
-        Of the greatest of its test statistics.
-    against : str
-        The named term seen most clearly, in words; empty where none could be looked for.
-    """
+    counts: Mapping[Key, float]
+    noise: Mapping[Key, float]
 
-    fitted: Fitted
-    noise: Noise
-    p_value: float
-    against: str
+    def criterion(self, squares: Mapping[Key, float], count: int) -> float:
+        """Schwarz's, the variance of each channel unknown but for its noise: ``sum n log S + p log(sum n)``."""
+        likely = math.fsum(n * math.log(max(squares[name], self.noise[name] ** 2)) for name, n in self.counts.items())
+        return likely + count * math.log(max(2.0, math.fsum(self.counts.values())))
 
-    @property
-    def name(self) -> str:
-        """As in ``MOTIONS``."""
-        return self.fitted.motion.name
+    def over(self, squares: Mapping[Key, float], best: Mapping[Key, float]) -> float:
+        """What is left over what the best law leaves, the mean over channels and records."""
+        floors = {name: noise**2 for name, noise in self.noise.items()}
+        return float(np.mean([max(squares[n], low) / max(best[n], low) for n, low in floors.items()]))
 
-    @property
-    def kept(self) -> bool:
-        """Whether no named term that it lacks is seen."""
-        return self.p_value >= SIZE
 
-    @cached_property
-    def whiteness(self) -> float:
-        """p-value of its residual being white."""
-        return _whiteness(self.fitted.residual, self.noise.floor)
+def independent(residual: Array) -> float:
+    """How many samples that tell each a story of their own a residual holds."""
+    return len(residual) / correlation_time(residual)
 
-    @property
-    def verdict(self) -> str:
-        """In words; the term named is most like what is left over, and need not be at work."""
-        if self.kept:
-            return f"kept (p = {self.p_value:.2g})"
-        likely = "p < 1e-6" if self.p_value < 1e-6 else f"p = {self.p_value:.1g}"
-        return f"rejected ({likely}): something like {self.against} is missing"
 
-    @cached_property
-    def _influences(self) -> dict[str, Array]:
-        """How each parameter follows the data, the added term held."""
-        columns = self.fitted.settled
-        rows = np.linalg.pinv(self.fitted.jacobian[:, columns])
-        return {self.fitted.motion.free[column]: row for column, row in zip(columns, rows, strict=True)}
+def standings(
+    misfits: Sequence[Misfit], evidence: Evidence, *, excess: Estimate | None, calibration: float
+) -> tuple[list[Standing], float]:
+    """The laws, the best one first, those kept that the records leave possible; and the confidence in that."""
+    order = sorted(misfits, key=lambda each: evidence.criterion(each.squares, each.count))
+    best = order[0]
+    ratios = {each.name: evidence.over(each.squares, best.squares) for each in order}
+    forecasts = _forecasts(order, evidence)
+    inner, sure = _within([each for each in order if each.family == best.family], evidence, excess, calibration)
+    others = {each.name for each in order if each.family != best.family}
+    near = {name for name in others if ratios[name] <= SEPARATED or forecasts[name] < 1}
+    level = evidence.criterion(best.squares, best.count)
+    told = []
+    for each in order:
+        kept = each.name in (near if each.name in others else inner)
+        words = inner.get(each.name) or ("not rejected" if kept else f"rejected: misfit {times(ratios[each.name])}")
+        worse = evidence.criterion(each.squares, each.count) - level
+        told.append(Standing(each.name, each.family, ratios[each.name], worse, forecasts[each.name], kept, words))
+    nearest = {name: min(ratio, forecasts[name]) if forecasts[name] < 1 else ratio for name, ratio in ratios.items()}
+    odds = math.fsum(ratio**-SHARPNESS for ratio in _nearest(order, nearest, best.family))
+    return told, min(CERTAIN, sure / (1 + odds))
 
-    @cached_property
-    def _term(self) -> tuple[Array, float, float]:
-        """The added term's direction, and how far it may lie below and above its value: never below zero."""
-        fitted, added = self.fitted, self.fitted.added
-        if added is None:
-            return np.zeros(len(fitted.residual)), 0.0, 0.0
-        direction = fitted.jacobian[:, fitted.motion.free.index(added)]
-        others = fitted.jacobian[:, fitted.settled]
-        left = direction - others @ (np.linalg.pinv(others) @ direction)
-        power, value = float(left @ left), fitted.value(added)
-        room = HIGHEST.get(added, math.inf) - value
-        if power <= (APART * np.linalg.norm(direction)) ** 2:
-            return direction, -value, room if math.isfinite(room) else 0.0
-        sd, freedom = self.noise.along(left / power)
-        reach = student(freedom) * sd
-        return direction, -min(reach, value), min(reach, room)
 
-    @cached_property
-    def _yielding(self) -> float:
-        """How far the dry friction ``x_k`` gives way, over itself, to a rise ``sigma`` by one.
+def times(ratio: float) -> str:
+    """ "2.31 times", "40 times"."""
+    return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.0f} times"
 
-        Their product is at work: ``x_k (1 + sigma s)`` stays, so ``x_k`` falls as a hyperbola and never to zero.
-        """
-        row, dry = self._influences.get("dry_displacement"), self.fitted.value("dry_displacement")
-        if self.fitted.added != "rise" or row is None or dry <= 0:
-            return 0.0
-        return max(0.0, float(row @ self._term[0])) / dry
 
-    def estimate(self, parameter: str, *, name: str | None = None, unit: str = "1", factor: float = 1.0) -> Estimate:
-        """One of its parameters with the interval that holds if this is the motion; exactly zero where it has none."""
-        row = self._influences.get(parameter)
-        value = self.fitted.value(parameter)
-        if parameter == self.fitted.added:
-            _, below, above = self._term
-            low, high, sd = value + below, value + above, (above - below) / (2 * NORMAL_95)
-        elif row is None:
-            low = high = value
-            sd = 0.0
+def _forecasts(order: Sequence[Misfit], evidence: Evidence) -> dict[str, float]:
+    """What the predictions of each law leave over those of the best one."""
+    best = order[0].predicted
+    return {
+        each.name: math.nan if each.predicted is None or best is None else evidence.over(each.predicted, best)
+        for each in order
+    }
+
+
+def _nearest(order: Sequence[Misfit], ratios: Mapping[str, float], best: str) -> list[float]:
+    """The least misfit of each other family."""
+    families = {each.family for each in order} - {best}
+    return [min(ratios[each.name] for each in order if each.family == family) for family in families]
+
+
+def _within(
+    family: Sequence[Misfit], evidence: Evidence, excess: Estimate | None, calibration: float
+) -> tuple[dict[str, str], float]:
+    """The laws of one family that are not rejected, with words; from the simplest on, a richer one has to earn it."""
+    steps = sorted(family, key=lambda each: each.count)
+    low, high = excess.interval if excess is not None else (0.0, math.inf)
+    least = CALIBRATIONS * calibration
+    chosen, doubted, sure = steps[0], list[Misfit](), 1.0
+    for richer in steps[1:]:
+        gain = evidence.criterion(chosen.squares, chosen.count) - evidence.criterion(richer.squares, richer.count)
+        odds = math.exp(max(-50.0, min(50.0, gain / 2)))
+        better = odds / (1 + odds)
+        if gain > 0 and low > 0 and excess is not None and excess.value > least:
+            chosen, doubted, sure = richer, [], sure * better
+        elif (gain > 0 or chosen is steps[0]) and high > least:
+            doubted.append(richer)
+            sure = min(sure, 0.5)
         else:
-            sd, freedom = self.noise.along(row)
-            direction, below, above = self._term
-            above /= 1 + above * self._yielding
-            moves = [-float(row @ direction) * end for end in (below, above)]
-            reach = student(freedom) * sd
-            low, high = value - math.hypot(reach, min(0.0, *moves)), value + math.hypot(reach, max(0.0, *moves))
-            sd = (high - low) / (2 * NORMAL_95)
-        return Estimate(
-            name or parameter, factor * value, (factor * low, factor * high), factor * sd, unit,
-            f"least squares, {self.fitted.motion.words}", self._status,
-        )  # fmt: skip
-
-    @property
-    def _status(self) -> str:
-        return "ok" if self.kept else f"{self.against} is seen beside it"
-
-
-@dataclass(frozen=True, eq=False)
-class Choice:
-    """Which motion a free decay followed, and which others it may have followed.
-
-    Attributes
-    ----------
-    model : str
-        The simplest candidate that the record does not speak against.
-    candidates : tuple of Candidate
-        All that were tried, the simplest first.
-    lack_of_fit : float
-        p-value of the chosen motion's residual being white (cumulative periodogram).
-    status : str
-        "ok", or in words what to beware of.
-    """
-
-    model: str
-    candidates: tuple[Candidate, ...]
-    lack_of_fit: float
-    status: str
-
-    @property
-    def chosen(self) -> Candidate:
-        """The candidate of that name."""
-        return self.candidate(self.model)
-
-    @property
-    def kept(self) -> tuple[Candidate, ...]:
-        """Those not rejected; where all are, those that leave at most twice the residual of the best."""
-        return tuple(self.candidate(name) for name in kept_by_all((self,)))
-
-    def interval(self, parameter: str) -> tuple[float, float]:
-        """95 % interval of a parameter, whichever of the candidates not rejected is the motion."""
-        return interval_of((self,), parameter)
-
-    def seen_beside(self, *names: str) -> str:
-        """What is seen beside the motions of these names, in words; empty where one of them is not rejected."""
-        tried = [each for each in self.candidates if each.name in names]
-        if not tried or any(each.kept for each in tried):
-            return ""
-        best = min(tried, key=lambda each: each.fitted.motion.size)
-        return f"{best.against} is seen beside {best.fitted.motion.words}"
-
-    def candidate(self, name: str) -> Candidate:
-        """The candidate of a name in ``MOTIONS``."""
-        return next(each for each in self.candidates if each.name == name)
-
-
-def choose(
-    times: ArrayLike,
-    values: ArrayLike,
-    *,
-    fs: float,
-    start: ArrayLike,
-    counts: ArrayLike | None = None,
-    restoring: Restoring = "linear",
-    candidates: tuple[str, ...] = tuple(MOTIONS),
-    weights: ArrayLike | None = None,
-) -> Choice:
-    """Which motion does a free decay follow?
-
-    Every candidate is fitted by least squares. Each is then tested against every named term that it lacks, with the
-    noise of the candidate that leaves least: a true one is rejected once in twenty. The simplest that is not rejected
-    is the model; all that are not rejected give the interval that counts the model's form.
-
-    Parameters
-    ----------
-    times, values : array_like, shape (n,)
-        Instants [s], rising, and displacements; or centres and means of blocks of samples.
-    fs : float
-        Sampling rate [Hz] within a block.
-    start : array_like, shape (6,)
-        Rough angular frequency [rad/s], damping ratio, dry friction displacement, rest position, first amplitude from
-        there (signed) and release [s].
-    counts : array_like, shape (n,), optional
-        Samples in each block; one when not given.
-    restoring : {"linear", "pendulum"}
-        The spring's law: x, or sin x.
-    candidates : tuple of str
-        Names in ``MOTIONS``.
-    weights : array_like, shape (n,), optional
-        Independent readings in each block, where they are not as many as its samples.
-
-    Returns
-    -------
-    Choice
-
-    Raises
-    ------
-    EstimateError
-        A name that is no candidate's, or fewer samples than a fit needs.
-
-    Examples
-    --------
-    >>> from stickslip.fit.motions import free_decay
-    >>> t, rng = np.arange(480) / 40, np.random.default_rng(1)
-    >>> x, _, _ = free_decay(t, [6.28, 0.02, 0.02, 0, 1, 0.3, 0, 0, 0, 0, 0.5, 0])
-    >>> found = choose(t, x + 1e-3 * rng.standard_normal(480), fs=40, start=[6.2, 0.02, 0.02, 0, 1, 0.3])
-    >>> found.model
-    'both'
-    """
-    unknown = [name for name in candidates if name not in MOTIONS]
-    if unknown or not candidates:
-        raise EstimateError(
-            f"candidates = {', '.join(unknown) or 'none'}",
-            f"each is one of {', '.join(MOTIONS)}",
-            "name one of them at least",
-        )
-    instants, data = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
-    each = np.ones(len(instants)) if counts is None else np.asarray(counts, dtype=float)
-    most = max(len(MOTIONS[name].free) for name in candidates)
-    if len(instants) < 3 * most:
-        raise EstimateError(
-            f"{len(instants)} samples", f"{most} parameters need three times as many", "give a longer record"
-        )
-    independent = each if weights is None else np.asarray(weights, dtype=float)
-    blocks = BlockMeans(instants, data, each, independent, fs, restoring)
-    fits = fit_candidates(candidates, blocks, np.asarray(start, float))
-    best = min(fits.values(), key=lambda fitted: fitted.cost)
-    noise = Noise(best.residual, best.jacobian.shape[1], blocks.floor)
-    tried = tuple(_tested(fitted, noise, best) for name, fitted in fits.items() if name in candidates)
-    return _chosen(tried)
-
-
-def kept_by_all(choices: Sequence[Choice]) -> tuple[str, ...]:
-    """Names of the candidates that no release speaks against; where there is none, those that leave least.
-
-    A true candidate is rejected once in twenty, however many releases look for it (Bonferroni). Least is up to twice
-    the best residual of all releases together.
-    """
-    tried = {each.name: [choice.candidate(each.name) for choice in choices] for each in choices[0].candidates}
-    kept = tuple(name for name, each in tried.items() if len(choices) * min(one.p_value for one in each) >= SIZE)
-    costs = {name: sum(one.fitted.cost for one in each) for name, each in tried.items()}
-    return kept or tuple(name for name, cost in costs.items() if cost <= NEAR**2 * min(costs.values()))
-
-
-def interval_of(choices: Sequence[Choice], parameter: str) -> tuple[float, float]:
-    """95 % interval of what several releases share, whichever of the candidates not rejected is the motion."""
-    ends = [_pooled([each.candidate(name).estimate(parameter) for each in choices]) for name in kept_by_all(choices)]
-    return min(low for low, _ in ends), max(high for _, high in ends)
-
-
-def _pooled(estimates: Sequence[Estimate]) -> tuple[float, float]:
-    """Interval of the mean of estimates, each as heavy as it is sure."""
-    sd = np.array([each.sd for each in estimates])
-    share = 1.0 * (sd == 0) if (sd == 0).any() else sd.min() ** 2 / sd**2
-    share /= share.sum()
-    value = share @ [each.value for each in estimates]
-    low, high = (np.array([each.interval[side] - each.value for each in estimates]) for side in (0, 1))
-    return float(value - np.linalg.norm(share * low)), float(value + np.linalg.norm(share * high))
-
-
-def _chosen(tried: tuple[Candidate, ...]) -> Choice:
-    """The simplest candidate kept, or the nearest of all."""
-    kept = [each for each in tried if each.kept]
-    fewest = min((each.fitted.motion.size for each in kept), default=0)
-    simplest = [each for each in kept if each.fitted.motion.size == fewest] or tried
-    best = min(simplest, key=lambda each: each.fitted.cost)
-    seen = f"no candidate fits: {best.against} is seen beside {best.fitted.motion.words}"
-    status = lack_of_fit(best) if kept else seen
-    return Choice(best.name, tried, best.whiteness, status or "ok")
-
-
-def lack_of_fit(candidate: Candidate) -> str:
-    """What is left unexplained, in words; empty where the residual is white."""
-    if candidate.whiteness >= COLOURED:
-        return ""
-    return f"the residual of {candidate.fitted.motion.words} is not white (p = {candidate.whiteness:.1g})"
-
-
-def white_noise_test(residual: ArrayLike) -> float:
-    """Is a residual white?
-
-    Bartlett's cumulative periodogram: the greatest distance between the running share of its power and a straight line,
-    by Kolmogorov and Smirnov's distribution (Stephens 1970 for short series).
-
-    Parameters
-    ----------
-    residual : array_like, shape (n,)
-        In order of time.
-
-    Returns
-    -------
-    float
-        p-value.
-
-    Examples
-    --------
-    >>> white_noise_test(np.random.default_rng(0).standard_normal(400)) > 0.05
-    True
-    >>> white_noise_test(np.sin(np.arange(400.0))) < 1e-6
-    True
-    """
-    from scipy.special import kolmogorov
-
-    values = np.asarray(residual, dtype=float)
-    power = np.abs(np.fft.rfft(values - values.mean())[1 : (len(values) + 1) // 2]) ** 2
-    if len(power) < 3 or power.sum() == 0:
-        return 1.0
-    share = np.cumsum(power)[:-1] / power.sum()
-    steps = np.arange(1, len(power))
-    last = len(power) - 1
-    # Sums of exponentials over their total are uniform order statistics.
-    distance = max(float((steps / last - share).max()), float((share - (steps - 1) / last).max()))
-    root = math.sqrt(last)
-    return float(kolmogorov((root + 0.12 + 0.11 / root) * distance))
-
-
-def _whiteness(residual: Array, floor: float) -> float:
-    """p-value of a residual's being white; rounding is not asked."""
-    return 1.0 if float(residual @ residual) <= floor**2 * len(residual) else white_noise_test(residual)
-
-
-def _tested(fitted: Fitted, noise: Noise, best: Fitted) -> Candidate:
-    """Does the record speak against this candidate: is a named term seen that it lacks?
-
-    Each term gives a direction ``d``, in which the motion would move if it were at work; ``M d`` is what of it the
-    fitted parameters can not imitate. ``t = (M d) r / sd`` is Student's where the candidate is true. The greatest
-    ``|t|`` is set against the distribution of the greatest of so correlated variables (Hothorn, Bretz and Westfall
-    2008), so that a true candidate is rejected once in twenty, however many terms are looked for.
-    """
-    basis, _ = np.linalg.qr(fitted.jacobian)
-    names, rows = [], []
-    for name, direction in _directions(fitted, best):
-        rest = direction - basis @ (basis.T @ direction)
-        rest -= basis @ (basis.T @ rest)
-        length = np.linalg.norm(rest)
-        if length > APART * np.linalg.norm(direction):
-            names.append(name)
-            rows.append(rest / length)
-    if not names:
-        return Candidate(fitted, noise, 1.0, "")
-    spreads = [noise.along(row) for row in rows]
-    statistics = [
-        abs(float(row @ fitted.residual)) / sd if sd > 0 else 0.0 for row, (sd, _) in zip(rows, spreads, strict=True)
-    ]
-    greatest = int(np.argmax(statistics))
-    matrix = np.array(rows)
-    p_value = _greatest_p(statistics[greatest], matrix @ matrix.T, min(freedom for _, freedom in spreads))
-    return Candidate(fitted, noise, p_value, SEEN[names[greatest]])
-
-
-def _greatest_p(statistic: float, correlation: Array, freedom: float) -> float:
-    """How often the greatest of correlated Student variables exceeds this."""
-    from scipy.special import stdtr
-
-    bound = 2 * float(stdtr(freedom, -statistic)) * len(correlation)
-    if bound < SIZE / 10:
-        return bound  # Bonferroni's: far out it is sharp enough
-    rng = np.random.default_rng(0)
-    values, vectors = np.linalg.eigh(correlation)
-    normal = rng.standard_normal((DRAWS, len(values))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
-    greatest = np.abs(normal).max(axis=1) / np.sqrt(rng.chisquare(freedom, DRAWS) / freedom)
-    return float((1 + np.count_nonzero(greatest >= statistic)) / (1 + DRAWS))
-
-
-def _directions(fitted: Fitted, best: Fitted) -> list[tuple[str, Array]]:
-    """How the weighted motion would move with each named term that the candidate lacks."""
-    terms, blocks = fitted.motion.terms, fitted.blocks
-    dry = "dry_displacement" in terms
-
-    def column(name: str, **shape: float) -> Array:
-        parameters = fitted.parameters.copy()
-        for other, value in shape.items():
-            parameters[NUMBERS[other]] = value
-        jacobian = blocks.motion(parameters, free=(name,), half_cycles=fitted.half_cycles if dry else None)[1]
-        return blocks.weighted(jacobian)[:, 0]
-
-    found = [
-        (name, column(name))
-        for name in ("damping_ratio", "dry_displacement", "quadratic", "curvature")
-        if name not in terms
-    ]
-    if "micro_slip" not in terms:
-        found.append(("micro_slip", column("micro_slip", exponent=EXPONENT)))
-    if dry and "rise" not in terms:
-        speed = first_speed(fitted.parameters)
-        found += [("rise", column("rise", stribeck_speed=share * speed)) for share in STRIBECK_SPEEDS]
-    near = fitted.cost < HOPELESS * best.cost
-    if dry and near and fitted.half_cycles > 1 and not fitted.motion.sticks_early:
-        earlier = fit_motion(fitted.motion, blocks, fitted.parameters, half_cycles=fitted.half_cycles - 1)
-        found.append(("static", fitted.residual - earlier.residual))
-    return found
+            sure *= 1 - better
+    words = {chosen.name: "not rejected" if doubted else "best"}
+    return words | {each.name: "not rejected" for each in doubted}, sure

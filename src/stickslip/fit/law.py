@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit.law_search import Knob, Point, Problem, descend
-from stickslip.fit.law_start import Shown, best_start, better_start, free_names, knob, seen_profile, thinned, value_of
-from stickslip.fit.law_stretch import channels_of
-from stickslip.fit.law_surety import Surety, surety
+from stickslip.fit.search import Knob, Point, Problem, descend
+from stickslip.fit.start import Shown, best_start, better_start, free_names, knob, seen_profile, thinned, value_of
+from stickslip.fit.stretch import channels_of
+from stickslip.fit.surety import Surety, surety
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator

@@ -1,129 +1,254 @@
-"""Where the fit of a ring-down begins: blocks, period, release and amplitudes, read off the record itself."""
+"""Where a fit of a law begins: what the record shows of motion and friction, and which values are tried."""
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 
-from stickslip.compiled import FAST, compiled
-from stickslip.fit.profile import solve
-from stickslip.fit.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, REST, normal_equations
-from stickslip.signals.turns import turning_points
+import numpy as np
+from numpy.typing import NDArray
 
-BLOCKS = 40  # a period; the variance of the answer rises by 0.3 % of itself
-FIRST_SWINGS = 0.25  # of the range: what counts as a swing before the noise is averaged
-LATER_SWINGS = 0.05
-NOISES = 12.0  # standard deviations of the noise that a swing is larger than
+from stickslip.errors import EstimateError, ModelError, RecordError
+from stickslip.fit.drive import measured_drive
+from stickslip.fit.search import ABOVE, Knob, Point, Problem, Profile, descend
+from stickslip.fit.stretch import Sensor, Stretch
+from stickslip.oscillator import Oscillator
+from stickslip.parameters import find
+from stickslip.record.record import Record
+from stickslip.signals.differentiate import LEAST, differentiate
+from stickslip.signals.noise import noise_level
 
+Array = NDArray[np.float64]
 
-@compiled(**FAST)
-def block_means(samples, size, means):
-    """Mean of every `size` samples; of the rest the last."""
-    total = samples.shape[0]
-    for block in range(means.shape[0]):
-        first, last = block * size, min(block * size + size, total)
-        mean = 0.0
-        for j in range(first, last):
-            mean += samples[j]
-        means[block] = mean / (last - first)
-
-
-@compiled(**FAST)
-def roughness(values):
-    """Standard deviation of the noise, by fourth differences: of a motion of 20 samples a period 0.1 % is left."""
-    total = 0.0
-    for j in range(values.shape[0] - 4):
-        fourth = values[j] - 4.0 * values[j + 1] + 6.0 * values[j + 2] - 4.0 * values[j + 3] + values[j + 4]
-        total += fourth * fourth
-    return math.sqrt(total / (70.0 * max(values.shape[0] - 4, 1)))
-
-
-@compiled(**FAST)
-def passages(values, rows, count, times):
-    """When the motion passes half way between one extreme and the next, as the area under the swing has it.
-
-    The same share of every half cycle, so that they lie half a period apart.
-    """
-    for k in range(count - 1):
-        top, bottom = values[rows[k]], values[rows[k + 1]]
-        area = 0.0
-        for j in range(rows[k], rows[k + 1]):
-            area += values[j] - bottom
-        times[k] = rows[k] + area / (top - bottom)
+FAST = 0.5  # of the largest speed: then the contact slides for certain
+EDGE = 0.02  # of the record at its ends, where a derivative is poor
+FINEST = 1e-5  # of a channel's range: noise below it is not asked for
+AUDIBLE = 2.0  # times its noise that a motion must stray
+SHAPES = ("exponent", "printed", "rule", "seed", "error")  # of a law, that are chosen and not fitted
+GRID = {
+    "stiffness": (0.25, 1.0, 4.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0),
+}  # fmt: skip
+EXCESS = (0.04, 0.15, 0.25, 0.4)  # of static over kinetic friction
+SPEEDS = (0.03, 0.1, 0.3)  # of the largest speed
+THIN = 1000.0  # readings of a channel that a first look takes
+FINALISTS = 3
+KNOTS, BENT = 17, 0.03  # of a surface's profile, and how stiff it is
 
 
-@compiled(**FAST)
-def half_period(values, rows, times, count):
-    """Spacing and first of the passages, by least squares weighted with the swings squared; (0, 0) if there is one."""
-    s0, s1, s2, t0, t1 = 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(count - 1):
-        swing = values[rows[k]] - values[rows[k + 1]]
-        weight = swing * swing
-        s0 += weight
-        s1 += weight * k
-        s2 += weight * k * k
-        t0 += weight * times[k]
-        t1 += weight * k * times[k]
-    det = s0 * s2 - s1 * s1
-    if count < 3 or det <= 0.0:
-        return 0.0, 0.0
-    return (s0 * t1 - s1 * t0) / det, (s2 * t0 - s1 * t1) / det
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What one record shows before any law is fitted: motion, where it slides, and the friction's level."""
+
+    record: Record
+    channels: tuple[str, ...]
+    displacement: Array
+    velocity: Array
+    late: float
+    felt: Array
+    level: float
+
+    @classmethod
+    def of(cls, record: Record, channels: Sequence[str], oscillator: Oscillator) -> Shown:
+        """Displacement and velocity by x or v; the level of the load, the friction, or the balance of forces."""
+        name = next((name for name in ("x", "v") if name in record), None)
+        if name is None:
+            raise RecordError(
+                f"a record of {', '.join(record)}", "a law is fitted to a motion: displacement x or velocity v",
+                "give one, or integrate the acceleration first",
+            )  # fmt: skip
+        record.require_clean(*channels, name, question="a fitted law", samples=2 * LEAST)
+        values, late = record[name], record.channels[name].delay
+        noise = record.channels[name].noise or noise_level(values, record.fs)
+        if not np.std(values) > AUDIBLE * noise:
+            raise EstimateError(
+                f"{name} strays by {np.std(values):.3g} {record.channels[name].unit} in noise of {noise:.3g}",
+                "a law is fitted to motion above the noise", "drive harder, or measure with less noise",
+            )  # fmt: skip
+        if name == "x":
+            velocity = differentiate(values, record.fs).values
+            displacement = values - _middle(record, values, velocity)
+        else:
+            velocity = values
+            displacement = np.cumsum(values - values.mean()) / record.fs
+        felt = _felt(record, velocity, oscillator)
+        return cls(record, tuple(channels), displacement, velocity, late, felt, _level(felt, velocity))
+
+    @property
+    def fastest(self) -> float:
+        """Largest speed [m/s] away from the ends."""
+        cut = max(1, int(EDGE * len(self.velocity)))
+        return float(np.abs(self.velocity[cut:-cut]).max())
+
+    def slides(self) -> NDArray[np.intp]:
+        """Rows in which the mass moves fast, away from the ends."""
+        cut = max(1, int(EDGE * len(self.velocity)))
+        rows = np.flatnonzero(np.abs(self.velocity) > FAST * self.fastest)
+        return rows[(rows >= cut) & (rows < len(self.velocity) - cut)]
+
+    def stretch(self, number: int, rows: tuple[int, int], oscillator: Oscillator) -> Stretch:
+        """The stretch between two rows, the mass sliding at the first."""
+        record = self.record
+        span = (rows[0] / record.fs - self.late, rows[1] / record.fs - self.late)
+        sensors = tuple(Sensor.of(record, name, span, self.noise(name)) for name in self.channels)
+        start = {"x": float(self.displacement[rows[0]]), "v": float(self.velocity[rows[0]])}
+        scales = np.array([np.ptp(self.displacement) / 2, self.fastest])
+        return Stretch(number, span, sensors, measured_drive(record, oscillator.drive), start, scales)
+
+    def noise(self, name: str) -> float:
+        """Standard deviation of a channel's noise, as stated or as found."""
+        stated, values = self.record.channels[name].noise, self.record[name]
+        found = noise_level(values, self.record.fs) if stated is None else stated
+        return max(found, FINEST * float(np.ptp(values)), 1e-300)
 
 
-@compiled(**FAST)
-def linear_step(p, n, means, size, total, dt, order, hessian, gradient, work):
-    """Best dry friction, rest and amplitude for the other three parameters: they enter linearly."""
-    small, right, answer, factor = work[3, :3, :3], work[4, 0, :3], work[4, 1, :3], work[5, :3, :3]
-    squares = normal_equations(p, n, means, size, total, dt, order, hessian, gradient, work[:3])
-    places = (DRY, REST, AMPLITUDE)
-    for j in range(3):
-        right[j] = gradient[places[j]]
-        for k in range(3):
-            small[j, k] = hessian[places[j], places[k]]
-    if not solve(small, right, answer, factor, 1e-12):
-        return squares
-    for j in range(3):
-        p[places[j]] += answer[j]
-        squares -= answer[j] * right[j]
-    return squares
+def _middle(record: Record, values: Array, velocity: Array) -> float:
+    """Where the spring is at rest: about the middle of a motion to and fro; of one that creeps one way, as measured."""
+    fast = velocity[np.abs(velocity) > FAST * np.abs(velocity).max()]
+    if np.min(fast) < 0 < np.max(fast):
+        return float(values.mean())
+    return float(np.mean(record.samples.get("z", 0.0)))
 
 
-@compiled(**FAST)
-def guess(means, size, total, dt, order, rows, times, p, work):
-    """First parameters of the motion in `p`; the number of half cycles seen, 0 where there are fewer than two."""
-    low, high = means[0], means[0]
-    for j in range(means.shape[0]):
-        low, high = min(low, means[j]), max(high, means[j])
-    hessian, gradient, trial = work[8, :6], work[9, 0], work[9, 1]
-    count = turning_points(means, max(LATER_SWINGS * (high - low), NOISES * roughness(means)), rows)
-    passages(means, rows, count, times)
-    spacing, first = half_period(means, rows, times, count)
-    if spacing <= 0.0:
-        return 0
-    best, step = math.inf, size * dt
-    half = spacing * step
-    for shift in range(-4, 5 if order == 0 else 9, 4 if order == 0 else 1):  # quarters of a half period, backwards
-        release = (first + 0.5) * step - (0.5 + 0.25 * shift) * half - 0.5 * dt
-        for damping in (0.001, 0.01, 0.03, 0.08, 0.2):
-            trial[DAMPING], trial[RELEASE] = damping, release
-            trial[RATE] = math.pi / (half * math.sqrt(1.0 - damping * damping))
-            trial[DRY], trial[REST] = 0.0, means[means.shape[0] - 1]
-            trial[AMPLITUDE] = means[rows[0]] - trial[REST] if order == 0 else high - low
-            n = max(1, count - 1 + shift // 4)
-            squares = linear_step(trial, n, means, size, total, dt, order, hessian, gradient, work)
-            if squares < best and trial[AMPLITUDE] != 0.0:
-                best = squares
-                for k in range(6):
-                    p[k] = trial[k]
-    return count - 1
+def _felt(record: Record, velocity: Array, oscillator: Oscillator) -> Array:
+    """Friction [N] as a sensor feels it, or as the balance of forces has it."""
+    if "load" in record or "friction" in record:
+        return record["load" if "load" in record else "friction"]
+    acceleration = record["a"] if "a" in record else differentiate(velocity, record.fs).values
+    place = record["x"] if "x" in record else np.cumsum(velocity) / record.fs
+    pull = oscillator.stiffness * (record.samples.get("z", 0.0) - place) + record.samples.get("force", 0.0)
+    return np.asarray(pull - oscillator.damping * velocity - oscillator.mass * acceleration)
 
 
-@compiled(**FAST)
-def block_size(samples, rows, times):
-    """Samples a block, for about `BLOCKS` of them a period; 0 where no period is seen."""
-    low, high = samples[0], samples[0]
-    for j in range(samples.shape[0]):
-        low, high = min(low, samples[j]), max(high, samples[j])
-    count = turning_points(samples, FIRST_SWINGS * (high - low), rows)
-    passages(samples, rows, count, times)
-    spacing, _ = half_period(samples, rows, times, count)
-    return max(1, int(2.0 * spacing / BLOCKS)) if spacing > 0.0 else 0
+def _level(felt: Array, velocity: Array) -> float:
+    fast = np.abs(velocity) > FAST * np.abs(velocity).max()
+    forward, back = (felt[fast & (side * velocity > 0)] for side in (1, -1))
+    if len(forward) and len(back):
+        return float(np.median(forward) - np.median(back)) / 2
+    return float(abs(np.median(felt[fast])))
+
+
+def free_names(oscillator: Oscillator, free: Sequence[str] | None) -> tuple[str, ...]:
+    """The parameters to fit: those asked for, or all of the law that have a value."""
+    if free is not None:
+        for name in free:
+            find(oscillator, name)
+        return tuple(free)
+    found = []
+    for field in fields(oscillator.law):  # type: ignore[arg-type]
+        value = getattr(oscillator.law, field.name)
+        if isinstance(value, int | float) and not isinstance(value, bool) and value and field.name not in SHAPES:
+            alone = find(oscillator, field.name) == (("law", field.name),)
+            found.append(field.name if alone else f"law.{field.name}")
+    if not found:
+        raise ModelError(
+            f"{type(oscillator.law).__name__} has no number to fit", "a law is fitted by its parameters",
+            "name those to fit in free=, or take another law",
+        )  # fmt: skip
+    return tuple(found)
+
+
+def value_of(oscillator: Oscillator, name: str) -> float:
+    """The present value of a parameter."""
+    part = oscillator
+    for word in find(oscillator, name)[0]:
+        part = getattr(part, word)
+    return float(part)  # type: ignore[arg-type]
+
+
+def knob(oscillator: Oscillator, name: str) -> Knob:
+    """How a parameter is turned."""
+    head, _, tail = name.rpartition(".")
+    if head not in ("", "law", "drive") and tail in ("gain", "delay"):
+        return Knob(name, tail, 1.0, 0.01) if tail == "gain" else Knob(name, tail, 0.0, 1e-4)
+    value = value_of(oscillator, name)
+    if tail == "static":
+        kinetic = value_of(oscillator, f"{head}.kinetic" if head else "kinetic")
+        return Knob(name, "above", max(0.0, value / kinetic - 1), ABOVE)
+    if value > 0:
+        return Knob(name, "log", value)
+    return Knob(name, "linear", value, abs(value) or 1.0)
+
+
+def better_start(oscillator: Oscillator, names: Sequence[str], shown: Sequence[Shown]) -> Oscillator:
+    """The law with its forces scaled to the friction that the records show."""
+    level = float(np.median([each.level for each in shown]))
+    if "kinetic" not in names or not level > 0:
+        return oscillator
+    share = level / value_of(oscillator, "kinetic")
+    static = getattr(oscillator.law, "static", None)
+    changes = {"kinetic": level} | ({"static": static * share} if static is not None else {})
+    return oscillator.having(**changes)
+
+
+def trials(oscillator: Oscillator, names: Sequence[str], fastest: float) -> Iterator[Oscillator]:
+    """The values a search begins with: as given, and spread where the misfit has several valleys."""
+    choices: list[list[tuple[str, float]]] = []
+    for name in names:
+        last = name.rpartition(".")[2]
+        if name == last and name in ("mass", "stiffness", "damping"):
+            continue
+        if last in GRID:
+            choices.append([(name, factor * value_of(oscillator, name)) for factor in GRID[last]])
+        if last == "static":
+            level = value_of(oscillator, name.replace("static", "kinetic"))
+            choices.append([(name, level * (1 + excess)) for excess in EXCESS])
+        if last == "speed":
+            choices.append([(name, share * fastest) for share in SPEEDS])
+    yield oscillator
+    for chosen in itertools.product(*choices) if choices else ():
+        yield oscillator.having(**dict(chosen))
+
+
+def thinned(stretch: Stretch) -> Stretch:
+    """The stretch with fewer readings, and a drive that is taken as measured, for a first look."""
+    sensors = []
+    for sensor in stretch.sensors:
+        each = slice(None, None, max(1, int(len(sensor.time) / THIN)))
+        known, _ = np.linalg.qr(sensor.known[each])
+        sensors.append(replace(sensor, time=sensor.time[each], readings=sensor.readings[each], known=known))
+    drive = replace(stretch.drive, unsure=())  # type: ignore[type-var]
+    return replace(stretch, sensors=tuple(sensors), drive=drive)
+
+
+def best_start(
+    oscillator: Oscillator,
+    names: Sequence[str],
+    stretches: Sequence[Stretch],
+    fastest: float,
+    tell: Callable[[], None],
+) -> Oscillator:
+    """The values from which the search descends lowest, on a part of the readings."""
+    few = [thinned(stretch) for stretch in stretches]
+    looked: list[tuple[float, int, Problem, Point]] = []
+    for number, trial in enumerate(trials(oscillator, names, fastest)):
+        tell()
+        problem = Problem.of(trial, few, ())
+        point = descend(problem, problem.begin(np.zeros(0)), passes=2)
+        looked.append((point.chi2, number, problem, point))
+    looked.sort(key=lambda each: each[:2])
+    ends = []
+    for _, number, problem, point in looked[:FINALISTS]:
+        turned = replace(problem, knobs=tuple(knob(problem.oscillator, name) for name in names))
+        end = descend(turned, replace(point, u=np.zeros(len(names))), passes=12, tell=tell)
+        ends.append((end.chi2, number, turned, end))
+    _, _, problem, point = min(ends, key=lambda each: each[:2])
+    return problem.system(point.u)
+
+
+def seen_profile(shown: Sequence[Shown], level: float) -> Profile:
+    """The friction along the surface, as it was felt in sliding forward and back."""
+    span = max(float(np.abs(each.displacement).max()) for each in shown)
+    places = np.linspace(-span, span, KNOTS)
+    columns, values = [], []
+    for each in shown:
+        rows = each.slides()
+        side = np.sign(each.velocity[rows])
+        columns.append(np.maximum(0.0, 1 - np.abs(each.displacement[rows, None] - places) / (places[1] - places[0])))
+        values.append((each.felt[rows] - np.mean(each.felt)) * side / level)
+    design, told = np.vstack(columns), np.concatenate(values)
+    # where no slide was fast the profile goes on as it is beside
+    bends = np.diff(np.eye(KNOTS), 2, axis=0) * BENT * math.sqrt(len(told))
+    found = np.linalg.lstsq(np.vstack([design, bends]), np.append(told, np.zeros(len(bends))), rcond=None)[0]
+    return Profile(tuple(np.clip(found, 0.5, 2.0).tolist()), float(places[1] - places[0]))

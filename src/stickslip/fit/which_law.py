@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
+from stickslip.fit.choice import CALIBRATIONS, FAMILIES, SEPARATED, Misfit, Standing, standings, times
 from stickslip.fit.guess import GUESSES, Seen
 from stickslip.fit.law import LawFit, answered
-from stickslip.fit.law_choice import CALIBRATIONS, FAMILIES, SEPARATED, Misfit, Standing, standings, times
-from stickslip.fit.law_search import descend
-from stickslip.fit.law_start import Shown
-from stickslip.fit.law_stretch import Stretch, channels_of
-from stickslip.fit.law_surety import surety
-from stickslip.fit.law_trials import (
+from stickslip.fit.search import descend
+from stickslip.fit.start import Shown
+from stickslip.fit.stretch import Stretch, channels_of
+from stickslip.fit.surety import surety
+from stickslip.fit.trials import (
     CONTENDING,
     PASSES,
     Trial,

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.fit.curves import CurveFit
-from stickslip.fit.law_choice import SEPARATED
+from stickslip.curves.fit_curve import CurveFit
+from stickslip.fit.choice import SEPARATED
 from stickslip.fit.which_law import LawComparison
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import (

@@ -8,9 +8,9 @@ import numpy as np
 
 from stickslip.analysis.decay_comparison import DecayComparison
 from stickslip.analysis.decays import CLEAR, DecayFindings
+from stickslip.decay.answer import beginning
+from stickslip.decay.choice import SIZE
 from stickslip.estimate import Estimate
-from stickslip.fit.answer import beginning
-from stickslip.fit.choice import SIZE
 from stickslip.identify.release import CAUGHT
 from stickslip.reports.words import interval_of, number, value_of
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from stickslip.curves.fit_curve import CurveFit
 from stickslip.errors import ModelError
-from stickslip.fit.curves import CurveFit
 from stickslip.fit.which_law import LawComparison
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.curves.data import BLOCKS, Samples
+from stickslip.curves.nonlinear import inverse_normal, minimise, slopes
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.fit.curve_data import BLOCKS, Samples
-from stickslip.fit.nonlinear import inverse_normal, minimise, slopes
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.statistics import FEW_CYCLES, INSEPARABLE, correlation_time, mean_uncertainty, student

@@ -1,7 +1,7 @@
 """Best fit and profile likelihood where the likelihood is more than a sum of squares: other noise, several releases.
 
 An objective gives minus twice the log likelihood at some parameters, half its downhill slope, and half its curvature
-(Gauss and Newton's part). The steps are those of :mod:`stickslip.fit.profile`, which does the same for the plain case
+(Gauss and Newton's part). The steps are those of :mod:`stickslip.decay.profile`, which does the same for the plain case
 in compiled form.
 """
 

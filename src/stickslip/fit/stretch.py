@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.drives import Release
 from stickslip.errors import ModelError, SolveError
-from stickslip.fit.law_drive import DriveFrom
+from stickslip.fit.drive import DriveFrom
 from stickslip.oscillator import Oscillator
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record

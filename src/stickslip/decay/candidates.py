@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.fit.motions import MOTIONS, PARAMETERS, Motion, Restoring, free_decay
+from stickslip.decay.motions import MOTIONS, PARAMETERS, Motion, Restoring, free_decay
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
-from stickslip.fit.law_choice import Evidence, Key, independent
-from stickslip.fit.law_search import Knob, Point, Problem, descend, rows_of
-from stickslip.fit.law_start import Shown, free_names, knob, thinned
-from stickslip.fit.law_stretch import Stretch
+from stickslip.fit.choice import Evidence, Key, independent
+from stickslip.fit.search import Knob, Point, Problem, descend, rows_of
+from stickslip.fit.start import Shown, free_names, knob, thinned
+from stickslip.fit.stretch import Stretch
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.stribeck import Stribeck
 from stickslip.oscillator import Oscillator

@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.decay.answer import DecayFit, beginning, constants, spring_of
+from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.fit.answer import DecayFit, beginning, constants, spring_of
-from stickslip.fit.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
 
 if TYPE_CHECKING:
-    from stickslip.fit.joint import Release
-    from stickslip.fit.motions import Restoring
-    from stickslip.fit.search import Blocks
+    from stickslip.decay.joint import Release
+    from stickslip.decay.motions import Restoring
+    from stickslip.decay.search import Blocks
 
 Array = NDArray[np.float64]
 
@@ -114,7 +114,7 @@ def fit_decay(
     >>> found.damping_ratio_any.includes(found.damping_ratio.value)
     True
     """
-    from stickslip.fit.noise import KINDS
+    from stickslip.decay.noise import KINDS
 
     if noise is not None and noise not in KINDS:
         raise EstimateError(f"noise = '{noise}'", f"it is one of {', '.join(KINDS)}", "choose one, or leave it out")
@@ -136,7 +136,7 @@ def fit_decay(
     history = tuple(step for each in records for step in each.history)
     notes = tuple(dict.fromkeys(note for each in found for note in each.notes))
     if restoring != "linear":
-        from stickslip.fit.pendulum import fit_pendulum
+        from stickslip.decay.pendulum import fit_pendulum
 
         return fit_pendulum(
             ring_downs, restoring=restoring, noise=noise, motions=motions, known=known, notes=notes, history=history
@@ -182,9 +182,9 @@ def _from_motion(ring_down: RingDown) -> RingDown:
 
 def _release(ring_down: RingDown, noise: str | None) -> Release:
     """One release: its blocks, its fits in white noise, its noise."""
-    from stickslip.fit.joint import Release
-    from stickslip.fit.noise import find_noise
-    from stickslip.fit.search import Search
+    from stickslip.decay.joint import Release
+    from stickslip.decay.noise import find_noise
+    from stickslip.decay.search import Search
 
     samples = np.ascontiguousarray(ring_down.samples)
     search = Search()
@@ -212,8 +212,8 @@ class _Motion:
 
 
 def _alone(release: Release) -> _Motion:
-    from stickslip.fit.search import Search, variance, weights
-    from stickslip.fit.waveform import sample_motion
+    from stickslip.decay.search import Search, variance, weights
+    from stickslip.decay.waveform import sample_motion
 
     blocks, fits = release.blocks, release.fits
     share = weights(fits, blocks)
@@ -226,7 +226,7 @@ def _alone(release: Release) -> _Motion:
 
 
 def _together(releases: list[Release]) -> _Motion:
-    from stickslip.fit.joint import candidates, ends, unlike
+    from stickslip.decay.joint import candidates, ends, unlike
 
     found = candidates(releases)
     least = min(each.value for each in found)
@@ -324,7 +324,7 @@ def _answer(
 
 
 def _fitted(blocks: Blocks, n: int, p: Array) -> Array:
-    from stickslip.fit.waveform import sample_motion
+    from stickslip.decay.waveform import sample_motion
 
     values, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
     sample_motion(p, n, *blocks.data[1:], values, jacobian, np.empty((3, 7, 6)))
@@ -333,7 +333,7 @@ def _fitted(blocks: Blocks, n: int, p: Array) -> Array:
 
 def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[str, ...]:
     """Doubt where the residual is much more than the record's own noise from block to block."""
-    from stickslip.fit.start import roughness
+    from stickslip.decay.start import roughness
 
     worst = 0.0
     for release, values in zip(releases, fitted, strict=True):
@@ -349,7 +349,7 @@ def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[str, ...]:
 
 def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:
     """Static friction lies between where the mass stayed and where it last turned, in every release."""
-    from stickslip.fit.profile import last_swing
+    from stickslip.decay.profile import last_swing
 
     low, high, rested, method = 0.0, math.inf, False, "between where it stayed and where it last turned"
     for number, release in enumerate(releases):

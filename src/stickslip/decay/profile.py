@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from stickslip.compiled import FAST, compiled
-from stickslip.fit.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, normal_equations
+from stickslip.decay.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, normal_equations
 
 STEPS = 60
 CLOSE = 1e-5  # of the variance: what the sum of squares may still fall

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.fit.likelihood import Objective, extreme, minimise, solve
-from stickslip.fit.noise import Noise
-from stickslip.fit.profile import last_swing
-from stickslip.fit.search import Blocks
+from stickslip.decay.likelihood import Objective, extreme, minimise, solve
+from stickslip.decay.noise import Noise
+from stickslip.decay.profile import last_swing
+from stickslip.decay.search import Blocks
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.fit.law_search import Knob, Point, Problem, Slopes, descend, rows_of, without_starts
+from stickslip.fit.search import Knob, Point, Problem, Slopes, descend, rows_of, without_starts
 from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from stickslip.decay.answer import DecayFit, beginning, spring_of
+from stickslip.decay.candidates import Fitted
+from stickslip.decay.choice import COLOURED, Candidate, lack_of_fit
+from stickslip.decay.motions import Restoring, free_decay
+from stickslip.decay.which_motion import SWING, DecayMotion, choice_of, told, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.fit.answer import DecayFit, beginning, spring_of
-from stickslip.fit.candidates import Fitted
-from stickslip.fit.choice import COLOURED, Candidate, lack_of_fit
-from stickslip.fit.motions import Restoring, free_decay
-from stickslip.fit.which_motion import SWING, DecayMotion, choice_of, told, whichever
 from stickslip.identify.release import RingDown
 from stickslip.record.record import Step
 
@@ -32,7 +32,7 @@ def fit_pendulum(
     notes: tuple[str, ...],
     history: tuple[Step, ...],
 ) -> DecayFit:
-    """:func:`~stickslip.fit.decay.fit_decay` of a pendulum: ``x'' = -w^2 sin x - 2 zeta w v - w^2 x_k sgn v``.
+    """:func:`~stickslip.decay.fit_decay.fit_decay` of a pendulum: ``x'' = -w^2 sin x - 2 zeta w v - w^2 x_k sgn v``.
 
     Parameters
     ----------

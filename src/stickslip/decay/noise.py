@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.decay.counts import add_counts
+from stickslip.decay.drift import restricted
+from stickslip.decay.likelihood import Objective, solve
+from stickslip.decay.search import Blocks, variance
+from stickslip.decay.waveform import normal_equations, sample_motion
 from stickslip.errors import EstimateError
-from stickslip.fit.counts import add_counts
-from stickslip.fit.drift import restricted
-from stickslip.fit.likelihood import Objective, solve
-from stickslip.fit.search import Blocks, variance
-from stickslip.fit.waveform import normal_equations, sample_motion
 
 Array = NDArray[np.float64]
 

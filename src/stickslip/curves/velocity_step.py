@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import FAST, compiled
+from stickslip.curves.data import Samples
+from stickslip.curves.family import Family
 from stickslip.errors import EstimateError
-from stickslip.fit.curve_data import Samples
-from stickslip.fit.family import Family
 from stickslip.laws.rate_state import RateState
 
 Array = NDArray[np.float64]

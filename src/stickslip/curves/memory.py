@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.curves.data import Samples, samples_of
+from stickslip.curves.nonlinear import minimise
+from stickslip.curves.presliding import deflections
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
-from stickslip.fit.curve_data import Samples, samples_of
-from stickslip.fit.nonlinear import minimise
-from stickslip.fit.presliding_curves import deflections
 from stickslip.record.record import Record
 from stickslip.statistics import mean_of_cycles
 

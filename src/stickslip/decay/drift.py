@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from stickslip.compiled import FAST, compiled
-from stickslip.fit.profile import log_determinant, solve
+from stickslip.decay.profile import log_determinant, solve
 
 
 @compiled(**FAST)

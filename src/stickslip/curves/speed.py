@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.curves.data import Samples
+from stickslip.curves.family import Family
 from stickslip.estimate import Estimate
-from stickslip.fit.curve_data import Samples
-from stickslip.fit.family import Family
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.stribeck import Stribeck

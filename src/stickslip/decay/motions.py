@@ -135,7 +135,7 @@ def free_decay(
     >>> free_decay([0.0, 0.5, 1.0], dry)[0].round(6).tolist()  # each half cycle loses 2 x_k
     [1.0, -0.9, 0.8]
     """
-    from stickslip.fit.half_cycles import decay
+    from stickslip.decay.half_cycles import decay
 
     instants = np.ascontiguousarray(times, dtype=float)
     if spread is not None:

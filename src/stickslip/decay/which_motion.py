@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.decay.choice import Candidate, Choice, choose, interval_of, kept_by_all
+from stickslip.decay.motions import MOTIONS, RESTORING, Restoring
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
-from stickslip.fit.choice import Candidate, Choice, choose, interval_of, kept_by_all
-from stickslip.fit.motions import MOTIONS, RESTORING, Restoring
 from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.record.record import Record
 
@@ -53,7 +53,7 @@ class DecayMotion(Result):
     status : str
         "ok", or in words what to beware of.
     terms : tuple of Estimate
-        Every term of `model`, as quadratic damping ``q`` [1/m] (:func:`~stickslip.fit.motions.free_decay` has the
+        Every term of `model`, as quadratic damping ``q`` [1/m] (:func:`~stickslip.decay.motions.free_decay` has the
         equation), but for the shape of one too faint to show it.
     """
 
@@ -95,7 +95,7 @@ def choose_motion(
     restoring : {"linear", "pendulum"}
         The spring's law: x, or sin x (`theta` in rad from the vertical; swings above 2.5 rad are left out).
     candidates : tuple of str
-        Names in ``stickslip.fit.motions.MOTIONS``.
+        Names in ``stickslip.decay.motions.MOTIONS``.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def choose_motion(
 
     Examples
     --------
-    >>> from stickslip.fit.motions import free_decay
+    >>> from stickslip.decay.motions import free_decay
     >>> t, rng = np.arange(600) / 50, np.random.default_rng(1)
     >>> x, _, _ = free_decay(t, [6.28, 0.02, 0.02, 0, 1, 0.3, 0, 0, 0, 0, 0.5, 0])
     >>> found = choose_motion(Record.of({"x": x + 1e-3 * rng.standard_normal(t.size)}, fs=50))
@@ -167,7 +167,7 @@ def choice_of(
             "the choice among motions is made on a displacement",
             "record or integrate the displacement, or use fit_decay(record)",
         )
-    from stickslip.fit.start import BLOCKS
+    from stickslip.decay.start import BLOCKS
 
     rows, start = _begin(ring_down, restoring)
     size = max(1, int(2 * math.pi / start[0] * ring_down.fs / BLOCKS))

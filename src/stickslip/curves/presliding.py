@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import FAST, compiled
+from stickslip.curves.data import Samples
+from stickslip.curves.family import Family
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.fit.curve_data import Samples
-from stickslip.fit.family import Family
 from stickslip.laws.dahl import Dahl
 from stickslip.laws.elastoslip import ElastoSlip
 

@@ -10,12 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.curves import presliding as presliding_curves
+from stickslip.curves import speed as speed_curves
+from stickslip.curves.data import Samples, require_resisting, require_reversals, require_speeds, samples_of
+from stickslip.curves.family import Family, Member, best_member
+from stickslip.curves.velocity_step import velocity_step
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit import presliding_curves, speed_curves
-from stickslip.fit.curve_data import Samples, require_resisting, require_reversals, require_speeds, samples_of
-from stickslip.fit.family import Family, Member, best_member
-from stickslip.fit.velocity_step import velocity_step
 from stickslip.identify.loops import Loops
 from stickslip.laws.base import Law, finite
 from stickslip.laws.curved import CurvedLaw

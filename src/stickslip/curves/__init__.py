@@ -1,0 +1,1 @@
+"""Curves of friction over velocity, displacement, load and time, against a record."""

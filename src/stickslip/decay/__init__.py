@@ -1,0 +1,1 @@
+"""The whole waveform of a free decay against a record."""
