@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import welch
 
 import stickslip as ss
+from squeak_peer import Rig, dop853, taylor
 
 CASES = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
 SQUEAKS = ("wet", 6.13)
@@ -66,6 +67,20 @@ def test_where_it_begins_to_squeak_is_where_sliding_ceases_to_be_stable() -> Non
         swings = np.abs(late.sample(moments.ravel(), ("v",))[0][1]).reshape(2, -1)
         assert late.events == ()
         assert (swings[1].max() > swings[0].max()) == begins
+
+
+@pytest.mark.parametrize("peer", ["extended precision", "scipy"])
+def test_sticks_and_flights_of_two_contacts_are_those_of_the_rules_written_out(peer: str) -> None:
+    rig, duration = ss.squeak_rig(*SQUEAKS), 0.28
+    if peer == "scipy":
+        order, end = dop853(Rig(rig), duration, rtol=1e-10, longest=2e-5)
+    else:
+        order, end = taylor(Rig(rig, np.longdouble), duration)
+    run = ss.simulate(rig, duration=duration)
+    assert [tuple(run.table.modes[m].name.split(" + ")) for m in run.modes] == order
+    assert {"stuck", "lifted", "back", "forward"} == {part for each in order for part in each}
+    assert len(order) > 50
+    assert np.allclose(run.sample([duration], ("x", "v"))[0][:, 0], end[:6].astype(float), rtol=1e-9, atol=0)
 
 
 @pytest.mark.parametrize(

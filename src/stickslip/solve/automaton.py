@@ -27,6 +27,7 @@ System = Oscillator | Structure
 
 DEGREE = 20  # of the Taylor polynomial in a cell; with rate * cell <= 1 the remainder is 1/21! = 2e-20 of its scale
 SPLITTER = 134217729.0  # 2^27 + 1: halves a number into 26 bits and the rest
+SETTLED = 16  # terms of an exponential after which one that changes nothing is followed by none that does
 CANCELLED = 8 * 2.220446049250313e-16  # of the terms: what rounding leaves of a difference of equals
 
 
@@ -253,9 +254,15 @@ class _Builder:
 def _mode_tables(flow_: bytes, quantities_: bytes, size: int) -> tuple[float, Array, Array]:
     """Cell, hop and series of a mode: systems that differ a little, as those of a fit, share most of theirs."""
     flow, quantities = (np.frombuffer(data).reshape(-1, size) for data in (flow_, quantities_))
-    cell = _cell(flow)
     series = np.stack(derivatives(quantities, flow), axis=1)
-    return cell, halved(exponential(flow, cell)), series
+    return *cell_of(flow), series
+
+
+def cell_of(flow: Array) -> tuple[float, Array]:
+    """The length of a Taylor cell [s], in which no rate turns more than one radian, and exp(A cell) as `hop` has it."""
+    rate = fastest(flow)
+    cell = 1.0 / rate if rate > 0 else np.inf
+    return cell, halved(exponential(flow, cell, rate))
 
 
 def derivatives(quantity: Any, flow: Any) -> list[Any]:
@@ -263,9 +270,11 @@ def derivatives(quantity: Any, flow: Any) -> list[Any]:
     rows = [quantity]
     sizes = np.abs(flow)
     for _ in range(DEGREE):
+        if not np.any(rows[-1]):
+            break
         row, size = rows[-1] @ flow, np.abs(rows[-1]) @ sizes
         rows.append(np.where(np.abs(row) > CANCELLED * size, row, 0.0))
-    return rows
+    return rows + [np.zeros_like(rows[-1])] * (DEGREE + 1 - len(rows))
 
 
 def _leaps(count: int, first: NDArray[np.int64], targets: NDArray[np.int64], resets: Array, size: int) -> Array:
@@ -284,12 +293,6 @@ def _leaps(count: int, first: NDArray[np.int64], targets: NDArray[np.int64], res
     return leaps
 
 
-def _cell(flow: Array) -> float:
-    """The length of a Taylor cell [s]: no rate turns more than one radian in it."""
-    rate = fastest(flow)
-    return 1.0 / rate if rate > 0 else np.inf
-
-
 def fastest(flow: Array) -> float:
     """The fastest rate of a flow [1/s]: the largest modulus of its eigenvalues.
 
@@ -306,7 +309,9 @@ def _eigenvalues(flow: Array) -> Any:
     for _ in range(max(1, size.bit_length())):
         reach = reach @ reach
     parts = {tuple(np.flatnonzero(reach[j] & reach[:, j])) for j in range(size)}
-    return np.concatenate([np.linalg.eigvals(flow[np.ix_(part, part)]) for part in sorted(parts)])
+    return np.concatenate(
+        [flow[part, part] if len(part) == 1 else np.linalg.eigvals(flow[np.ix_(part, part)]) for part in sorted(parts)]
+    )
 
 
 def halved(matrix: Any) -> Array:
@@ -317,20 +322,23 @@ def halved(matrix: Any) -> Array:
     return np.array([upper, whole - upper, np.asarray(matrix - whole, dtype=np.float64)])
 
 
-def exponential(flow: Array, time: float) -> Any:
+def exponential(flow: Array, time: float, rate: float | None = None) -> Any:
     """exp(A t) in extended precision by its Taylor series, halved until no entry of the flow dominates.
 
-    Each entry is summed on its own, so entries of very different units keep their digits.
+    Each entry is summed on its own, so entries of very different units keep their digits. `rate` is the flow's fastest
+    rate where it is known.
     """
     if not np.isfinite(time):
         return np.eye(len(flow), dtype=np.longdouble)
-    rate = float(np.max(np.abs(_eigenvalues(flow)), initial=0.0)) * time
-    halvings = max(0, int(np.ceil(np.log2(rate))) + 1) if rate > 0.5 else 0
+    turned = (fastest(flow) if rate is None else rate) * time
+    halvings = max(0, int(np.ceil(np.log2(turned))) + 1) if turned > 0.5 else 0
     step = np.asarray(flow, dtype=np.longdouble) * (np.longdouble(time) / 2**halvings)
     total = term = np.eye(len(flow), dtype=np.longdouble)
     for k in range(1, 40):
         term = term @ step / k
-        total = total + term
+        before, total = total, total + term
+        if k >= SETTLED and np.array_equal(total, before):
+            break
     for _ in range(halvings):
         total = total @ total
     return total

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
-from stickslip.solve.automaton import DEGREE, Automaton, derivatives, exponential, fastest, halved
+from stickslip.solve.automaton import DEGREE, Automaton, cell_of, derivatives
 from stickslip.structure import Contact, Structure
 
 Rows = NDArray[np.floating[Any]]
@@ -238,12 +238,15 @@ class _Builder:
         flows, frictions = zip(*map(self.flow, modes), strict=True)
         rows, resets, first = [], [], [0]
         for mode, flow, friction, follow in zip(modes, flows, frictions, targets, strict=True):
-            for e, (exit_, owner) in enumerate(zip(mode.exits, mode.owners, strict=True)):
-                rows.append(derivatives(self.relative(owner, exit_.quantity, friction[owner], flow), flow))
-                resets.append(self.carry(mode, e, modes[follow[e]], friction))
+            quantities = [
+                self.relative(owner, exit_.quantity, friction[owner], flow)
+                for exit_, owner in zip(mode.exits, mode.owners, strict=True)
+            ]
+            rows += list(np.stack(derivatives(np.array(quantities), flow), axis=1))
+            resets += [self.carry(mode, e, modes[follow[e]], friction) for e in range(len(mode.exits))]
             first.append(len(rows))
         smooth = np.array(flows, dtype=np.float64)
-        cells = np.array([1 / rate if (rate := fastest(flow)) > 0 else np.inf for flow in smooth])
+        cells, hops = zip(*map(cell_of, smooth), strict=True)
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
         lifted = np.array([[part.kind == "flight" for part in mode.parts] for mode in modes], dtype=bool)
         lifted = lifted.reshape(len(modes), len(self.contacts), 1)
@@ -262,8 +265,8 @@ class _Builder:
             names=self.names,
             modes=modes,
             flow=smooth,
-            cell=cells,
-            hop=np.array([halved(exponential(flow, cell)) for flow, cell in zip(smooth, cells, strict=True)]),
+            cell=np.array(cells),
+            hop=np.array(hops),
             series=np.array(rows, dtype=np.float64).reshape(len(rows), DEGREE + 1, self.size),
             target=np.array([t for follow in targets for t in follow], dtype=np.int64),
             crossing=np.array([e.crossing for mode in modes for e in mode.exits], dtype=np.bool_),
