@@ -35,6 +35,7 @@ BY_PLACE = {
     "parameter",
     "load",
     "oscillator",
+    "grid",
 }  # may follow the first argument without being named
 
 

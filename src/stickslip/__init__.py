@@ -211,6 +211,7 @@ if TYPE_CHECKING:
         stability_map as stability_map,
     )
     from stickslip.squeak.virtual_rig import squeak_rig as squeak_rig
+    from stickslip.sweeps.sweep import sweep as sweep
     from stickslip.structure import Contact as Contact, Structure as Structure
     from stickslip.system_file import Case as Case, read_system as read_system, scenario_case as scenario_case
     from stickslip.laws.dahl import Dahl as Dahl
@@ -284,6 +285,7 @@ _ROOMS = {
     "InSeries": "laws.series", "TimeDelay": "laws.time_delay",
     "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
+    "sweep": "sweeps.sweep",
     "squeak_rig": "squeak.virtual_rig", "sound_pressure": "squeak.sound", "squeak_record": "squeak.sound",
     "find_squeaks": "squeak.bursts", "Squeaks": "squeak.bursts", "Squeak": "squeak.bursts",
     "coupling": "squeak.coupling", "Coupling": "squeak.coupling", "Pair": "squeak.coupling",

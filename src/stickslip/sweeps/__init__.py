@@ -1,0 +1,1 @@
+"""One system, many values of its parameters: maps of what its motion does."""

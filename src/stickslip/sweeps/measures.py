@@ -1,0 +1,109 @@
+"""What can be asked of each motion of a sweep: a register of measures, and what each one leaves on the map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from stickslip.errors import ModelError
+from stickslip.settings import nearest
+
+Measure = str | Callable[..., float]
+OUTCOMES = ("moving", "at_rest", "too_many_events", "unproved", "no_such_system", "unbounded")
+MOVING, AT_REST, CROWDED, UNPROVED, NO_SYSTEM, UNBOUNDED = range(len(OUTCOMES))
+ORDERS = 8  # longest orbit looked for, in periods of the drive
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One number of each point of a map.
+
+    Attributes
+    ----------
+    unit : str
+        "1" where it has none.
+    words : str
+        What it is.
+    dtype : str
+        As numpy has it.
+    fill : float or int
+        What stands where nothing is known.
+    attributes : mapping
+        More for the labelled answer.
+    """
+
+    unit: str
+    words: str
+    dtype: str = "float64"
+    fill: Any = math.nan
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+
+STATUS = Variable(
+    "1", "what became of the motion", "int8", -1,
+    {"flag_values": list(range(-1, len(OUTCOMES))), "flag_meanings": " ".join(("not_run", *OUTCOMES))},
+)  # fmt: skip
+MEASURES: dict[str, dict[str, Variable]] = {
+    "stops": {
+        "normal_stops": Variable("1", "stops per period after which the motion turns"),
+        "abnormal_stops": Variable("1", "stops per period after which the motion goes on the same way"),
+    },
+    "amplitude": {"amplitude": Variable("m", "largest displacement from zero")},
+    "stick_share": {"stick_share": Variable("1", "share of the time that the contact holds")},
+    "micro_slips": {"micro_slips": Variable("1", "slips per period shorter than a tenth of the longest")},
+    "transition_speed": {"transition_speed": Variable("m/s", "largest speed at which a microstick becomes a slip")},
+    "energy": {"energy": Variable("J", "work of friction per period")},
+    "period": {"order": Variable("1", "periods of the drive after which the motion repeats; 0: none up to 8")},
+    "multipliers": {
+        "multiplier": Variable("1", "largest Floquet multiplier", "complex128", complex(math.nan, math.nan))
+    },
+    "lyapunov": {"lyapunov": Variable("1/s", "largest Lyapunov exponent")},
+}
+
+
+def variables(measures: Sequence[Measure]) -> dict[str, Variable]:
+    """The variables that the measures leave, by name, the status first."""
+    found = {"status": STATUS}
+    for measure in measures:
+        found |= (
+            MEASURES[measure] if isinstance(measure, str) else {own_name(measure): Variable("1", "a user's measure")}
+        )
+    return found
+
+
+def read_measures(measures: Sequence[Measure] | Measure) -> tuple[Measure, ...]:
+    """The measures asked for, each known or a function.
+
+    Raises
+    ------
+    ModelError
+        None is asked for, or one is unknown or there twice.
+    """
+    given = (measures,) if isinstance(measures, str) or callable(measures) else tuple(measures)
+    if not given:
+        raise ModelError("no measures", "a map shows something", f"ask for some of {', '.join(MEASURES)}")
+    names = [name for measure in given for name in _names(measure)]
+    for name in names:
+        if names.count(name) > 1 or name in ("status",):
+            raise ModelError(
+                f"two measures are called '{name}'", "each has a name of its own", "rename or leave one out"
+            )
+    return given
+
+
+def _names(measure: Measure) -> tuple[str, ...]:
+    if callable(measure):
+        return (own_name(measure),)
+    if measure not in MEASURES:
+        raise ModelError(
+            f"no measure is called '{measure}'", f"there are {', '.join(MEASURES)}, and functions of a Trajectory",
+            nearest(str(measure), MEASURES),
+        )  # fmt: skip
+    return tuple(MEASURES[measure])
+
+
+def own_name(measure: Callable[..., float]) -> str:
+    """What a user's function is called on the map."""
+    return str(getattr(measure, "__name__", type(measure).__name__)).strip("<>")

@@ -1,0 +1,135 @@
+"""Maps: one system over a grid of its parameters, every motion of it run and measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import ModelError
+from stickslip.solve.automaton import System
+from stickslip.sweeps.engines import read_engine
+from stickslip.sweeps.grid import Grid, read_grid
+from stickslip.sweeps.measures import Measure, read_measures
+from stickslip.sweeps.plan import Arrays, Plan, assemble, blank, chunked, required
+
+
+def sweep(
+    system: System,
+    grid: Grid,
+    *,
+    measures: Sequence[Measure] = ("stops", "amplitude"),
+    cycles: int = 50,
+    settle: int = 200,
+    start: Mapping[str, float | str] | None = None,
+    engine: str = "serial",
+    store: str | Path | None = None,
+) -> Any:
+    """How does the motion change with the parameters of the system?
+
+    Every motion is the exact one of :func:`simulate`; each is followed through `settle` periods that are not measured
+    and `cycles` that are. The grid is cut into blocks, which the engine runs wherever it runs them, with one answer.
+
+    Parameters
+    ----------
+    system : Oscillator or Structure
+        What moves.
+    grid : mapping or sequence of mapping
+        Values by parameter, each a dimension of the map: ``{"frequency": [...], "kinetic": [...]}``. A parameter is
+        named as :meth:`Oscillator.having` does ("kinetic", "law.stiffness"), with numbers, arrays or whole laws as
+        values ("law"); "start.x" is of the start. Parameters that change together stand in a tuple:
+        ``{("mass", "stiffness"): [(1, 4), (2, 8)]}``. A list of mappings is a list of points.
+    measures : sequence of str or callable
+        What is asked of each motion: "stops", "amplitude" [m], "stick_share", "micro_slips", "transition_speed"
+        [m/s], "energy" [J], "period", "multipliers", "lyapunov" [1/s], or a function of a Trajectory.
+    cycles : int
+        Periods of the drive that are measured; without a periodic drive, natural periods.
+    settle : int
+        Periods before that.
+    start : mapping, optional
+        State at time 0, as :func:`simulate` takes it.
+    engine : str
+        Where the blocks are run: "serial".
+    store : path, optional
+        Where what is done is kept, so that a sweep that was ended goes on.
+
+    Returns
+    -------
+    xarray.Dataset
+        One variable for each answer over the dimensions of the grid, and ``status``; settings, version and checksum
+        in its attributes. Where the user interrupts (Ctrl-C), what was done until then, with the status "interrupted".
+
+    Raises
+    ------
+    ModelError
+        The grid is empty or names a parameter that the system does not have; a measure or an engine is unknown.
+
+    Examples
+    --------
+    >>> from stickslip import Coulomb, HarmonicForce, Oscillator
+    >>> drive = HarmonicForce(1.0, frequency=0.8 / 6.283185307)
+    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=drive)
+    >>> atlas = sweep(slider, {"kinetic": [0.5, 0.9]}, measures=["stops", "amplitude"], settle=40, cycles=10)
+    >>> atlas.normal_stops.values, atlas.amplitude.values.round(6)
+    (array([0., 2.]), array([2.332235, 0.068345]))
+    """
+    required("xarray")
+    run, address = read_engine(engine)
+    plan = planned(system, grid, measures=measures, cycles=cycles, settle=settle, start=start)
+    if store is not None:
+        raise ModelError("store", "not there yet", "leave it out")
+    kept = Memory(plan)
+    status = "complete"
+    try:
+        run(plan, kept.missing, kept.keep, address)
+    except KeyboardInterrupt:
+        if not kept.done:
+            raise
+        status = f"interrupted: {len(kept.done)} of {len(plan.blocks)} blocks are there"
+    return kept.dataset(status)
+
+
+def planned(
+    system: System,
+    grid: Grid,
+    *,
+    measures: Sequence[Measure],
+    cycles: int,
+    settle: int,
+    start: Mapping[str, float | str] | None,
+) -> Plan:
+    """The plan of a sweep, with everything checked that can be before it is run."""
+    for name, count, least in (("cycles", cycles, 1), ("settle", settle, 0)):
+        if not (isinstance(count, int | np.integer) and count >= least):
+            raise ModelError(
+                f"{name} = {count}", f"{name} is a whole number of periods, at least {least}", "correct it"
+            )
+    axes = read_grid(system, grid)
+    chunks = chunked([len(axis.values) for axis in axes])
+    plan = Plan(system, axes, read_measures(measures), int(cycles), int(settle), dict(start or {}), chunks)
+    plan.at([0] * len(axes))
+    return plan
+
+
+class Memory:
+    """What is done of a sweep, in memory."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan, self.arrays, self.done = plan, blank(plan), set[int]()
+
+    @property
+    def missing(self) -> list[int]:
+        """Blocks still to be run."""
+        return [number for number in self.plan.blocks if number not in self.done]
+
+    def keep(self, number: int, arrays: Arrays, events: Arrays | None = None) -> None:
+        """Take a block."""
+        for name, values in arrays.items():
+            self.arrays[name][self.plan.slices(number)] = values
+        self.done.add(number)
+
+    def dataset(self, status: str = "complete") -> Any:
+        """The labelled map as far as it is known."""
+        return assemble(self.plan, self.arrays, status=status)

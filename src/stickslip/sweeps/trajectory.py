@@ -1,0 +1,149 @@
+"""The measures of one simulated motion, whatever its law: the slow way, and the truth of the compiled one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import ModelError
+from stickslip.solve.automaton import Array, System
+from stickslip.solve.lyapunov import lyapunov
+from stickslip.solve.poincare import derivative, end_of, lap, tables
+from stickslip.solve.trajectory import Trajectory
+from stickslip.structure import Structure
+from stickslip.sweeps import tally as log
+from stickslip.sweeps.measures import ORDERS, own_name
+from stickslip.sweeps.plan import Plan
+
+ORDER = 12  # Gauss points of a cell
+SEEN = 8  # looks at a cell for a turn
+KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
+CLOSE = 1e-6  # of the motion's size: a return this near is one
+
+
+def measured(run: Trajectory, plan: Plan, start: Mapping[str, float | str]) -> dict[str, Any]:
+    """The variables of a plan's measures, of what the run does after the periods in which it settles."""
+    measures, settle, cycles = plan.measures, plan.settle, plan.cycles
+    begin = settle * period(run.system, run)
+    found: dict[str, Any] = {}
+    if set(measures) & {"stops", "stick_share", "micro_slips", "transition_speed"}:
+        sums = counted(run, begin)
+        found |= {"normal_stops": sums[log.NORMAL] / cycles, "abnormal_stops": sums[log.ABNORMAL] / cycles,
+                  "stick_share": sums[log.HELD] / (run.duration - begin), "micro_slips": sums[log.SHORT] / cycles,
+                  "transition_speed": sums[log.FASTEST] if sums[log.FASTEST] > 0 else math.nan}  # fmt: skip
+    if "amplitude" in measures:
+        found["amplitude"] = farthest(run, begin)
+    if "energy" in measures:
+        found["energy"] = work(run, begin) / cycles
+    if "period" in measures:
+        found["order"] = order(run, settle)
+    if "multipliers" in measures:
+        found["multiplier"] = multiplier(run, settle)
+    if "lyapunov" in measures:
+        found["lyapunov"] = lyapunov(run.system, cycles=cycles, transient=settle, start=start).value
+    return found | {own_name(measure): measure(run) for measure in measures if callable(measure)}
+
+
+def period(system: System, run: Trajectory) -> float:
+    """The drive's period [s]; without one, the natural period."""
+    driven = run.table.motion.period
+    return driven if math.isfinite(driven) else 1 / system.frequency
+
+
+def counted(run: Trajectory, begin: float) -> Array:
+    """The event log counted from a time on."""
+    if isinstance(run.system, Structure) and len(run.system.contacts) != 1:
+        raise ModelError(
+            f"stops of {len(run.system.contacts)} contacts", "this measure is of systems with one contact",
+            "ask a function of the Trajectory for what you need",
+        )  # fmt: skip
+    modes = run.table.modes
+    parts = [getattr(mode, "parts", (mode,))[0] for mode in modes]
+    kinds = np.array([KINDS.get(part.kind, log.SLIP) for part in parts])
+    sides = np.array([part.side for part in parts], dtype=np.float64)
+    ends = np.append(run.starts, run.duration)
+    values, _ = run.sample(ends, ("slip", "x", "face"))
+    slip, x, face = values[0], values[1], values[-1]
+    sums = np.zeros(log.ENTRIES)
+    log.tally(
+        kinds, sides, run.modes, run.starts - begin, run.durations, np.abs(np.diff(x - face)), np.abs(slip[:-1]), sums
+    )
+    return sums
+
+
+def farthest(run: Trajectory, begin: float) -> float:
+    """Largest displacement from zero after a time, of any degree of freedom [m]."""
+    starts, widths = _cells(run, begin)
+    inner = np.linspace(0.0, 1.0, SEEN, endpoint=False)
+    times = np.append((starts[:, None] + widths[:, None] * inner).ravel(), run.duration)
+    (x, v, _), count = _moved(run, times)
+    best = float(np.max(np.abs(x)))
+    for degree in range(count):
+        turns = np.flatnonzero(v[degree, :-1] * v[degree, 1:] < 0)
+        if not len(turns):
+            continue
+        low, high = times[turns], times[turns + 1]
+        near = low + (high - low) * v[degree, turns] / (v[degree, turns] - v[degree, turns + 1])
+        for _ in range(4):
+            (x, slope, rate), _ = _moved(run, near)
+            best = max(best, float(np.max(np.abs(x[degree]))))
+            step = np.divide(slope[degree], rate[degree], out=np.zeros_like(near), where=rate[degree] != 0)
+            near = np.clip(near - step, low, high)
+    return best
+
+
+def _moved(run: Trajectory, times: Array) -> tuple[Array, int]:
+    values, _ = run.sample(times, ("x", "v", "a"))
+    return values.reshape(3, -1, len(times)), len(values) // 3
+
+
+def work(run: Trajectory, begin: float) -> float:
+    """Work that friction takes from the motion after a time [J]."""
+    starts, widths = _cells(run, begin)
+    nodes, weights = np.polynomial.legendre.leggauss(ORDER)
+    times = np.minimum(starts[:, None] + widths[:, None] * (nodes + 1) / 2, run.duration)
+    values, _ = run.sample(times.ravel(), ("friction", "slip"))
+    force, slip = values.reshape(2, -1, times.size)
+    return float(np.sum(np.sum(force * slip, axis=0) * (widths[:, None] * weights / 2).ravel()))
+
+
+def _cells(run: Trajectory, begin: float) -> tuple[Array, Array]:
+    """Start and length of the stretches after a time on which the motion is one short polynomial."""
+    starts, widths = run.cells
+    ends = starts + widths
+    late = ends > begin
+    starts = np.maximum(starts[late], begin)
+    return starts, ends[late] - starts
+
+
+def order(run: Trajectory, settle: int) -> int:
+    """Periods of the drive after which the motion repeats; 0 where it does not up to 8."""
+    if not math.isfinite(run.table.motion.period):
+        return 0
+    return repeats(run.section()[settle:])
+
+
+def repeats(section: Array) -> int:
+    """The least number of rows after which the last ones are there again."""
+    size = np.max(np.abs(section), axis=0)
+    for step in range(1, min(ORDERS, len(section) // 2) + 1):
+        last = section[-2 * step :]
+        if np.all(np.abs(last[step:] - last[:step]) <= CLOSE * size):
+            return step
+    return 0
+
+
+def multiplier(run: Trajectory, settle: int) -> complex:
+    """The largest Floquet multiplier of the orbit at the end; nan where none repeats."""
+    steps = order(run, settle)
+    if not steps:
+        return complex(math.nan, math.nan)
+    table = tables(run.system)
+    end = run.states[0].copy()
+    end[: table.physical] = run.section()[-1]
+    orbit = lap(run.system, table, end, int(run.modes[-1]), steps)
+    found = np.linalg.eigvals(derivative(orbit, end_of(orbit)[1])[0])
+    return complex(found[np.argmax(np.abs(found))])

@@ -1,0 +1,115 @@
+"""Maps are the motions of their points, one by one, and known answers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.errors import ModelError
+
+pytest.importorskip("xarray")
+CIRCLE = 2 * math.pi
+UNIT = ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb(0.5), drive=ss.HarmonicForce(1.0, frequency=0.8 / CIRCLE))
+RIGID = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5))
+COMPLIANT = RIGID.having(law=ss.CompliantContact(1.1, 192000, 23.8635))
+
+
+def test_amplitudes_are_den_hartogs() -> None:
+    """x0 = sqrt(V^2 - (U r)^2) for the motion without stops, V = 1 / (1 - b^2), U = tan(pi / 2b) / b."""
+    b, r = np.array([0.6, 0.8, 1.3, 2.0]), np.array([0.3, 0.5, 0.4, 0.2])
+    grid = [{"frequency": p / CIRCLE, "kinetic": q} for p, q in zip(b, r, strict=True)]
+    found = ss.sweep(UNIT.having(damping=1e-3), grid, measures=["amplitude", "stops"], settle=4000, cycles=4)
+    known = np.sqrt((1 / (1 - b**2)) ** 2 - (np.tan(np.pi / 2 / b) / b * r) ** 2)
+    assert found.amplitude.values == pytest.approx(known, rel=1e-2)  # the damping of 0.05 % takes some of it
+    assert not found.normal_stops.values.any()
+
+
+def test_a_map_is_its_points_one_by_one() -> None:
+    found = ss.sweep(RIGID, {"frequency": [2.5, 5.61], "kinetic": [0.9, 1.1]}, settle=300, cycles=10,
+                     measures=["stops", "amplitude", "stick_share", "period", "multipliers"])  # fmt: skip
+    for f in (2.5, 5.61):
+        for level in (0.9, 1.1):
+            orbit, here = (
+                ss.steady_state(RIGID.having(frequency=f, kinetic=level)),
+                found.sel(frequency=f, kinetic=level),
+            )
+            assert (int(here.normal_stops), int(here.abnormal_stops)) == orbit.stops
+            assert float(here.amplitude) == pytest.approx(orbit.amplitude, rel=1e-9)
+            assert int(here.order) == orbit.order
+            assert abs(complex(here.multiplier)) == pytest.approx(abs(orbit.multipliers[0]), rel=1e-6, abs=1e-9)
+
+
+def test_micro_slips_and_transition_speed_are_those_of_the_contact() -> None:
+    """Thesis, the 2.5 Hz case: two micro-slips in each of two sticks a cycle."""
+    found = ss.sweep(COMPLIANT, {"kinetic": [1.1]}, settle=20, cycles=4,
+                     measures=["micro_slips", "transition_speed", "energy", "stick_share"])  # fmt: skip
+    orbit = ss.steady_state(COMPLIANT)
+    assert float(found.micro_slips[0]) == 4
+    assert float(found.transition_speed[0]) == pytest.approx(orbit.transition_speed, rel=1e-9)
+    assert float(found.energy[0]) == pytest.approx(ss.energy(orbit.orbit).friction, rel=1e-9)
+
+
+def test_laws_arrays_starts_and_own_functions() -> None:
+    def events(run: ss.Trajectory) -> float:
+        return float(len(run.events))
+
+    grid = {"law": [ss.Coulomb(1.0), COMPLIANT.law], ("start.x", "start.v"): [(0.0, 0.0), (1e-3, 0.02)]}
+    found = ss.sweep(RIGID, grid, measures=[events, "amplitude"], settle=2, cycles=2)
+    assert dict(found.sizes) == {"law": 2, "start.x_start.v": 2}
+    assert found["start.x"].values.tolist() == [0.0, 1e-3]
+    run = ss.simulate(RIGID.having(law=COMPLIANT.law), cycles=4, start={"x": 1e-3, "v": 0.02})
+    assert int(found.events[1, 1]) == len(run.events)
+
+
+@pytest.mark.parametrize(
+    ("grid", "words"),
+    [
+        ({}, "an empty grid"),
+        ([], "an empty grid"),
+        ({"kinetic": []}, "no values"),
+        ({"kinetc": [1.0]}, "no parameter is called 'kinetc'.*kinetic"),
+        ({"kinetic": [1.0], "law.kinetic": [1.0]}, "one parameter"),
+        ({"kinetic": [1.0, math.nan]}, "finite number"),
+        ({"kinetic": 1.0}, "several values"),
+        ({("mass", "stiffness"): [(1.0,)]}, "1 entries"),
+        ([{"mass": 1.0}, {"stiffness": 1.0}], "different parameters"),
+    ],
+)
+def test_a_grid_without_meaning_is_refused(grid: object, words: str) -> None:
+    with pytest.raises(ModelError, match=words):
+        ss.sweep(UNIT, grid, measures=["stops"])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"measures": ["stop"]}, "no measure is called 'stop'.*stops"),
+        ({"measures": []}, "no measures"),
+        ({"measures": ["stops", "stops"]}, "two measures"),
+        ({"engine": "thread"}, "no engine is called 'thread'"),
+        ({"cycles": 0}, "cycles = 0"),
+        ({"settle": -1}, "settle = -1"),
+    ],
+)
+def test_a_sweep_without_meaning_is_refused(options: dict[str, object], words: str) -> None:
+    with pytest.raises(ModelError, match=words):
+        ss.sweep(UNIT, {"kinetic": [0.5]}, **options)  # type: ignore[arg-type]
+
+
+def test_a_point_without_meaning_is_marked_and_the_rest_stands() -> None:
+    found = ss.sweep(UNIT.having(static=0.6), {"kinetic": [0.5, 0.7]}, settle=2, cycles=2)
+    words = dict(zip(found.status.flag_values, found.status.flag_meanings.split(), strict=True))
+    assert [words[int(code)] for code in found.status] == ["moving", "no_such_system"]
+    assert math.isnan(found.amplitude[1])
+
+
+def test_the_answer_says_what_made_it() -> None:
+    found = ss.sweep(UNIT, {"kinetic": [0.5]}, settle=2, cycles=2)
+    assert found.attrs["version"] == ss.__version__
+    assert "Coulomb" in found.attrs["system"]
+    assert found.kinetic.units == "N"
+    other = ss.sweep(UNIT, {"kinetic": [0.5 * (1 + 1e-16 * 4)]}, settle=2, cycles=2)
+    assert other.attrs["checksum"] != found.attrs["checksum"]
