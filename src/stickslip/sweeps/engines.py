@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from stickslip.errors import ModelError
+from stickslip.sweeps.cluster import on_cluster
 from stickslip.sweeps.plan import Keep, Plan
 from stickslip.sweeps.serial import serial
 
 Engine = Callable[[Plan, Sequence[int], Keep, str | None], None]
-ENGINES: dict[str, Engine] = {"serial": serial}
+ENGINES: dict[str, Engine] = {"serial": serial, "dask": on_cluster}
 
 
 def read_engine(name: str) -> tuple[Engine, str | None]:

@@ -145,6 +145,7 @@ def assemble(plan: Plan, arrays: Mapping[str, NDArray[Any]], *, status: str = "c
     data = {
         name: (plan.dims, arrays[name], {"units": variable.unit, "long_name": variable.words, **variable.attributes})
         for name, variable in plan.variables.items()
+        if name in arrays
     }
     known = {
         name: (dim, values, {"units": unit} if unit else {}) for name, (dim, values, unit) in plan.coordinates.items()

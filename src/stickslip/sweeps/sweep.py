@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from stickslip.sweeps.engines import read_engine
 from stickslip.sweeps.grid import Grid, read_grid
 from stickslip.sweeps.measures import Measure, read_measures
 from stickslip.sweeps.plan import Arrays, Plan, assemble, blank, chunked, required
+from stickslip.sweeps.store import Store
 
 
 def sweep(
@@ -51,9 +53,11 @@ def sweep(
     start : mapping, optional
         State at time 0, as :func:`simulate` takes it.
     engine : str
-        Where the blocks are run: "serial".
+        Where the blocks are run: "serial", "dask" (the cores of this machine), "dask://host:port" (the workers of the
+        scheduler there).
     store : path, optional
-        Where what is done is kept, so that a sweep that was ended goes on.
+        A Zarr group where each finished block is kept, so that a sweep that was ended, or killed, goes on there when
+        it is called again; ``xarray.open_zarr`` reads it.
 
     Returns
     -------
@@ -64,7 +68,10 @@ def sweep(
     Raises
     ------
     ModelError
-        The grid is empty or names a parameter that the system does not have; a measure or an engine is unknown.
+        The grid is empty or names a parameter that the system does not have; a measure or an engine is unknown; the
+        store holds something else.
+    SolveError
+        The store can not be written or another process writes there; no scheduler answers.
 
     Examples
     --------
@@ -78,17 +85,16 @@ def sweep(
     required("xarray")
     run, address = read_engine(engine)
     plan = planned(system, grid, measures=measures, cycles=cycles, settle=settle, start=start)
-    if store is not None:
-        raise ModelError("store", "not there yet", "leave it out")
-    kept = Memory(plan)
-    status = "complete"
-    try:
-        run(plan, kept.missing, kept.keep, address)
-    except KeyboardInterrupt:
-        if not kept.done:
-            raise
-        status = f"interrupted: {len(kept.done)} of {len(plan.blocks)} blocks are there"
-    return kept.dataset(status)
+    with nullcontext(Memory(plan)) if store is None else Store(store, plan) as kept:
+        before, status = len(kept.missing), "complete"
+        try:
+            run(plan, kept.missing, kept.keep, address)
+        except KeyboardInterrupt:
+            if len(kept.missing) == before:
+                raise
+            done = len(plan.blocks) - len(kept.missing)
+            status = f"interrupted: {done} of {len(plan.blocks)} blocks are there"
+        return kept.dataset(status)
 
 
 def planned(

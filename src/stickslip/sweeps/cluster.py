@@ -1,0 +1,67 @@
+"""The blocks of a map on a Dask cluster: workers that die are replaced, and their blocks run again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import islice
+from logging import CRITICAL
+from typing import TYPE_CHECKING, Any
+
+from stickslip.errors import SolveError
+from stickslip.sweeps.block import run_block
+from stickslip.sweeps.plan import Keep, Plan, required
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+AHEAD = 4  # blocks in flight a thread: enough to hide the way, few enough to keep memory flat
+PATIENCE = 10  # s to wait for a scheduler
+DEATHS = 10  # workers that may die of one block
+
+
+def on_cluster(plan: Plan, numbers: Sequence[int], keep: Keep, where: str | None) -> None:
+    """Run blocks on the cluster whose scheduler is at `where`, or on one made of this machine's cores."""
+    from distributed import as_completed
+
+    with _client(where) as client:
+        shared = client.scatter(plan, broadcast=True)
+        waiting = iter(numbers)
+
+        def send(count: int) -> list[Any]:
+            return [client.submit(_run, shared, number, pure=False) for number in islice(waiting, count)]
+
+        threads = max(1, sum(client.nthreads().values()))
+        running = as_completed(send(AHEAD * threads))
+        for future in running:
+            keep(*future.result())
+            future.release()
+            running.update(send(1))
+
+
+def _run(plan: Plan, number: int) -> tuple[int, Any, Any]:
+    return (number, *run_block(plan, number))
+
+
+@contextmanager
+def _client(where: str | None) -> Iterator[Client]:
+    """A cluster of one's own, or the one that stands at an address."""
+    dask, distributed = required("dask"), required("distributed")
+    if where is None:
+        with (
+            dask.config.set({"distributed.scheduler.allowed-failures": DEATHS}),
+            distributed.LocalCluster(threads_per_worker=1, dashboard_address=None, silence_logs=CRITICAL) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            yield client
+        return
+    try:
+        client = distributed.Client(f"tcp://{where}", timeout=PATIENCE)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise SolveError(
+            f"no Dask scheduler answers at {where}",
+            f"it is asked for {PATIENCE} s",
+            "start one there with `dask scheduler`, or leave the address for a cluster of this machine",
+        ) from error
+    with client:
+        yield client

@@ -1,0 +1,168 @@
+"""A map on disk: kills, damage, other settings, two writers and full disks lose nothing and are told."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip import Coulomb, HarmonicForce, ModelError, Oscillator, SolveError, sweep
+
+pytest.importorskip("zarr")
+SLIDER = Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=HarmonicForce(1.0, frequency=0.127))
+GRID = {"kinetic": np.linspace(0.1, 1.2, 9), "frequency": np.linspace(0.1, 0.2, 8)}
+SETTINGS: dict[str, Any] = {"measures": ["stops", "amplitude"], "settle": 20, "cycles": 5, "engine": "serial"}
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("whole") / "map.zarr"
+    sweep(SLIDER, GRID, store=path, **SETTINGS)
+    return path
+
+
+def test_a_map_on_disk_is_the_one_in_memory(whole: Path) -> None:
+    import xarray
+
+    kept = xarray.open_zarr(whole, consolidated=False)
+    asked = sweep(SLIDER, GRID, **SETTINGS)
+    assert bool(kept.done.all())
+    assert set(asked.data_vars) == set(kept.data_vars) - {"done"}
+    for name in asked.data_vars:
+        np.testing.assert_array_equal(kept[name].values, asked[name].values)
+        assert kept[name].attrs["units"] == asked[name].attrs["units"]
+    assert kept.attrs["checksum"] == asked.attrs["checksum"]
+
+
+def test_killed_at_random_it_goes_on_and_ends_with_the_same_bytes(whole: Path, tmp_path: Path) -> None:
+    path = tmp_path / "map.zarr"
+    script = tmp_path / "run.py"
+    script.write_text(
+        textwrap.dedent(f"""
+        import sys, time
+        sys.path.insert(0, {str(Path(__file__).parent)!r})
+        from test_store import GRID, SETTINGS, SLIDER
+        from stickslip import sweep
+        from stickslip.sweeps.store import Store
+        keep = Store.keep
+        def slowly(store, *block):
+            keep(store, *block)
+            print("kept", flush=True)
+            time.sleep(0.005)
+        Store.keep = slowly
+        sweep(SLIDER, GRID, store={str(path)!r}, **SETTINGS)
+    """)
+    )
+    chance = np.random.default_rng(7)
+    for _ in range(3):
+        run = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
+        assert run.stdout is not None
+        assert run.stdout.readline() == "kept\n"
+        time.sleep(chance.uniform(0, 0.1))
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+        run.stdout.close()
+    subprocess.run([sys.executable, str(script)], check=True, capture_output=True)
+    assert files(path) == files(whole)
+
+
+def test_what_is_done_is_not_run_again(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from stickslip.sweeps import serial
+
+    def refuse(plan: Any, number: int) -> Any:
+        raise AssertionError(f"block {number} is there already")
+
+    monkeypatch.setattr(serial, "run_block", refuse)
+    before = files(whole)
+    sweep(SLIDER, GRID, store=whole, **SETTINGS)
+    assert files(whole) == before
+
+
+def test_a_damaged_block_is_run_again(whole: Path, tmp_path: Path) -> None:
+    import shutil
+
+    path = tmp_path / "map.zarr"
+    shutil.copytree(whole, path)
+    chunk = max((path / "amplitude" / "c").rglob("*"), key=lambda at: at.is_file())
+    bytes_ = bytearray(chunk.read_bytes())
+    bytes_[-6] ^= 1
+    chunk.write_bytes(bytes_)
+    sweep(SLIDER, GRID, store=path, **SETTINGS)
+    assert files(path) == files(whole)
+
+
+def test_other_settings_are_refused_by_name(whole: Path) -> None:
+    before = files(whole)
+    with pytest.raises(ModelError, match=r"cycles = 5 \(asked: 6\)"):
+        sweep(SLIDER, GRID, store=whole, **{**SETTINGS, "cycles": 6})
+    assert files(whole) == before
+
+
+def test_another_system_is_refused(whole: Path) -> None:
+    with pytest.raises(ModelError, match="mass=2"):
+        sweep(SLIDER.having(mass=2), GRID, store=whole, **SETTINGS)
+
+
+def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ModelError, match="is not a map of ours"):
+        sweep(SLIDER, GRID, store=tmp_path, **SETTINGS)
+    assert files(tmp_path) == {"notes.txt": b"mine"}
+
+
+def test_two_writers_are_refused(whole: Path) -> None:
+    fcntl = pytest.importorskip("fcntl")
+    handle = os.open(whole, os.O_RDONLY)
+    fcntl.flock(handle, fcntl.LOCK_EX)
+    try:
+        with pytest.raises(SolveError, match="is being written by another process"):
+            sweep(SLIDER, GRID, store=whole, **SETTINGS)
+    finally:
+        os.close(handle)
+
+
+def test_a_full_disk_is_one_sentence_and_the_map_goes_on(whole: Path, tmp_path: Path) -> None:
+    import zarr.storage._local as local
+
+    path, put, left = tmp_path / "map.zarr", local._put, [60]
+
+    def filling(*given: Any, **named: Any) -> Any:
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError(28, "No space left on device")
+        return put(*given, **named)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(local, "_put", filling)
+        with pytest.raises(SolveError, match=r"No space left on device.*call again"):
+            sweep(SLIDER, GRID, store=path, **SETTINGS)
+    sweep(SLIDER, GRID, store=path, **SETTINGS)
+    assert files(path) == files(whole)
+
+
+def test_the_cluster_gives_the_same_bytes(whole: Path, tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    path = tmp_path / "map.zarr"
+    sweep(SLIDER, GRID, store=path, **{**SETTINGS, "engine": "dask"})
+    assert files(path) == files(whole)
+
+
+def test_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    from stickslip.sweeps import cluster
+
+    monkeypatch.setattr(cluster, "PATIENCE", 1)
+    with pytest.raises(SolveError, match=r"no Dask scheduler answers at 127\.0\.0\.1:9"):
+        sweep(SLIDER, GRID, **{**SETTINGS, "engine": "dask://127.0.0.1:9"})
