@@ -200,6 +200,14 @@ if TYPE_CHECKING:
     from stickslip.solve.simulate import simulate as simulate
     from stickslip.solve.trajectory import Trajectory as Trajectory
     from stickslip.squeak.bursts import Squeak as Squeak, Squeaks as Squeaks, find_squeaks as find_squeaks
+    from stickslip.squeak.spectra import BurstSpectra as BurstSpectra, burst_spectra as burst_spectra
+    from stickslip.squeak.listening import Clip as Clip, burst_clips as burst_clips, write_sound as write_sound
+    from stickslip.analysis.squeaks import SqueakFindings as SqueakFindings, analyze_squeaks as analyze_squeaks
+    from stickslip.analysis.squeak_comparison import (
+        Condition as Condition,
+        SqueakComparison as SqueakComparison,
+        compare_squeaks as compare_squeaks,
+    )
     from stickslip.squeak.coupling import Coupling as Coupling, Pair as Pair, coupling as coupling
     from stickslip.squeak.sound import sound_pressure as sound_pressure, squeak_record as squeak_record
     from stickslip.squeak.stability import (
@@ -288,6 +296,11 @@ _ROOMS = {
     "sweep": "sweeps.sweep",
     "squeak_rig": "squeak.virtual_rig", "sound_pressure": "squeak.sound", "squeak_record": "squeak.sound",
     "find_squeaks": "squeak.bursts", "Squeaks": "squeak.bursts", "Squeak": "squeak.bursts",
+    "burst_spectra": "squeak.spectra", "BurstSpectra": "squeak.spectra",
+    "burst_clips": "squeak.listening", "Clip": "squeak.listening", "write_sound": "squeak.listening",
+    "analyze_squeaks": "analysis.squeaks", "SqueakFindings": "analysis.squeaks",
+    "compare_squeaks": "analysis.squeak_comparison", "SqueakComparison": "analysis.squeak_comparison",
+    "Condition": "analysis.squeak_comparison",
     "coupling": "squeak.coupling", "Coupling": "squeak.coupling", "Pair": "squeak.coupling",
     "stability": "squeak.stability", "Stability": "squeak.stability", "SlidingMode": "squeak.stability",
     "critical_value": "squeak.stability", "Threshold": "squeak.stability", "stability_map": "squeak.stability",

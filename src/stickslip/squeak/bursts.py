@@ -120,6 +120,8 @@ class Squeaks:
         Where they were found.
     notes : tuple of str
         What could not be told, and why.
+    band : tuple of float
+        Lowest and highest frequency that were listened to [Hz].
     """
 
     bursts: tuple[Squeak, ...]
@@ -128,6 +130,7 @@ class Squeaks:
     forcing: float
     record: Record
     notes: tuple[str, ...] = ()
+    band: tuple[float, float] = (0.0, math.inf)
 
     @property
     def kind(self) -> str:
@@ -208,7 +211,7 @@ def find_squeaks(
     >>> found.kind, all(475 < burst.frequency < 500 for burst in found.of("squeak"))
     ('squeak', True)
     """
-    name = _chosen(record, channel)
+    name = chosen_channel(record, channel)
     record.require_clean(name, question="hearing squeaks", samples=256)
     low, high = frequencies or (LOWEST, 0.45 * record.fs)
     if not 0 < low < high <= 0.5 * record.fs or high < 4 * low:
@@ -228,7 +231,7 @@ def find_squeaks(
     clipped = [fault.rows for fault in record.check() if (fault.kind, fault.channel) == ("clipped", name)]
     listener = _Listener(record, name, hearing, motion, list(itertools.chain(*clipped)))
     bursts = sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start)
-    return Squeaks(tuple(bursts), name, _reference(unit), motion.frequency, record, tuple(listener.notes(unit)))
+    return Squeaks(tuple(bursts), name, _reference(unit), motion.frequency, record, tuple(listener.notes(unit)), (low, high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -392,7 +395,8 @@ class _Listener:
         return told
 
 
-def _chosen(record: Record, channel: str | None) -> str:
+def chosen_channel(record: Record, channel: str | None) -> str:
+    """The channel asked for, or the first that is usual."""
     if channel is not None:
         record.require(channel, question="hearing squeaks")
         return channel

@@ -15,6 +15,7 @@ from stickslip.estimate import Estimate
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
 from stickslip.squeak.hearing import filtered
+from stickslip.squeak.spectra import coherence_by_chance, rows_inside, rows_outside
 from stickslip.statistics import student
 
 Array = NDArray[np.float64]
@@ -23,7 +24,6 @@ Waves = NDArray[np.complex128]
 MOTIONS = ("a", "normal_acceleration", "torsion_velocity", "friction", "sound")
 CYCLES = 8.0  # of the tone in a segment: its line is an eighth of its frequency wide
 FEWEST = 4  # segments
-LEVEL = 0.05  # of chance: what coherence exceeds by chance once in twenty
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,11 @@ class Coupling:
     energy_per_cycle: Estimate | None
     dissipated_per_cycle: Estimate | None
     segments: int
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """The energies that are known."""
+        return tuple(each for each in (self.energy_per_cycle, self.dissipated_per_cycle) if each is not None)
 
     def of(self, first: str, second: str) -> Pair:
         """The pair of two channels, in this order."""
@@ -178,7 +183,7 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
         )
     frequency = float(np.average([b.frequency for b in bursts], weights=[b.duration for b in bursts]))
     size = math.ceil(CYCLES * record.fs / frequency)
-    within, beyond = _segments(record, bursts, size)
+    within, beyond = rows_inside(record, bursts, size), rows_outside(record, bursts, size)
     if len(within) < FEWEST:
         raise EstimateError(
             f"{len(within)} segments of {CYCLES:g} cycles in the squeaks",
@@ -192,18 +197,6 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
         for one, other in itertools.combinations(names, 2)
     ]
     return Coupling(frequency, tuple(pairs), *_energies(record, bursts, frequency), len(within))
-
-
-def _segments(record: Record, squeaks: tuple[Squeak, ...], size: int) -> tuple[list[int], list[int]]:
-    """First rows of the segments in the squeaks, and of those outside of them."""
-    inside, sounds = [], np.zeros(len(record) + 1, dtype=int)
-    for burst in squeaks:
-        first, last = np.searchsorted(record.time, [burst.start, burst.end])
-        sounds[first:last] = 1
-        inside += list(range(first, last - size, size))
-    quiet = np.concatenate([[0], np.cumsum(sounds)])
-    outside = [row for row in range(0, len(record) - size, size) if quiet[row + size] == quiet[row]]
-    return inside, outside
 
 
 def _tones(values: Array, rows: list[int], size: int, frequency: float) -> Waves:
@@ -221,21 +214,17 @@ def _pair(one: str, other: str, inside: dict[str, Waves], outside: dict[str, Wav
     phase = Estimate.normal(
         f"phase of {other} behind {one}", angle, sd=sd, unit="rad",
         method=f"cross spectrum of {count} segments", quantile=student(count - 1),
-        status="ok" if coherence > _chance(count) else "no coherence beyond chance: the phase means nothing",
+        status="ok" if coherence > coherence_by_chance(count) else "no coherence beyond chance: the phase means nothing",
     )  # fmt: skip
     delay = phase.scaled(1 / (2 * math.pi * frequency), "s", f"delay of {other} behind {one}")
     beyond = math.nan if outside is None else _coherence(outside[one], outside[other])[0]
-    return Pair(one, other, coherence, beyond, _chance(count), phase, delay)
+    return Pair(one, other, coherence, beyond, coherence_by_chance(count), phase, delay)
 
 
 def _coherence(one: Waves, other: Waves) -> tuple[float, float]:
     cross = np.sum(one * np.conj(other))
     power = float(np.sum(np.abs(one) ** 2) * np.sum(np.abs(other) ** 2))
     return (float(np.abs(cross) ** 2 / power) if power else 0.0), float(np.angle(cross))
-
-
-def _chance(count: int) -> float:
-    return float(1 - LEVEL ** (1 / (count - 1)))
 
 
 def _energies(record: Record, squeaks: tuple[Squeak, ...], frequency: float) -> tuple[Estimate | None, Estimate | None]:

@@ -1,0 +1,231 @@
+"""Everything that is asked of a record of squeaks: bursts, spectra, coupling, friction over speed, how it sounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from stickslip.analysis.findings import plain, record_name
+from stickslip.errors import EstimateError, StickslipError
+from stickslip.estimate import Estimate, Result
+from stickslip.identify.loops import Loops, friction_loops
+from stickslip.record.record import Record
+from stickslip.squeak.bursts import HEARD, Squeak, Squeaks, find_squeaks
+from stickslip.squeak.coupling import Coupling, coupling
+from stickslip.squeak.spectra import BurstSpectra, burst_spectra
+from stickslip.statistics import mean_of_cycles
+from stickslip.units import parse_value
+
+if TYPE_CHECKING:
+    from stickslip.record.check import Fault
+
+Answer = TypeVar("Answer")
+
+VIBRATING = (*HEARD, "torsion_velocity", "load")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SqueakFindings(Result):
+    """What a record says about its squeaks.
+
+    Attributes
+    ----------
+    name : str
+        The record's name: its file, or what the caller called it.
+    record : Record
+        The record.
+    faults : tuple of Fault
+        What the check-up found in it.
+    squeaks : Squeaks
+        The bursts.
+    beside : tuple of Squeaks
+        The bursts of every other channel that vibrates.
+    spectra : BurstSpectra or None
+        In the bursts and outside of them.
+    coupling : Coupling or None
+        Which motions move together in squeaks.
+    loops : Loops or None
+        Friction over the forcing cycle: its level, and its slope against speed.
+    normal : float or None
+        Normal load [N] on the contact, where stated or measured.
+    notes : tuple of str
+        What could not be asked, and why.
+    settings : mapping
+        What was chosen and stated.
+    """
+
+    name: str
+    record: Record
+    faults: tuple[Fault, ...]
+    squeaks: Squeaks
+    beside: tuple[Squeaks, ...] = ()
+    spectra: BurstSpectra | None = None
+    coupling: Coupling | None = None
+    loops: Loops | None = None
+    normal: float | None = None
+    notes: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def loudest(self) -> Squeak | None:
+        """The loudest of the squeaks and squeals, or of all bursts where there are none; of clipped ones the longest."""
+        bursts = self.squeaks.of("squeak", "squeal") or self.squeaks.bursts
+        return max(bursts, key=lambda each: (np.nan_to_num(each.level, nan=-math.inf), each.duration), default=None)
+
+    @property
+    def frequency(self) -> Estimate | None:
+        """Mean frequency of the squeaks and squeals [Hz], its interval from the scatter between them."""
+        heard = [burst.frequency for burst in self.squeaks.of("squeak", "squeal")]
+        if not heard:
+            return None
+        found = mean_of_cycles("frequency of the squeaks", heard, unit="Hz", method="mean of the bursts")
+        return _of_bursts(found)
+
+    @property
+    def coefficient(self) -> Estimate | None:
+        """Sliding friction over the normal load, where both are known."""
+        return self._over_load("level", "1", "friction coefficient")
+
+    @property
+    def slope_of_coefficient(self) -> Estimate | None:
+        """Change of the coefficient of friction with speed [s/m], where the load is known."""
+        return self._over_load("slope", "s/m", "slope of the friction coefficient against speed")
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every number found."""
+        joined = self.coupling
+        found = [
+            self.frequency,
+            *(() if self.loops is None else (self.loops.level, self.loops.slope)),
+            self.coefficient,
+            self.slope_of_coefficient,
+            *(() if joined is None else joined.estimates),
+        ]
+        return tuple(each for each in found if each is not None)
+
+    def _over_load(self, name: str, unit: str, called: str) -> Estimate | None:
+        if self.loops is None or self.normal is None or self.loops.level.unit != "N":
+            return None
+        found: Estimate = getattr(self.loops, name)
+        return found.scaled(1 / self.normal, unit, called)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: settings, bursts, estimates, coupling, faults, notes and history."""
+        told = {
+            "name": self.name,
+            "settings": dict(self.settings),
+            "normal_load": self.normal,
+            "squeaks": {key: value for key, value in self.squeaks.to_dict().items() if key not in ("notes", "history")},
+            "beside": {
+                each.channel: {"kind": each.kind, "squeaks": len(each.of("squeak", "squeal"))} for each in self.beside
+            },
+            "coupling": None if self.coupling is None else self.coupling.to_dict(),
+            "estimates": [each.to_dict() for each in self.estimates],
+            "faults": [str(fault) for fault in self.faults],
+            "notes": list(self.notes),
+            "history": [step.to_dict() for step in self.record.history],
+        }
+        return {key: plain(value) for key, value in told.items()}
+
+
+def analyze_squeaks(
+    record: Record, *, name: str | None = None, channel: str | None = None,
+    frequencies: tuple[float, float] | None = None, contact: str | None = None, normal: float | str | None = None,
+) -> SqueakFindings:  # fmt: skip
+    """Does it squeak, how does it sound, what moves together then, and how does friction change with speed?
+
+    The check-up, the bursts (:func:`find_squeaks`) in the sound and in every channel that vibrates, their spectra
+    (:func:`burst_spectra`), the coupling (:func:`coupling`) and the friction over the forcing cycle
+    (:func:`friction_loops`). A question that can not be answered becomes a note.
+
+    Parameters
+    ----------
+    record : Record
+        With a sound, or a vibration; best with friction and the motion too.
+    name : str, optional
+        What the record is called, as "wet, 6.13 N"; its file where left out.
+    channel : str, optional
+        Where to listen, as in :func:`find_squeaks`.
+    frequencies : tuple of float, optional
+        Lowest and highest that are listened to [Hz], as in :func:`find_squeaks`.
+    contact : {"ground", "base"}, optional
+        What the mass slides on, as in :func:`friction_loops`.
+    normal : float or str, optional
+        Normal load [N]; the mean of the channel "normal" where there is one.
+
+    Returns
+    -------
+    SqueakFindings
+
+    Raises
+    ------
+    RecordError, EstimateError
+        As :func:`find_squeaks`: the bursts can not be looked for.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> run = ss.simulate(ss.squeak_rig("wet", load=6.13), duration=2.4)
+    >>> found = analyze_squeaks(ss.squeak_record(run, snr=30, rng=1), normal=6.13)
+    >>> found.squeaks.kind, bool(475 < found.frequency.value < 500), found.coefficient.includes(8 / 6.13)
+    ('squeak', True, True)
+    """
+    faults = tuple(record.check())
+    squeaks = find_squeaks(record, channel=channel, frequencies=frequencies)
+    notes = list(squeaks.notes)
+
+    def ask(question: str, answer: Callable[[], Answer]) -> Answer | None:
+        try:
+            return answer()
+        except StickslipError as error:
+            notes.append(f"{question}: {error}")
+            return None
+
+    others = [each for each in VIBRATING if each in record and each != squeaks.channel]
+    beside = [
+        ask(f"Bursts in {each}", lambda each=each: find_squeaks(record, channel=each, frequencies=frequencies))
+        for each in others
+    ]
+    loops = None
+    if "friction" in record and any(each in record for each in ("x", "v", "theta")):
+        loops = ask("Friction over the cycle", lambda: friction_loops(record, contact=contact))
+    else:
+        notes.append("No friction beside a motion is recorded: how it changes with speed can not be told.")
+    return SqueakFindings(
+        name=name or record_name(record),
+        record=record,
+        faults=faults,
+        squeaks=squeaks,
+        beside=tuple(each for each in beside if each is not None),
+        spectra=ask("Spectra", lambda: burst_spectra(record, squeaks=squeaks)) if squeaks.bursts else None,
+        coupling=ask("Coupling", lambda: coupling(record, squeaks=squeaks)) if squeaks.squeaking else None,
+        loops=loops,
+        normal=_normal(record, normal),
+        notes=tuple(notes),
+        settings={"channel": squeaks.channel, "frequencies": list(squeaks.band), **({"contact": contact} if contact else {})},
+    )
+
+
+def _normal(record: Record, stated: float | str | None) -> float | None:
+    """The load stated, or the magnitude of the one measured."""
+    if stated is not None:
+        load = parse_value(stated, "N")
+        if not (math.isfinite(load) and load > 0):
+            raise EstimateError(f"normal = {stated}", "a normal load is positive", "give normal= in N")
+        return load
+    if "normal" not in record:
+        return None
+    measured = abs(float(np.nanmean(record["normal"]))) if np.isfinite(record["normal"]).any() else 0.0
+    return measured or None
+
+
+def _of_bursts(found: Estimate) -> Estimate:
+    return replace(
+        found, status=found.status.replace("cycle", "burst"),
+        checks=tuple(check.replace("cycle", "burst") for check in found.checks),
+    )  # fmt: skip

@@ -1,0 +1,179 @@
+"""Spectra inside bursts against outside of them, and which frequencies two channels share there."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.record.record import Record
+from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
+
+Array = NDArray[np.float64]
+Waves = NDArray[np.complex128]
+
+LISTENED = ("a", "v", "normal_acceleration", "torsion_velocity", "friction", "load", "sound")
+LONGEST = 0.1  # s: the window where bursts allow it
+ENOUGH, FEWEST = 8, 2  # segments that are sought, and needed
+CHANCE = 0.05  # with which coherence exceeds what is called significant
+
+
+@dataclass(frozen=True, eq=False)
+class BurstSpectra:
+    """Spectra of a record's channels in bursts and outside of them.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (k,)
+        Frequencies [Hz].
+    inside, outside : mapping of str to ndarray, shape (k,)
+        Power spectral density of each channel [unit^2/Hz], one-sided; `outside` is empty where too little lies there.
+    coherence : mapping of (str, str) to ndarray, shape (k,)
+        Magnitude-squared coherence of each two channels in the bursts, 0 to 1.
+    coherence_outside : mapping of (str, str) to ndarray, shape (k,)
+        The same outside of the bursts.
+    phase : mapping of (str, str) to ndarray, shape (k,)
+        Of the cross spectrum in the bursts [rad], by which the second lags the first.
+    significant, significant_outside : float
+        Coherence that channels that have nothing to do with each other exceed once in twenty times.
+    segments, segments_outside : int
+        Stretches averaged.
+    """
+
+    frequency: Array
+    inside: Mapping[str, Array]
+    outside: Mapping[str, Array]
+    coherence: Mapping[tuple[str, str], Array]
+    coherence_outside: Mapping[tuple[str, str], Array]
+    phase: Mapping[tuple[str, str], Array]
+    significant: float
+    significant_outside: float
+    segments: int
+    segments_outside: int
+
+    @property
+    def resolution(self) -> float:
+        """Distance of two frequencies [Hz]."""
+        return float(self.frequency[1] - self.frequency[0])
+
+
+def burst_spectra(record: Record, *, squeaks: Squeaks | None = None) -> BurstSpectra:
+    r"""Which frequencies sound in the bursts, in which channels, and which of them do two channels share?
+
+    Welch's power and cross spectra (IEEE Trans. Audio Electroacoust. 15, 1967) of segments without overlap, Hann's
+    window, the mean of each segment taken off: from segments that lie in squeaks and squeals (in bursts of any kind
+    where there are none), and from segments that lie outside of all bursts. A segment is a tenth of a second long, or as
+    long as leaves eight of them in the bursts. The coherence is :math:`|G_{xy}|^2/(G_{xx} G_{yy})`.
+
+    Parameters
+    ----------
+    record : Record
+        With one at least of a, v, normal_acceleration, torsion_velocity, friction, load, sound; or the channel in which
+        the bursts were heard.
+    squeaks : Squeaks, optional
+        What :func:`find_squeaks` found in it; found where left out.
+
+    Returns
+    -------
+    BurstSpectra
+
+    Raises
+    ------
+    RecordError
+        A channel is broken.
+    EstimateError
+        No burst, or none long enough.
+
+    Examples
+    --------
+    >>> t = np.arange(20_000) / 10_000
+    >>> tone = np.sin(2 * np.pi * 500 * t) * (np.abs(t - 1) < 0.5)
+    >>> noise = np.random.default_rng(0).standard_normal((2, t.size))
+    >>> record = Record.of({"sound": tone + 0.01 * noise[0], "a": 3 * tone + 0.1 * noise[1]}, fs=10_000)
+    >>> found = burst_spectra(record)
+    >>> peak = int(np.argmax(found.inside["sound"]))
+    >>> bool(abs(found.frequency[peak] - 500) < found.resolution), bool(found.coherence["a", "sound"][peak] > 0.99)
+    (True, True)
+    """
+    squeaks = find_squeaks(record) if squeaks is None else squeaks
+    bursts = squeaks.of("squeak", "squeal") or squeaks.bursts
+    if not bursts:
+        raise EstimateError("no burst was found", "spectra are compared in bursts and outside", "see find_squeaks(record)")
+    names = [name for name in LISTENED if name in record and np.ptp(record[name]) > 0] or [squeaks.channel]
+    record.require_clean(*names, question="spectra of bursts")
+    size, within = _size(record, bursts, squeaks)
+    beyond = rows_outside(record, squeaks.bursts, size)
+    waves = {name: _waves(record[name], within, size) for name in names}
+    quiet = {name: _waves(record[name], beyond, size) for name in names} if len(beyond) >= FEWEST else {}
+    scale = 2 / (record.fs * float(np.sum(np.hanning(size) ** 2)))
+    cross = {pair: _cross(waves, pair) for pair in itertools.combinations(names, 2)}
+    cross_quiet = {pair: _cross(quiet, pair) for pair in cross} if quiet else {}
+    return BurstSpectra(
+        frequency=np.fft.rfftfreq(size, 1 / record.fs),
+        inside={name: scale * _power(wave) for name, wave in waves.items()},
+        outside={name: scale * _power(wave) for name, wave in quiet.items()},
+        coherence={pair: both[0] for pair, both in cross.items()},
+        coherence_outside={pair: both[0] for pair, both in cross_quiet.items()},
+        phase={pair: both[1] for pair, both in cross.items()},
+        significant=coherence_by_chance(len(within)),
+        significant_outside=coherence_by_chance(len(beyond)) if quiet else math.nan,
+        segments=len(within),
+        segments_outside=len(beyond) if quiet else 0,
+    )
+
+
+def rows_inside(record: Record, bursts: tuple[Squeak, ...], size: int) -> list[int]:
+    """First rows of the segments that lie in bursts."""
+    ends = [np.searchsorted(record.time, [burst.start, burst.end]) for burst in bursts]
+    return [row for first, last in ends for row in range(int(first), int(last) - size + 1, size)]
+
+
+def rows_outside(record: Record, bursts: tuple[Squeak, ...], size: int) -> list[int]:
+    """First rows of the segments that lie outside of all bursts."""
+    sounds = np.zeros(len(record), dtype=int)
+    for burst in bursts:
+        first, last = np.searchsorted(record.time, [burst.start, burst.end])
+        sounds[first:last] = 1
+    count = np.concatenate([[0], np.cumsum(sounds)])
+    return [row for row in range(0, len(record) - size + 1, size) if count[row + size] == count[row]]
+
+
+def coherence_by_chance(count: int) -> float:
+    """What the coherence of `count` segments of independent noise exceeds once in twenty times."""
+    return float(1 - CHANCE ** (1 / (count - 1)))
+
+
+def _size(record: Record, bursts: tuple[Squeak, ...], squeaks: Squeaks) -> tuple[int, list[int]]:
+    """Samples of a segment, and the rows at which those in the bursts begin."""
+    size = 1 << round(math.log2(LONGEST * record.fs))
+    while size >= 64:
+        within = rows_inside(record, bursts, size)
+        if len(within) >= (ENOUGH if size >= 128 else FEWEST):
+            return size, within
+        size //= 2
+    raise EstimateError(
+        f"bursts of {max(burst.duration for burst in bursts) * record.fs:.0f} samples at most",
+        f"spectra are averaged over {FEWEST} segments of 64 samples at least", "record at a higher rate, or for longer",
+    )  # fmt: skip
+
+
+def _waves(values: Array, rows: list[int], size: int) -> Waves:
+    parts = values[np.add.outer(rows, np.arange(size))]
+    return np.asarray(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * np.hanning(size), axis=1))
+
+
+def _power(waves: Waves) -> Array:
+    return np.asarray(np.mean(np.abs(waves) ** 2, axis=0))
+
+
+def _cross(waves: Mapping[str, Waves], pair: tuple[str, str]) -> tuple[Array, Array]:
+    """Coherence and phase of two channels."""
+    one, other = (waves[name] for name in pair)
+    shared = np.mean(one * np.conj(other), axis=0)
+    powers = np.maximum(_power(one) * _power(other), np.finfo(float).tiny)
+    return np.abs(shared) ** 2 / powers, np.angle(shared)
