@@ -180,8 +180,8 @@ def _verdicts(conditions: Sequence[Condition]) -> list[str]:
     falling = [each for each in silent if each.trend == "falls"]
     if falling:
         told.append(
-            f"Friction falls with speed in {_names(falling)} too, and nothing squeaks there: a falling friction alone is "
-            "not enough."
+            f"Friction falls with speed in {_names(falling)} too, and nothing squeaks there: a falling friction "
+            "alone is not enough."
         )
     rising = [each for each in loud if each.trend == "rises"]
     if rising:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -72,7 +73,7 @@ class SqueakFindings(Result):
 
     @property
     def loudest(self) -> Squeak | None:
-        """The loudest of the squeaks and squeals, or of all bursts where there are none; of clipped ones the longest."""
+        """The loudest of the squeaks and squeals, or of all bursts where there are none; if clipped, the longest."""
         bursts = self.squeaks.of("squeak", "squeal") or self.squeaks.bursts
         return max(bursts, key=lambda each: (np.nan_to_num(each.level, nan=-math.inf), each.duration), default=None)
 
@@ -187,10 +188,8 @@ def analyze_squeaks(
             return None
 
     others = [each for each in VIBRATING if each in record and each != squeaks.channel]
-    beside = [
-        ask(f"Bursts in {each}", lambda each=each: find_squeaks(record, channel=each, frequencies=frequencies))
-        for each in others
-    ]
+    listen = partial(find_squeaks, record, frequencies=frequencies)
+    beside = [ask(f"Bursts in {each}", partial(listen, channel=each)) for each in others]
     loops = None
     if "friction" in record and any(each in record for each in ("x", "v", "theta")):
         loops = ask("Friction over the cycle", lambda: friction_loops(record, contact=contact))
@@ -207,7 +206,11 @@ def analyze_squeaks(
         loops=loops,
         normal=_normal(record, normal),
         notes=tuple(notes),
-        settings={"channel": squeaks.channel, "frequencies": list(squeaks.band), **({"contact": contact} if contact else {})},
+        settings={
+            "channel": squeaks.channel,
+            "frequencies": list(squeaks.band),
+            **({"contact": contact} if contact else {}),
+        },
     )
 
 

@@ -13,6 +13,7 @@ from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
 from stickslip.cli.rig import rig
 from stickslip.cli.simulate import INTERRUPTED, simulate
+from stickslip.cli.squeak import squeak
 from stickslip.cli.wavelet import wavelet
 from stickslip.cli.words import spoken
 
@@ -44,5 +45,5 @@ def main() -> None:
     """
 
 
-for _command in (analyze, check, convert, datasets, decay, demo, fit, rig, simulate, wavelet):
+for _command in (analyze, check, convert, datasets, decay, demo, fit, rig, simulate, squeak, wavelet):
     main.add_command(_command)

@@ -19,13 +19,24 @@ from stickslip.cli.options import pair
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip import Comparison, DecayComparison, DecayFindings, Findings, Record, RigSettings
+    from stickslip import (
+        Comparison,
+        DecayComparison,
+        DecayFindings,
+        Findings,
+        Record,
+        RigSettings,
+        SqueakComparison,
+        SqueakFindings,
+    )
 
 Answer = TypeVar("Answer")
 
 LONG = 1 << 26  # bytes on the disk
 PART = 1 << 18  # rows of a long record's part
-Result = TypeVar("Result", "Findings | Comparison", "DecayFindings | DecayComparison")
+Result = TypeVar(
+    "Result", "Findings | Comparison", "DecayFindings | DecayComparison", "SqueakFindings | SqueakComparison"
+)
 
 
 def rig_of(

@@ -14,14 +14,29 @@ import stickslip as ss
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip import Comparison, DecayComparison, DecayFindings, Findings, Outcome, TimeFrequency
+    from typing import TypeAlias
+
+    from stickslip import (
+        Comparison,
+        DecayComparison,
+        DecayFindings,
+        Findings,
+        Outcome,
+        SqueakComparison,
+        SqueakFindings,
+        TimeFrequency,
+    )
+
+    Asked: TypeAlias = (
+        Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | SqueakFindings | SqueakComparison
+    )
 
 
 SHOWN_EVENTS = 12
 
 
 def show(
-    results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison,
+    results: Asked,
     written: Path | None,
     *,
     as_json: bool,
@@ -38,9 +53,7 @@ def show(
         click.echo(f"Report: {written / 'report.html'}")
 
 
-def _print_table(
-    console: Any, results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison
-) -> None:
+def _print_table(console: Any, results: Asked) -> None:
     from rich.markup import escape
 
     summary = ss.summary(results)
@@ -55,6 +68,11 @@ def _print_table(
     ]
     if rows:
         console.print(table(headings, rows))
+    for each in summary.tables:
+        console.print(f"\n{escape(each.title)}")
+        console.print(table(each.headings, each.rows))
+        if each.note:
+            console.print(f"[dim]{escape(each.note)}[/dim]")
     if summary.verdicts:
         console.print(table(("motion tried", "verdict"), summary.verdicts))
     for note in summary.notes:
@@ -99,7 +117,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Any:
 
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in headings:
-        table.add_column(heading, overflow="fold")
+        table.add_column(escape(heading), overflow="fold")
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     return table

@@ -8,6 +8,8 @@ from stickslip.analysis.comparison import Comparison
 from stickslip.analysis.decay_comparison import DecayComparison
 from stickslip.analysis.decays import DecayFindings
 from stickslip.analysis.findings import Findings
+from stickslip.analysis.squeak_comparison import SqueakComparison
+from stickslip.analysis.squeaks import SqueakFindings
 from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.identify.compare_force import UNLIKE
 from stickslip.identify.force import FUSIONS
@@ -26,6 +28,7 @@ from stickslip.plot.decay import plates_together as together_plates
 from stickslip.plot.force import plot_force_comparison
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
+from stickslip.plot.squeak import plates_of_conditions, plates_of_squeaks
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
 
 UNSURE = "not stated"  # in the status of what sensors that are not known may have made
@@ -35,15 +38,23 @@ if TYPE_CHECKING:
 
 
 def figures(
-    result: Findings | Comparison | DecayFindings | DecayComparison | TimeFrequency | Trajectory,
+    result: Findings
+    | Comparison
+    | DecayFindings
+    | DecayComparison
+    | TimeFrequency
+    | SqueakFindings
+    | SqueakComparison
+    | Trajectory,
 ) -> tuple[Plate, ...]:
     """The figures that show a result, in reading order.
 
     Parameters
     ----------
-    result : Findings, Comparison, DecayFindings, DecayComparison, TimeFrequency or Trajectory
-        What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`compare_decays`, :func:`time_frequency` or
-        :func:`simulate` returned.
+    result : Findings, Comparison, DecayFindings, DecayComparison, TimeFrequency, SqueakFindings, SqueakComparison or \
+            Trajectory
+        What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`compare_decays`, :func:`time_frequency`,
+        :func:`analyze_squeaks`, :func:`compare_squeaks` or :func:`simulate` returned.
 
     Returns
     -------
@@ -66,6 +77,10 @@ def figures(
         return tuple(decay_plates(result))
     if isinstance(result, DecayComparison):
         return tuple(together_plates(result))
+    if isinstance(result, SqueakFindings):
+        return tuple(plates_of_squeaks(result))
+    if isinstance(result, SqueakComparison):
+        return tuple(plates_of_conditions(result))
     if isinstance(result, TimeFrequency):
         from stickslip.plot.wavelet import plates_of as plates_of_map
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.plot.contact import draw_loop
+from stickslip.estimate import decimals
+from stickslip.plot.contact import plot_displacement_loop, plot_velocity_loop
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import (
     BLUE,
@@ -17,7 +19,6 @@ from stickslip.plot.style import (
     INK,
     ORANGE,
     PURPLE,
-    SKY,
     WIDTH,
     Array,
     axis_label,
@@ -27,6 +28,7 @@ from stickslip.plot.style import (
     spelled,
     styled,
 )
+from stickslip.squeak.bursts import ForcedMotion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,5 +41,420 @@ if TYPE_CHECKING:
     from stickslip.squeak.spectra import BurstSpectra
 
 COLOURS = {"squeak": ORANGE, "squeal": ORANGE, "creak": PURPLE, "scrape": GREEN, "tonal": BLUE, "noise": FAINT}
+TRACED = {
+    "v": GREEN, "a": BLUE, "normal_acceleration": BLUE, "torsion_velocity": PURPLE, "friction": ORANGE, "load": PURPLE,
+    "sound": INK,
+}  # fmt: skip
+SHORT = {
+    "a": "acceleration", "normal_acceleration": "normal\nacceleration", "torsion_velocity": "torsion\nvelocity",
+    "friction": "friction", "sound": "sound",
+}  # fmt: skip
 SPAN = 70.0  # dB of the spectrogram
-SHARE = 1e-3  # of the power that lies above the highest frequency shown
+WINDOW = 0.0232  # s of its frames
+COLUMNS = 900
+SHARE = 0.02  # of the power that lies above half of the highest frequency shown
+PHASES = 100
+MOST_NUMBERS = 30
+MOST_ROWS = 6
+
+
+@styled
+def plot_squeaks(found: Squeaks) -> Figure:
+    """The sound over time with its bursts shaded, and its spectrogram with their dominant frequencies.
+
+    Parameters
+    ----------
+    found : Squeaks
+        What :func:`~stickslip.find_squeaks` returned.
+
+    Returns
+    -------
+    Figure
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> t = np.arange(10_000) / 10_000
+    >>> tone = np.sin(2 * np.pi * 500 * t) * (np.abs(t - 0.5) < 0.2)
+    >>> figure = plot_squeaks(ss.find_squeaks(ss.Record.of({"sound": tone}, fs=10_000)))
+    >>> len(figure.axes)  # the sound, the spectrogram, its bar
+    3
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+    record, name = found.record, found.channel
+    figure = Figure(figsize=(WIDTH, 4.8), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2.2))
+    _trace(above, record, name)
+    drawn = _spectrogram(below, found)
+    numbered = len(found.bursts) <= MOST_NUMBERS
+    for number, burst in enumerate(found.bursts):
+        above.axvspan(burst.start, burst.end, color=COLOURS[burst.kind], alpha=0.22, linewidth=0)
+        if numbered:
+            middle = (burst.start + burst.end) / 2
+            above.annotate(
+                f"{number + 1}", (middle, 1), xycoords=("data", "axes fraction"), xytext=(0, 1), ha="center",
+                textcoords="offset points", fontsize=7,
+            )  # fmt: skip
+        _frame(below, burst)
+    kinds = dict.fromkeys(burst.kind for burst in found.bursts)
+    if kinds:
+        handles = [Patch(color=COLOURS[kind], alpha=0.4, label=kind) for kind in kinds]
+        figure.legend(handles=handles, ncols=len(handles), loc="outside upper left")
+    below.set(xlabel="time [s]", ylabel="frequency [Hz]")
+    below.set_xlim(float(record.time[0]), float(record.time[-1]))
+    bar = figure.colorbar(drawn, ax=below, pad=0.01, aspect=30)
+    bar.set_label("dB below the largest")
+    bar.outline.set_visible(False)
+    figure.align_ylabels([above, below])
+    return figure
+
+
+@styled
+def plot_burst_spectra(spectra: BurstSpectra, *, channel: str, record: Record) -> Figure:
+    """Power spectra of each channel, in the bursts and outside of them.
+
+    Parameters
+    ----------
+    spectra : BurstSpectra
+        What :func:`~stickslip.burst_spectra` returned.
+    channel : str
+        Where the bursts were heard.
+    record : Record
+        Where they were found, for the units.
+
+    Returns
+    -------
+    Figure
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    names = list(spectra.inside)
+    figure, axes = _panels(len(names))
+    last = _highest(spectra.frequency, spectra.inside, channel)
+    for ax, name in zip(axes, names, strict=True):
+        shown = spectra.frequency[1:last]
+        if name in spectra.outside:
+            ax.semilogy(shown, spectra.outside[name][1:last], color=BLUE, linewidth=1.0, label="outside")
+        ax.semilogy(shown, spectra.inside[name][1:last], color=ORANGE, label="in the bursts")
+        unit = spelled(record.channels[name].unit)
+        ax.yaxis.set_major_locator(LogLocator(numticks=5))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ax.yaxis.set_minor_locator(NullLocator())
+        power = "1/Hz" if unit == "1" else f"({unit})²/Hz" if "/" in unit else f"{unit}²/Hz"
+        ax.set_ylabel(f"{_words(record, name)}\n[{power}]")
+    axes[0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    axes[-1].set(xlabel="frequency [Hz]", xlim=(0, float(spectra.frequency[last - 1])))
+    figure.align_ylabels(axes)
+    return figure
+
+
+@styled
+def plot_coherence(spectra: BurstSpectra, *, channel: str, record: Record) -> Figure:
+    """Coherence of every channel with the one in which the bursts were heard, in the bursts and outside of them.
+
+    Parameters
+    ----------
+    spectra : BurstSpectra
+        Of two channels at least.
+    channel : str
+        Where the bursts were heard.
+    record : Record
+        Where they were found.
+
+    Returns
+    -------
+    Figure
+    """
+    pairs = [pair for pair in spectra.coherence if channel in pair] or list(spectra.coherence)
+    figure, axes = _panels(len(pairs))
+    last = _highest(spectra.frequency, spectra.inside, channel)
+    shown = spectra.frequency[1:last]
+    for ax, pair in zip(axes, pairs, strict=True):
+        if pair in spectra.coherence_outside:
+            ax.plot(shown, spectra.coherence_outside[pair][1:last], color=BLUE, linewidth=1.0, label="outside")
+        ax.plot(shown, spectra.coherence[pair][1:last], color=ORANGE, label="in the bursts")
+        ax.axhline(spectra.significant, color=ORANGE, linestyle=":", linewidth=0.9)
+        if pair in spectra.coherence_outside:
+            ax.axhline(spectra.significant_outside, color=BLUE, linestyle=":", linewidth=0.9)
+        other = pair[0] if pair[1] == channel else pair[1]
+        ax.set(ylim=(0, 1.02), ylabel=_words(record, other))
+    axes[0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    axes[-1].set(xlabel="frequency [Hz]", xlim=(0, float(shown[-1])))
+    figure.align_ylabels(axes)
+    return figure
+
+
+@styled
+def plot_forcing_cycle(found: Squeaks) -> Figure:
+    """Where in the forcing cycle, and at which sliding velocity, the bursts come.
+
+    Parameters
+    ----------
+    found : Squeaks
+        Of a record with the forced motion.
+
+    Returns
+    -------
+    Figure
+    """
+    record, motion = found.record, ForcedMotion.of(found.record)
+    assert motion.velocity is not None
+    assert motion.phase is not None
+    factor, unit = prefixed(motion.velocity, "m/s")
+    figure, (above, below) = new_figure(2, height=4.2, heights=[1.4, 1])
+    bins = np.linspace(0, 1, PHASES + 1)
+    place = np.clip(np.digitize(motion.phase, bins) - 1, 0, PHASES - 1)
+    middle = [float(np.median(motion.velocity[place == each])) for each in np.unique(place)]
+    above.plot(
+        (bins[1:] + bins[:-1])[np.unique(place)] / 2, factor * np.array(middle), color=INK,
+        label="sliding velocity, median of the cycles",
+    )  # fmt: skip
+    above.axhline(0, color=FAINT, linewidth=0.8)
+    thick = max(1.0, min(5.0, 100 / len(found.bursts)))
+    for number, burst in enumerate(found.bursts):
+        colour = COLOURS[burst.kind]
+        above.plot(burst.phase, factor * burst.speed, "o", color=colour, markersize=4.5)
+        for ends, wide in (((burst.start, burst.end), 0.3), (burst.loud, 1.0)):
+            first, last = np.searchsorted(record.time, ends)
+            turn = np.unwrap(2 * np.pi * motion.phase[first : last + 1]) / (2 * np.pi)
+            for begin, end in _within_one(float(turn[0]), float(turn[-1])):
+                below.plot([begin, end], [number + 1] * 2, color=colour, linewidth=thick * wide, solid_capstyle="butt")
+        below.plot(burst.phase, number + 1, "o", color=INK, markersize=2.5)
+    above.legend(loc="lower left", bbox_to_anchor=(0, 1))
+    above.set_ylabel(axis_label("velocity", unit))
+    below.set(xlabel="phase of the forcing cycle, 0 at the largest displacement", ylabel="burst", xlim=(0, 1))
+    below.set_ylim(len(found.bursts) + 0.7, 0.3)
+    below.yaxis.get_major_locator().set_params(integer=True)
+    figure.align_ylabels([above, below])
+    return figure
+
+
+@styled
+def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
+    """Every channel about one burst.
+
+    Parameters
+    ----------
+    found : SqueakFindings
+        What :func:`~stickslip.analyze_squeaks` returned.
+    burst : Squeak
+        Which one.
+
+    Returns
+    -------
+    Figure
+    """
+    around = min(0.5 * burst.duration, 0.1)
+    part = found.record.between(burst.start - around, burst.end + around)
+    names = [name for name in TRACED if name in part] or [found.squeaks.channel]
+    figure, axes = _panels(len(names))
+    for ax, name in zip(axes, names, strict=True):
+        _trace(ax, part, name)
+        ax.axvspan(burst.start, burst.end, color=COLOURS[burst.kind], alpha=0.15, linewidth=0)
+    axes[-1].set(xlabel="time [s]", xlim=(float(part.time[0]), float(part.time[-1])))
+    figure.align_ylabels(axes)
+    return figure
+
+
+@styled
+def plot_conditions(comparison: SqueakComparison) -> Figure:
+    """Friction and its slope against speed in each condition, with their 95 % intervals; where it squeaks is orange.
+
+    Parameters
+    ----------
+    comparison : SqueakComparison
+        What :func:`~stickslip.compare_squeaks` returned, friction in one condition at least.
+
+    Returns
+    -------
+    Figure
+    """
+    from matplotlib.figure import Figure
+
+    conditions = [each for each in comparison.conditions if each.level is not None]
+    figure = Figure(figsize=(WIDTH, 1.5 + 0.34 * len(conditions)), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    for ax, name, words in ((left, "level", "sliding friction"), (right, "slope", "slope against speed")):
+        estimates = [getattr(each, name) for each in conditions]
+        unit = estimates[0].unit
+        for place, (each, estimate) in enumerate(zip(conditions, estimates, strict=True)):
+            away = np.abs(np.array(estimate.interval)[:, None] - estimate.value)
+            colour, marker = (ORANGE, "D") if each.squeaks else (BLUE, "o")
+            label = "squeaks" if each.squeaks else "silent"
+            ax.errorbar(
+                estimate.value, place, xerr=away, fmt=marker, color=colour, capsize=3, markersize=5, label=label
+            )
+        ax.axvline(0, color=INK, linewidth=0.8)
+        ax.set_xlabel(axis_label(f"{words}, 95 %", unit, between="\n"))
+    left.set_yticks(range(len(conditions)), [_short(each.name) for each in conditions])
+    left.set_ylim(len(conditions) - 0.4, -0.6)
+    both: dict[str, Any] = {}
+    for handle, label in zip(*left.get_legend_handles_labels(), strict=True):
+        both.setdefault(label, handle)
+    figure.legend(both.values(), both.keys(), ncols=2, loc="outside upper left")
+    return figure
+
+
+@styled
+def plot_condition_loops(comparison: SqueakComparison) -> Figure:
+    """Friction against displacement and velocity, a row for each condition, as the thesis's figures 7.3 and 7.6.
+
+    Parameters
+    ----------
+    comparison : SqueakComparison
+        With friction loops in one condition at least; the first six are drawn.
+
+    Returns
+    -------
+    Figure
+    """
+    from matplotlib.figure import Figure
+
+    rows = [each for each in comparison.findings if each.loops is not None][:MOST_ROWS]
+    figure = Figure(figsize=(WIDTH, 0.4 + 2.1 * len(rows)), layout="constrained")
+    axes = figure.subplots(len(rows), 2, sharey="row", squeeze=False)
+    for (left, right), found in zip(axes, rows, strict=True):
+        assert found.loops is not None
+        for ax, draw in ((left, plot_displacement_loop), (right, plot_velocity_loop)):
+            draw(found, ax=ax)
+            legend = ax.get_legend()
+            if legend is not None:
+                legend.remove()
+        right.set_ylabel("")
+        slope = found.loops.slope
+        low, high = slope.interval
+        left.set_title(_short(found.name), loc="left")
+        digits = decimals(slope.sd, slope.value)
+        told = f"{slope.value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f}) {spelled(slope.unit)}"
+        right.set_title(told, loc="right", fontsize=8)
+    return figure
+
+
+def plates_of_squeaks(found: SqueakFindings) -> list[Plate]:
+    """The figures of one record."""
+    squeaks = found.squeaks
+    plates = [
+        plate("spectrogram", plot_squeaks(squeaks), "When it sounds, and how high",
+              "Above: the signal, its bursts shaded and numbered. Below: how strong each frequency is at each time; "
+              "bright is strong, and a white line is a burst's dominant frequency.")
+    ]  # fmt: skip
+    loudest = found.loudest
+    if loudest is None:
+        return plates
+    if found.spectra is not None:
+        plates.append(
+            plate("spectra", plot_burst_spectra(found.spectra, channel=squeaks.channel, record=found.record),
+                  "What sounds in the bursts",
+                  f"Power spectra of each channel in {found.spectra.compared}; a peak that stands above the other line "
+                  "belongs to the bursts.")
+        )  # fmt: skip
+        if found.spectra.coherence:
+            plates.append(
+                plate("coherence", plot_coherence(found.spectra, channel=squeaks.channel, record=found.record),
+                      f"Which frequencies the motions share with the {_words(found.record, squeaks.channel)}",
+                      "Coherence is 1 where two channels move together and 0 where they have nothing to do with each "
+                      "other; what is below the dotted line may be chance.")
+            )  # fmt: skip
+    if not math.isnan(squeaks.forcing):
+        plates.append(
+            plate("forcing-cycle", plot_forcing_cycle(squeaks), "Where in the cycle it sounds",
+                  "Above: the sliding velocity over the forcing cycle; a mark is the loudest moment of a burst. Below: "
+                  "each burst from its beginning to its end, thick where it is within ten decibel of its loudest "
+                  "moment.")
+        )  # fmt: skip
+    if len(found.record) > 1:
+        plates.append(
+            plate("burst", plot_burst(found, burst=loudest), f"Burst {squeaks.bursts.index(loudest) + 1}, the loudest",
+                  "Every channel about it; shaded from its beginning to its end.")
+        )  # fmt: skip
+    if found.loops is not None:
+        plates.append(
+            plate("friction-velocity", plot_velocity_loop(found), "Friction against velocity",
+                  "Friction that falls away from zero velocity feeds a vibration, one that rises damps it. Dotted: the "
+                  "sliding friction to either side.")
+        )  # fmt: skip
+    return plates
+
+
+def plates_of_conditions(comparison: SqueakComparison) -> list[Plate]:
+    """The figures of several records side by side."""
+    if all(each.loops is None for each in comparison.findings):
+        return []
+    return [
+        plate("conditions", plot_conditions(comparison), "Friction, and how it changes with speed",
+              "Left: sliding friction. Right: its slope against speed; left of zero it falls with speed."),
+        plate("loops", plot_condition_loops(comparison), "Friction against displacement and velocity",
+              "Each condition in a row, each row with a scale of its own. Grey: cycles; orange: their mean; dots: the "
+              "mean at each velocity. The number is the slope against speed with its 95 % interval."),
+    ]  # fmt: skip
+
+
+def _panels(count: int) -> tuple[Figure, Any]:
+    figure, axes = new_figure(count, height=1.0 + 1.15 * count)
+    return figure, np.atleast_1d(axes)
+
+
+def _trace(ax: Axes, record: Record, name: str) -> None:
+    factor, unit = prefixed(record[name], record.channels[name].unit)
+    ax.plot(*envelope(record.time, factor * record[name]), color=TRACED.get(name, BLUE), linewidth=0.8)
+    ax.set_ylabel(axis_label(_words(record, name), unit, between="\n"))
+
+
+def _spectrogram(ax: Axes, found: Squeaks) -> Any:
+    """Power over time and frequency in decibel, the largest of each column's frames."""
+    from scipy.signal import stft
+
+    record = found.record
+    values = record[found.channel] - record[found.channel].mean()
+    size = min(len(values), max(64, 2 ** round(math.log2(WINDOW * record.fs))))
+    frequencies, times, waves = stft(values, record.fs, nperseg=size, noverlap=size - max(1, size // 8))
+    power = np.abs(waves) ** 2
+    width = -(-power.shape[1] // COLUMNS)
+    if width > 1:
+        starts = np.arange(0, power.shape[1], width)
+        power = np.maximum.reduceat(power, starts, axis=1)
+        times = times[np.minimum(starts + width // 2, len(times) - 1)]
+    inside = (frequencies >= found.band[0] / 2) & (frequencies <= found.band[1])
+    last = _highest(frequencies[inside], {found.channel: power[inside].sum(axis=1)}, found.channel)
+    shown = power[inside][:last]
+    level = 10 * np.log10(np.maximum(shown / max(float(shown.max()), np.finfo(float).tiny), 1e-30))
+    ax.grid(visible=False)
+    return ax.pcolormesh(
+        record.start + times, frequencies[inside][:last], np.maximum(level, -SPAN), cmap="cividis", vmin=-SPAN, vmax=0,
+        shading="nearest", rasterized=True,
+    )  # fmt: skip
+
+
+def _frame(ax: Axes, burst: Squeak) -> None:
+    """The dominant frequency of a tonal burst."""
+    if burst.kind in ("squeak", "squeal", "tonal") and burst.frequency < ax.get_ylim()[1]:
+        ends = [burst.start, burst.end]
+        ax.plot(ends, [burst.frequency] * 2, color="black", linewidth=2.4, alpha=0.5)
+        ax.plot(ends, [burst.frequency] * 2, color="white", linewidth=1.0)
+
+
+def _highest(frequencies: Array, powers: Mapping[str, Array], heard: str) -> int:
+    """How many of the frequencies are worth showing: twice those below which nearly all is that was heard."""
+    power = powers.get(heard, next(iter(powers.values())))
+    share = np.cumsum(power[1:]) / max(float(power[1:].sum()), np.finfo(float).tiny)
+    return min(len(frequencies), max(2 * int(np.searchsorted(share, 1 - SHARE)), 16))
+
+
+def _within_one(begin: float, end: float) -> list[tuple[float, float]]:
+    """A stretch of turns as stretches between 0 and 1."""
+    pieces: list[tuple[float, float]] = []
+    while end - math.floor(begin) > 1 and len(pieces) < 50:
+        pieces.append((begin - math.floor(begin), 1.0))
+        begin = math.floor(begin) + 1.0
+    return [*pieces, (begin - math.floor(begin), end - math.floor(begin))]
+
+
+def _words(record: Record, name: str) -> str:
+    """What a channel measures, short enough for an axis."""
+    return SHORT.get(name) or re.split("[,(]", record.channels[name].quantity or name)[0].strip()
+
+
+def _short(name: str) -> str:
+    return name if len(name) < 30 else f"{name[:27]}..."

@@ -11,34 +11,30 @@ from pathlib import Path
 from typing import Any
 
 from stickslip import __version__
-from stickslip.analysis.comparison import Comparison
-from stickslip.analysis.decay_comparison import DecayComparison
-from stickslip.analysis.decays import DecayFindings
-from stickslip.analysis.findings import Findings
-from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.errors import ModelError, RecordError
 from stickslip.plot.plate import Plate
-from stickslip.reports.page import render, sections_of
+from stickslip.reports.page import Asked, render, sections_of
+from stickslip.squeak.listening import Clip
 
 PROGRAM = "stickslip"
 NUMBERS = "results.json"
 
 
 def publish(
-    results: Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison,
+    results: Asked,
     *,
     folder: str | Path,
 ) -> Path:
-    """Write ``report.html``, ``results.json`` and the figures as SVG and PNG into a folder.
+    """Write ``report.html``, ``results.json``, the figures as SVG and PNG, and the bursts as WAV into a folder.
 
     The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
     is left alone.
 
     Parameters
     ----------
-    results : Findings, Comparison, TimeFrequency, DecayFindings or DecayComparison
-        What :func:`analyze`, :func:`compare`, :func:`time_frequency`, :func:`analyze_decay` or
-        :func:`compare_decays` returned.
+    results : Findings, Comparison, TimeFrequency, DecayFindings, DecayComparison, SqueakFindings or SqueakComparison
+        What :func:`analyze`, :func:`compare`, :func:`time_frequency`, :func:`analyze_decay`, :func:`compare_decays`,
+        :func:`analyze_squeaks` or :func:`compare_squeaks` returned.
     folder : path
         The folder to make.
 
@@ -71,7 +67,16 @@ def publish(
         for number, section in enumerate(sections):
             prefix = f"{number}-{_fit_for_a_file(section.words.title)}-" if len(sections) > 1 else ""
             write_figures(draft / "figures", prefix, section.plates)
+            _write_sounds(draft / "sounds", prefix, section.clips)
     return folder
+
+
+def _write_sounds(folder: Path, prefix: str, clips: Sequence[Clip]) -> None:
+    """Each burst to listen to."""
+    if clips:
+        folder.mkdir(exist_ok=True)
+    for clip in clips:
+        (folder / f"{prefix}{clip.name}.wav").write_bytes(clip.wav)
 
 
 @contextmanager

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import base64
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 from stickslip import __version__
 from stickslip.analysis.comparison import Comparison
 from stickslip.analysis.decay_comparison import DecayComparison
 from stickslip.analysis.decays import DecayFindings
 from stickslip.analysis.findings import Findings
+from stickslip.analysis.squeak_comparison import SqueakComparison
+from stickslip.analysis.squeaks import SqueakFindings
 from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.estimate import Estimate
 from stickslip.files.write import whole
@@ -21,24 +24,31 @@ from stickslip.plot.figures import figures
 from stickslip.plot.plate import Plate
 from stickslip.record.record import Record
 from stickslip.reports.summary import Summary, summary
+from stickslip.squeak.listening import Clip, burst_clips
 
 TEMPLATE = "page.html.jinja"
+MOST_SOUND = 1 << 20  # bytes of sound of one record in a page; the folder holds all
 _COLOURS = {
     style.INK: "currentColor", style.FAINT: "var(--faint)", style.SHADE: "var(--shade)", style.BLUE: "var(--blue)",
     style.ORANGE: "var(--orange)", style.GREEN: "var(--green)", style.PURPLE: "var(--purple)", style.SKY: "var(--sky)",
 }  # fmt: skip
+Asked: TypeAlias = (
+    Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | SqueakFindings | SqueakComparison
+)
+Results: TypeAlias = Asked | Estimate | Sequence[Estimate]
 
 
 @dataclass(frozen=True)
 class Section:
-    """What the page says of one record, or of all of them: words and figures."""
+    """What the page says of one record, or of all of them: words, figures, and sounds."""
 
     words: Summary
     plates: Sequence[Plate] = ()
+    clips: Sequence[Clip] = ()
 
 
 def report(
-    results: Findings | Comparison | TimeFrequency | Estimate | Sequence[Estimate] | DecayFindings | DecayComparison,
+    results: Results,
     record: Record | None,
     path: str | Path,
 ) -> Path:
@@ -46,7 +56,8 @@ def report(
 
     Parameters
     ----------
-    results : Findings, Comparison, TimeFrequency, DecayFindings, DecayComparison, Estimate, or a sequence of estimates
+    results : Findings, Comparison, TimeFrequency, DecayFindings, DecayComparison, SqueakFindings, SqueakComparison, \
+            Estimate, or a sequence of estimates
         What was found.
     record : Record or None
         Where plain estimates were found: its faults, channels and history are told. Findings bring their own.
@@ -79,16 +90,20 @@ def report(
 
 
 def sections_of(
-    results: Findings | Comparison | TimeFrequency | Estimate | Sequence[Estimate] | DecayFindings | DecayComparison,
+    results: Results,
     record: Record | None = None,
 ) -> list[Section]:
     """The sections of the page, with their figures drawn."""
-    if isinstance(results, Comparison | DecayComparison):
-        parts: list[Findings | Comparison | DecayFindings | DecayComparison] = [results, *results.findings]
-        return [Section(summary(part), figures(part)) for part in parts]
-    if isinstance(results, Findings | DecayFindings | TimeFrequency):
-        return [Section(summary(results), figures(results))]
+    if isinstance(results, Comparison | DecayComparison | SqueakComparison):
+        return [_section(part) for part in (results, *results.findings)]
+    if isinstance(results, Findings | DecayFindings | TimeFrequency | SqueakFindings):
+        return [_section(results)]
     return [Section(summary(cast(Sequence[Estimate], results), record=record))]
+
+
+def _section(part: Asked) -> Section:
+    clips = burst_clips(part.squeaks) if isinstance(part, SqueakFindings) else ()
+    return Section(summary(part), figures(part), clips)
 
 
 def render(sections: Sequence[Section]) -> str:
@@ -99,8 +114,24 @@ def render(sections: Sequence[Section]) -> str:
         loader=PackageLoader("stickslip.reports"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters.update(inline_svg=inline_svg, told=told, spelled=style.spelled)
+    environment.filters.update(inline_svg=inline_svg, told=told, spelled=style.spelled, played=played, heard=heard)
     return environment.get_template(TEMPLATE).render(sections=sections, version=__version__)
+
+
+def heard(clips: Sequence[Clip]) -> Sequence[Clip]:
+    """The clips that the page itself holds: as many of the loudest as keep it light."""
+    light, size = set(), 0
+    for clip in sorted(clips, key=lambda clip: -clip.level):
+        size += len(clip.wav)
+        if size > MOST_SOUND:
+            break
+        light.add(clip.name)
+    return [clip for clip in clips if clip.name in light]
+
+
+def played(clip: Clip) -> str:
+    """The sound as an address that holds it."""
+    return f"data:audio/wav;base64,{base64.b64encode(clip.wav).decode('ascii')}"
 
 
 def inline_svg(plate: Plate) -> str:

@@ -9,12 +9,14 @@ from stickslip.analysis.comparison import Comparison
 from stickslip.analysis.decay_comparison import DecayComparison
 from stickslip.analysis.decays import DecayFindings
 from stickslip.analysis.findings import Findings, record_name
+from stickslip.analysis.squeak_comparison import SqueakComparison
+from stickslip.analysis.squeaks import SqueakFindings
 from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record, Step
-from stickslip.reports import decay
+from stickslip.reports import decay, squeak
 from stickslip.reports.words import cautions, doubts, headline, interval_of, number, ringing_told, value_of
 
 _CONSTANT_UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
@@ -46,6 +48,28 @@ class Line:
 
 
 @dataclass(frozen=True)
+class Table:
+    """A table of text.
+
+    Attributes
+    ----------
+    title : str
+        What it shows.
+    headings : sequence of str
+        Of its columns.
+    rows : sequence of sequence of str
+        Its cells.
+    note : str
+        How to read it.
+    """
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+
+
+@dataclass(frozen=True)
 class Summary:
     """A result in words.
 
@@ -65,6 +89,8 @@ class Summary:
         Constants and choices.
     verdicts : sequence of (str, str)
         The motions that were tried, and what the record says of each.
+    tables : sequence of Table
+        What is told in rows of its own: bursts, pairs of channels, conditions.
     channels : sequence of Channel
         The record's channels.
     history : sequence of Step
@@ -79,6 +105,7 @@ class Summary:
     notes: Sequence[str] = ()
     settings: Mapping[str, str] | None = None
     verdicts: Sequence[tuple[str, str]] = ()
+    tables: Sequence[Table] = ()
     channels: Sequence[Channel] = ()
     history: Sequence[Step] = ()
 
@@ -94,7 +121,15 @@ class Summary:
 
 
 def summary(
-    results: Findings | DecayFindings | Comparison | DecayComparison | TimeFrequency | Estimate | Sequence[Estimate],
+    results: Findings
+    | DecayFindings
+    | Comparison
+    | DecayComparison
+    | TimeFrequency
+    | SqueakFindings
+    | SqueakComparison
+    | Estimate
+    | Sequence[Estimate],
     *,
     record: Record | None = None,
 ) -> Summary:
@@ -102,7 +137,8 @@ def summary(
 
     Parameters
     ----------
-    results : Findings, DecayFindings, Comparison, DecayComparison, TimeFrequency, Estimate or sequence of Estimate
+    results : Findings, DecayFindings, Comparison, DecayComparison, TimeFrequency, SqueakFindings, SqueakComparison, \
+            Estimate or sequence of Estimate
         What was found.
     record : Record, optional
         Where plain estimates were found; Findings bring their own.
@@ -130,6 +166,10 @@ def summary(
         return _of_findings(results)
     if isinstance(results, TimeFrequency):
         return _of_time_frequency(results)
+    if isinstance(results, SqueakFindings):
+        return _of_squeaks(results)
+    if isinstance(results, SqueakComparison):
+        return _of_conditions(results)
     return _of_estimates([results] if isinstance(results, Estimate) else list(results), record)
 
 
@@ -163,6 +203,36 @@ def _of_time_frequency(found: TimeFrequency) -> Summary:
         },
         channels=list(record.channels.values()), history=record.history,
     )  # fmt: skip
+
+
+def _of_squeaks(found: SqueakFindings) -> Summary:
+    record, bursts = found.record, found.squeaks.bursts
+    tables = []
+    if bursts:
+        more = f", the first {squeak.MOST}" if len(bursts) > squeak.MOST else ""
+        title = f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}{more}, levels re {found.squeaks.reference}"
+        tables.append(Table(title, *squeak.burst_table(found)))
+    if found.coupling is not None:
+        title = f"What moves together at {number(found.coupling.frequency, 0.5, 'Hz')}"
+        tables.append(Table(title, *squeak.coupling_table(found.coupling), squeak.coupling_note(found.coupling)))
+    low, high = found.squeaks.band
+    return Summary(
+        found.name, list(squeak.headline(found)), [*squeak.cautions(found), *doubts(found.estimates)],
+        lines=[_line(each) for each in found.estimates], faults=[str(fault) for fault in found.faults],
+        notes=found.notes, tables=tables,
+        settings={
+            "heard in": found.squeaks.channel, "between": f"{low:g} and {high:g} Hz",
+            **({} if found.normal is None else {"normal load": number(found.normal, 0.0, "N")}),
+            "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s",
+        },
+        channels=list(record.channels.values()), history=record.history,
+    )  # fmt: skip
+
+
+def _of_conditions(comparison: SqueakComparison) -> Summary:
+    title = f"{len(comparison.conditions)} conditions compared"
+    table = Table("Conditions", *squeak.condition_table(comparison))
+    return Summary(title, list(comparison.verdicts), tables=[table], notes=comparison.notes)
 
 
 def _of_comparison(comparison: Comparison) -> Summary:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ TOLD = 100.0  # cycles in which partials at whole ratios are told from those of 
 SWINGS = 0.25  # of the friction's level: beneath a squeak it swings by a third, beneath a free ringing by a sixth
 THROUGH = 1.5  # periods of the forced motion: what sounds longer goes on through reversals
 QUIET = 45.0  # dB re 20 uPa: less is not heard beside a running rig
+RINGS = 30.0  # cycles around a burst that a filter about its tone needs
 PARTIALS = 0.1  # of the power in steady lines
 RISEN = 0.1  # of the largest sliding speed: slower is no sliding
 FRICTION = ("squeak", "squeal", "creak", "scrape")
@@ -71,6 +73,8 @@ class Squeak:
         is recorded.
     speed : float
         Velocity of sliding at that moment [m/s]; NaN where no motion is recorded.
+    loud : tuple of float
+        From when to when it is within ten decibel of its loudest moment [s].
     status : str
         "ok", or what is wrong with it.
     """
@@ -89,6 +93,7 @@ class Squeak:
     rate: float
     phase: float
     speed: float
+    loud: tuple[float, float]
     status: str
 
     @property
@@ -98,7 +103,7 @@ class Squeak:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not known is None."""
-        told = {**vars(self), "harmonics": [list(each) for each in self.harmonics]}
+        told = {**vars(self), "harmonics": [list(each) for each in self.harmonics], "loud": list(self.loud)}
         return {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in told.items()}
 
 
@@ -226,16 +231,18 @@ def find_squeaks(
     if not values.any():
         raise EstimateError(f"channel {name} is silent", "a burst needs a sound", "name another channel=")
     hearing = Hearing.of(values, record.fs, (low, high), span)
-    motion = _Motion.of(record)
+    motion = ForcedMotion.of(record)
     unit = record.channels[name].unit
     clipped = [fault.rows for fault in record.check() if (fault.kind, fault.channel) == ("clipped", name)]
     listener = _Listener(record, name, hearing, motion, list(itertools.chain(*clipped)))
     bursts = sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start)
-    return Squeaks(tuple(bursts), name, _reference(unit), motion.frequency, record, tuple(listener.notes(unit)), (low, high))
+    return Squeaks(
+        tuple(bursts), name, _reference(unit), motion.frequency, record, tuple(listener.notes(unit)), (low, high)
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class _Motion:
+class ForcedMotion:
     """The forced motion beside the sound: its frequency [Hz], velocity of sliding [m/s] and phase, where recorded."""
 
     frequency: float = math.nan
@@ -243,7 +250,7 @@ class _Motion:
     phase: Array | None = None
 
     @classmethod
-    def of(cls, record: Record) -> _Motion:
+    def of(cls, record: Record) -> ForcedMotion:
         from scipy.signal import butter, hilbert, sosfiltfilt
 
         name = next((each for each in ("x", "v") if each in record and np.ptp(record[each]) > 0), None)
@@ -276,7 +283,7 @@ class _Listener:
     record: Record
     name: str
     hearing: Hearing
-    motion: _Motion
+    motion: ForcedMotion
     clipped: list[tuple[int, int]]
 
     def burst(self, part: Span) -> Squeak:
@@ -287,7 +294,7 @@ class _Listener:
         frequency, harmonics, tonality = hearing.tones(part)
         rate = pulse_train(hearing.values[rows], record.fs) if not part.tonal else math.nan
         kind, friction, evidence = self._kind(part, rate, () if spoilt else harmonics)
-        loudest = part.first + hearing.loudest(part)
+        loudest, loud = hearing.loudest(part)
         reference = REFERENCES.get(unit, 1.0)
         calibrated = unit == "Pa" and not spoilt
         return Squeak(
@@ -305,17 +312,25 @@ class _Listener:
             rate=rate,
             phase=float(motion.phase[loudest]) if motion.phase is not None else math.nan,
             speed=float(motion.velocity[loudest]) if motion.velocity is not None else math.nan,
+            loud=(float(record.time[loud[0]]), float(record.time[loud[1] - 1])),
             status=self._status(part, spoilt),
         )
 
+    @cached_property
+    def vibrations(self) -> dict[str, Array]:
+        """Every channel that vibrates, in the band that is listened to."""
+        units = {name: channel.unit for name, channel in self.record.channels.items()}
+        return {
+            name: filtered(self.record[name], self.record.fs, self.hearing.band)
+            for name, unit in units.items()
+            if unit in REFERENCES and np.all(np.isfinite(self.record[name]))
+        }
+
     def _levels(self, rows: slice) -> dict[str, float]:
-        """Of every channel that vibrates, in the band that is listened to."""
-        told = {}
-        for name, channel in self.record.channels.items():
-            if channel.unit in REFERENCES and np.all(np.isfinite(self.record[name])):
-                heard = filtered(self.record[name], self.record.fs, self.hearing.band)[rows]
-                told[name] = level(heard, REFERENCES[channel.unit], fs=self.record.fs)
-        return told
+        references = {name: REFERENCES[self.record.channels[name].unit] for name in self.vibrations}
+        return {
+            name: level(values[rows], references[name], fs=self.record.fs) for name, values in self.vibrations.items()
+        }
 
     def _kind(self, part: Span, rate: float, harmonics: tuple[tuple[float, float], ...]) -> tuple[str, str, str]:
         """Its kind, whether friction makes it, and why."""
@@ -365,9 +380,12 @@ class _Listener:
 
     def _modulation(self, part: Span) -> float:
         """Amplitude of the friction force about the tone, over the friction's level."""
-        rows, friction = slice(part.first, part.last), self.record["friction"]
-        beats = filtered(friction, self.record.fs, (0.8 * part.line, min(1.2 * part.line, 0.49 * self.record.fs)))[rows]
-        return float(math.sqrt(2) * np.std(beats) / max(np.mean(np.abs(friction[rows])), np.finfo(float).tiny))
+        band = (0.8 * part.line, min(1.2 * part.line, 0.49 * self.record.fs))
+        before = max(0, part.first - round(RINGS * self.record.fs / part.line))
+        near = self.record["friction"][before : part.last + part.first - before]
+        rows = slice(part.first - before, part.last - before)
+        beats = filtered(near, self.record.fs, band)[rows]
+        return float(math.sqrt(2) * np.std(beats) / max(np.mean(np.abs(near[rows])), np.finfo(float).tiny))
 
     def _loudness(self, part: Span) -> float:
         return level(self.hearing.values[part.first : part.last], REFERENCES["Pa"], fs=self.record.fs)

@@ -15,7 +15,7 @@ from stickslip.estimate import Estimate
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
 from stickslip.squeak.hearing import filtered
-from stickslip.squeak.spectra import coherence_by_chance, rows_inside, rows_outside
+from stickslip.squeak.spectra import coherence_by_chance, stretches
 from stickslip.statistics import student
 
 Array = NDArray[np.float64]
@@ -90,6 +90,8 @@ class Coupling:
         What the friction force takes from the whole motion meanwhile, in a cycle of the squeak [J].
     segments : int
         Stretches in the bursts that were averaged.
+    compared : str
+        What `inside` and `outside` are.
     """
 
     frequency: float
@@ -97,6 +99,7 @@ class Coupling:
     energy_per_cycle: Estimate | None
     dissipated_per_cycle: Estimate | None
     segments: int
+    compared: str
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -117,6 +120,7 @@ class Coupling:
         return {
             "frequency": self.frequency,
             "segments": self.segments,
+            "compared": self.compared,
             "pairs": [pair.to_dict() for pair in self.pairs],
             **{name: None if each is None else each.to_dict() for name, each in energies.items()},
         }
@@ -170,7 +174,8 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
     >>> found.of("normal_acceleration", "torsion_velocity").coupled
     True
     """
-    bursts = (find_squeaks(record) if squeaks is None else squeaks).of("squeak", "squeal")
+    squeaks = find_squeaks(record) if squeaks is None else squeaks
+    bursts = squeaks.of("squeak", "squeal")
     if not bursts:
         raise EstimateError("no squeak was found", "coupling is told inside of squeaks", "see find_squeaks(record)")
     names = [name for name in MOTIONS if name in record and np.ptp(record[name]) > 0]
@@ -183,7 +188,8 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
         )
     frequency = float(np.average([b.frequency for b in bursts], weights=[b.duration for b in bursts]))
     size = math.ceil(CYCLES * record.fs / frequency)
-    within, beyond = rows_inside(record, bursts, size), rows_outside(record, bursts, size)
+    where = stretches(record, squeaks=squeaks, size=size)
+    within, beyond = where.inside, where.outside
     if len(within) < FEWEST:
         raise EstimateError(
             f"{len(within)} segments of {CYCLES:g} cycles in the squeaks",
@@ -196,7 +202,7 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
         _pair(one, other, inside, outside if len(beyond) >= FEWEST else None, frequency)
         for one, other in itertools.combinations(names, 2)
     ]
-    return Coupling(frequency, tuple(pairs), *_energies(record, bursts, frequency), len(within))
+    return Coupling(frequency, tuple(pairs), *_energies(record, bursts, frequency), len(within), where.words)
 
 
 def _tones(values: Array, rows: list[int], size: int, frequency: float) -> Waves:
@@ -210,15 +216,15 @@ def _tones(values: Array, rows: list[int], size: int, frequency: float) -> Waves
 def _pair(one: str, other: str, inside: dict[str, Waves], outside: dict[str, Waves] | None, frequency: float) -> Pair:
     count = len(inside[one])
     coherence, angle = _coherence(inside[one], inside[other])
-    sd = math.sqrt(max(1 - coherence, 1e-12) / (2 * count * max(coherence, 1e-12)))
+    sd, chance = math.sqrt(max(1 - coherence, 1e-12) / (2 * count * max(coherence, 1e-12))), coherence_by_chance(count)
     phase = Estimate.normal(
         f"phase of {other} behind {one}", angle, sd=sd, unit="rad",
         method=f"cross spectrum of {count} segments", quantile=student(count - 1),
-        status="ok" if coherence > coherence_by_chance(count) else "no coherence beyond chance: the phase means nothing",
+        status="ok" if coherence > chance else "no coherence beyond chance: the phase means nothing",
     )  # fmt: skip
     delay = phase.scaled(1 / (2 * math.pi * frequency), "s", f"delay of {other} behind {one}")
     beyond = math.nan if outside is None else _coherence(outside[one], outside[other])[0]
-    return Pair(one, other, coherence, beyond, coherence_by_chance(count), phase, delay)
+    return Pair(one, other, coherence, beyond, chance, phase, delay)
 
 
 def _coherence(one: Waves, other: Waves) -> tuple[float, float]:

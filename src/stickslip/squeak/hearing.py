@@ -139,9 +139,13 @@ class Hearing:
         apart = power > 10 ** (STANDS_OUT / 10) * median_filter(power, 2 * AROUND + 1)
         return float(power[apart].sum() / max(power.sum(), np.finfo(float).tiny))
 
-    def loudest(self, part: Span) -> int:
-        """Row of its loudest moment, counted from its first."""
-        return int(np.argmax(_smooth(self.values[part.first : part.last] ** 2, self.size // 2)))
+    def loudest(self, part: Span) -> tuple[int, tuple[int, int]]:
+        """Row of its loudest moment, and the rows about it that are within ten decibel of it."""
+        energy = _smooth(self.values[part.first : part.last] ** 2, self.size // 2)
+        peak = int(np.argmax(energy))
+        soft = np.flatnonzero(energy < energy[peak] * 10 ** (-DIP / 10))
+        first, last = soft[soft < peak].max(initial=-1) + 1, soft[soft > peak].min(initial=len(energy))
+        return part.first + peak, (part.first + int(first), part.first + int(last))
 
     def _active(self) -> Flags:
         """Frames in which something sounds."""

@@ -34,9 +34,13 @@ class Clip:
     name : str
         Short name, fit for a file.
     caption : str
-        Which burst it is, and how its level was changed.
+        Which burst it is.
     full_scale : float
-        What the largest count stands for [unit of the channel].
+        What the largest count stands for [unit]: the loudest moment of all bursts.
+    unit : str
+        SI unit of the channel; "1" where it is not calibrated.
+    level : float
+        Mean power, for comparison among the clips of one record.
     wav : bytes
         The WAV file, 16 bit.
     """
@@ -44,6 +48,8 @@ class Clip:
     name: str
     caption: str
     full_scale: float
+    unit: str
+    level: float
     wav: bytes
 
 
@@ -145,12 +151,11 @@ def burst_clips(found: Squeaks, *, most: int | None = None) -> tuple[Clip, ...]:
     pieces = [_cut(values, record, burst) for burst in found.bursts]
     scale = max((float(np.max(np.abs(piece))) for piece in pieces), default=0.0) * COUNTS / (COUNTS - 1) or 1.0
     kept = _loudest(pieces, most)
-    full = f"{scale:.3g} {unit}" if unit not in ("1", "FS") else f"{scale:.3g} of the file's full scale"
     return tuple(
         Clip(
             f"{number + 1}-{burst.kind}-{burst.frequency:.0f}-Hz",
-            f"Burst {number + 1}, {burst.kind}, {burst.start:.3f} to {burst.end:.3f} s. Full scale of the sound is {full}.",
-            scale, wav_bytes(pieces[number], record.fs, scale),
+            f"Burst {number + 1}, {burst.kind}, {burst.start:.3f} to {burst.end:.3f} s",
+            scale, unit, float(np.mean(pieces[number] ** 2)), wav_bytes(pieces[number], record.fs, scale),
         )
         for number, burst in enumerate(found.bursts)
         if number in kept

@@ -12,14 +12,18 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.record.record import Record
-from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
+from stickslip.squeak.bursts import Squeaks, find_squeaks
 
 Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]
 
 LISTENED = ("a", "v", "normal_acceleration", "torsion_velocity", "friction", "load", "sound")
 LONGEST = 0.1  # s: the window where bursts allow it
+SHORTEST = 64  # samples
 ENOUGH, FEWEST = 8, 2  # segments that are sought, and needed
+APART = "the bursts and the pauses between them"
+LOUD = "the loud parts of the bursts and the rest: there are no pauses between them"
+NOTHING_OUTSIDE = "the bursts alone: nothing lies outside of them"
 CHANCE = 0.05  # with which coherence exceeds what is called significant
 
 
@@ -43,6 +47,8 @@ class BurstSpectra:
         Coherence that channels that have nothing to do with each other exceed once in twenty times.
     segments, segments_outside : int
         Stretches averaged.
+    compared : str
+        What is held against what.
     """
 
     frequency: Array
@@ -55,6 +61,7 @@ class BurstSpectra:
     significant_outside: float
     segments: int
     segments_outside: int
+    compared: str
 
     @property
     def resolution(self) -> float:
@@ -67,8 +74,9 @@ def burst_spectra(record: Record, *, squeaks: Squeaks | None = None) -> BurstSpe
 
     Welch's power and cross spectra (IEEE Trans. Audio Electroacoust. 15, 1967) of segments without overlap, Hann's
     window, the mean of each segment taken off: from segments that lie in squeaks and squeals (in bursts of any kind
-    where there are none), and from segments that lie outside of all bursts. A segment is a tenth of a second long, or as
-    long as leaves eight of them in the bursts. The coherence is :math:`|G_{xy}|^2/(G_{xx} G_{yy})`.
+    where there are none), and from segments that lie outside of all bursts. Where bursts follow each other without a
+    pause, what is within ten decibel of their loudest moments is held against the rest. A segment is a tenth of a
+    second long, or as long as leaves eight of them in the bursts. The coherence is :math:`|G_{xy}|^2/(G_{xx} G_{yy})`.
 
     Parameters
     ----------
@@ -101,45 +109,74 @@ def burst_spectra(record: Record, *, squeaks: Squeaks | None = None) -> BurstSpe
     (True, True)
     """
     squeaks = find_squeaks(record) if squeaks is None else squeaks
-    bursts = squeaks.of("squeak", "squeal") or squeaks.bursts
-    if not bursts:
-        raise EstimateError("no burst was found", "spectra are compared in bursts and outside", "see find_squeaks(record)")
+    if not squeaks.bursts:
+        raise EstimateError(
+            "no burst was found", "spectra are compared in bursts and outside", "see find_squeaks(record)"
+        )
     names = [name for name in LISTENED if name in record and np.ptp(record[name]) > 0] or [squeaks.channel]
     record.require_clean(*names, question="spectra of bursts")
-    size, within = _size(record, bursts, squeaks)
-    beyond = rows_outside(record, squeaks.bursts, size)
-    waves = {name: _waves(record[name], within, size) for name in names}
-    quiet = {name: _waves(record[name], beyond, size) for name in names} if len(beyond) >= FEWEST else {}
+    size, where = _longest(record, squeaks)
+    waves = {name: _waves(record[name], where.inside, size) for name in names}
+    quiet = {name: _waves(record[name], where.outside, size) for name in names} if where.outside else {}
     scale = 2 / (record.fs * float(np.sum(np.hanning(size) ** 2)))
     cross = {pair: _cross(waves, pair) for pair in itertools.combinations(names, 2)}
     cross_quiet = {pair: _cross(quiet, pair) for pair in cross} if quiet else {}
     return BurstSpectra(
-        frequency=np.fft.rfftfreq(size, 1 / record.fs),
+        frequency=np.asarray(np.fft.rfftfreq(size, 1 / record.fs), dtype=float),
         inside={name: scale * _power(wave) for name, wave in waves.items()},
         outside={name: scale * _power(wave) for name, wave in quiet.items()},
         coherence={pair: both[0] for pair, both in cross.items()},
         coherence_outside={pair: both[0] for pair, both in cross_quiet.items()},
         phase={pair: both[1] for pair, both in cross.items()},
-        significant=coherence_by_chance(len(within)),
-        significant_outside=coherence_by_chance(len(beyond)) if quiet else math.nan,
-        segments=len(within),
-        segments_outside=len(beyond) if quiet else 0,
+        significant=coherence_by_chance(len(where.inside)),
+        significant_outside=coherence_by_chance(len(where.outside)) if quiet else math.nan,
+        segments=len(where.inside),
+        segments_outside=len(where.outside),
+        compared=where.words,
     )
 
 
-def rows_inside(record: Record, bursts: tuple[Squeak, ...], size: int) -> list[int]:
-    """First rows of the segments that lie in bursts."""
-    ends = [np.searchsorted(record.time, [burst.start, burst.end]) for burst in bursts]
-    return [row for first, last in ends for row in range(int(first), int(last) - size + 1, size)]
+@dataclass(frozen=True)
+class Stretches:
+    """First rows of the segments of a length that lie in bursts, and outside; and what that means."""
+
+    inside: list[int]
+    outside: list[int]
+    words: str
 
 
-def rows_outside(record: Record, bursts: tuple[Squeak, ...], size: int) -> list[int]:
-    """First rows of the segments that lie outside of all bursts."""
-    sounds = np.zeros(len(record), dtype=int)
-    for burst in bursts:
-        first, last = np.searchsorted(record.time, [burst.start, burst.end])
-        sounds[first:last] = 1
-    count = np.concatenate([[0], np.cumsum(sounds)])
+def stretches(record: Record, *, squeaks: Squeaks, size: int) -> Stretches:
+    """Segments of `size` samples in the squeaks (or the bursts of any kind where there are none) and outside of all.
+
+    Where bursts follow each other without a pause, their loud parts are held against the rest.
+    """
+    bursts = squeaks.of("squeak", "squeal") or squeaks.bursts
+    inside = [_rows(record, burst.start, burst.end) for burst in bursts]
+    pauses = _between(record, [_rows(record, burst.start, burst.end) for burst in squeaks.bursts], size)
+    if len(pauses) >= FEWEST:
+        return Stretches(_segments(inside, size), pauses, APART)
+    loud = [_rows(record, *burst.loud) for burst in bursts]
+    rest, within = _between(record, loud, size), _segments(loud, size)
+    if len(rest) >= FEWEST and len(within) >= FEWEST:
+        return Stretches(within, rest, LOUD)
+    return Stretches(_segments(inside, size), [], NOTHING_OUTSIDE)
+
+
+def _rows(record: Record, start: float, end: float) -> tuple[int, int]:
+    first, last = np.searchsorted(record.time, [start, end])
+    return int(first), int(last)
+
+
+def _segments(rows: list[tuple[int, int]], size: int) -> list[int]:
+    return [row for first, last in rows for row in range(first, last - size + 1, size)]
+
+
+def _between(record: Record, rows: list[tuple[int, int]], size: int) -> list[int]:
+    """Segments that hold none of the rows."""
+    taken = np.zeros(len(record), dtype=int)
+    for first, last in rows:
+        taken[first:last] = 1
+    count = np.concatenate([[0], np.cumsum(taken)])
     return [row for row in range(0, len(record) - size + 1, size) if count[row + size] == count[row]]
 
 
@@ -148,18 +185,20 @@ def coherence_by_chance(count: int) -> float:
     return float(1 - CHANCE ** (1 / (count - 1)))
 
 
-def _size(record: Record, bursts: tuple[Squeak, ...], squeaks: Squeaks) -> tuple[int, list[int]]:
-    """Samples of a segment, and the rows at which those in the bursts begin."""
-    size = 1 << round(math.log2(LONGEST * record.fs))
-    while size >= 64:
-        within = rows_inside(record, bursts, size)
-        if len(within) >= (ENOUGH if size >= 128 else FEWEST):
-            return size, within
-        size //= 2
+def _longest(record: Record, squeaks: Squeaks) -> tuple[int, Stretches]:
+    """Samples of a segment, and where segments lie."""
+    longest = max(SHORTEST, 1 << round(math.log2(LONGEST * record.fs)))
+    sizes = [longest >> halved for halved in range(10) if longest >> halved >= SHORTEST]
+    tried = [(size, stretches(record, squeaks=squeaks, size=size)) for size in sizes]
+    for enough, beyond in ((ENOUGH, ENOUGH), (ENOUGH, FEWEST), (ENOUGH, 0), (FEWEST, 0)):
+        for size, found in tried:
+            if len(found.inside) >= enough and len(found.outside) >= beyond:
+                return size, found
     raise EstimateError(
-        f"bursts of {max(burst.duration for burst in bursts) * record.fs:.0f} samples at most",
-        f"spectra are averaged over {FEWEST} segments of 64 samples at least", "record at a higher rate, or for longer",
-    )  # fmt: skip
+        f"bursts of {max(burst.duration for burst in squeaks.bursts) * record.fs:.0f} samples at most",
+        f"spectra are averaged over {FEWEST} segments of {SHORTEST} samples at least",
+        "record at a higher rate, or for longer",
+    )
 
 
 def _waves(values: Array, rows: list[int], size: int) -> Waves:

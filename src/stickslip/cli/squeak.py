@@ -1,0 +1,76 @@
+"""stickslip squeak"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.options import frequency_range, reading_options, result_options
+from stickslip.cli.progress import progress
+from stickslip.cli.records import (
+    answers,
+    groups_of,
+    name_left_out,
+    require_fits,
+    rig_of,
+    with_left_out,
+)
+from stickslip.cli.show import show
+
+if TYPE_CHECKING:
+    from stickslip import Record, SqueakFindings
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@click.option(
+    "--channel", metavar="NAME", help="Where to listen; sound, normal_acceleration, a, friction unless given."
+)
+@click.option("--frequencies", metavar="LOW:HIGH", help="What is listened to in Hz; from 50 Hz up unless given.")
+@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+@click.option(
+    "--normal",
+    multiple=True,
+    metavar='LOAD or "PATTERN=LOAD"',
+    help="Normal load in N, for all files or for those whose name fits. Repeatable.",
+)
+@result_options("FILE-squeak")
+@reading_options
+def squeak(
+    files: tuple[str, ...], output: Path | None, as_json: bool, channel: str | None, frequencies: str | None,
+    **options: Any,
+) -> None:  # fmt: skip
+    """Find squeaks: when, how loud, at which frequency, which motions move together, and whether friction makes them.
+
+    FILES hold a sound or a vibration, best with the motion and the friction force. Files that belong to one record are
+    joined with +, as in sound.wav+motion.csv. Several records are compared: friction, its slope against speed, and
+    whether it squeaks, as wet against dry or light against heavy.
+
+    Results go into a folder: report.html to open in a browser, results.json, the figures, and each burst as a WAV file.
+
+    \b
+    stickslip squeak squeal.wav --channels "sound=sound * 2.5 [Pa]"
+    stickslip squeak wet_6N.csv wet_1N.csv --normal "*6N*=6.13" --normal "*1N*=1.23"
+    """
+    rig = rig_of(**options)
+    groups = [group for argument in files for group in groups_of(argument)]
+    require_fits(options["normal"], groups)
+    band = frequency_range(frequencies)
+    folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
+
+    def ask(record: Record) -> SqueakFindings:
+        found = ss.analyze_squeaks(record, channel=channel, frequencies=band, contact=rig.contact)
+        loads = (rig.normal_load(part) for part in (*found.name.split(" + "), found.name))
+        return replace(found, normal=next((load for load in loads if load is not None), found.normal))
+
+    with progress(2 * len(groups) + 1) as tell:
+        found, refused = answers(groups, rig, ask, tell)
+        results = with_left_out(ss.compare_squeaks(found) if len(found) > 1 else found[0], refused)
+        tell("drawing and writing", 2 * len(groups))
+        written = ss.publish(results, folder=folder) if output or not as_json else None
+    name_left_out(refused)
+    show(results, written, as_json=as_json)

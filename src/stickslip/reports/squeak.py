@@ -1,0 +1,162 @@
+"""Squeaks in sentences, tables and sounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from stickslip.analysis.squeak_comparison import Condition, SqueakComparison
+from stickslip.analysis.squeaks import SqueakFindings
+from stickslip.estimate import Estimate, decimals
+from stickslip.reports.words import interval_of, number, value_of
+from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
+from stickslip.squeak.coupling import Coupling, Pair
+from stickslip.units import prefixed
+
+MOST = 40  # bursts in a table
+NONE = "–"
+
+
+def headline(found: SqueakFindings) -> Iterator[str]:
+    """What was heard, in a few sentences."""
+    squeaks, record = found.squeaks, found.record
+    heard = squeaks.of("squeak", "squeal")
+    where = "" if squeaks.channel == "sound" else f" in the channel {squeaks.channel}"
+    if not squeaks.bursts:
+        yield f"Nothing sounds{where}: no burst in {record.duration:.4g} s."
+        return
+    if not heard:
+        yield f"No squeak{where}. {_counted(squeaks.bursts)}, {WORDS[squeaks.kind]} for most of the time."
+    elif found.frequency is not None:
+        word = "squeals" if len(squeaks.of("squeal")) > len(squeaks.of("squeak")) else "squeaks"
+        many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"
+        yield f"It {word}{where} {many}, at {number(found.frequency.value, found.frequency.value / 500, 'Hz')}."
+    loudest = found.loudest
+    if loudest is not None:
+        yield _of_one(loudest, squeaks)
+    if found.coupling is not None:
+        joined = [pair for pair in found.coupling.pairs if pair.coupled]
+        told = f"{len(joined)} of {len(found.coupling.pairs)} pairs of channels move together beyond chance"
+        yield f"While it squeaks, {told}."
+        energy = found.coupling.energy_per_cycle
+        if energy is not None and not energy.includes(0.0):
+            verb = "feeds" if energy.value > 0 else "damps"
+            yield f"Friction {verb} the tangential vibration: {value_of(energy)} in each of its cycles."
+    if found.loops is not None:
+        slope = found.loops.slope
+        trend = "falls" if slope.value < 0 else "rises"
+        sure = " can not be told to change" if slope.includes(0.0) or slope.status != "ok" else f" {trend}"
+        yield (
+            f"Friction is {value_of(found.loops.level)} and{sure} with speed: {value_of(slope)} ({interval_of(slope)})."
+        )
+
+
+def _of_one(burst: Squeak, squeaks: Squeaks) -> str:
+    """The loudest burst in a sentence."""
+    where = "" if math.isnan(burst.phase) else f", at {100 * burst.phase:.0f} % of the forcing cycle"
+    speed = "" if math.isnan(burst.speed) else f" and {number(burst.speed, 1e-3, 'm/s')}"
+    told = f"The loudest is {level_of(burst, squeaks)}{where}{speed}"
+    friction = {"shown": "friction makes it", "likely": "friction likely makes it"}.get(burst.friction)
+    return f"{told}; {friction}: {burst.evidence}." if friction else f"{told}: {burst.evidence}."
+
+
+def level_of(burst: Squeak, squeaks: Squeaks) -> str:
+    """The level with its reference, and weighted where that is known."""
+    if math.isnan(burst.level):
+        return "clipped, its level unknown"
+    weighted = "" if math.isnan(burst.weighted_level) else f", {burst.weighted_level:.0f} dB(A)"
+    return f"{burst.level:.1f} dB re {squeaks.reference}{weighted}"
+
+
+def _counted(bursts: Sequence[Squeak]) -> str:
+    return f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}"
+
+
+def cautions(found: SqueakFindings) -> list[str]:
+    """What should keep the reader from trusting it."""
+    told = [note for note in found.squeaks.notes if "calibrated" in note]
+    spoilt: dict[str, list[str]] = {}
+    for place, burst in enumerate(found.squeaks.bursts):
+        for part in burst.status.split("; ") if burst.status != "ok" else ():
+            spoilt.setdefault(part, []).append(str(place + 1))
+    return told + [
+        f"Burst{'s' if len(places) > 1 else ''} {', '.join(places)}: {part}." for part, places in spoilt.items()
+    ]
+
+
+def burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each burst."""
+    squeaks = found.squeaks
+    moves, calibrated = not math.isnan(squeaks.forcing), any(not math.isnan(b.weighted_level) for b in squeaks.bursts)
+    headings = [
+        "", "begins [s]", "lasts [s]", "kind", "[Hz]", "[dB]", *(["[dB(A)]"] if calibrated else []), "tonal",
+        *(["phase", "[m/s]"] if moves else []), "friction",
+    ]  # fmt: skip
+    rows = []
+    for place, burst in enumerate(squeaks.bursts[:MOST]):
+        rate = "" if math.isnan(burst.rate) else f", {burst.rate:.3g} pulses in a second"
+        rows.append([
+            str(place + 1), f"{burst.start:.3f}", f"{burst.duration:.3f}", burst.kind + rate, f"{burst.frequency:.1f}",
+            "clipped" if math.isnan(burst.level) else f"{burst.level:.1f}",
+            *([_or_none(burst.weighted_level, ".1f")] if calibrated else []), f"{100 * burst.tonality:.0f} %",
+            *([_or_none(burst.phase, ".2f"), _or_none(burst.speed, ".3f")] if moves else []), burst.friction,
+        ])  # fmt: skip
+    return headings, rows
+
+
+def coupling_table(joined: Coupling) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each pair of channels, the one that leads before the other."""
+    headings = ["channels, the first leads", "coherence", "outside", "phase", "later by"]
+    return headings, [_pair(pair) for pair in joined.pairs]
+
+
+def coupling_note(joined: Coupling) -> str:
+    """How to read the table of pairs."""
+    return (
+        f"Compared: {joined.compared}. Channels that have nothing to do with each other have a coherence below "
+        f"{joined.pairs[0].significant:.2f} in 95 of 100 cases. A tone has no beginning: which channel leads holds within "
+        "half a period, and is no cause."
+    )
+
+
+def _pair(pair: Pair) -> list[str]:
+    sign = -1 if pair.leads == pair.second else 1
+    first, second = (pair.second, pair.first) if sign < 0 else (pair.first, pair.second)
+    told = [
+        f"{first}{' → ' if pair.leads != 'neither' else ', '}{second}",
+        f"{pair.inside:.2f}",
+        _or_none(pair.outside, ".2f"),
+    ]
+    if not pair.coupled:
+        return [*told, NONE, "by chance"]
+    delay, half = sign * pair.delay.value, (pair.delay.interval[1] - pair.delay.interval[0]) / 2
+    factor, unit = prefixed(delay, "s")
+    digits = decimals(factor * half, factor * delay)
+    phase = f"{math.degrees(sign * pair.phase.value):.0f}°"
+    return [*told, phase, f"{factor * delay:.{digits}f} ± {factor * half:.{digits}f} {unit}"]
+
+
+def condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each condition."""
+    headings = ["condition", "load", "driven", "friction", "slope against speed (95 %)", "squeaks", "[Hz]", "[dB]"]
+    return headings, [_condition(each) for each in comparison.conditions]
+
+
+def _condition(each: Condition) -> list[str]:
+    forcing = "" if math.isnan(each.forcing) else f"{each.forcing:.3g} Hz"
+    stroke = "" if math.isnan(each.stroke) else f"±{number(each.stroke, each.stroke / 100, 'm')}"
+    slope = NONE if each.slope is None else f"{value_of(each.slope)} ({interval_of(each.slope)})"
+    return [
+        each.name, NONE if each.normal is None else number(each.normal, 0.0, "N"),
+        ", ".join(part for part in (forcing, stroke) if part) or NONE, _value(each.level), slope,
+        f"{each.count} ({each.rate:.2g} in a second)" if each.squeaks else "none",
+        NONE if each.frequency is None else f"{each.frequency.value:.1f}", _or_none(each.sound, ".1f"),
+    ]  # fmt: skip
+
+
+def _value(estimate: Estimate | None) -> str:
+    return NONE if estimate is None else value_of(estimate)
+
+
+def _or_none(value: float, form: str) -> str:
+    return NONE if math.isnan(value) else f"{value:{form}}"

@@ -1,0 +1,217 @@
+"""A record of squeaks from the command line: findings, comparison, page, figures and sounds."""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import stickslip as ss
+from stickslip.cli.program import main
+
+CONDITIONS = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
+SLOPES = {"dry": 2.3, "wet": -0.26}  # s/m, of the rig's laws
+FS = 10_000.0
+
+
+@cache
+def measured(surface: str, load: float) -> ss.Record:
+    run = ss.simulate(ss.squeak_rig(surface, load), duration=2.4)
+    return ss.squeak_record(run, snr=30, rng=1).between(0.4, 2.4)
+
+
+@cache
+def findings(surface: str, load: float) -> ss.SqueakFindings:
+    return ss.analyze_squeaks(measured(surface, load), name=f"{surface}, {load:g} N", normal=load)
+
+
+def compared() -> ss.SqueakComparison:
+    return ss.compare_squeaks([findings(*each) for each in CONDITIONS])
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, ["squeak", *map(str, arguments)])
+
+
+def tone(duration: float = 0.4) -> np.ndarray:
+    t = np.arange(int(FS)) / FS
+    inside = np.exp(-((np.maximum(0, np.abs(t - 0.5) - duration / 2) / 0.01) ** 2))
+    wave = sum(np.sin(2 * np.pi * order * 500 * t) / order**2 for order in (1, 2, 3))
+    return inside * wave + 1e-3 * np.random.default_rng(0).standard_normal(len(t))
+
+
+# ---- conditions, as the thesis's figures 7.3 and 7.6
+
+
+def test_the_four_conditions_show_the_four_observations() -> None:
+    found = {each.name: each for each in compared().conditions}
+    assert compared().squeaking == ("wet, 6.13 N",)
+    assert {name: each.trend for name, each in found.items() if name != "wet, 6.13 N"} == {
+        "dry, 6.13 N": "rises", "dry, 1.23 N": "rises", "wet, 1.23 N": "falls",
+    }  # fmt: skip
+    assert found["wet, 6.13 N"].slope.value < 0
+    for load in ("6.13 N", "1.23 N"):  # water lowers friction
+        assert found[f"wet, {load}"].level.value < 0.5 * found[f"dry, {load}"].level.value
+    assert any("falling friction" in sentence and "wet, 1.23 N" in sentence for sentence in compared().verdicts)
+
+
+@pytest.mark.parametrize(("surface", "load"), CONDITIONS)
+def test_the_slope_against_speed_holds_the_truth(surface: str, load: float) -> None:
+    found = findings(surface, load)
+    assert found.slope_of_coefficient is not None
+    assert found.slope_of_coefficient.includes(SLOPES[surface])
+    assert found.loops.slope.includes(SLOPES[surface] * load)
+    assert found.coefficient.value == pytest.approx({"dry": 20, "wet": 8}[surface] / 6.13, rel=0.15)
+
+
+def test_a_condition_says_what_drove_it() -> None:
+    each = compared().conditions[1]
+    assert each.forcing == pytest.approx(5, rel=0.01)
+    x = measured("wet", 6.13)["x"]
+    assert each.stroke == pytest.approx((x.max() - x.min()) / 2)
+    assert each.rate == pytest.approx(each.count / 2.0)
+    assert each.to_dict()["trend"] == each.trend
+
+
+def test_one_record_is_no_comparison() -> None:
+    with pytest.raises(ss.EstimateError, match="two or more"):
+        ss.compare_squeaks([findings("wet", 1.23)])
+
+
+def test_the_load_is_read_where_it_is_measured() -> None:
+    record = measured("wet", 1.23)
+    with_load = record.with_channel("normal", np.full(len(record), -1.23), unit="N", source="cell")
+    assert ss.analyze_squeaks(with_load).normal == pytest.approx(1.23)
+    with pytest.raises(ss.EstimateError, match="normal = -1"):
+        ss.analyze_squeaks(record, normal=-1)
+
+
+# ---- spectra
+
+
+def test_the_tone_stands_in_the_bursts_alone() -> None:
+    record = ss.Record.of({"sound": tone()}, fs=FS)
+    found = ss.burst_spectra(record)
+    place = int(np.argmax(found.inside["sound"]))
+    assert found.frequency[place] == pytest.approx(500, abs=found.resolution)
+    assert found.inside["sound"][place] > 1e4 * found.outside["sound"][place]
+    assert "pauses" in found.compared
+
+
+def test_the_spectrum_has_the_power_of_the_noise() -> None:
+    rng = np.random.default_rng(0)
+    noise = 0.3 * rng.standard_normal(60_000)
+    loud = np.zeros(60_000)
+    loud[20_000:40_000] = 10 * np.sin(2 * np.pi * 1000 * np.arange(20_000) / FS)
+    found = ss.burst_spectra(ss.Record.of({"sound": noise + loud}, fs=FS))
+    assert np.mean(found.outside["sound"][5:-5]) == pytest.approx(0.3**2 / (FS / 2), rel=0.1)
+    assert found.inside["sound"].sum() * found.resolution == pytest.approx(50 + 0.09, rel=0.02)
+
+
+def test_channels_without_a_tie_are_below_chance_as_often_as_said() -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(40_000) / FS
+    gate = (t > 1) & (t < 3)
+    record = ss.Record.of({"sound": gate * np.sin(2 * np.pi * 500 * t) + 0.1 * rng.standard_normal(t.size),
+                           "a": rng.standard_normal(t.size)}, fs=FS)  # fmt: skip
+    found = ss.burst_spectra(record)
+    beyond = np.mean(found.coherence["a", "sound"][2:-2] > found.significant)
+    assert 0.02 < beyond < 0.09
+
+
+def test_where_bursts_have_no_pauses_their_loud_parts_are_compared() -> None:
+    found = findings("wet", 6.13)
+    assert "loud parts" in found.spectra.compared
+    assert set(found.spectra.outside) == set(found.spectra.inside)
+    for burst in found.squeaks.bursts:
+        assert burst.start <= burst.loud[0] < burst.loud[1] <= burst.end
+
+
+def test_a_record_of_silence_between_clicks_has_no_spectra() -> None:
+    record = ss.Record.of({"sound": np.r_[np.zeros(600), 1.0, np.zeros(600)] + 1e-9}, fs=FS)
+    squeaks = ss.find_squeaks(record)
+    assert not squeaks.squeaking
+
+
+# ---- sounds
+
+
+def test_a_sound_comes_back_as_it_was(tmp_path: Path) -> None:
+    record = ss.Record.of({"sound": 3 * tone()}, fs=FS)
+    scale = ss.write_sound(record, tmp_path / "tone.wav")
+    again = ss.read_record(tmp_path / "tone.wav", channels={"sound": f"sound * {scale} [Pa]"})
+    assert again.fs == FS
+    assert again["sound"] == pytest.approx(record["sound"], abs=0.51 * scale / 32768)
+    with pytest.raises(ss.FormatError, match="there already"):
+        ss.write_sound(record, tmp_path / "tone.wav")
+    with pytest.raises(ss.FormatError, match=r"written as \.wav"):
+        ss.write_sound(record, tmp_path / "tone.mp3")
+    with pytest.raises(ss.RecordError, match="full scale of 1"):
+        ss.write_sound(record, tmp_path / "loud.wav", full_scale=1.0)
+
+
+def test_a_slow_record_is_written_faster_and_sounds_alike(tmp_path: Path) -> None:
+    record = ss.Record.of({"a": np.sin(2 * np.pi * 200 * np.arange(3000) / 1000.0)}, fs=1000)
+    ss.write_sound(record, tmp_path / "slow.wav", full_scale=2.0)
+    again = ss.read_record(tmp_path / "slow.wav")
+    assert again.fs == 8000
+    power = np.abs(np.fft.rfft(again["sound"]))
+    assert np.argmax(power) * 8000 / len(again) == pytest.approx(200, abs=0.5)
+
+
+def test_bursts_are_cut_out_in_proportion() -> None:
+    quiet = np.concatenate([tone(), 0.1 * tone()])
+    found = ss.find_squeaks(ss.Record.of({"sound": quiet}, fs=FS))
+    loud, soft = ss.burst_clips(found)
+    assert loud.full_scale == soft.full_scale == pytest.approx(np.max(np.abs(tone())), rel=0.05)
+    assert loud.level > 50 * soft.level
+    assert ss.burst_clips(found, most=1) == (loud,)
+
+
+# ---- the command
+
+
+def test_a_record_becomes_a_page_with_its_sounds(tmp_path: Path) -> None:
+    ss.write_record(measured("wet", 6.13), tmp_path / "wet.csv")
+    result = run(tmp_path / "wet.csv", "--normal", "6.13 N", "--output", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "It squeaks" in result.output
+    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
+    assert told["squeaks"]["squeaking"]
+    assert told["normal_load"] == 6.13
+    assert set(told["files"]) == {
+        path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*") if path.is_file()
+    }
+    sounds = sorted((tmp_path / "out" / "sounds").iterdir())
+    assert len(sounds) == len(told["squeaks"]["bursts"])
+    assert ss.find_squeaks(ss.read_record(sounds[1])).bursts[0].frequency == pytest.approx(483, rel=0.02)
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert page.count("<audio") == len(sounds)
+    assert not re.search(r'(src|href)="(?!data:|#)', page), "it asks nothing of a network"
+    names = {path.stem for path in (tmp_path / "out" / "figures").glob("*.svg")}
+    assert names == {"spectrogram", "spectra", "coherence", "forcing-cycle", "burst", "friction-velocity"}
+
+
+def test_several_records_are_compared(tmp_path: Path) -> None:
+    for surface, load in CONDITIONS[1::2]:
+        ss.write_record(measured(surface, load), tmp_path / f"{surface}_{load}.csv")
+    result = run(tmp_path / "*.csv", "--normal", "*6.13*=6.13", "--normal", "*1.23*=1.23", "--output", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
+    rows = {each["name"]: each for each in told["comparison"]["conditions"]}
+    assert rows["wet_6.13.csv"]["normal"] == 6.13
+    assert rows["wet_6.13.csv"]["count"] > 5 > rows["wet_1.23.csv"]["count"] == 0
+    assert (tmp_path / "out" / "figures" / "0-2-conditions-compared-conditions.svg").exists()
+
+
+def test_json_alone_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    ss.write_sound(ss.Record.of({"sound": tone()}, fs=FS), tmp_path / "squeal.wav")
+    told = json.loads(run("squeal.wav", "--json").output)
+    assert told["squeaks"]["reference"] == "1"
+    assert [path.name for path in tmp_path.iterdir()] == ["squeal.wav"]
