@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.analysis.findings import plain
-from stickslip.analysis.squeaks import SqueakFindings
+from stickslip.analysis.squeaks import SqueakFindings, trend_of
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 
@@ -71,9 +71,7 @@ class Condition:
     @property
     def trend(self) -> str:
         """Whether friction "falls" or "rises" with speed; "flat or not told" where the slope's interval holds zero."""
-        if self.slope is None or self.slope.status != "ok" or self.slope.includes(0.0):
-            return "flat or not told"
-        return "falls" if self.slope.value < 0 else "rises"
+        return trend_of(self.slope)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""

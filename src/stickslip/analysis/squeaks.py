@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 Answer = TypeVar("Answer")
 
+UNTOLD = "no slope can be told"  # in the status of a slope that the motion does not tell
 VIBRATING = (*HEARD, "torsion_velocity", "load")
 
 
@@ -212,6 +213,13 @@ def analyze_squeaks(
             **({"contact": contact} if contact else {}),
         },
     )
+
+
+def trend_of(slope: Estimate | None) -> str:
+    """Whether friction "falls" or "rises" with speed; "flat or not told" where the slope's interval holds zero."""
+    if slope is None or UNTOLD in slope.status or slope.includes(0.0):
+        return "flat or not told"
+    return "falls" if slope.value < 0 else "rises"
 
 
 def _normal(record: Record, stated: float | str | None) -> float | None:

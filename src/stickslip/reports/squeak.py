@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from stickslip.analysis.squeak_comparison import Condition, SqueakComparison
-from stickslip.analysis.squeaks import SqueakFindings
+from stickslip.analysis.squeaks import SqueakFindings, trend_of
 from stickslip.estimate import Estimate, decimals
 from stickslip.reports.words import interval_of, number, value_of
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
@@ -44,8 +44,8 @@ def headline(found: SqueakFindings) -> Iterator[str]:
             yield f"Friction {verb} the tangential vibration: {value_of(energy)} in each of its cycles."
     if found.loops is not None:
         slope = found.loops.slope
-        trend = "falls" if slope.value < 0 else "rises"
-        sure = " can not be told to change" if slope.includes(0.0) or slope.status != "ok" else f" {trend}"
+        trend = trend_of(slope)
+        sure = f" {trend}" if trend in ("falls", "rises") else " can not be told to change"
         yield (
             f"Friction is {value_of(found.loops.level)} and{sure} with speed: {value_of(slope)} ({interval_of(slope)})."
         )
@@ -114,8 +114,8 @@ def coupling_note(joined: Coupling) -> str:
     """How to read the table of pairs."""
     return (
         f"Compared: {joined.compared}. Channels that have nothing to do with each other have a coherence below "
-        f"{joined.pairs[0].significant:.2f} in 95 of 100 cases. A tone has no beginning: which channel leads holds within "
-        "half a period, and is no cause."
+        f"{joined.pairs[0].significant:.2f} in 95 of 100 cases. A tone has no beginning: which channel leads holds "
+        "within half a period, and is no cause."
     )
 
 
