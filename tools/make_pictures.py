@@ -1,6 +1,6 @@
 """Draw the pictures of the README and of the pages, with the project's own figures.
 
-python tools/make_pictures.py          writes docs/images/loops.png and decay.png
+python tools/make_pictures.py          writes docs/images/loops.png, decay.png, stability.png and limit_cycles.png
 """
 
 from __future__ import annotations
@@ -38,6 +38,19 @@ def loops() -> None:
     saved(figure, "loops.png")
 
 
+def squeak() -> None:
+    """The squeaking rig: where sliding is stable, and the limit cycle over the load."""
+
+    def rig(load: float, slope: float = -0.26) -> ss.Structure:
+        return ss.squeak_rig("wet", load).having(slope=slope)
+
+    grid = {"slope": np.linspace(-4, 4, 121), "load": np.linspace(0.5, 8, 151)}
+    stable = ss.stability_map(rig, grid=grid, speed=-0.1)
+    saved(ss.plot_stability(stable, labels=("slope of friction over speed [s/m]", "load [N]")), "stability.png")
+    branches = ss.limit_cycles(rig(2.0), rig, values=np.linspace(1.3, 6.5, 27), speed=-0.1)
+    saved(ss.plot_limit_cycles(branches, label="load [N]"), "limit_cycles.png")
+
+
 def decay() -> None:
     """The example of the page on free decay: its envelopes, and its amplitude differences."""
     slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
@@ -54,10 +67,11 @@ def decay() -> None:
 
 def saved(figure: Figure, name: str) -> None:
     IMAGES.mkdir(exist_ok=True)
-    figure.savefig(IMAGES / name, dpi=110)
+    figure.savefig(IMAGES / name, dpi=110, facecolor="white")
     print(f"{IMAGES / name}: {(IMAGES / name).stat().st_size / 1024:.0f} kB")
 
 
 if __name__ == "__main__":
     loops()
     decay()
+    squeak()

@@ -150,6 +150,7 @@ if TYPE_CHECKING:
         transition_speed as transition_speed,
     )
     from stickslip.analysis.time_frequency import TimeFrequency as TimeFrequency, time_frequency as time_frequency
+    from stickslip.plot.limit_cycle import plot_limit_cycles as plot_limit_cycles, plot_stability as plot_stability
     from stickslip.plot.wavelet import plot_wavelet as plot_wavelet
     from stickslip.drives import (
         Belt as Belt,
@@ -190,7 +191,7 @@ if TYPE_CHECKING:
     )
     from stickslip import scenarios as scenarios
     from stickslip.solve.continuation import Branch as Branch, continue_orbit as continue_orbit
-    from stickslip.solve.energy import energy as energy
+    from stickslip.solve.energy import EnergyFlow as EnergyFlow, energy as energy, energy_flow as energy_flow
     from stickslip.solve.lyapunov import lyapunov as lyapunov
     from stickslip.solve.periodic import (
         SteadyState as SteadyState,
@@ -218,6 +219,8 @@ if TYPE_CHECKING:
         stability as stability,
         stability_map as stability_map,
     )
+    from stickslip.squeak.bifurcation import CycleBranches as CycleBranches, limit_cycles as limit_cycles
+    from stickslip.squeak.limit_cycle import LimitCycle as LimitCycle, limit_cycle as limit_cycle
     from stickslip.squeak.virtual_rig import squeak_rig as squeak_rig
     from stickslip.sweeps.sweep import sweep as sweep
     from stickslip.structure import Contact as Contact, Structure as Structure
@@ -304,6 +307,10 @@ _ROOMS = {
     "coupling": "squeak.coupling", "Coupling": "squeak.coupling", "Pair": "squeak.coupling",
     "stability": "squeak.stability", "Stability": "squeak.stability", "SlidingMode": "squeak.stability",
     "critical_value": "squeak.stability", "Threshold": "squeak.stability", "stability_map": "squeak.stability",
+    "limit_cycle": "squeak.limit_cycle", "LimitCycle": "squeak.limit_cycle",
+    "limit_cycles": "squeak.bifurcation", "CycleBranches": "squeak.bifurcation",
+    "plot_limit_cycles": "plot.limit_cycle", "plot_stability": "plot.limit_cycle",
+    "energy_flow": "solve.energy", "EnergyFlow": "solve.energy",
     "export_law": "laws.export",
     "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",
     "Release": "drives", "HarmonicBase": "drives", "HarmonicForce": "drives", "MultiTone": "drives",

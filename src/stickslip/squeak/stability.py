@@ -281,13 +281,15 @@ def critical_value(
     return Threshold(value, frequency, beyond.mechanism, not signs[first])
 
 
-def stability_map(system: System, *, grid: Mapping[str, Sequence[float]], speed: float | None = None) -> xr.Dataset:
+def stability_map(
+    system: System | Callable[..., System], *, grid: Mapping[str, Sequence[float]], speed: float | None = None
+) -> xr.Dataset:
     """Where, over two or more parameters, does steady sliding last, and what ends it?
 
     Parameters
     ----------
-    system : Structure or Oscillator
-        What slides.
+    system : Structure, Oscillator or callable
+        What slides; or a function that makes it of the values, which it takes by name.
     grid : mapping
         Values of each parameter by name, as in ``system.having`` ("preload", "slope", "kinetic" ...).
     speed : float, optional
@@ -322,7 +324,7 @@ def stability_map(system: System, *, grid: Mapping[str, Sequence[float]], speed:
     found = np.empty(shape, dtype=object)
     for place in np.ndindex(*shape):
         values = {name: float(axes[name][i]) for name, i in zip(axes, place, strict=True)}
-        found[place] = stability(system.having(**values), speed=speed)
+        found[place] = stability(system(**values) if callable(system) else system.having(**values), speed=speed)
 
     def told(what: Callable[[Stability], Any], kind: Any) -> tuple[list[str], NDArray[Any]]:
         return list(axes), np.array([what(one) for one in found.ravel()], dtype=kind).reshape(shape)

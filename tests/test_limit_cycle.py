@@ -1,0 +1,178 @@
+"""Limit cycles: closed forms of stick-slip, averaging of a smooth law, and what a long simulation ends in."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+
+
+def sticking(speed: float, damping: float = 0.0) -> ss.Oscillator:
+    """BS-1 and BS-4: static friction of 1.5 N over 1 N."""
+    return ss.Oscillator(1.0, 1.0, ss.Coulomb(1.0, static=1.5), ss.Belt(speed), damping=damping)
+
+
+@pytest.mark.parametrize(
+    ("speed", "damping", "period"),
+    [(0.5, 0.0, 6.7123889803846899), (0.1, 0.1, 12.635457258784897), (0.5, 0.1, 6.4941269476513108)],
+)
+def test_stick_slip_has_the_period_of_the_closed_form(speed: float, damping: float, period: float) -> None:
+    found = ss.limit_cycle(sticking(speed, damping), push=1.5)
+    assert found.status == "periodic"
+    assert 1 / found.frequency == pytest.approx(period, rel=1e-12)
+    assert abs(found.multipliers[0]) < 1e-6, "a stick ends in one state alone"
+    if not damping:
+        assert found.amplitude == pytest.approx(math.hypot(0.5, speed), rel=1e-9)
+        assert found.stick_share[0] == pytest.approx(2 * 0.5 / speed / period, rel=1e-12)
+
+
+def test_beside_stable_sliding_stick_slip_lasts_up_to_a_known_speed() -> None:
+    """BS-4: above 0.549 the mass does not stick again."""
+    speeds = [0.2, 0.54, 0.558]
+    found = ss.limit_cycles(sticking(0.5, 0.1), "drive.speed", values=speeds)
+    assert [one.status for one in found.up] == ["steady sliding"] * 3
+    assert [one.status for one in found.down] == ["periodic", "periodic", "steady sliding"]
+    assert (found.both, found.threshold, found.kind) == ((0.2, 0.54), None, "cannot be told")
+    assert "stable at every value" in found.evidence
+
+
+@cache
+def smooth() -> ss.CycleBranches:
+    """ST-2: friction that falls with the speed and rises again by a cubic law, as Thomsen and Fidlin have it."""
+    law = ss.FrictionCurve(lambda v: 0.4 - 0.225 * (v / 0.5 - (v / 0.5) ** 3 / 3))
+    block = ss.Oscillator(1.0, 1.0, law, ss.Belt(0.5), damping=0.1)
+    return ss.limit_cycles(block, "drive.speed", values=[0.42, 0.43, 0.44, 0.45])
+
+
+def test_a_smooth_law_begins_supercritically_with_the_root_of_the_distance() -> None:
+    found = smooth()
+    assert found.threshold is not None
+    assert found.threshold.value == pytest.approx(0.44095855184409843, rel=1e-12)
+    assert found.kind == "supercritical"
+    assert found.exponent == pytest.approx(0.5, abs=1e-3)
+    assert found.both is None
+    # averaging: 2 sqrt(v1^2 - v^2), to the order of the small friction
+    known = 2 * np.sqrt(np.maximum(0.0, found.threshold.value**2 - found.values**2))
+    assert np.allclose(found.amplitudes(), known, rtol=0.015, atol=0)
+    assert np.allclose(found.amplitudes("down"), found.amplitudes(), rtol=1e-6, atol=0)
+    assert not any(any(one.stick_share) for one in found.up)
+
+
+def test_a_falling_law_with_a_stick_begins_subcritically() -> None:
+    """ST-1: sliding becomes stable above 0.2303; the stick that bounds the motion does not know of it."""
+    law = ss.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
+    block = ss.Oscillator(1.0, 1.0, law, ss.Belt(0.2), damping=0.3)
+    found = ss.limit_cycles(block, "drive.speed", values=[0.2, 0.22, 0.25])
+    assert found.kind == "subcritical"
+    assert found.both is not None
+    assert found.both[0] < 0.2304 < found.both[1] == 0.25
+    assert [one.vibrates for one in found.up] == [True, True, True]
+    assert [one.vibrates for one in found.down] == [True, True, False], "going down the sliding is stable at first"
+    assert "until a contact sticks" in found.evidence
+
+
+@cache
+def rig(load: float) -> ss.LimitCycle:
+    return ss.limit_cycle(ss.squeak_rig("wet", load), speed=-0.1)
+
+
+@pytest.mark.parametrize("load", [1.9, 3.0, 6.13])
+def test_the_rig_squeaks_by_lifting_a_contact(load: float) -> None:
+    found = rig(load)
+    assert found.status == "periodic"
+    assert abs(found.multipliers[0]) < 1
+    assert found.stick_share == (0.0, 0.0)
+    assert 0.1 < sum(found.separation_share) < 0.3
+    assert found.growth == pytest.approx(found.sliding.growth, rel=1e-8)
+    assert found.frequency == pytest.approx(found.sliding.frequency, rel=0.03)
+
+
+def test_the_cycle_is_what_a_long_simulation_ends_in() -> None:
+    found = rig(3.0)
+    belt = ss.squeak_rig("wet", 3.0).having(drive=ss.Belt(-0.1))
+    rest = dict(zip(("x1", "x2", "x3"), found.sliding.place, strict=True))
+    run = ss.simulate(belt, duration=40.0, start={**rest, "v1": 0.0, "v2": 1e-4, "v3": 0.0})
+    times = np.linspace(39.9, 40.0, 20_001)
+    late = run.sample(times, ("x",))[0]
+    assert np.allclose(np.ptp(late[1:], axis=1) / 2, found.amplitudes[1:], rtol=1e-5, atol=0)
+    last = run.starts[[j for j, mode in enumerate(run.modes) if "lifted" in run.table.modes[mode].name][-101:]]
+    assert np.mean(np.diff(last)) * found.frequency == pytest.approx(1.0, rel=1e-7)
+
+
+def test_friction_feeds_torsion_and_the_contacts_carry_it_to_bending() -> None:
+    energy = rig(6.13).energy
+    _, bending, torsion = energy.friction + energy.contacts + energy.springs + energy.damping
+    assert abs(bending) + abs(torsion) < 1e-9 * energy.friction[2], "over a cycle nothing is stored"
+    assert energy.friction[2] > 0
+    assert energy.friction[1] == 0
+    assert energy.contacts[1] == pytest.approx(-energy.contacts[2], rel=1e-6)
+    assert energy.contacts[1] > 0
+    assert np.all(energy.damping < 0)
+    assert np.max(np.abs(energy.drive)) < 1e-9 * energy.friction[2], "a belt drives by friction alone"
+
+
+def test_the_rig_begins_and_ends_to_squeak_at_one_load() -> None:
+    found = ss.limit_cycles(ss.squeak_rig(), lambda n: ss.squeak_rig("wet", n), values=[1.5, 1.9, 6.0], speed=-0.1)
+    assert found.threshold is not None
+    assert found.threshold.value == pytest.approx(1.79657, rel=1e-5)
+    assert found.kind == "supercritical"
+    assert found.exponent == pytest.approx(0, abs=0.1), "linear until a contact lifts off: the amplitude jumps"
+    assert [one.vibrates for one in found.up] == [one.vibrates for one in found.down] == [False, True, True]
+    assert "until a contact lifts off" in found.evidence
+
+
+def test_energy_of_each_displacement_adds_up_to_that_of_all() -> None:
+    run = ss.simulate(ss.squeak_rig(), duration=0.3)
+    flow, whole = ss.energy_flow(run), ss.energy(run)
+    assert -flow.friction.sum() == pytest.approx(whole.friction, rel=1e-9)
+    assert flow.kinetic.sum() == pytest.approx(whole.kinetic, rel=1e-9)
+    assert np.allclose(flow.drive[1:], 0, atol=1e-12 * whole.turnover), "the base moves the mass alone"
+    # of the base: k z v over the run
+    times = np.linspace(0, 0.3, 300_001)
+    z, v = run.sample(times, ("z", "v"))[0][[0, 1]]
+    assert flow.drive[0] == pytest.approx(np.trapezoid(2310.0 * z * v, times), rel=1e-6)
+
+
+def test_the_figures_show_both_ways_and_the_threshold() -> None:
+    figure = ss.plot_limit_cycles(smooth(), label="belt speed [m/s]")
+    lines = figure.axes[0].get_lines()
+    drawn = {line.get_label(): line for line in lines}
+    assert np.array_equal(drawn["going up"].get_ydata(), 1e3 * smooth().amplitudes())
+    assert "sliding ceases to be stable at 0.441" in drawn
+    assert figure.axes[-1].get_xlabel() == "belt speed [m/s]"
+
+
+def test_the_map_of_the_rig_over_load_and_slope() -> None:
+    grid = {"slope": [-3.0, 0.0, 3.0], "load": [1.0, 4.0, 7.0]}
+    found = ss.stability_map(lambda load, slope: ss.squeak_rig("wet", load).having(slope=slope), grid=grid, speed=-0.1)
+    assert found.mechanism.sel(load=7.0, slope=0.0) == "mode coupling"
+    assert found.mechanism.sel(load=1.0, slope=3.0) == "stable"
+    figure = ss.plot_stability(found, labels=("slope [s/m]", "load [N]"))
+    named = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
+    assert named == set(np.unique(found.mechanism.values))
+    with pytest.raises(ss.ModelError, match="two parameters"):
+        ss.plot_stability(found.isel(load=0))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: ss.limit_cycle(sticking(0.5), speed=0.0), "speed = 0"),
+        (lambda: ss.limit_cycle(sticking(0.5), push=0.0), "push = 0"),
+        (lambda: ss.limit_cycle(sticking(0.5), patience=3), "patience = 3"),
+        (lambda: ss.limit_cycle(sticking(0.5).having(drive=ss.Release())), "driven by Release"),
+        (lambda: ss.limit_cycle(sticking(0.5).having(stiffness=0.0)), "no spring holds"),
+        (lambda: ss.limit_cycles(sticking(0.5), "drive.speed", values=[0.3, 0.2, 0.4]), "numbers that rise"),
+        (lambda: ss.limit_cycles(sticking(0.5), "drive.speed", values=[0.3, 0.4]), "at least three"),
+        (lambda: ss.limit_cycles(sticking(0.5), "drive.sped", values=[0.3, 0.4, 0.5]), "sped"),
+    ],
+)
+def test_what_has_no_answer_is_refused(call: Any, words: str) -> None:
+    with pytest.raises(ss.ModelError) as refused:
+        call()
+    assert words in str(refused.value)
