@@ -98,6 +98,19 @@ if TYPE_CHECKING:
         from_xarray as from_xarray,
     )
     from stickslip.record.record import Record as Record, Step as Step
+    from stickslip.regimes.attractor import Attractor as Attractor
+    from stickslip.regimes.basins import Basins as Basins, basins as basins
+    from stickslip.regimes.bifurcation import (
+        Bifurcation as Bifurcation,
+        Change as Change,
+        bifurcation as bifurcation,
+    )
+    from stickslip.regimes.boundary import Boundary as Boundary, boundary as boundary
+    from stickslip.plot.bifurcation import (
+        plot_basins as plot_basins,
+        plot_bifurcation as plot_bifurcation,
+        plot_boundary as plot_boundary,
+    )
     from stickslip.reports.fit import (
         fit_numbers as fit_numbers,
         fit_summary as fit_summary,
@@ -154,6 +167,7 @@ if TYPE_CHECKING:
     from stickslip.plot.wavelet import plot_wavelet as plot_wavelet
     from stickslip.drives import (
         Belt as Belt,
+        Dithered as Dithered,
         HarmonicBase as HarmonicBase,
         HarmonicForce as HarmonicForce,
         MultiTone as MultiTone,
@@ -314,13 +328,17 @@ _ROOMS = {
     "export_law": "laws.export",
     "steady_sliding": "solve.sliding", "SteadySliding": "solve.sliding",
     "Release": "drives", "HarmonicBase": "drives", "HarmonicForce": "drives", "MultiTone": "drives",
-    "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives",
+    "Belt": "drives", "Ramp": "drives", "RecordedBase": "drives", "Dithered": "drives",
     "SpeedProfile": "drives",
     "Oscillator": "oscillator", "Structure": "structure", "Contact": "structure",
     "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
     "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
     "energy": "solve.energy", "attractors": "solve.periodic",
     "continue_orbit": "solve.continuation", "Branch": "solve.continuation",
+    "bifurcation": "regimes.bifurcation", "Bifurcation": "regimes.bifurcation", "Change": "regimes.bifurcation",
+    "basins": "regimes.basins", "Basins": "regimes.basins", "Attractor": "regimes.attractor",
+    "boundary": "regimes.boundary", "Boundary": "regimes.boundary",
+    "plot_bifurcation": "plot.bifurcation", "plot_basins": "plot.bifurcation", "plot_boundary": "plot.bifurcation",
     "Rig": "rig", "Sensor": "rig", "Mount": "rig", "Noise": "rig", "Digitiser": "rig",
     "scenarios": "scenarios", "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
     "outcome": "reports.simulation", "Outcome": "reports.simulation", "publish_run": "reports.simulation",

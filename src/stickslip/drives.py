@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -442,6 +442,69 @@ class SpeedProfile:
             face=row if self.on == "face" else {},
             knots=knots,
             knotted=names,
+        )
+
+
+@dataclass(frozen=True)
+class Dithered:
+    r"""Any drive, with a fast small tone along the contact on top: :math:`a \cos(2\pi F t + \varphi)`.
+
+    Attributes
+    ----------
+    drive : Drive
+        What moves the system besides.
+    amplitude : float
+        a [m] of the counter-face or of the spring's end, or [N] of a force on the mass.
+    frequency : float
+        F [Hz].
+    phase : float
+        Phase [rad].
+    on : {"face", "base", "force"}
+        What the tone moves: the counter-face, the spring's end, or the mass (a force).
+
+    Examples
+    --------
+    >>> Dithered(HarmonicBase(1e-3, frequency=2.5), amplitude=1e-5, frequency=250.0).motion().period
+    0.4
+    """
+
+    drive: Drive
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+    on: str = "face"
+
+    def __post_init__(self) -> None:
+        require_drive(self.drive)
+        _require(self.on in ("face", "base", "force"), f"on = '{self.on}'",
+                 "dither moves the 'face', the 'base' or acts as 'force'", "choose one of the three")  # fmt: skip
+        _require(
+            not isinstance(self.drive, Dithered),
+            "dither on a dithered drive",
+            "one tone is put on top",
+            "leave one out",
+        )
+        self.motion()
+
+    def motion(self) -> Motion:
+        """The drive's signals and a turning pair; it repeats where the drive holds a whole number of its cycles."""
+        own, omega = self.drive.motion(), 2 * math.pi * self.frequency
+        _check_frequency(self.frequency)
+        _check_finite(amplitude=self.amplitude, phase=self.phase)
+        moved = {part: dict(getattr(own, part)) for part in ("force", "base", "face")}
+        moved[self.on]["dither"] = self.amplitude
+        cycles = own.period * self.frequency
+        whole = math.isfinite(cycles) and abs(cycles - round(cycles)) <= 1e-9 * cycles
+        still = not own.rates and own.knots is None
+        return replace(
+            own,
+            rates={**own.rates, "dither": {"dither'": -omega}, "dither'": {"dither": omega}},
+            start={**own.start, "dither": math.cos(self.phase), "dither'": math.sin(self.phase)},
+            tones=(*own.tones, ("dither", "dither'", omega, self.phase)),
+            period=1 / self.frequency if still else own.period if whole else math.inf,
+            force=moved["force"],
+            base=moved["base"],
+            face=moved["face"],
         )
 
 

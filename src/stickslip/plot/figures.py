@@ -34,6 +34,9 @@ from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_for
 UNSURE = "not stated"  # in the status of what sensors that are not known may have made
 
 if TYPE_CHECKING:
+    from stickslip.regimes.basins import Basins
+    from stickslip.regimes.bifurcation import Bifurcation
+    from stickslip.regimes.boundary import Boundary
     from stickslip.solve.trajectory import Trajectory
 
 
@@ -45,16 +48,20 @@ def figures(
     | TimeFrequency
     | SqueakFindings
     | SqueakComparison
-    | Trajectory,
+    | Trajectory
+    | Bifurcation
+    | Basins
+    | Boundary,
 ) -> tuple[Plate, ...]:
     """The figures that show a result, in reading order.
 
     Parameters
     ----------
-    result : Findings, Comparison, DecayFindings, DecayComparison, TimeFrequency, SqueakFindings, SqueakComparison or \
-            Trajectory
+    result : Findings, Comparison, DecayFindings, DecayComparison, TimeFrequency, SqueakFindings, SqueakComparison, \
+            Trajectory, Bifurcation, Basins or Boundary
         What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`compare_decays`, :func:`time_frequency`,
-        :func:`analyze_squeaks`, :func:`compare_squeaks` or :func:`simulate` returned.
+        :func:`analyze_squeaks`, :func:`compare_squeaks`, :func:`simulate`, :func:`bifurcation`, :func:`basins` or
+        :func:`boundary` returned.
 
     Returns
     -------
@@ -85,9 +92,11 @@ def figures(
         from stickslip.plot.wavelet import plates_of as plates_of_map
 
         return tuple(plates_of_map(result))
+    from stickslip.plot.bifurcation import plates_of as plates_of_attractors
     from stickslip.plot.trajectory import plates_of
+    from stickslip.solve.trajectory import Trajectory
 
-    return plates_of(result)
+    return plates_of(result) if isinstance(result, Trajectory) else plates_of_attractors(result)
 
 
 def _of_findings(findings: Findings) -> list[Plate]:

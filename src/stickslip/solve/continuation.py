@@ -11,7 +11,7 @@ import numpy as np
 from stickslip.errors import ModelError
 from stickslip.parameters import find, places
 from stickslip.solve.automaton import Array, System
-from stickslip.solve.periodic import SteadyState, judged
+from stickslip.solve.periodic import SteadyState, cycle_of, judged
 from stickslip.solve.poincare import closes, derivative, end_of, extent, lap, tables
 from stickslip.solve.simulate import opening
 
@@ -151,7 +151,7 @@ def continue_orbit(orbit: SteadyState, parameter: str, *, to: float, step: float
         if ahead is None:
             length, clean = max(min(length, rest) / 2, FLOOR), False
             continue
-        turned, same = last.turn * ahead.turn < 0, _cycle(last.orbit) == _cycle(ahead.orbit)
+        turned, same = last.turn * ahead.turn < 0, cycle_of(last.orbit) == cycle_of(ahead.orbit)
         if turned and not same and length > step / 64:
             length, clean = length / 2, False  # a fold and a corner in one step are told apart
             continue
@@ -166,7 +166,7 @@ def continue_orbit(orbit: SteadyState, parameter: str, *, to: float, step: float
             break
         tangent = _tangent(ahead, tangent, side)
         length, clean = min(step, 1.4 * length if clean else length), True
-    cycles = [_cycle(look.orbit) for look in found]
+    cycles = [cycle_of(look.orbit) for look in found]
     return Branch(
         parameter,
         np.array([first + look.point[-1] * (to - first) for look in found]),
@@ -230,7 +230,7 @@ def _family(orbit: SteadyState, parameter: str, first: float, way: float) -> _Ma
         for nudge in (-NUDGE, NUDGE):
             place = float(np.clip(point[-1] + nudge, min(0.0, point[-1]), max(1.0, point[-1])))
             there, _, beside, _ = end(np.append(point[:-1], place), mode)
-            alike.append(_cycle(beside) == _cycle(closed))
+            alike.append(cycle_of(beside) == cycle_of(closed))
             places.append(place)
             ends.append(there)
         # across a corner the map has two slopes: only a side with the point's own order of events counts
@@ -315,11 +315,3 @@ def _fold(map_: _Map, last: _Look, tangent: Array, length: float) -> _Look | Non
         if high - low < FLOOR or look.turn == 0:
             break
     return best
-
-
-def _cycle(orbit: SteadyState) -> tuple[str, ...]:
-    """The modes around the orbit, wherever phase zero falls among them."""
-    modes = [orbit.orbit.table.modes[m].name for m in orbit.orbit.modes]
-    if len(modes) > 1 and modes[0] == modes[-1]:
-        modes.pop()
-    return min(tuple(modes[j:] + modes[:j]) for j in range(len(modes)))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve.automaton import Array, System, exponential
 from stickslip.solve.curved import CurvedTrajectory
-from stickslip.solve.poincare import Table, closes, derivative, end_of, extent, lap, stretch, tables
+from stickslip.solve.poincare import CLOSED, Table, closes, derivative, end_of, extent, lap, stretch, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.tape import Tape
 from stickslip.solve.trajectory import Event, Trajectory
@@ -287,22 +287,32 @@ def attractors(
     found: list[SteadyState] = []
     for start in starts:
         orbit = steady_state(system, start=start, transient=transient, orders=orders)
-        if not any(_same(orbit, other) for other in found):
+        if not any(alike(orbit, other) for other in found):
             found.append(orbit)
     return tuple(found)
 
 
-def _same(one: SteadyState, other: SteadyState) -> bool:
-    """Whether two steady motions are one: alike in status, order, modes and, at phase zero, state."""
+def alike(one: SteadyState, other: SteadyState) -> bool:
+    """Whether two steady motions are one: alike in status, order and modes, and the state of one at some period of the
+    drive is that of the other."""
     if (one.status, one.order) != (other.status, other.order):
         return False
     if one.status == "rest":
         return True  # a set of equilibria counts once
-    if list(one.orbit.modes) != list(other.orbit.modes):
+    if cycle_of(one) != cycle_of(other):
         return False
-    physical = one.orbit.table.physical
-    gap = np.abs(one.orbit.states[0] - other.orbit.states[0])[:physical]
-    return bool(np.all(gap <= 1e-8 * extent(one.orbit)))
+    shape = one.orbit.table.physical
+    points = other.orbit.section() if one.order > 1 else other.orbit.states[:1, :shape]
+    gaps = np.abs(points - one.orbit.states[0, :shape])
+    return bool(np.any(np.all(gaps <= 1e-8 * extent(one.orbit), axis=1)))
+
+
+def cycle_of(orbit: SteadyState) -> tuple[str, ...]:
+    """The modes around the orbit, wherever phase zero falls among them."""
+    modes = [orbit.orbit.table.modes[m].name for m in orbit.orbit.modes]
+    if len(modes) > 1 and modes[0] == modes[-1]:
+        modes.pop()
+    return min(tuple(modes[j:] + modes[:j]) for j in range(len(modes)))
 
 
 def _iterate(system: System, table: Table, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
@@ -337,8 +347,19 @@ def _closed(system: System, table: Table, state: Array, mode: int, orders: int) 
             point, where = point.copy(), int(orbit.modes[0])
             point[: table.physical] += step
         if best[1] is not None and closes(best[1], best[0]):
-            return judged(best[1], order, *derivative(best[1], best[2]))
+            return _least(system, table, best[1], best[2], order)
     return None
+
+
+def _least(system: System, table: Table, orbit: Trajectory, after: int, order: int) -> SteadyState:
+    """An orbit that closes, over no more laps than it needs: Newton may have closed several turns of it alone."""
+    for fewer in range(1, order):
+        if order % fewer == 0:
+            part = lap(system, table, orbit.states[0], int(orbit.modes[0]), fewer)
+            gap = np.abs(end_of(part)[0] - orbit.states[0])[: table.physical]
+            if np.all(gap <= 1e3 * CLOSED * extent(orbit)):
+                return judged(part, fewer, *derivative(part, end_of(part)[1]))
+    return judged(orbit, order, *derivative(orbit, after))
 
 
 def _repeats_freely(table: Table) -> bool:

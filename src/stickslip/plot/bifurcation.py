@@ -1,0 +1,284 @@
+"""Attractors along a parameter, basins, boundaries, and what dither does."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stickslip.oscillator import Oscillator
+from stickslip.parameters import UNITS
+from stickslip.plot.plate import Plate, plate
+from stickslip.plot.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    SHADE,
+    SKY,
+    axes_of,
+    axis_label,
+    new_figure,
+    prefixed,
+    styled,
+)
+from stickslip.regimes.attractor import Attractor
+from stickslip.regimes.basins import Basins
+from stickslip.regimes.bifurcation import Bifurcation
+from stickslip.regimes.boundary import Boundary
+from stickslip.solve.automaton import Array, System
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK, FAINT, SHADE)
+MOST_NAMED = 8  # attractors in a legend
+_UNITS = {"x": "m", "v": "m/s"}
+
+
+def unit_of(system: System, parameter: str) -> str:
+    """The unit of a parameter."""
+    name = parameter.rpartition(".")[2]
+    drive = f"{type(system.drive).__name__}.{name}"
+    return UNITS.get(drive, UNITS.get(name, "1"))
+
+
+@styled
+def plot_bifurcation(found: Bifurcation) -> Figure:
+    """The diagram: where the motion is once in each period of the drive, followed up and down, with every change.
+
+    Parameters
+    ----------
+    found : Bifurcation
+        What :func:`stickslip.bifurcation` returned.
+
+    Returns
+    -------
+    Figure
+        Displacement once in each period over the parameter (top) and the largest multiplier (bottom).
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> found = ss.bifurcation(ss.scenarios.forced(0.8, 0.5), "kinetic", values=[0.5, 0.7, 0.9])
+    >>> len(plot_bifurcation(found).axes)
+    2
+    """
+    figure, (top, bottom) = new_figure(2, height=4.6, heights=(3, 1))
+    factor, unit = prefixed(np.concatenate([each.points[:, 0] for each in (*found.up, *found.down)]), "m")
+    looks = (("down", ORANGE, "o", 5.0, "none"), ("up", BLUE, ".", 4.0, BLUE))
+    for name, colour, marker, size, face in looks:
+        way = getattr(found, name)
+        places = np.repeat(found.values, [len(each.points) for each in way])
+        heights = factor * np.concatenate([each.points[:, 0] for each in way])
+        style = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
+        crowded = len(places) > 20 * len(found.values)
+        top.plot(places, heights, markersize=1.2 if crowded else size, markeredgewidth=0.7,
+                 label=f"followed {name}", zorder=3 if name == "up" else 2, **style)  # fmt: skip
+        bottom.plot(found.values, [_largest(each) for each in way], markersize=size, markeredgewidth=0.7, **style)
+    for number, (value, each) in enumerate(_beside(found)):
+        top.plot([value] * len(each.points), factor * each.points[:, 0], "x", color=GREEN, markersize=5,
+                 label="beside, from another start" if not number else None)  # fmt: skip
+    for number, branch in enumerate(found.branches):
+        unstable = np.array([orbit.status == "unstable" for orbit in branch.orbits])
+        heights = factor * np.array([orbit.orbit.states[0, 0] for orbit in branch.orbits])
+        top.plot(branch.values, np.where(unstable, heights, np.nan), "--", color=INK, linewidth=1.0,
+                 label="unstable" if not number else None)  # fmt: skip
+    for change in found.changes:
+        colour = BLUE if change.direction == "up" else ORANGE
+        for ax in (top, bottom):
+            ax.axvline(change.value, color=colour, linewidth=0.8, linestyle=":" if change.direction == "up" else "--")
+    _name_regimes(top, found)
+    bottom.axhline(1.0, color=INK, linewidth=0.8)
+    bottom.set_ylim(0, 1.15)
+    bottom.set_ylabel("largest\nmultiplier")
+    top.set_ylabel(axis_label("displacement at phase zero", unit))
+    bottom.set_xlabel(_named(found.up[0].orbit.orbit.system, found.parameter))
+    top.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=4, borderaxespad=0.2)
+    return figure
+
+
+def _largest(attractor: Attractor) -> float:
+    """The largest multiplier's modulus; a motion that never repeats has none."""
+    return math.nan if attractor.orbit.order < 1 else float(np.max(np.abs(attractor.orbit.multipliers)))
+
+
+def _beside(found: Bifurcation) -> list[tuple[float, Attractor]]:
+    return [(float(v), each) for v, others in zip(found.values, found.beside, strict=True) for each in others]
+
+
+def _name_regimes(ax: Axes, found: Bifurcation) -> None:
+    """What the motion does, written over each stretch of values: upwards at the top, downwards below."""
+    first, last = found.values[[0, -1]]
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + 0.22 * (high - low))
+    for row, (direction, colour) in enumerate((("up", BLUE), ("down", ORANGE))):
+        changes = sorted(change.value for change in found.changes if change.direction == direction)
+        for begin, end in pairwise([first, *changes, last]):
+            inside = np.flatnonzero((found.values >= begin) & (found.values <= end))
+            if not len(inside):
+                continue
+            text = getattr(found, direction)[inside[len(inside) // 2]].regime
+            if end - begin > 0.012 * len(text) * (last - first):
+                ax.text((begin + end) / 2, 0.985 - 0.075 * row, text, color=colour, fontsize=7, ha="center", va="top",
+                        transform=ax.get_xaxis_transform())  # fmt: skip
+
+
+def _named(system: System, parameter: str) -> str:
+    unit = unit_of(system, parameter)
+    return axis_label(parameter.replace(".", " ").replace("_", " "), unit)
+
+
+@styled
+def plot_basins(found: Basins, *, ax: Axes | None = None) -> Axes:
+    """The map of starts, each in the colour of the motion it leads to; crosses where the motion is at phase zero.
+
+    Parameters
+    ----------
+    found : Basins
+        What :func:`stickslip.basins` returned.
+    ax : Axes, optional
+        Where to draw; a new figure where left out.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.scenarios.forced(0.8, 0.7, static_ratio=1.5)
+    >>> found = ss.basins(slider, grid={"x": [-1.0, 0.0, 1.0], "v": [-1.0, 0.0, 1.0]})
+    >>> plot_basins(found).get_xlabel()
+    'x [m]'
+    """
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    ax = axes_of(ax, height=4.2)
+    (down, across), (rows, columns) = found.names, found.axes
+    across_factor, across_unit = prefixed(rows, _UNITS.get(down[0], "1"))
+    down_factor, down_unit = prefixed(columns, _UNITS.get(across[0], "1"))
+    count = len(found.attractors)
+    colours = [COLOURS[j % len(COLOURS)] for j in range(count)]
+    ax.pcolormesh(
+        across_factor * rows, down_factor * columns, found.which.T, cmap=ListedColormap(colours), vmin=-0.5,
+        vmax=count - 0.5, alpha=0.55, shading="nearest", rasterized=True, linewidth=0,
+    )  # fmt: skip
+    ax.grid(visible=False)
+    handles = []
+    for j, (each, share) in enumerate(zip(found.attractors, found.shares, strict=True)):
+        table = each.orbit.orbit.table
+        if set(found.names) <= set(table.names) and each.status != "rest":
+            places = [table.names.index(name) for name in found.names]
+            points = each.points[:, places] * (across_factor, down_factor)
+            inside = np.all((points >= _ends(found, 0, across_factor, down_factor))
+                            & (points <= _ends(found, -1, across_factor, down_factor)), axis=1)  # fmt: skip
+            ax.plot(*points[inside].T, "+", color=INK, markersize=8, markeredgewidth=1.4)
+        low, high = share.interval
+        words = f"{each.regime}: {100 * share.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+        handles.append(Patch(color=colours[j], alpha=0.55, label=words))
+    ax.legend(handles=handles[:MOST_NAMED], loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2, borderaxespad=0.2)
+    ax.set_xlabel(axis_label(down, across_unit))
+    ax.set_ylabel(axis_label(across, down_unit))
+    return ax
+
+
+def _ends(found: Basins, end: int, *factors: float) -> Array:
+    return np.array([factor * axis[end] for factor, axis in zip(factors, found.axes, strict=True)])
+
+
+@styled
+def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
+    """The boundary as a curve, with Den Hartog's closed form over it where it applies.
+
+    Parameters
+    ----------
+    found : Boundary
+        What :func:`stickslip.boundary` returned with ``along=``.
+    ax : Axes, optional
+        Where to draw; a new figure where left out.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.scenarios.forced(0.8, 0.5)
+    >>> found = ss.boundary(slider, "kinetic", between=(0.05, 0.99), along={"frequency": [0.1, 0.2]}, precision=1e-3)
+    >>> plot_boundary(found).get_lines()[1].get_label()
+    'Den Hartog (1931)'
+    """
+    from stickslip.identify.sliding_balance import Slider
+
+    ax = axes_of(ax)
+    system = next(each for each in found.low if each is not None).orbit.orbit.system
+    free = np.array([each is not None and each.status == "not unique" for each in found.low])
+    for chosen, face, words in (
+        (~free, BLUE, "bisection of exact runs"),
+        (free, "none", "of a family, from one start"),
+    ):
+        if np.any(chosen & np.isfinite(found.values)):
+            ax.plot(found.places[chosen], found.values[chosen], "o", color=BLUE, markerfacecolor=face, markersize=4,
+                    label=words, zorder=3)  # fmt: skip
+    if is_den_hartog(system, found):
+        assert isinstance(system, Oscillator)
+        fine = np.linspace(found.places[0], found.places[-1], 400)
+        force = _force(system)
+        curve = [
+            force * Slider(system.mass, system.stiffness, 2 * math.pi * f, system.damping).boundary() for f in fine
+        ]
+        ax.plot(fine, curve, color=ORANGE, label="Den Hartog (1931)")
+        ax.axvline(system.frequency, color=FAINT, linewidth=0.8)
+    low, high = next(pair for pair, value in zip(found.kinds, found.values, strict=True) if math.isfinite(value))
+    ax.margins(y=0.12)
+    for place, kind in ((0.98, high), (0.02, low)):
+        ax.text(0.98, place, str(kind), transform=ax.transAxes, ha="right", va="top" if place > 0.5 else "bottom")
+    ax.set_xlabel(_named(system, found.along) if found.along else "place")
+    ax.set_ylabel(_named(system, found.parameter))
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2, borderaxespad=0.2)
+    return ax
+
+
+def is_den_hartog(system: System, found: Boundary) -> bool:
+    """Whether the curve is that of rigid Coulomb friction under a harmonic drive, over the frequency."""
+    return (
+        isinstance(system, Oscillator)
+        and type(system.law).__name__ == "Coulomb"
+        and getattr(system.law, "static", None) in (None, getattr(system.law, "kinetic", None))
+        and type(system.drive).__name__ in ("HarmonicForce", "HarmonicBase")
+        and getattr(system.drive, "contact", "ground") == "ground"
+        and system.damper == "ground"
+        and (found.parameter, found.along) == ("kinetic", "frequency")
+        and {"no stops", "stops"} == set(next(k for k, v in zip(found.kinds, found.values, strict=True) if v == v))
+    )
+
+
+def _force(system: Oscillator) -> float:
+    amplitude = float(getattr(system.drive, "amplitude", math.nan))
+    return amplitude * (system.stiffness if type(system.drive).__name__ == "HarmonicBase" else 1.0)
+
+
+def plates_of(result: Bifurcation | Basins | Boundary) -> tuple[Plate, ...]:
+    """The figure of one result, with its words."""
+    drawn: Any
+    if isinstance(result, Bifurcation):
+        drawn, name, title = plot_bifurcation(result), "bifurcation", "Motion along a parameter"
+        words = (
+            "Where the mass is once in each period of the drive: blue followed upwards, orange downwards; lines mark "
+            "where the kind of motion changes. Below, the largest multiplier: at 1 the motion ceases to attract."
+        )
+    elif isinstance(result, Basins):
+        drawn, name, title = plot_basins(result), "basins", "Which start leads where"
+        words = "Each start in the colour of the motion it leads to; crosses: where that motion is at phase zero."
+    else:
+        drawn, name, title = plot_boundary(result), "boundary", "Where the kind of motion changes"
+        words = "Points: found by bisection of exact runs. Line: the closed form."
+    return (plate(name, drawn, title, words),)

@@ -1,0 +1,1 @@
+"""Which motions a system settles on, where they change, and how sticking is kept away."""

@@ -1,0 +1,199 @@
+"""Attractors along a parameter, basins and boundaries: against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.scenarios import forced
+
+TURN = 2 * math.pi
+BISTABLE = forced(0.8, 1.0, static_ratio=1.5)  # over the force's amplitude P: r = 1 / P
+SHAW = 0.72697564257968176  # r at which sliding with static = 1.5 kinetic friction begins to stick, b = 0.8
+
+
+def test_hysteresis_is_followed_up_and_down() -> None:
+    """Held until the force exceeds the static friction; on the way down sliding lasts to Shaw's boundary."""
+    found = ss.bifurcation(BISTABLE, "amplitude", values=np.linspace(1.2, 1.6, 9))
+    up, down = found.changes
+    assert (up.direction, up.before, up.after) == ("up", "held", "no stops")
+    assert up.value == pytest.approx(1.5, abs=up.error)
+    assert (down.direction, down.before, down.after) == ("down", "no stops", "2 + 0 stops")
+    assert down.value == pytest.approx(1 / SHAW, abs=1.01 * down.error)
+    assert up.error < 1e-6
+    assert found.coexisting == pytest.approx(np.linspace(1.2, 1.5, 7))
+    assert [each.regime for each in found.at(0)] == ["held", "2 + 0 stops"]
+
+
+def test_the_number_of_stops_is_the_one_known() -> None:
+    """A row of the table of stops over friction (Hong and Liu 2000), b = 0.1."""
+    known = ss.scenarios.grid("HL-1")
+    row = known["ratios"].index(0.1)
+    found = ss.bifurcation(forced(0.1, 0.5), "kinetic", values=known["loads"], precision=1e-3)
+    stops = [each.orbit.stops for each in found.up]
+    assert stops == list(zip(known["normal"][row], known["abnormal"][row], strict=True))
+
+
+def test_starts_find_what_following_does_not() -> None:
+    """From below only rest is met before the static friction; another start slides there."""
+    found = ss.bifurcation(BISTABLE, "amplitude", values=[1.2, 1.3], starts=[{}, {"x": 3.0}])
+    assert [each.regime for each in found.up + found.down] == ["held"] * 4
+    assert [[each.regime for each in others] for others in found.beside] == [["2 + 0 stops"]] * 2
+
+
+def test_the_diagram_is_labelled() -> None:
+    found = ss.bifurcation(BISTABLE, "amplitude", values=[1.3, 1.4, 1.6], precision=1e-2)
+    data = found.data
+    assert data["regime"].sel(direction="down", amplitude=1.3) == "2 + 0 stops"
+    sliding = data.sel(direction="up", amplitude=1.6)
+    orbit = ss.steady_state(BISTABLE.having(amplitude=1.6), start={"x": 3.0})
+    assert sliding["displacement"] == pytest.approx(orbit.amplitude, rel=1e-9)
+    assert np.allclose(np.abs(sliding["multipliers"]), np.abs(orbit.multipliers), rtol=1e-6)
+    assert np.allclose(sliding["points"].sel(point=0), orbit.orbit.states[0, :2], rtol=1e-9)
+    assert "held -> no stops" in data.attrs["changes"][0]
+
+
+def test_chaos_is_points_that_do_not_repeat() -> None:
+    case = ss.scenarios.get("FM-1")
+    found = ss.bifurcation(case.system, "drive.amplitude", values=[1.88, 1.9], transient=100)
+    wild = found.up[-1]
+    assert wild.regime == "not periodic"
+    assert len(np.unique(wild.points[:, 0].round(9))) > 200
+    assert found.data["points"].sizes["point"] == len(wild.points)
+
+
+def test_branches_hold_the_unstable_orbits_between() -> None:
+    """Stick-slip ends at a fold, below which the mass is held; the branch turns back there and is unstable."""
+    found = ss.bifurcation(BISTABLE, "amplitude", values=[1.1, 1.4, 1.6], branches=True)
+    assert [change.after for change in found.changes] == ["no stops", "2 + 0 stops", "held"]
+    [branch] = found.branches
+    [fold] = branch.folds
+    assert branch.values[fold] == pytest.approx(found.changes[-1].value, abs=1e-5)
+    assert {orbit.status for orbit in branch.orbits[fold + 1 :]} == {"unstable"}
+
+
+def test_basins_are_those_of_the_exact_runs() -> None:
+    """Where Shaw's sliding and rest stand beside each other, each start leads where a long run ends."""
+    system = BISTABLE.having(amplitude=1.25)
+    found = ss.basins(system, grid={"x": np.linspace(-2, 2, 9), "v": np.linspace(-2, 2, 9)})
+    assert [each.regime for each in found.attractors] == ["2 + 0 stops", "held"]
+    for i, x in enumerate(found.axes[0]):
+        for j, v in enumerate(found.axes[1]):
+            run = ss.simulate(system, cycles=300, start={"x": x, "v": v})
+            moves = any(event.time > 280 / system.drive.frequency for event in run.events)
+            assert found.attractors[found.which[i, j]].regime == ("2 + 0 stops" if moves else "held")
+    assert sum(share.value for share in found.shares) == pytest.approx(1.0)
+    assert all(share.includes(share.value) for share in found.shares)
+    assert found.data.sel(x=-2.0, v=2.0) == 0
+
+
+def test_a_grid_of_rest_is_known_in_closed_form() -> None:
+    """Held starts, without velocity, stay held where P + k |x| does not exceed the static friction."""
+    system = forced(0.8, 0.7, static_ratio=2.0)  # P = 1, static friction 1.4
+    x = np.linspace(-0.6, 0.6, 13)
+    found = ss.basins(system, grid={"x": x, "v": [-3.0, 0.0]})
+    held = [each.regime for each in found.attractors].index("held")
+    stay = found.which[:, 1] == held
+    assert np.all(stay[np.abs(x) <= 0.4 - 1e-9])
+
+
+def test_several_turns_of_an_orbit_are_one() -> None:
+    """Near resonance Newton's method closes three and four turns of it before one; they are the same orbit."""
+    orbits = [ss.steady_state(forced(0.99, 0.789305), start={"x": x}) for x in (0.0, 10.0, 30.0)]
+    assert [orbit.order for orbit in orbits] == [1, 1, 1]
+    assert all(orbit.amplitude == pytest.approx(orbits[0].amplitude, rel=1e-9) for orbit in orbits)
+
+
+@pytest.mark.parametrize("row", ss.scenarios.grid("DH-2")["boundary"], ids=str)
+def test_the_boundary_is_den_hartogs(row: tuple[float, float, float]) -> None:
+    ratio, damping, load = row
+    if (ratio, damping) == (0.5, 0.0):
+        pytest.skip("at half the natural frequency the sliding motion is not unique")
+    system = forced(ratio, 0.5, damping_ratio=damping)
+    found = ss.boundary(system, "kinetic", between=(0.9 * load, min(1.1 * load, 0.99)))
+    assert found.value == pytest.approx(load, rel=1e-8)
+    assert found.kinds == (("no stops", "stops"),)
+    assert np.all(found.multipliers < 1)
+
+
+def test_the_boundary_with_static_friction_is_shaws() -> None:
+    found = ss.boundary(BISTABLE, "amplitude", between=(1.2, 1.6), start={"x": 3.0})
+    assert found.value == pytest.approx(1 / SHAW, rel=1e-8)
+    assert found.kinds == (("stops", "no stops"),)
+
+
+def test_a_boundary_is_followed_along_a_parameter() -> None:
+    chosen = {b: r for b, z, r in ss.scenarios.grid("DH-2")["boundary"] if not z and b in (0.4, 0.8, 1.4)}
+    places = np.array(sorted(chosen)) / TURN
+    found = ss.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along={"frequency": places})
+    assert found.values == pytest.approx([chosen[b] for b in sorted(chosen)], rel=1e-8)
+    assert found.data["kinetic"].dims == ("frequency",)
+
+
+def test_other_questions_have_boundaries_too() -> None:
+    """Held from where the friction is the force; and a user's own question."""
+    held = ss.boundary(forced(0.3, 0.5), "kinetic", between=(0.9, 1.2), kind="held", precision=1e-6)
+    assert held.value == pytest.approx(1.0, rel=2e-4)
+    orbit = ss.boundary(forced(0.8, 0.5), "kinetic", between=(0.1, 0.7), kind=lambda found: found.orbit.amplitude > 2.5)
+    assert orbit.low[0].orbit.amplitude == pytest.approx(2.5, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("ask", "told"),
+    [
+        (lambda: ss.bifurcation(BISTABLE, "amplitud", values=[1, 2]), "amplitude"),
+        (lambda: ss.bifurcation(BISTABLE, "law", values=[1, 2]), "one number is varied"),
+        (lambda: ss.bifurcation(BISTABLE, "amplitude", values=[1.0]), "two different finite values"),
+        (lambda: ss.bifurcation(BISTABLE, "amplitude", values=[1.0, math.nan]), "finite"),
+        (lambda: ss.bifurcation(BISTABLE.having(drive=ss.Belt(0.1)), "kinetic", values=[1, 1.2]), "Belt"),
+        (lambda: ss.basins(BISTABLE.having(drive=ss.Release()), grid={"x": [0, 1], "v": [0, 1]}), "Release"),
+        (lambda: ss.basins(BISTABLE, grid={"x": [0, 1]}), "two start coordinates"),
+        (lambda: ss.basins(BISTABLE, grid={"x": [0, 1], "v": [0]}), "two different finite values"),
+        (lambda: ss.basins(BISTABLE, grid={"x": [0, 1], "q": [0, 1]}), "'q'"),
+        (lambda: ss.boundary(BISTABLE, "kinetc", between=(0.1, 0.2)), "kinetic"),
+        (lambda: ss.boundary(BISTABLE, "kinetic", between=(0.2, 0.2)), "two different values"),
+        (lambda: ss.boundary(forced(0.8, 0.5), "kinetic", between=(0.1, 0.2)), "widen between="),
+        (lambda: ss.boundary(BISTABLE, "kinetic", between=(0.1, 0.2), kind="colour"), "sticking"),
+        (lambda: ss.boundary(BISTABLE, "kinetic", between=(0.1, 0.2), along={"frequency": [1.0]}), "two finite values"),
+    ],
+)
+def test_bad_questions_are_refused_in_a_sentence(ask, told) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(ss.StickslipError, match=told) as caught:
+        ask()
+    assert str(caught.value).endswith(".")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_tone_on_top_of_any_drive() -> None:
+    """As two tones on the mass; and on the face of a belt, seen from the face."""
+    tone, drive = (0.3, 24 / TURN), ss.HarmonicForce(1.0, 0.8 / TURN)
+    both = ss.MultiTone([(1.0, 0.8 / TURN, 0.0), (*tone, 0.0)], on="force")
+    mine = forced(0.8, 0.5).having(drive=ss.Dithered(drive, *tone, on="force"))
+    other = forced(0.8, 0.5).having(drive=both)
+    one, two = (ss.simulate(system, duration=30.0) for system in (mine, other))
+    assert [event[1:] for event in one.events] == [event[1:] for event in two.events]
+    assert one.state(30.0)["x"] == pytest.approx(two.state(30.0)["x"], rel=1e-9)
+    assert mine.drive.motion().period == pytest.approx(TURN / 0.8)
+    # a belt whose face shakes: in the face's frame the mass feels its acceleration
+    belt = ss.Oscillator(mass=1, stiffness=0, law=ss.Coulomb(1.0), drive=ss.Dithered(ss.Belt(0.5), 0.01, 10.0))
+    run = ss.simulate(belt, duration=2.0)
+    assert run.sample([1.0], ("slip",))[0][0, 0] == pytest.approx(
+        run.state(1.0)["v"] - 0.5 + 0.01 * TURN * 10 * math.sin(TURN * 10), abs=1e-12
+    )
+    with pytest.raises(ss.ModelError, match="three"):
+        ss.Dithered(drive, *tone, on="roof")
+
+
+def test_the_figures_show_what_was_found() -> None:
+    diagram = ss.bifurcation(BISTABLE, "amplitude", values=[1.3, 1.6], starts=[{}, {"x": 3.0}], precision=1e-2)
+    places = {"frequency": np.array([0.6, 0.8, 1.1]) / TURN}
+    curve = ss.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along=places, precision=1e-6)
+    found = ss.basins(BISTABLE.having(amplitude=1.25), grid={"x": np.linspace(-2, 2, 5), "v": np.linspace(-2, 2, 5)})
+    for result, words in ((diagram, "held"), (curve, "Den Hartog"), (found, "2 + 0 stops")):
+        [plate] = ss.figures(result)
+        assert words in plate.svg()
+    line = next(line for line in ss.plot_boundary(curve).get_lines() if "Hartog" in str(line.get_label()))
+    assert np.interp(curve.places, *line.get_data()) == pytest.approx(curve.values, rel=2e-4)
