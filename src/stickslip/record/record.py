@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -326,9 +327,14 @@ class Record:
 
         See :mod:`stickslip.record.check` for what is looked for.
         """
+        return list(self._faults)
+
+    @cached_property
+    def _faults(self) -> tuple[Fault, ...]:
+        """Looked for once: a record does not change, and every question asks."""
         from stickslip.record.check import find_faults
 
-        return find_faults(self)
+        return tuple(find_faults(self))
 
     def to_pandas(self) -> pd.DataFrame:
         """A DataFrame indexed by time [s]; units and history in ``.attrs``."""
