@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from stickslip import __version__
 from stickslip.analysis.comparison import Comparison
@@ -25,6 +25,9 @@ from stickslip.plot.plate import Plate
 from stickslip.record.record import Record
 from stickslip.reports.summary import Summary, summary
 from stickslip.squeak.listening import Clip, burst_clips
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 TEMPLATE = "page.html.jinja"
 MOST_SOUND = 1 << 20  # bytes of sound of one record in a page; the folder holds all
@@ -108,14 +111,19 @@ def _section(part: Asked) -> Section:
 
 def render(sections: Sequence[Section]) -> str:
     """The page as text."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    return templates().get_template(TEMPLATE).render(sections=sections, version=__version__)
+
+
+def templates(*folders: Path) -> Environment:
+    """The page's template and those of other folders that extend it, with the filters that they use."""
+    from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("stickslip.reports"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
+        loader=ChoiceLoader([PackageLoader("stickslip.reports"), FileSystemLoader(folders)]), autoescape=True,
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     environment.filters.update(inline_svg=inline_svg, told=told, spelled=style.spelled, played=played, heard=heard)
-    return environment.get_template(TEMPLATE).render(sections=sections, version=__version__)
+    return environment
 
 
 def heard(clips: Sequence[Clip]) -> Sequence[Clip]:

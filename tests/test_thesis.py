@@ -1,0 +1,131 @@
+"""The thesis's chapters: every verdict holds, numbers follow from the parameters, and the page shows them."""
+
+from __future__ import annotations
+
+import json
+import re
+from copy import deepcopy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from thesis import page, printed
+
+from stickslip.cli.program import main
+
+CHAPTERS = pytest.mark.parametrize("chapter", page.CHAPTERS)
+MOVED = {
+    "3": ("sliding", "mass", "base"),
+    "6": ("decay", "damping", "extremes"),
+}  # a parameter, and a number that has to follow it
+
+
+def moved(section: str, name: str) -> dict[str, dict[str, float]]:
+    """What the chapters start from, with one parameter three per cent larger."""
+    start = deepcopy(printed.given())
+    start[section][name] *= 1.03
+    return start
+
+
+@CHAPTERS
+def test_every_verdict_holds(chapter: str) -> None:
+    found = page.run_chapter(chapter, draw=False)
+    wrong = [
+        (table.name, row.quantity, number, value, verdict)
+        for table, rows in found.tables
+        for row, entries in zip(table.rows, rows, strict=True)
+        for number, (value, verdict) in zip(row.numbers, entries, strict=True)
+        if verdict != number.expected
+    ]
+    assert not wrong
+    assert found.counts[printed.SAME] > 0
+
+
+@CHAPTERS
+def test_every_number_of_a_chapter_is_shown(chapter: str) -> None:
+    shown = {row.ours for table in printed.tables() if table.chapter == chapter for row in table.rows}
+    assert shown == set(page.module_of(chapter).numbers(printed.given()))
+
+
+@CHAPTERS
+def test_numbers_follow_from_the_parameters(chapter: str) -> None:
+    section, name, number = MOVED[chapter]
+    module = page.module_of(chapter)
+    before, after = module.numbers(printed.given())[number], module.numbers(moved(section, name))[number]
+    assert abs(np.ravel(after)[-1] / np.ravel(before)[-1] - 1) > 1e-4
+
+
+def test_what_differs_says_why() -> None:
+    for table in printed.tables():
+        for row in table.rows:
+            for number in row.numbers:
+                assert number.expected in (printed.SAME, printed.CORRECTED, printed.NOT_REPRODUCIBLE)
+                assert bool(number.why) == (number.expected != printed.SAME), (table.name, row.quantity, number)
+                assert (number.instead is not None) >= (number.expected == printed.CORRECTED)
+
+
+@pytest.mark.parametrize(
+    ("number", "ours", "verdict"),
+    [
+        (printed.Number("", "0.0197", "same", None, 5e-5, ""), 0.01974, "same"),
+        (printed.Number("", "0.0197", "same", None, 5e-5, ""), 0.01976, "changed"),
+        (printed.Number("", "0.0197", "same", None, 5e-5, ""), None, "changed"),
+        (printed.Number("", "5.3", "corrected", "5.4", 0.05, "."), 5.38, "corrected"),
+        (printed.Number("", "5.3", "corrected", "5.4", 0.05, "."), 5.31, "changed"),
+        (printed.Number("", "5.3", "corrected", "5.4", 0.05, "."), 5.5, "changed"),
+        (printed.Number("", "0.49", "not reproducible", "0.335", 0.005, "."), 0.3352, "not reproducible"),
+        (printed.Number("", "0.49", "not reproducible", "0.335", 0.005, "."), 0.49, "changed"),
+        (printed.Number("", "0.49", "not reproducible", None, 0.005, "."), None, "not reproducible"),
+        (printed.Number("", "0.49", "not reproducible", None, 0.005, "."), 0.52, "changed"),
+    ],
+)
+def test_a_verdict_is_borne_out_or_changed(number: printed.Number, ours: float | None, verdict: str) -> None:
+    assert number.verdict(ours) == verdict
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("thesis") / "six"
+    done = CliRunner().invoke(main, ["thesis", "6", "--output", str(folder)], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert "222 same" in done.output
+    return folder
+
+
+def test_the_page_shows_tables_and_figures(folder: Path) -> None:
+    text = (folder / "thesis.html").read_text("utf-8")
+    assert text.count("<svg") == len(list((folder / "figures").glob("*.svg"))) > 10
+    assert "Simulated response of MKCF system" in text
+    assert re.search(r"0\.86728.*?0\.867277", text, flags=re.DOTALL)
+    assert "http" not in re.sub(r"http://www\.w3\.org[\w/.]*", "", text), "it asks nothing of a network"
+
+
+def test_the_results_hold_every_number(folder: Path) -> None:
+    told = json.loads((folder / "results.json").read_text("utf-8"))
+    six = [table for table in printed.tables() if table.chapter == "6"]
+    assert len(told["numbers"]) == sum(len(row.numbers) for table in six for row in table.rows)
+    assert told["verdicts"]["changed"] == 0
+    first = next(entry for entry in told["numbers"] if entry["place"] == "Table 6.1" and entry["entry"] == "i = 1")
+    assert {"printed": "-0.86728", "verdict": "same"}.items() <= first.items()
+    assert first["ours"] == pytest.approx(-0.86727678404443999)
+
+
+def test_a_verdict_that_no_longer_holds_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page, "given", lambda: moved("decay", "damping"))
+    done = CliRunner().invoke(main, ["thesis", "6", "--json"], catch_exceptions=False)
+    assert done.exit_code == 1
+    assert json.loads(done.output)["verdicts"]["changed"] > 10
+
+
+def test_without_the_source_it_says_what_to_do(tmp_path: Path) -> None:
+    done = CliRunner().invoke(main, ["thesis", "--source", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "holds no thesis/" in done.output
+    assert "--source" in done.output
+
+
+def test_a_chapter_that_is_not_there_is_refused() -> None:
+    done = CliRunner().invoke(main, ["thesis", "9"])
+    assert done.exit_code == 2
+    assert "'9' is none of" in done.output
