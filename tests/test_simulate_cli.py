@@ -192,6 +192,22 @@ def test_the_moving_picture_shows_what_the_contact_does() -> None:
     assert colours == {"slip", "stick"}
 
 
+def test_the_squeak_rig_is_heard_and_its_sensors_are_read_again() -> None:
+    result = run("SQUEAK wet 6.13 N", "--sound", "--output", "rig", "--fs", "10 kHz")
+    assert result.exit_code == 0, result.output
+    heard, sensors = ss.read_record("rig/sound.wav"), ss.read_record("rig/sensors.csv")
+    assert (heard.fs, len(heard)) == (sensors.fs, len(sensors)) == (10_000, 10_001)
+    scale = np.max(np.abs(sensors["sound"])) / np.max(np.abs(heard[next(iter(heard))]))
+    assert np.allclose(heard[next(iter(heard))] * scale, sensors["sound"], atol=1e-4 * np.ptp(sensors["sound"]))
+    assert ss.find_squeaks(sensors).of("squeak")
+
+
+def test_any_mass_is_heard_by_its_acceleration() -> None:
+    assert run("slider.toml", "--sound", "--output", "slider", "--cycles", "1").exit_code == 0
+    assert ss.read_record("slider/sound.wav").fs >= 8000
+    assert not Path("slider/sensors.csv").exists()
+
+
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_an_mp4_is_written_by_ffmpeg() -> None:
     assert run("FD-4", "--animate", "mp4").exit_code == 0

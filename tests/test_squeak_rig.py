@@ -83,6 +83,18 @@ def test_sticks_and_flights_of_two_contacts_are_those_of_the_rules_written_out(p
     assert np.allclose(run.sample([duration], ("x", "v"))[0][:, 0], end[:6].astype(float), rtol=1e-9, atol=0)
 
 
+@pytest.mark.parametrize(("surface", "load"), CASES)
+def test_the_scenario_is_the_rig(surface: str, load: float) -> None:
+    known, rig = ss.scenarios.get(f"SQUEAK {surface} {load} N").system, ss.squeak_rig(surface, load)
+    for name in ("mass", "damping", "stiffness", "acts_on"):
+        assert np.array_equal(getattr(known, name), getattr(rig, name))
+    assert known.drive == rig.drive
+    for one, other in zip(known.contacts, rig.contacts, strict=True):
+        assert (one.law, one.stiffness, one.preload) == (other.law, other.stiffness, other.preload)
+        assert np.array_equal(one.tangent, other.tangent)
+        assert np.array_equal(one.normal, other.normal)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [({"surface": "oily"}, "surface = 'oily'"), ({"load": -1.0}, "load = -1"), ({"amplitude": 0.0}, "amplitude = 0")],

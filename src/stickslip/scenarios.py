@@ -344,6 +344,8 @@ OF_ORBITS: dict[str, Callable[[SteadyState], Any]] = {
 OF_RUNS: dict[str, Callable[[Trajectory], Any]] = {
     "half_cycles": lambda motion: len(motion.events),
     "rest": lambda motion: motion.state(motion.duration)["x"],
+    "changes": lambda motion: len(motion.modes) - 1,
+    "end": lambda motion: motion.sample([motion.duration], ("x",))[0][:, 0].tolist(),
     "stop_time": lambda motion: motion.events[-1].time,
     "extrema": _extrema,
     "slip_time": lambda motion: _last_of(motion, "slip"),

@@ -33,6 +33,7 @@ LIST_WIDTH = 100
     help="Format of the record.",
 )
 @click.option("--animate", "animation", type=click.Choice(["gif", "mp4"]), help="Add a moving picture; mp4 by ffmpeg.")
+@click.option("--sound", is_flag=True, help="Add what is heard, sound.wav; of a squeak rig its sensors' record too.")
 @result_options("NAME-stickslip")
 def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool, **options: Any) -> None:
     """Simulate masses that rub, exactly, event by event.
@@ -45,6 +46,7 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
     \b
     stickslip simulate FD-4
     stickslip simulate slider.toml --cycles 100 --set "kinetic=1.3 N" --animate gif
+    stickslip simulate "SQUEAK wet 6.13 N" --sound
 
     Ctrl-C while it runs keeps what was simulated until then, marked "interrupted", with exit code 130.
     """
@@ -54,7 +56,7 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
     wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
     folder = output or (None if as_json else folder_name(wanted, "stickslip"))
     if folder:
-        ss.require_output(wanted, folder=folder, **options)
+        ss.require_output(wanted, folder=folder, **{key: options[key] for key in ("form", "animation")})
     with progress(4 if options["animation"] else 3) as tell:
         tell("simulating", 0)
         result = ss.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", share))

@@ -33,6 +33,9 @@ from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.energy import energy
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Event, Trajectory
+from stickslip.squeak.listening import write_sound
+from stickslip.squeak.sound import sound_pressure, squeak_record
+from stickslip.structure import Structure
 from stickslip.system_file import Case
 from stickslip.units import prefixed
 
@@ -43,6 +46,8 @@ MOST_PIECES = 200_000  # of a run whose energy is integrated: beyond, it takes l
 MOST_TOLD = 10_000  # events in JSON; events.csv has them all
 MOST_NAMED = 4  # masses in a sentence
 KINDS = ("slip", "microstick", "stick", "flight")
+TANGENTIAL_NORMAL_TORSIONAL = 3  # displacements of a squeak rig
+HEARD = 10_000.0  # Hz of a sound whose rate was not asked for
 PEAKS = 4001  # instants looked at for the largest values of the last cycle
 
 
@@ -151,9 +156,10 @@ def publish_run(
     fs: float | None = None,
     form: str = "csv",
     animation: str | None = None,
+    sound: bool = False,
     tell: Callable[[str, float], None] = lambda words, done: None,
 ) -> Path:
-    """Write a run into a folder: results.json, events.csv, the sampled record, the figures, and a moving picture.
+    """Write a run into a folder: results.json, events.csv, the sampled record, figures, a moving picture, the sound.
 
     The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
     is left alone.
@@ -170,6 +176,8 @@ def publish_run(
         Format of the record.
     animation : {"gif", "mp4"}, optional
         A moving picture beside the figures.
+    sound : bool
+        Add sound.wav, what :func:`sound_pressure` says of it, and of a squeak rig the record of its sensors.
     tell : callable
         Called before each part of the work with a few words and how many parts are done; the run counts as one.
 
@@ -206,7 +214,19 @@ def publish_run(
             from stickslip.plot.animation import animate
 
             animate(run, draft / f"animation.{animation}", tell=lambda n, of: tell("animating", 3 + n / of))
+        if sound:
+            _write_sound(run, draft, fs or result.case.fs or HEARD, form)
     return Path(folder)
+
+
+def _write_sound(run: Trajectory, folder: Path, fs: float, form: str) -> None:
+    """The sound as a WAV; of a squeak rig, as its sensors would have written it, with their record."""
+    if isinstance(run.system, Structure) and run.system.size == TANGENTIAL_NORMAL_TORSIONAL and run.table.motion.base:
+        heard = squeak_record(run, fs=fs)
+        write_record(heard, folder / f"sensors.{form}")
+    else:
+        heard = sound_pressure(run, fs=fs)
+    write_sound(heard, folder / "sound.wav")
 
 
 def _write_events(run: Trajectory, path: Path) -> None:
