@@ -89,6 +89,35 @@ def test_laws_of_the_thesis_are_told(law: object, memory: str) -> None:
         assert found.time.value == pytest.approx(1 / (1.1 * 30.0), rel=0.03)
 
 
+def shaken(law: object, hz: float, base: float, *, noise: float = 0.0) -> Record:
+    """A slider shaken slowly, where a rigid contact sticks, or fast; 8 cycles, run in."""
+    slider = ss.Oscillator(
+        mass=2.42, stiffness=2310, damping=0.12, law=law, drive=ss.HarmonicBase(base, frequency=hz)
+    )  # fmt: skip
+    run = ss.simulate(slider, cycles=12).record(fs=4000)
+    run, rng = run.rows(round(4000 * 4 / hz), len(run)), np.random.default_rng(1)
+    x, friction = (run[name] + noise * np.ptp(run[name]) * rng.standard_normal(len(run)) for name in ("x", "friction"))
+    return Record.of({"x": x, "friction": friction}, fs=4000)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+@pytest.mark.parametrize("law", [ss.Coulomb(1.1), ss.Coulomb(1.1, static=1.4)])
+def test_friction_that_sticks_has_no_memory(law: object, noise: float) -> None:
+    found = friction_memory([shaken(law, 2.5, 0.65e-3, noise=noise), shaken(law, 8.7, 1.1e-3, noise=noise)])
+    assert (found.memory, found.rotation) == ("none", "none"), found.reason
+    assert all(phase.includes(0.0) for phase in found.phases)
+    assert "at 2.5 Hz the contact rests 3" in found.status
+    assert "at 8.7 Hz the contact" not in found.status
+
+
+def test_a_state_is_told_though_the_contact_almost_sticks() -> None:
+    law = ss.StateVariable(1.1, rate=60.0)
+    found = friction_memory([shaken(law, 2.5, 0.65e-3), shaken(law, 8.7, 1.1e-3)])
+    assert found.memory == "state variable", found.reason
+    assert found.time.includes(1 / (1.1 * 60.0))
+    assert found.time.value == pytest.approx(1 / (1.1 * 60.0), rel=0.03)
+
+
 def test_noise_speaks_against_no_memory() -> None:
     found = friction_memory([loop("curve", hz, noise=30.0) for hz in (2.0, 8.0)])
     assert found.memory == "undecided"

@@ -51,6 +51,8 @@ class Samples:
         Of the displacement, "m" or "rad".
     skipped : int
         Samples at the start that set the memory of a curve that has one, and are not compared.
+    blur : int
+        Samples over which the velocity's smoothing spreads a kink.
     """
 
     time: Array
@@ -63,6 +65,7 @@ class Samples:
     noise: float
     unit: str
     skipped: int = 0
+    blur: int = 1
 
     @property
     def compared(self) -> Samples:
@@ -143,6 +146,7 @@ def samples_of(
         time=record.start + rows / record.fs, displacement=place, velocity=motion.velocity,
         friction=friction, cycle=label, block=np.clip((BLOCKS * share).astype(np.intp), 0, BLOCKS - 1),
         cycles=len(edges) - 1, noise=noise_level(friction, record.fs), unit=motion.unit,
+        blur=motion.blur,
     )  # fmt: skip
     fast = np.abs(motion.velocity) > max(CREEP * peak, AUDIBLE * motion.noise)
     clear = fast & away_from(~fast, motion.blur)

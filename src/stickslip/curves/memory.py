@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,18 @@ from stickslip.curves.nonlinear import minimise
 from stickslip.curves.presliding import deflections
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.identify.motion import CREEP
 from stickslip.record.record import Record
 from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]
 
 MEMORIES = ("none", "time delay", "state variable", "way", "undecided")
-LEAST_PHASE = 0.005  # rad: what smoothing and sampling leave of a phase
+LEAST_PHASE = 0.005  # rad: what smoothing leaves of a phase
+POINTS = 2000  # of a mean cycle, at most
+BLURRED = 0.25  # of the phase over which smoothing spreads the velocity's kinks: what it may shift the loop's
+HALF = 0.5  # of the speed of creep: slower is at rest
+STICKS = 0.05  # of the time at rest: more is no mere reversal
 UNSURE = 0.1  # rad: phases that are no surer do not speak against a memory
 REJECTED = 0.01  # chance of a misfit so large, below which a memory is ruled out
 FAR = 100.0  # logarithm beyond which no memory is
@@ -42,7 +47,7 @@ class FrictionMemory(Result):
     reason : str
         The evidence, in words and numbers.
     phases : tuple of Estimate
-        Of each record, by which angle [rad] the fundamental of the friction follows that of the velocity.
+        Of each record, by which angle [rad] friction follows the velocity.
     frequencies : ndarray, shape (m,)
         Of the records [Hz].
     delay : Estimate or None
@@ -81,11 +86,13 @@ class FrictionMemory(Result):
 
 @dataclass(frozen=True, eq=False)
 class _Loop:
-    """One record's loop: its phase, its frequency, and the mean cycle of its displacement."""
+    """One record's loop: its phase and frequency, and the mean cycle of its motion; `way` is the velocity's sign."""
 
     phase: Estimate
     frequency: float
     displacement: Array
+    velocity: Array
+    way: Array
 
 
 def friction_memory(
@@ -93,15 +100,19 @@ def friction_memory(
 ) -> FrictionMemory:
     r"""Does friction over velocity go round a loop, which way, and how does that grow with the frequency?
 
-    Friction that follows the speed alone has its fundamental in phase with the velocity's, whatever the curve. Friction
-    with memory (thesis, 1.4 and 4.4) follows by an angle :math:`\varphi`, and its loop of area
-    :math:`\pi V F_1 \sin\varphi` is gone round anticlockwise; where a falling curve answers late (higher friction while
-    speeding up than while slowing down), clockwise. How the angle grows with the frequency tells which memory it is:
+    Friction that follows the speed alone comes back by the way it went, whatever the curve and the motion: its loop has
+    no area, and while the contact sticks nothing is added, since there the speed does not change. Friction with memory
+    (thesis, 1.4 and 4.4) follows by an angle
+
+    .. math:: \varphi = \arg\Big(\omega\!\int\! f v\,dt - i\oint\! f\,dv\Big),
+
+    of a sine that of the fundamental, and its loop is gone round anticlockwise; where a falling curve answers late
+    (higher friction while speeding up than while slowing down), clockwise. How the angle grows with the frequency tells
+    which memory it is; each is followed along the measured motion, and for a sine:
 
     * a time delay: :math:`\varphi = \omega\tau`; of all friction, and so of a late sensor too;
     * a state variable, :math:`\dot\theta = (F(v) - \theta)/T`: :math:`\tan\varphi = \omega T`;
-    * a way, Y, over which the contact gives before it slides: the angle of such an element along the measured
-      displacement, of one amplitude the same at every frequency.
+    * a way, Y, over which the contact gives before it slides: of one amplitude the same at every frequency.
 
     A memory is ruled out whose misfit has a chance of less than 1 %.
 
@@ -129,12 +140,12 @@ def friction_memory(
     --------
     >>> records = []
     >>> for hz in (5.0, 20.0):
-    ...     t = np.arange(8000) / 1000
+    ...     t = np.arange(16000) / 4000
     ...     late = np.sign(np.cos(2 * np.pi * hz * (t - 8e-3)))
-    ...     records.append(Record.of({"x": np.sin(2 * np.pi * hz * t), "friction": late}, fs=1000))
+    ...     records.append(Record.of({"x": np.sin(2 * np.pi * hz * t), "friction": late}, fs=4000))
     >>> found = friction_memory(records)
-    >>> found.memory, found.rotation, round(found.delay.value, 4)
-    ('time delay', 'anticlockwise', 0.008)
+    >>> found.memory, found.rotation, found.delay.includes(8e-3)
+    ('time delay', 'anticlockwise', True)
     """
     given = [records] if isinstance(records, Record) else list(records)
     if not given:
@@ -160,38 +171,68 @@ def _loop(samples: Samples) -> _Loop:
     count = samples.cycles
     starts = np.searchsorted(samples.cycle, np.arange(count))
     ends = np.append(starts[1:], len(samples.cycle))
+    shortest = int(np.min(ends - starts))
+    points = min(POINTS, shortest)
     length = (samples.time[-1] - samples.time[0]) / max(1, len(samples.time) - 1) * len(samples.time) / count
-    turned = np.exp(-2j * np.pi * (samples.time - samples.time[0]) / length)
-    waves = [np.add.reduceat(turned * (values - values.mean()), starts) / (ends - starts)
-             for values in (samples.velocity, samples.friction)]  # fmt: skip
-    mean = float(np.angle(np.sum(waves[0] * np.conj(waves[1]))))
-    each = mean + np.angle(waves[0] * np.conj(waves[1]) * np.exp(-1j * mean))
-    phase = mean_of_cycles(
-        f"phase of friction behind velocity at {1 / length:.3g} Hz", each, unit="rad", method="fundamentals, each cycle"
+    way = np.clip(samples.velocity / (CREEP * np.abs(samples.velocity).max()), -1, 1)
+    velocity, friction, displacement, way = (
+        _folded(values, starts, ends, points)
+        for values in (samples.velocity, samples.friction, samples.displacement, way)
     )
-    visited = np.bincount(samples.block)
-    cycle = np.bincount(samples.block, samples.displacement) / np.maximum(visited, 1)
-    return _Loop(phase, 1 / length, cycle[visited > 0])
+    mean = velocity.mean(axis=0)
+    # against the other cycles' motion, whose noise the friction of a cycle does not share
+    others = (count * mean - velocity) / (count - 1) if count > 1 else velocity
+    each = np.array([_angle(v, f) for v, f in zip(others, friction, strict=True)])
+    middle = _angle(mean, friction.mean(axis=0))
+    phase = mean_of_cycles(
+        f"phase of friction behind velocity at {1 / length:.3g} Hz",
+        middle + np.angle(np.exp(1j * (each - middle))), unit="rad", method="area of the loop, each cycle",
+    )  # fmt: skip
+    # a reversal lies between two samples, and its kink within the blur
+    least = math.hypot(LEAST_PHASE, math.pi / points, BLURRED * math.pi * samples.blur / shortest)
+    return _Loop(_at_least(phase, least), 1 / length, displacement.mean(axis=0), mean, way.mean(axis=0))
 
 
-def _late(value: float, loop: _Loop) -> float:
-    return 2 * math.pi * loop.frequency * value
+def _folded(values: Array, starts: NDArray[np.intp], ends: NDArray[np.intp], points: int) -> Array:
+    """Means over equal parts of each cycle (m, points): a jump inside a part keeps its place."""
+    summed = np.concatenate([[0.0], np.cumsum(values)])
+    edges = np.linspace(starts, ends, points + 1, axis=1)
+    return np.asarray(
+        np.diff(np.interp(edges, np.arange(len(summed)), summed), axis=1) * points / (ends - starts)[:, None]
+    )
 
 
-def _following(value: float, loop: _Loop) -> float:
-    return math.atan(2 * math.pi * loop.frequency * value)
+def _angle(velocity: Array, friction: Array) -> float:
+    """By which friction follows the velocity, of one cycle each."""
+    change = (np.roll(velocity, -1) - np.roll(velocity, 1)) / 2
+    return math.atan2(-float(friction @ change), 2 * math.pi / len(velocity) * float(friction @ velocity))
 
 
-def _giving(value: float, loop: _Loop) -> float:
-    """Phase of an element that gives way over `value` along the loop's displacement, gone through twice."""
+def _at_least(phase: Estimate, sd: float) -> Estimate:
+    """The phase with no narrower an interval than sampling allows."""
+    half = math.hypot(phase.interval[1] - phase.value, NORMAL_95 * sd)
+    return replace(phase, interval=(phase.value - half, phase.value + half), sd=math.hypot(phase.sd, sd))
+
+
+def _late(value: float, loop: _Loop) -> Array:
+    waves = np.fft.rfftfreq(len(loop.way), 1 / len(loop.way))
+    turned = np.exp(-2j * np.pi * loop.frequency * value * waves)
+    return np.asarray(np.fft.irfft(np.fft.rfft(loop.way) * turned, len(loop.way)))
+
+
+def _following(value: float, loop: _Loop) -> Array:
+    waves = np.fft.rfftfreq(len(loop.way), 1 / len(loop.way))
+    lag = 1 + 2j * np.pi * loop.frequency * value * waves
+    return np.asarray(np.fft.irfft(np.fft.rfft(loop.way) / lag, len(loop.way)))
+
+
+def _giving(value: float, loop: _Loop) -> Array:
+    """An element that gives way over `value` along the loop's displacement, gone through twice."""
     x = loop.displacement
-    v = np.roll(x, -1) - np.roll(x, 1)
-    y = deflections(np.tile(x, 2), np.array([value]))[len(x) :, 0]
-    turned = np.exp(-2j * np.pi * np.arange(len(y)) / len(y))
-    return float(np.angle(np.sum(turned * v) * np.conj(np.sum(turned * y))))
+    return deflections(np.tile(x, 2), np.array([value]))[len(x) :, 0]
 
 
-FOLLOWS: dict[str, tuple[Callable[[float, _Loop], float], str, str]] = {
+FOLLOWS: dict[str, tuple[Callable[[float, _Loop], Array], str, str]] = {
     "time delay": (_late, "delay of all friction", "s"),
     "state variable": (_following, "time constant of the friction", "s"),
     "way": (_giving, "give of the contact", "m"),
@@ -209,7 +250,7 @@ def _fitted(kind: str, loops: list[_Loop]) -> tuple[Estimate | None, float]:
 
     def misfit(logs: Array) -> Array:
         value = math.exp(float(np.clip(logs[0], -FAR, FAR)))
-        return np.asarray(np.array([follows(value, loop) for loop in loops]) / sds)
+        return np.asarray(np.array([_angle(loop.velocity, follows(value, loop)) for loop in loops]) / sds)
 
     grid = np.log(scale * np.geomspace(1e-5, 0.99, LAGS))
     start = min(grid, key=lambda log: float(np.sum((phases / sds - misfit(np.array([log]))) ** 2)))
@@ -228,7 +269,7 @@ def _fitted(kind: str, loops: list[_Loop]) -> tuple[Estimate | None, float]:
 
 def _sd(loop: _Loop) -> float:
     half = (loop.phase.interval[1] - loop.phase.interval[0]) / 2 / NORMAL_95
-    return math.hypot(half if math.isfinite(half) else 0.0, LEAST_PHASE)
+    return half if math.isfinite(half) else LEAST_PHASE
 
 
 def _rotation(loops: list[_Loop]) -> str:
@@ -277,6 +318,13 @@ def _chance(misfit: float, freedom: int) -> float:
 
 def _status(loops: list[_Loop], memory: str) -> str:
     words = [loop.phase.status for loop in loops if loop.phase.status != "ok"][:1]
+    for loop in loops:
+        stuck = float(np.mean(np.abs(loop.way) < HALF))
+        if stuck > STICKS:
+            words.append(
+                f"at {loop.frequency:.3g} Hz the contact rests {stuck:.0%} of the time, in which no memory shows: "
+                "records in which it slides all the time tell more"
+            )
     if memory == "undecided" and len(loops) > 1 and _reach(loops) >= FURTHEST:
         words.append("give records of higher frequencies, where the memories part")
     return "; ".join(words) or "ok"
