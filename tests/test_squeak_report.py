@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -207,6 +208,112 @@ def test_several_records_are_compared(tmp_path: Path) -> None:
     assert rows["wet_6.13.csv"]["normal"] == 6.13
     assert rows["wet_6.13.csv"]["count"] > 5 > rows["wet_1.23.csv"]["count"] == 0
     assert (tmp_path / "out" / "figures" / "0-2-conditions-compared-conditions.svg").exists()
+
+
+# ---- a seal: friction that grows with the pressure
+
+
+RANGES = {1: 7.83, 3: 10.88, 5: 13.83}  # N, twice the friction's level, by bar
+
+
+@pytest.fixture
+def seal(dataset: Callable[[str], Path]) -> dict[int, ss.Record]:
+    """The loops under each pressure: friction is the force less the pressure on the rod, dropped samples filled in."""
+    area = np.pi * (0.0250 / 2) ** 2
+    channels = {"x": "#5 [mm]", "pressure": "#6 [bar]", "friction": f"(#7 - #6 * 1e5 * {area}) [N]"}
+    folder = dataset("rubber_seal")
+    return {
+        bar: ss.fill_missing(
+            ss.fill_gaps(
+                ss.read_record(folder / f"O-ring_{bar}bar.csv", channels=channels, time="#1 [ms]", rows=(15, None))
+            )
+        )
+        for bar in RANGES
+    }
+
+
+def test_a_rubber_seals_friction_and_its_rise_with_the_pressure(seal: dict[int, ss.Record]) -> None:
+    levels = {bar: ss.fit_curve(record, curve="coulomb").parameters["kinetic"] for bar, record in seal.items()}
+    for bar, known in RANGES.items():
+        assert 2 * levels[bar].value == pytest.approx(known, rel=0.03)
+        assert levels[bar].includes(known / 2)
+    pressures = [float(record["pressure"].mean()) / 1e5 for record in seal.values()]  # bar, in the place of a load
+    line = ss.friction_over_load(list(levels.values()), loads=pressures)
+    rise = line.coefficient.scaled(2, "N/bar")
+    assert rise.includes((RANGES[5] - RANGES[1]) / 4)
+    assert rise.value == pytest.approx(1.5, rel=0.05)
+    assert rise.interval[0] > 0
+    assert line.adhesion.interval[0] > 0  # it rubs without pressure too
+    assert [line.friction(p).includes(known / 2) for p, known in zip(pressures, RANGES.values(), strict=True)] == [
+        True
+    ] * 3
+
+
+# ---- bad input
+
+
+def written(place: Path, values: np.ndarray, **options: object) -> Path:
+    path = place / "sound.csv"
+    return ss.write_record(ss.Record.of({"sound": values}, fs=FS, **options), path, overwrite=True)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (np.zeros(5000), "channel sound is silent"),
+        (np.full(5000, 0.3), "channel sound is silent"),
+        (tone()[:200], "the record has 200 samples"),
+        (np.full(5000, np.nan), "5000 values that are not numbers"),
+        (np.where(np.arange(10_000) == 77, np.nan, tone()), "--repair missing"),
+    ],
+    ids=["silent", "constant", "short", "without numbers", "one missing"],
+)
+def test_a_record_that_can_not_be_heard_ends_in_a_sentence(tmp_path: Path, values: np.ndarray, words: str) -> None:
+    result = run(written(tmp_path, values), "--output", tmp_path / "out")
+    assert result.exit_code == 1
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("scale", [1.2, 1.5, 4.0])
+def test_clipped_sound_from_a_file_has_no_level(tmp_path: Path, scale: float) -> None:
+    clipped = np.clip(scale * tone(), -1, 1)
+    ss.write_sound(ss.Record.of({"sound": clipped}, fs=FS), tmp_path / "clipped.wav", full_scale=1.0)
+    bursts = ss.find_squeaks(ss.read_record(tmp_path / "clipped.wav")).bursts
+    assert bursts
+    for burst in bursts:
+        assert np.isnan(burst.level)
+        assert "clipped" in burst.status
+        assert burst.frequency == pytest.approx(500, rel=1e-3)
+
+
+@pytest.mark.parametrize("frequency", [55.0, 440.0, 2000.0])
+def test_a_tone_on_the_steps_of_16_bit_is_not_called_clipped(tmp_path: Path, frequency: float) -> None:
+    wave = np.sin(2 * np.pi * frequency * np.arange(40_000) / 44_100)
+    ss.write_sound(ss.Record.of({"sound": wave}, fs=44_100), tmp_path / "tone.wav", full_scale=1.2)
+    assert np.isfinite(ss.find_squeaks(ss.read_record(tmp_path / "tone.wav")).bursts[0].level)
+
+
+def test_channels_at_different_rates_are_refused(tmp_path: Path) -> None:
+    sound = written(tmp_path, tone())
+    ss.write_record(ss.Record.of({"x": np.sin(np.arange(1000.0))}, fs=1000), tmp_path / "motion.csv")
+    result = run(f"{sound}+{tmp_path / 'motion.csv'}", "--output", tmp_path / "out")
+    assert result.exit_code == 1
+    assert "share one clock" in result.stderr
+
+
+def test_a_burst_cut_by_the_end_is_said_on_the_page(tmp_path: Path) -> None:
+    result = run(written(tmp_path, tone()[:5500]), "--output", tmp_path / "out")
+    assert "cut by the end of the record" in result.output
+    assert "can not be told" in result.output.splitlines()[2]
+    assert "cut by the end of the record" in (tmp_path / "out" / "report.html").read_text("utf-8")
+
+
+def test_reversals_of_dry_friction_are_no_creak() -> None:
+    t = np.arange(20_000) / FS
+    record = ss.Record.of({"x": 0.01 * np.sin(10 * np.pi * t), "friction": np.sign(np.cos(10 * np.pi * t))}, fs=FS)
+    assert not ss.find_squeaks(record).of("creak")
 
 
 def test_json_alone_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -216,6 +216,12 @@ if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory as Trajectory
     from stickslip.squeak.bursts import Squeak as Squeak, Squeaks as Squeaks, find_squeaks as find_squeaks
     from stickslip.squeak.spectra import BurstSpectra as BurstSpectra, burst_spectra as burst_spectra
+    from stickslip.squeak.quality import (
+        Impulsiveness as Impulsiveness,
+        SoundQuality as SoundQuality,
+        impulsiveness as impulsiveness,
+        sound_quality as sound_quality,
+    )
     from stickslip.squeak.listening import Clip as Clip, burst_clips as burst_clips, write_sound as write_sound
     from stickslip.analysis.squeaks import SqueakFindings as SqueakFindings, analyze_squeaks as analyze_squeaks
     from stickslip.analysis.squeak_comparison import (
@@ -313,6 +319,8 @@ _ROOMS = {
     "sweep": "sweeps.sweep",
     "squeak_rig": "squeak.virtual_rig", "sound_pressure": "squeak.sound", "squeak_record": "squeak.sound",
     "find_squeaks": "squeak.bursts", "Squeaks": "squeak.bursts", "Squeak": "squeak.bursts",
+    "sound_quality": "squeak.quality", "SoundQuality": "squeak.quality",
+    "impulsiveness": "squeak.quality", "Impulsiveness": "squeak.quality",
     "burst_spectra": "squeak.spectra", "BurstSpectra": "squeak.spectra",
     "burst_clips": "squeak.listening", "Clip": "squeak.listening", "write_sound": "squeak.listening",
     "analyze_squeaks": "analysis.squeaks", "SqueakFindings": "analysis.squeaks",

@@ -17,6 +17,7 @@ from stickslip.identify.loops import Loops, friction_loops
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import HEARD, Squeak, Squeaks, find_squeaks
 from stickslip.squeak.coupling import Coupling, coupling
+from stickslip.squeak.quality import Impulsiveness, SoundQuality, impulsiveness, sound_quality
 from stickslip.squeak.spectra import BurstSpectra, burst_spectra
 from stickslip.statistics import mean_of_cycles
 from stickslip.units import parse_value
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 Answer = TypeVar("Answer")
 
 UNTOLD = "no slope can be told"  # in the status of a slope that the motion does not tell
+HEARD_AT_ONCE = 5.0  # s
 VIBRATING = (*HEARD, "torsion_velocity", "load")
 
 
@@ -50,6 +52,10 @@ class SqueakFindings(Result):
         In the bursts and outside of them.
     coupling : Coupling or None
         Which motions move together in squeaks.
+    quality : SoundQuality or None
+        How loud, sharp and rough a calibrated sound is heard; of a long one, five seconds about its loudest burst.
+    impulses : Impulsiveness or None
+        How much it is made of pulses.
     loops : Loops or None
         Friction over the forcing cycle: its level, and its slope against speed.
     normal : float or None
@@ -67,6 +73,8 @@ class SqueakFindings(Result):
     beside: tuple[Squeaks, ...] = ()
     spectra: BurstSpectra | None = None
     coupling: Coupling | None = None
+    quality: SoundQuality | None = None
+    impulses: Impulsiveness | None = None
     loops: Loops | None = None
     normal: float | None = None
     notes: tuple[str, ...] = ()
@@ -127,6 +135,8 @@ class SqueakFindings(Result):
                 each.channel: {"kind": each.kind, "squeaks": len(each.of("squeak", "squeal"))} for each in self.beside
             },
             "coupling": None if self.coupling is None else self.coupling.to_dict(),
+            "sound_quality": None if self.quality is None else self.quality.to_dict(),
+            "impulses": None if self.impulses is None else self.impulses.to_dict(),
             "estimates": [each.to_dict() for each in self.estimates],
             "faults": [str(fault) for fault in self.faults],
             "notes": list(self.notes),
@@ -204,6 +214,8 @@ def analyze_squeaks(
         beside=tuple(each for each in beside if each is not None),
         spectra=ask("Spectra", lambda: burst_spectra(record, squeaks=squeaks)) if squeaks.bursts else None,
         coupling=ask("Coupling", lambda: coupling(record, squeaks=squeaks)) if squeaks.squeaking else None,
+        quality=_quality(record, squeaks, ask, notes),
+        impulses=ask("Pulses", partial(impulsiveness, record, channel=squeaks.channel)),
         loops=loops,
         normal=_normal(record, normal),
         notes=tuple(notes),
@@ -213,6 +225,22 @@ def analyze_squeaks(
             **({"contact": contact} if contact else {}),
         },
     )
+
+
+def _quality(
+    record: Record, squeaks: Squeaks, ask: Callable[[str, Callable[[], SoundQuality]], SoundQuality | None],
+    notes: list[str],
+) -> SoundQuality | None:  # fmt: skip
+    """Of a calibrated sound; of a long one, about its loudest burst: the method takes as long as the sound."""
+    if record.channels[squeaks.channel].unit != "Pa" or not squeaks.bursts:
+        return None
+    if record.duration > HEARD_AT_ONCE:
+        loudest = max(squeaks.bursts, key=lambda each: np.nan_to_num(each.level, nan=-math.inf))
+        end = record.start + record.duration
+        begin = min(max(record.start, loudest.start - HEARD_AT_ONCE / 2), end - HEARD_AT_ONCE)
+        record = record.between(begin, begin + HEARD_AT_ONCE)
+        notes.append(f"Loudness, sharpness and roughness are those of {begin:.4g} to {begin + HEARD_AT_ONCE:.4g} s.")
+    return ask("Loudness, sharpness and roughness", lambda: sound_quality(record, channel=squeaks.channel))
 
 
 def trend_of(slope: Estimate | None) -> str:

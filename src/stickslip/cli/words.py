@@ -21,7 +21,10 @@ _SPOKEN = (
     (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
     (r'\bfriction_force\(record, \.\.\., method="(\w+)"\)', r"--method \1"),
-    (r"\b(channels|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness)=(?=\W|$)", r"--\1"),
+    (
+        r"\b(channels|channel|frequencies|normal|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness)=(?=\W|$)",
+        r"--\1",
+    ),
 )
 
 

@@ -25,7 +25,10 @@ def headline(found: SqueakFindings) -> Iterator[str]:
     if not squeaks.bursts:
         yield f"Nothing sounds{where}: no burst in {record.duration:.4g} s."
         return
-    if not heard:
+    untold = [burst for burst in squeaks.bursts if burst.kind == "tonal" and burst.friction == "not told"]
+    if not heard and untold:
+        yield f"Whether it squeaks{where} can not be told: {_counted(squeaks.bursts)}, {len(untold)} of them tonal."
+    elif not heard:
         yield f"No squeak{where}. {_counted(squeaks.bursts)}, {WORDS[squeaks.kind]} for most of the time."
     elif found.frequency is not None:
         word = "squeals" if len(squeaks.of("squeal")) > len(squeaks.of("squeak")) else "squeaks"
@@ -89,8 +92,8 @@ def burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
     squeaks = found.squeaks
     moves, calibrated = not math.isnan(squeaks.forcing), any(not math.isnan(b.weighted_level) for b in squeaks.bursts)
     headings = [
-        "", "begins [s]", "lasts [s]", "kind", "[Hz]", "[dB]", *(["[dB(A)]"] if calibrated else []), "tonal",
-        *(["phase", "[m/s]"] if moves else []), "friction",
+        "", "begins [s]", "lasts [s]", "kind", "Hz", "dB", *(["dB(A)"] if calibrated else []), "tonal",
+        *(["phase", "m/s"] if moves else []), "friction",
     ]  # fmt: skip
     rows = []
     for place, burst in enumerate(squeaks.bursts[:MOST]):
@@ -102,6 +105,30 @@ def burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
             *([_or_none(burst.phase, ".2f"), _or_none(burst.speed, ".3f")] if moves else []), burst.friction,
         ])  # fmt: skip
     return headings, rows
+
+
+def hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each measure of how it is heard."""
+    rows, quality, impulses = [], found.quality, found.impulses
+    if quality is not None:
+        rows += [
+            ["loudness N5", f"{quality.loudness:.3g} sone", "exceeded 5 % of the time; Zwicker, ISO 532-1, free field"],
+            ["sharpness", f"{quality.sharpness:.3g} acum", "of the mean specific loudness; weighting of DIN 45692"],
+            ["roughness", _or_none(quality.roughness, ".3g") + " asper", "Daniel and Weber, mean of windows of 0.2 s"],
+        ]
+    if impulses is not None:
+        rows += [
+            ["crest factor", f"{impulses.crest_factor:.3g}", "largest magnitude over RMS; 1.41 of a sine"],
+            ["kurtosis", f"{impulses.kurtosis:.3g}", "3 of normal noise, 1.5 of a sine, large of pulses"],
+            ["pulses", f"{impulses.rate:.3g} in a second", "maxima in windows of 2 ms, 10 dB over the median level"],
+        ]
+    return ["", "value", "what it is"], rows
+
+
+def hearing_note(found: SqueakFindings) -> str:
+    """By what, and that no conformity is claimed."""
+    by = "" if found.quality is None else f"Loudness, sharpness and roughness by {found.quality.method}. "
+    return f"{by}No conformity to a standard is claimed; the pulses follow none."
 
 
 def coupling_table(joined: Coupling) -> tuple[Sequence[str], list[list[str]]]:
@@ -138,7 +165,7 @@ def _pair(pair: Pair) -> list[str]:
 
 def condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each condition."""
-    headings = ["condition", "load", "driven", "friction", "slope against speed (95 %)", "squeaks", "[Hz]", "[dB]"]
+    headings = ["condition", "load", "driven", "friction", "slope against speed (95 %)", "squeaks", "Hz", "dB"]
     return headings, [_condition(each) for each in comparison.conditions]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
 from stickslip.record.record import Record
-from stickslip.squeak.hearing import Hearing, Span, filtered, pulse_train
+from stickslip.squeak.hearing import Hearing, Span, clipped_rows, filtered, pulse_train
 from stickslip.squeak.sound import REFERENCES, level
 
 Array = NDArray[np.float64]
@@ -31,6 +30,8 @@ QUIET = 45.0  # dB re 20 uPa: less is not heard beside a running rig
 RINGS = 30.0  # cycles around a burst that a filter about its tone needs
 PARTIALS = 0.1  # of the power in steady lines
 RISEN = 0.1  # of the largest sliding speed: slower is no sliding
+ALIKE = 0.1  # of a rate: two that differ by less are the same
+TANGENTIAL = ("a", "v", "x", "friction", "load", "force")  # channels in which dry friction jumps at every reversal
 FRICTION = ("squeak", "squeal", "creak", "scrape")
 WORDS = {
     "squeak": "intermittent and tonal", "squeal": "sustained and tonal", "creak": "a train of stick-slip pulses",
@@ -233,8 +234,7 @@ def find_squeaks(
     hearing = Hearing.of(values, record.fs, (low, high), span)
     motion = ForcedMotion.of(record)
     unit = record.channels[name].unit
-    clipped = [fault.rows for fault in record.check() if (fault.kind, fault.channel) == ("clipped", name)]
-    listener = _Listener(record, name, hearing, motion, list(itertools.chain(*clipped)))
+    listener = _Listener(record, name, hearing, motion, clipped_rows(record, name))
     bursts = sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start)
     return Squeaks(
         tuple(bursts), name, _reference(unit), motion.frequency, record, tuple(listener.notes(unit)), (low, high)
@@ -366,6 +366,8 @@ class _Listener:
         )
 
     def _broad(self, part: Span, rate: float, slides: bool) -> tuple[str, str, str]:
+        if not math.isnan(rate) and self.name in TANGENTIAL and self._at_reversals(rate):
+            return "noise", "no", f"its {rate:.3g} jumps in a second are the reversals of the motion"
         if not math.isnan(rate):
             words = f"pulses follow each other at even intervals, {rate:.3g} in a second, as in stick-slip"
             return "creak", "shown" if slides else "likely", words
@@ -377,6 +379,10 @@ class _Listener:
             return "noise", "not told", "broad band from end to end: what makes it can not be told"
         words = "broad band, and it begins and ends; of sound alone it can not be told whether anything rubs"
         return "scrape", "not told", words
+
+    def _at_reversals(self, rate: float) -> bool:
+        """Whether pulses come once or twice in a forcing cycle, as the jumps of dry friction do."""
+        return any(abs(rate / (turns * self.motion.frequency) - 1) < ALIKE for turns in (1, 2))
 
     def _modulation(self, part: Span) -> float:
         """Amplitude of the friction force about the tone, over the friction's level."""
@@ -403,7 +409,9 @@ class _Listener:
 
     def notes(self, unit: str) -> list[str]:
         told = []
-        if unit not in REFERENCES:
+        if unit not in ("1", *REFERENCES):
+            told.append(f"Levels of channel {self.name} are re 1 {unit}: it is neither a sound nor a vibration.")
+        if unit == "1":
             told.append(
                 f"Channel {self.name} is not calibrated: its levels are relative to 1, and no sound pressure level is "
                 'told; state its sensitivity when reading, as in channels={"sound": "sound * 2.5 [Pa]"}.'
@@ -422,4 +430,5 @@ def chosen_channel(record: Record, channel: str | None) -> str:
 
 
 def _reference(unit: str) -> str:
-    return {"Pa": "20 uPa", "m/s^2": "1 um/s^2", "m/s": "1 nm/s", "N": "1 uN"}.get(unit, "1")
+    named = {"Pa": "20 uPa", "m/s^2": "1 um/s^2", "m/s": "1 nm/s", "N": "1 uN", "1": "1"}
+    return named.get(unit, f"1 {unit}")

@@ -10,6 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.record.check import find_clipping
+from stickslip.record.record import Record
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -31,6 +34,8 @@ PULSES, SLIM = 8, 0.5  # pulses at least, and their width against their interval
 WIDE, BROAD = 3.0, 0.3  # rates, and share of the middle frequency, that a pulse's spectrum is wide: beats are narrow
 STEADY = 5  # frames of the median that a level is taken over: no dip of two frames cuts a burst
 STILL = 0.4  # s: the window in which steady partials are told from each other
+FORCES = ("N", "N m")
+HELD, LEAP = 3, 1e-3  # samples at the extreme, how often, and the jump beside them, of the span
 TONAL = 0.5  # of a stretch that tones fill
 
 
@@ -211,11 +216,11 @@ class Hearing:
 
 def pulse_train(values: Array, fs: float) -> float:
     """Rate [Hz] of pulses that follow each other at intervals that change slowly; NaN where they do not."""
-    from scipy.signal import find_peaks, hilbert, peak_widths
+    from scipy.signal import find_peaks, peak_widths
 
     if len(values) < 64:
         return math.nan
-    level = _decibel(_smooth(np.abs(hilbert(values)) ** 2, max(3, round(PULSE * fs))))
+    level = short_time_level(values, fs)
     peaks, _ = find_peaks(level, prominence=DEEP, height=level.max() - AUDIBLE)
     if len(peaks) < PULSES:
         return math.nan
@@ -227,6 +232,39 @@ def pulse_train(values: Array, fs: float) -> float:
     low, middle, high = np.searchsorted(share, np.array([0.1, 0.5, 0.9]) * share[-1]) * fs / len(values)
     broad = high - low > max(WIDE * rate, BROAD * middle)
     return rate if broad and np.median(change) < APART and width < SLIM else math.nan
+
+
+def clipped_rows(record: Record, channel: str) -> list[tuple[int, int]]:
+    """First and last rows of what stands at the end of its sensor's range.
+
+    As :meth:`Record.check` finds it; and, since a sound has no plateaus by nature, wherever its extreme is held three
+    times for three samples, each entered and left with a jump. A friction force has plateaus, and is not asked.
+    """
+    if record.channels[channel].unit in FORCES:
+        return []
+    values = record[channel]
+    fault = find_clipping(record, channel)
+    return [*(() if fault is None else fault.rows), *_cut_tops(values), *_cut_tops(-values)]
+
+
+def _cut_tops(values: Array) -> list[tuple[int, int]]:
+    top, span = float(values.max()), float(np.ptp(values))
+    runs = _runs(values == top)
+    edges = [
+        (values[first - 1], values[last])
+        for first, last in runs
+        if last - first >= HELD and 0 < first < last < len(values)
+    ]
+    if len(edges) < HELD or top - float(np.median(edges)) < LEAP * span:
+        return []
+    return [(first, last - 1) for first, last in runs]
+
+
+def short_time_level(values: Array, fs: float) -> Array:
+    """Level in windows as short as a pulse [dB]."""
+    from scipy.signal import hilbert
+
+    return _decibel(_smooth(np.abs(hilbert(values)) ** 2, max(3, round(PULSE * fs))))
 
 
 def filtered(values: Array, fs: float, band: tuple[float, float]) -> Array:
