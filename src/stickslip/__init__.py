@@ -106,10 +106,16 @@ if TYPE_CHECKING:
         bifurcation as bifurcation,
     )
     from stickslip.regimes.boundary import Boundary as Boundary, boundary as boundary
+    from stickslip.regimes.dither import (
+        Dither as Dither,
+        dither as dither,
+        dithered_friction as dithered_friction,
+    )
     from stickslip.plot.bifurcation import (
         plot_basins as plot_basins,
         plot_bifurcation as plot_bifurcation,
         plot_boundary as plot_boundary,
+        plot_dither as plot_dither,
     )
     from stickslip.reports.fit import (
         fit_numbers as fit_numbers,
@@ -346,7 +352,9 @@ _ROOMS = {
     "bifurcation": "regimes.bifurcation", "Bifurcation": "regimes.bifurcation", "Change": "regimes.bifurcation",
     "basins": "regimes.basins", "Basins": "regimes.basins", "Attractor": "regimes.attractor",
     "boundary": "regimes.boundary", "Boundary": "regimes.boundary",
+    "dither": "regimes.dither", "Dither": "regimes.dither", "dithered_friction": "regimes.dither",
     "plot_bifurcation": "plot.bifurcation", "plot_basins": "plot.bifurcation", "plot_boundary": "plot.bifurcation",
+    "plot_dither": "plot.bifurcation",
     "Rig": "rig", "Sensor": "rig", "Mount": "rig", "Noise": "rig", "Digitiser": "rig",
     "scenarios": "scenarios", "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
     "outcome": "reports.simulation", "Outcome": "reports.simulation", "publish_run": "reports.simulation",

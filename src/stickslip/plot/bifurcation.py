@@ -20,16 +20,19 @@ from stickslip.plot.style import (
     PURPLE,
     SHADE,
     SKY,
+    WIDTH,
     axes_of,
     axis_label,
     new_figure,
     prefixed,
+    spelled,
     styled,
 )
 from stickslip.regimes.attractor import Attractor
 from stickslip.regimes.basins import Basins
 from stickslip.regimes.bifurcation import Bifurcation
 from stickslip.regimes.boundary import Boundary
+from stickslip.regimes.dither import Dither, dithered_friction
 from stickslip.solve.automaton import Array, System
 
 if TYPE_CHECKING:
@@ -266,7 +269,62 @@ def _force(system: Oscillator) -> float:
     return amplitude * (system.stiffness if type(system.drive).__name__ == "HarmonicBase" else 1.0)
 
 
-def plates_of(result: Bifurcation | Basins | Boundary) -> tuple[Plate, ...]:
+@styled
+def plot_dither(found: Dither) -> Figure:
+    """How the longest stick goes down with the dither, and what the dither makes of the friction.
+
+    Parameters
+    ----------
+    found : Dither
+        What :func:`stickslip.dither` returned.
+
+    Returns
+    -------
+    Figure
+        The longest stick in periods of the dither over its amplitude (top), and the mean friction over the sliding
+        speed, with the averaged law (bottom).
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(1, 1, ss.Coulomb(1.0, static=1.5), ss.Belt(0.5), damping=0.02)
+    >>> len(plot_dither(ss.dither(slider, frequency=5.0)).axes)
+    2
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
+
+    figure = Figure(figsize=(WIDTH, 4.8), layout="constrained")
+    top, bottom = figure.subplots(2, 1)
+    factor, unit = prefixed(found.scan[:, 0], found.amplitude.unit)
+    sticks = found.scan[:, 1] * found.frequency
+    least = 0.3 * min(1.0, np.min(sticks[sticks > 0], initial=1.0))
+    top.loglog(factor * found.scan[:, 0], np.maximum(sticks, least), ".", color=BLUE, label="exact runs")
+    for axis in (top.xaxis, top.yaxis):
+        low, high = axis.get_view_interval()
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("{x:g}" if high < 10 * low else NullFormatter())
+    top.axhline(1.0, color=INK, linewidth=0.8)
+    top.axvline(factor * found.amplitude.value, color=ORANGE, linestyle="--",
+                label=f"smallest that does it: {factor * found.amplitude.value:.3g} {spelled(unit)}")  # fmt: skip
+    if np.any(sticks == 0):
+        top.text(0.99, 0.04, "lowest row: no stick at all", transform=top.transAxes, ha="right", fontsize=7)
+    top.set_xlabel(axis_label(f"dither of {found.frequency:.4g} Hz on the {found.on}", unit))
+    top.set_ylabel("longest stick\n[periods of the dither]")
+    top.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2, borderaxespad=0.2)
+    shares = np.linspace(0, 1, 200)
+    bottom.plot(shares, dithered_friction(shares, speed=1.0), color=ORANGE, label="(2/pi) asin(v/aw)")
+    for column, colour, words in ((2, BLUE, "exact runs with this dither"), (3, GREEN, "with ten times as much")):
+        bottom.plot(found.averaged[:, 0], found.averaged[:, column], "o", color=colour, markersize=4, label=words)
+    bottom.axhline(1.0, color=FAINT, linewidth=0.8)
+    bottom.set_xlabel("sliding speed over that of the dither, v/aw")
+    bottom.set_ylabel("mean friction\nover sliding friction")
+    bottom.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=3, borderaxespad=0.2)
+    figure.align_ylabels([top, bottom])
+    return figure
+
+
+def plates_of(result: Bifurcation | Basins | Boundary | Dither) -> tuple[Plate, ...]:
     """The figure of one result, with its words."""
     drawn: Any
     if isinstance(result, Bifurcation):
@@ -278,6 +336,13 @@ def plates_of(result: Bifurcation | Basins | Boundary) -> tuple[Plate, ...]:
     elif isinstance(result, Basins):
         drawn, name, title = plot_basins(result), "basins", "Which start leads where"
         words = "Each start in the colour of the motion it leads to; crosses: where that motion is at phase zero."
+    elif isinstance(result, Dither):
+        drawn, name, title = plot_dither(result), "dither", "What dither does"
+        words = (
+            "Top: the longest stick left; below the line none outlasts a period of the dither. Bottom: the friction "
+            "left on average, and what the averaged law says; where they part, friction moves the mass in a period, "
+            "or the contact gives way."
+        )
     else:
         drawn, name, title = plot_boundary(result), "boundary", "Where the kind of motion changes"
         words = "Points: found by bisection of exact runs. Line: the closed form."

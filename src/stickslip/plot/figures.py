@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from stickslip.regimes.basins import Basins
     from stickslip.regimes.bifurcation import Bifurcation
     from stickslip.regimes.boundary import Boundary
+    from stickslip.regimes.dither import Dither
     from stickslip.solve.trajectory import Trajectory
 
 
@@ -51,17 +52,18 @@ def figures(
     | Trajectory
     | Bifurcation
     | Basins
-    | Boundary,
+    | Boundary
+    | Dither,
 ) -> tuple[Plate, ...]:
     """The figures that show a result, in reading order.
 
     Parameters
     ----------
     result : Findings, Comparison, DecayFindings, DecayComparison, TimeFrequency, SqueakFindings, SqueakComparison, \
-            Trajectory, Bifurcation, Basins or Boundary
+            Trajectory, Bifurcation, Basins, Boundary or Dither
         What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`compare_decays`, :func:`time_frequency`,
-        :func:`analyze_squeaks`, :func:`compare_squeaks`, :func:`simulate`, :func:`bifurcation`, :func:`basins` or
-        :func:`boundary` returned.
+        :func:`analyze_squeaks`, :func:`compare_squeaks`, :func:`simulate`, :func:`bifurcation`, :func:`basins`,
+        :func:`boundary` or :func:`dither` returned.
 
     Returns
     -------
