@@ -100,6 +100,25 @@ def test_a_grid_of_rest_is_known_in_closed_form() -> None:
     assert np.all(stay[np.abs(x) <= 0.4 - 1e-9])
 
 
+def test_a_start_that_can_not_be_followed_costs_no_map() -> None:
+    """A start under a negative load meets transitions that chase each other; the other starts are answered."""
+    found = ss.basins(ss.scenarios.get("FM-1").system, grid={"x": [-1.0, 0.5], "v": [0.5, 1.0]}, transient=20)
+    assert [sentence[:16] for sentence in found.lost] == ["x = -1, v = 0.5:"]
+    assert found.which[0, 0] == -1
+    assert np.all(found.which[1] >= 0)
+    assert "could not be followed" in repr(found)
+
+
+def test_micro_slips_go_one_by_one_as_the_contact_is_damped() -> None:
+    """Contact damping at which two micro-slips a stick become one, and none (thesis's case of 2.5 Hz, by bisection)."""
+    contact = ss.CompliantContact(1.1, stiffness=192000.0, damping=23.9)
+    rig = ss.Oscillator(2.42, 2310, contact, ss.HarmonicBase(0.65e-3, frequency=2.5))
+    two = ss.boundary(rig, "law.damping", between=(50.0, 138.5), kind="regime", precision=1e-5)
+    none = ss.boundary(rig, "law.damping", between=(200.0, 350.0), kind="regime", precision=1e-5)
+    assert two.value == pytest.approx(138.07, abs=0.15)
+    assert none.value == pytest.approx(298.35, abs=0.15)
+
+
 def test_several_turns_of_an_orbit_are_one() -> None:
     """Near resonance Newton's method closes three and four turns of it before one; they are the same orbit."""
     orbits = [ss.steady_state(forced(0.99, 0.789305), start={"x": x}) for x in (0.0, 10.0, 30.0)]
@@ -152,12 +171,16 @@ def test_other_questions_have_boundaries_too() -> None:
         (lambda: ss.basins(BISTABLE.having(drive=ss.Release()), grid={"x": [0, 1], "v": [0, 1]}), "Release"),
         (lambda: ss.basins(BISTABLE, grid={"x": [0, 1]}), "two start coordinates"),
         (lambda: ss.basins(BISTABLE, grid={"x": [0, 1], "v": [0]}), "two different finite values"),
+        (lambda: ss.bifurcation(BISTABLE, "amplitude", values=["much"]), "made of numbers"),
         (lambda: ss.basins(BISTABLE, grid={"x": [0, 1], "q": [0, 1]}), "'q'"),
         (lambda: ss.boundary(BISTABLE, "kinetc", between=(0.1, 0.2)), "kinetic"),
         (lambda: ss.boundary(BISTABLE, "kinetic", between=(0.2, 0.2)), "two different values"),
         (lambda: ss.boundary(forced(0.8, 0.5), "kinetic", between=(0.1, 0.2)), "widen between="),
         (lambda: ss.boundary(BISTABLE, "kinetic", between=(0.1, 0.2), kind="colour"), "sticking"),
-        (lambda: ss.boundary(BISTABLE, "kinetic", between=(0.1, 0.2), along={"frequency": [1.0]}), "two finite values"),
+        (
+            lambda: ss.boundary(BISTABLE, "kinetic", between=(0.1, 0.2), along={"frequency": [1.0]}),
+            "two different finite values",
+        ),
     ],
 )
 def test_bad_questions_are_refused_in_a_sentence(ask, told) -> None:  # type: ignore[no-untyped-def]

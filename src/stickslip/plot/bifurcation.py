@@ -169,8 +169,9 @@ def plot_basins(found: Basins, *, ax: Axes | None = None) -> Axes:
     down_factor, down_unit = prefixed(columns, _UNITS.get(across[0], "1"))
     count = len(found.attractors)
     colours = [COLOURS[j % len(COLOURS)] for j in range(count)]
+    known = np.ma.masked_less(found.which.T, 0)
     ax.pcolormesh(
-        across_factor * rows, down_factor * columns, found.which.T, cmap=ListedColormap(colours), vmin=-0.5,
+        across_factor * rows, down_factor * columns, known, cmap=ListedColormap(colours), vmin=-0.5,
         vmax=count - 0.5, alpha=0.55, shading="nearest", rasterized=True, linewidth=0,
     )  # fmt: skip
     ax.grid(visible=False)
@@ -299,7 +300,13 @@ def plot_dither(found: Dither) -> Figure:
     factor, unit = prefixed(found.scan[:, 0], found.amplitude.unit)
     sticks = found.scan[:, 1] * found.frequency
     least = 0.3 * min(1.0, np.min(sticks[sticks > 0], initial=1.0))
-    top.loglog(factor * found.scan[:, 0], np.maximum(sticks, least), ".", color=BLUE, label="exact runs")
+    top.loglog(
+        factor * found.scan[:, 0],
+        np.where(np.isfinite(sticks), np.maximum(sticks, least), np.nan),
+        ".",
+        color=BLUE,
+        label="exact runs",
+    )
     for axis in (top.xaxis, top.yaxis):
         low, high = axis.get_view_interval()
         axis.set_major_formatter("{x:g}")

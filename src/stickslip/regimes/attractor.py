@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stickslip.errors import ModelError
 from stickslip.parameters import PARTS
@@ -157,3 +158,16 @@ def require_number(parameter: str) -> None:
     """Refuse a part where a number is wanted."""
     if parameter.rpartition(".")[2] in PARTS:
         raise ModelError(f"'{parameter}' is a part", "one number is varied", "name what varies in it, as kinetic")
+
+
+def numbers(name: str, values: ArrayLike) -> Array:
+    """Different finite numbers, sorted; at least two."""
+    try:
+        found = np.unique(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError) as no_numbers:
+        raise ModelError(f"{name} = {values!r}", "a range is made of numbers", "give numbers") from no_numbers
+    if len(found) < 2 or not np.all(np.isfinite(found)):
+        raise ModelError(
+            f"{name} = {found.tolist()}", "a range has two different finite values at least", "give more"
+        )  # fmt: skip
+    return found

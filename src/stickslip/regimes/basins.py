@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.errors import ModelError
+from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.record.exchange import labelled_arrays
-from stickslip.regimes.attractor import Attractor, Start, as_start, require_period, same, settled
+from stickslip.regimes.attractor import Attractor, Start, as_start, numbers, require_period, same, settled
 from stickslip.solve.automaton import Array, System
 from stickslip.solve.poincare import Table, end_of, extent, lap, tables
 from stickslip.solve.simulate import opening
@@ -38,9 +38,11 @@ class Basins:
     attractors : tuple of Attractor
         The motions, that of most starts first.
     which : ndarray (n, m)
-        Number of the attractor to which each start leads; the first coordinate runs down the rows.
+        Number of the attractor to which each start leads; the first coordinate runs down the rows. -1: not followed.
     shares : tuple of Estimate
         Share of the starts that lead to each.
+    lost : tuple of str
+        Why starts could not be followed, a sentence for each.
     """
 
     names: tuple[str, str]
@@ -48,6 +50,7 @@ class Basins:
     attractors: tuple[Attractor, ...]
     which: NDArray[np.int64]
     shares: tuple[Estimate, ...]
+    lost: tuple[str, ...]
 
     @property
     def data(self) -> xr.DataArray:
@@ -68,7 +71,8 @@ class Basins:
 
     def __repr__(self) -> str:
         head = f"Basins({' x '.join(self.names)}, {' x '.join(map(str, self.which.shape))} starts)"
-        return "\n  ".join([head, *map(str, self.shares)])
+        told = [f"{len(self.lost)} starts could not be followed"] if self.lost else []
+        return "\n  ".join([head, *map(str, self.shares), *told])
 
 
 def basins(
@@ -105,6 +109,8 @@ def basins(
     ------
     ModelError
         The grid has no meaning, or the drive does not repeat.
+    SolveError
+        No start could be followed.
 
     Examples
     --------
@@ -119,24 +125,30 @@ def basins(
     names, axes = _axes(grid)
     table = tables(system)
     found: list[Attractor] = []
-    which = np.empty((len(axes[0]), len(axes[1])), dtype=np.int64)
+    lost: list[str] = []
+    which = np.full((len(axes[0]), len(axes[1])), -1, dtype=np.int64)
     for (i, j), _ in np.ndenumerate(which):
         begin = {**(start or {}), names[0]: float(axes[0][i]), names[1]: float(axes[1][j])}
-        which[i, j] = _number(system, table, found, begin, (transient, orders))
-    counts = np.bincount(which.ravel(), minlength=len(found))
+        try:
+            which[i, j] = _number(system, table, found, begin, (transient, orders))
+        except SolveError as stopped:
+            lost.append(f"{names[0]} = {begin[names[0]]:g}, {names[1]} = {begin[names[1]]:g}: {stopped}")
+    if not found:
+        raise SolveError("no start of the grid could be followed", lost[0], "see which motion is meant")
+    counts = np.bincount(which[which >= 0], minlength=len(found))
     order = np.argsort(-counts, kind="stable")
     shares = tuple(_share(found[k].regime, int(counts[k]), which.size) for k in order)
-    return Basins(names, axes, tuple(found[k] for k in order), np.argsort(order)[which], shares)
+    ranks = np.append(np.argsort(order), -1)  # the last for those that were not followed
+    return Basins(names, axes, tuple(found[k] for k in order), ranks[which], shares, tuple(lost))
 
 
 def _axes(grid: Mapping[str, ArrayLike]) -> tuple[tuple[str, str], tuple[Array, Array]]:
-    axes = [np.unique(np.asarray(values, dtype=np.float64)) for values in grid.values()]
-    shapes = {name: len(axis) for name, axis in zip(grid, axes, strict=True)}
-    if len(axes) != 2 or min(shapes.values()) < 2 or not all(np.all(np.isfinite(axis)) for axis in axes):
+    if len(grid) != 2:
         raise ModelError(
-            f"a grid of {shapes}", "two start coordinates with two different finite values each are needed",
+            f"a grid of {', '.join(grid) or 'nothing'}", "two start coordinates are needed",
             'give grid={"x": np.linspace(-1, 1, 50), "v": np.linspace(-1, 1, 50)}',
         )  # fmt: skip
+    axes = [numbers(name, values) for name, values in grid.items()]
     first, second = grid
     return (first, second), (axes[0], axes[1])
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import ModelError
 from stickslip.parameters import find
 from stickslip.record.exchange import labelled_arrays
-from stickslip.regimes.attractor import Attractor, Start, onward, require_number, require_period, same, settled
+from stickslip.regimes.attractor import Attractor, Start, numbers, onward, require_number, require_period, same, settled
 from stickslip.solve.automaton import Array, System
 from stickslip.solve.continuation import Branch, continue_orbit
 
@@ -201,9 +201,7 @@ def bifurcation(
     find(system, parameter)
     require_number(parameter)
     require_period(system, "a bifurcation diagram")
-    places = np.unique(np.asarray(values, dtype=np.float64))
-    if len(places) < 2 or not np.all(np.isfinite(places)):
-        raise ModelError(f"values = {places.tolist()}", "a range has two different finite values at least", "give more")
+    places = numbers("values", values)
     if not (0 < precision < 1 and len(starts) > 0):
         raise ModelError(
             f"precision = {precision}, {len(starts)} starts", "0 < precision < 1 and a start at least", "correct them"

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from stickslip.errors import ModelError, SolveError
 from stickslip.parameters import find
 from stickslip.record.exchange import labelled_arrays
-from stickslip.regimes.attractor import Attractor, Start, require_number, require_period, settled
+from stickslip.regimes.attractor import Attractor, Start, numbers, require_number, require_period, settled
 from stickslip.solve.automaton import Array, System
 
 if TYPE_CHECKING:
@@ -200,12 +200,9 @@ def _along(system: System, parameter: str, along: Mapping[str, ArrayLike] | None
     [(name, values)] = along.items()
     find(system, name)
     require_number(name)
-    places = np.unique(np.asarray(values, dtype=np.float64))
-    if name == parameter or len(places) < 2 or not np.all(np.isfinite(places)):
-        raise ModelError(
-            f"along = {name}, {len(places)} values", f"it is not {parameter}, and has two finite values at least",
-            "correct it, or leave it out for the boundary at one place",
-        )  # fmt: skip
+    places = numbers(name, values)
+    if name == parameter:
+        raise ModelError(f"along = {name}", "that is what is bisected", "name another parameter, or leave it out")
     return name, places
 
 

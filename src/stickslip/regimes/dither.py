@@ -54,7 +54,7 @@ class Dither(Result):
     tried : tuple of (float, float)
         Every frequency tried, with its smallest amplitude; NaN where none was found.
     scan : ndarray (n, 2)
-        Amplitudes tried at the frequency, and the longest stick with each [s].
+        Amplitudes tried at the frequency, and the longest stick with each [s]; infinite where the run did not end.
     averaged : ndarray (n, 4)
         Sliding speed over the dither's; mean friction over sliding friction by the averaged law, by simulation with
         this dither, and with one ten times as large.
@@ -248,7 +248,10 @@ class _Search:
         """Longest stick with a dither [s], of the first start where it is macroscopic, or of all."""
         longest, dithered = 0.0, self.having(amplitude, frequency)
         for start in self.starts:
-            run = simulate(dithered, duration=self.duration, start=start)
+            try:
+                run = simulate(dithered, duration=self.duration, start=start)
+            except SolveError:
+                return math.inf  # what can not be followed removes nothing for sure; the scan shows it
             longest = max(longest, longest_stick(run, FORGET * self.duration))
             if longest * frequency >= 1.0:
                 break
@@ -315,7 +318,12 @@ def _frequencies(
 ) -> list[float]:
     if given is None and transition is not None:
         given = max(2 * transition.frequency.value, SPLIT / stick)
-    values = np.unique(np.atleast_1d(max(FAST / period, SPLIT / stick) if given is None else given).astype(float))
+    try:
+        values = np.unique(
+            np.atleast_1d(np.asarray(max(FAST / period, SPLIT / stick) if given is None else given, float))
+        )
+    except (TypeError, ValueError) as no_numbers:
+        raise ModelError(f"frequency = {given!r}", "a frequency is a number", "give it in Hz") from no_numbers
     if not (len(values) and np.all(np.isfinite(values)) and np.all(values > 1 / period)):
         raise ModelError(
             f"frequency = {values.tolist()} Hz", f"dither is faster than the slow motion, {1 / period:.3g} Hz",
