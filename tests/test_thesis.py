@@ -16,6 +16,8 @@ from stickslip.cli.program import main
 
 CHAPTERS = pytest.mark.parametrize("chapter", page.CHAPTERS)
 MOVED = {
+    "2": ("rig", "mass", "natural frequency"),
+    "appendices": ("discharge", "hold", "drift"),
     "3": ("sliding", "mass", "base"),
     "6": ("decay", "damping", "extremes"),
 }  # a parameter, and a number that has to follow it

@@ -269,9 +269,11 @@ def _spectra(given: Given) -> Any:
     power = (2 * np.abs(np.fft.rfft(x * np.hanning(len(x)))) / np.sum(np.hanning(len(x)))) ** 2
     shown = frequency < 60
     axes[1].plot(frequency[shown], 1e6 * power[shown], color=PURPLE)
-    axes[2].semilogy(frequency[shown], 1e6 * power[shown], color=PURPLE)
+    axes[2].plot(frequency[shown], 10 * np.log10(1e6 * power[shown]), color=PURPLE)
+    axes[1].set_ylabel("power [mm²]")
+    axes[2].set_ylabel("power [dB of mm²]")
     for ax in axes[1:]:
-        ax.set(xlabel="frequency [Hz]", ylabel="power [mm²]")
+        ax.set_xlabel("frequency [Hz]")
     for ax, letter in zip(axes, "abc", strict=True):
         tag(ax, letter)
     return drawn

@@ -17,7 +17,7 @@ from stickslip.reports.page import templates
 from thesis.drawing import printed_caption
 from thesis.printed import CHANGED, CORRECTED, NOT_REPRODUCIBLE, SAME, Given, Number, Ours, Table, given, judged, tables
 
-CHAPTERS = ("3", "6")
+CHAPTERS = {"2": "chapter2", "3": "chapter3", "4": "chapter4", "6": "chapter6", "appendices": "appendices"}  # scripts
 VERDICTS = (SAME, CORRECTED, NOT_REPRODUCIBLE, CHANGED)
 TEMPLATE = "thesis.html.jinja"
 
@@ -76,7 +76,7 @@ def run_chapter(name: str, *, start: Given | None = None, draw: bool = True, tel
 
 def module_of(name: str) -> ModuleType:
     """The script of a chapter."""
-    return importlib.import_module(f"thesis.chapter{name}")
+    return importlib.import_module(f"thesis.{CHAPTERS[name]}")
 
 
 def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tuple[Chapter, ...]:
