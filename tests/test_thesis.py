@@ -15,12 +15,15 @@ from thesis import page, printed
 from stickslip.cli.program import main
 
 CHAPTERS = pytest.mark.parametrize("chapter", page.CHAPTERS)
-MOVED = {
+MOVED = {  # a parameter, and a number that has to follow it
     "2": ("rig", "mass", "natural frequency"),
-    "appendices": ("discharge", "hold", "drift"),
     "3": ("sliding", "mass", "base"),
+    "4": ("stick_slip", "stiffness", "coupled frequency"),
+    "5": ("stick_slip", "kinetic", "local maximum"),
     "6": ("decay", "damping", "extremes"),
-}  # a parameter, and a number that has to follow it
+    "7": ("bearing", "kinetic", "friction over the bearing's"),
+    "appendices": ("discharge", "hold", "drift"),
+}
 
 
 def moved(section: str, name: str) -> dict[str, dict[str, float]]:

@@ -17,7 +17,15 @@ from stickslip.reports.page import templates
 from thesis.drawing import printed_caption
 from thesis.printed import CHANGED, CORRECTED, NOT_REPRODUCIBLE, SAME, Given, Number, Ours, Table, given, judged, tables
 
-CHAPTERS = {"2": "chapter2", "3": "chapter3", "4": "chapter4", "6": "chapter6", "appendices": "appendices"}  # scripts
+CHAPTERS = {
+    "2": "chapter2",
+    "3": "chapter3",
+    "4": "chapter4",
+    "5": "chapter5",
+    "6": "chapter6",
+    "7": "chapter7",
+    "appendices": "appendices",
+}  # scripts
 VERDICTS = (SAME, CORRECTED, NOT_REPRODUCIBLE, CHANGED)
 TEMPLATE = "thesis.html.jinja"
 
