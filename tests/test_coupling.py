@@ -104,3 +104,31 @@ def test_what_holds_no_coupling_is_refused() -> None:
         ss.coupling(record, squeaks=quiet)
     with pytest.raises(ss.EstimateError, match="no pair"):
         ss.coupling(record, squeaks=found).of("x", "v")
+
+
+def test_the_work_on_torsion_and_normal_motion_is_that_of_the_closed_form() -> None:
+    fs, frequency, lag = 20_000, 500.0, 0.7
+    t = np.arange(2 * fs) / fs
+    turn = 2 * np.pi * frequency * t
+    inside = np.exp(-((np.maximum(0, np.abs(np.mod(t, 0.5) - 0.25) - 0.15) / 0.005) ** 2))
+    rng = np.random.default_rng(0)
+    sound = inside * sum(np.sin(k * turn) / k**2 for k in (1, 2, 3)) + 1e-4 * rng.standard_normal(len(t))
+    channels = {
+        "sound": sound, "friction": 5.0 + 2.0 * inside * np.cos(turn), "v": 0.3 + 0.01 * inside * np.cos(turn + 2.0),
+        "torsion_velocity": 0.4 * inside * np.cos(turn + lag), "normal": 6.0 + 1.5 * inside * np.cos(turn),
+        "normal_acceleration": -0.02 * 2 * np.pi * frequency * inside * np.sin(turn + lag),
+    }  # fmt: skip
+    found = ss.coupling(ss.Record.of(channels, fs=fs), lever="3 mm")
+    share = float(np.mean([np.mean(inside[(t >= b.start) & (t < b.end)] ** 2) for b in found_bursts(channels, fs)]))
+    expected = {
+        "energy_per_cycle": -2.0 * 0.01 * math.cos(2.0), "energy_to_torsion": -0.003 * 2.0 * 0.4 * math.cos(lag),
+        "energy_to_normal": -1.5 * 0.02 * math.cos(lag),
+    }  # fmt: skip
+    for name, amplitude in expected.items():
+        assert getattr(found, name).value == pytest.approx(0.5 * share * amplitude / frequency, rel=0.02)
+    assert found.energy_per_cycle.value > 0 > found.energy_to_torsion.value
+    assert ss.coupling(ss.Record.of(channels, fs=fs)).energy_to_torsion is None
+
+
+def found_bursts(channels: dict[str, np.ndarray], fs: float) -> tuple[ss.Squeak, ...]:
+    return ss.find_squeaks(ss.Record.of(channels, fs=fs)).of("squeak", "squeal")

@@ -100,3 +100,11 @@ def test_what_has_no_pulses_is_refused() -> None:
         ss.impulsiveness(ss.Record.of({"a": np.ones(1000)}, fs=FS))
     with pytest.raises(ss.RecordError, match="clipped"):
         ss.impulsiveness(ss.Record.of({"a": np.clip(np.sin(0.01 * np.arange(9000)), -0.5, 0.5)}, fs=FS))
+
+
+def test_noise_has_no_pulses_and_a_slow_record_tells_none() -> None:
+    noise = np.random.default_rng(0).standard_normal(50_000)
+    assert ss.impulsiveness(ss.Record.of({"a": noise}, fs=20_000)).rate == 0
+    slow = ss.impulsiveness(ss.Record.of({"a": noise}, fs=2_000))
+    assert np.isnan(slow.rate)
+    assert slow.to_dict()["rate"] is None

@@ -148,6 +148,7 @@ class SqueakFindings(Result):
 def analyze_squeaks(
     record: Record, *, name: str | None = None, channel: str | None = None,
     frequencies: tuple[float, float] | None = None, contact: str | None = None, normal: float | str | None = None,
+    lever: float | str | None = None,
 ) -> SqueakFindings:  # fmt: skip
     """Does it squeak, how does it sound, what moves together then, and how does friction change with speed?
 
@@ -169,6 +170,8 @@ def analyze_squeaks(
         What the mass slides on, as in :func:`friction_loops`.
     normal : float or str, optional
         Normal load [N]; the mean of the channel "normal" where there is one.
+    lever : float or str, optional
+        Distance of the friction force from the axis of the torsion [m], as in :func:`coupling`.
 
     Returns
     -------
@@ -213,7 +216,7 @@ def analyze_squeaks(
         squeaks=squeaks,
         beside=tuple(each for each in beside if each is not None),
         spectra=ask("Spectra", lambda: burst_spectra(record, squeaks=squeaks)) if squeaks.bursts else None,
-        coupling=ask("Coupling", lambda: coupling(record, squeaks=squeaks)) if squeaks.squeaking else None,
+        coupling=ask("Coupling", lambda: coupling(record, squeaks=squeaks, lever=lever)) if squeaks.squeaking else None,
         quality=_quality(record, squeaks, ask, notes),
         impulses=ask("Pulses", partial(impulsiveness, record, channel=squeaks.channel)),
         loops=loops,

@@ -38,11 +38,12 @@ if TYPE_CHECKING:
     metavar='LOAD or "PATTERN=LOAD"',
     help="Normal load in N, for all files or for those whose name fits. Repeatable.",
 )
+@click.option("--lever", metavar="VALUE", help="Distance of the friction from the axis of torsion in m, for its work.")
 @result_options("FILE-squeak")
 @reading_options
 def squeak(
     files: tuple[str, ...], output: Path | None, as_json: bool, channel: str | None, frequencies: str | None,
-    **options: Any,
+    lever: str | None, **options: Any,
 ) -> None:  # fmt: skip
     """Find squeaks: when, how loud, at which frequency, which motions move together, and whether friction makes them.
 
@@ -63,7 +64,7 @@ def squeak(
     folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
 
     def ask(record: Record) -> SqueakFindings:
-        found = ss.analyze_squeaks(record, channel=channel, frequencies=band, contact=rig.contact)
+        found = ss.analyze_squeaks(record, channel=channel, frequencies=band, contact=rig.contact, lever=lever)
         loads = (rig.normal_load(part) for part in (*found.name.split(" + "), found.name))
         return replace(found, normal=next((load for load in loads if load is not None), found.normal))
 

@@ -26,8 +26,11 @@ def headline(found: SqueakFindings) -> Iterator[str]:
         yield f"Nothing sounds{where}: no burst in {record.duration:.4g} s."
         return
     untold = [burst for burst in squeaks.bursts if burst.kind == "tonal" and burst.friction == "not told"]
-    if not heard and untold:
-        yield f"Whether it squeaks{where} can not be told: {_counted(squeaks.bursts)}, {len(untold)} of them tonal."
+    creaks = [f"{burst.rate:.3g}" for burst in squeaks.of("creak")]
+    if not heard and creaks:
+        yield f"It creaks{where}: stick-slip pulses, {' and '.join(creaks)} in a second."
+    elif not heard and untold:
+        yield f"Whether it squeaks{where} can not be told: {len(untold)} tonal burst{'s' if len(untold) > 1 else ''}."
     elif not heard:
         yield f"No squeak{where}. {_counted(squeaks.bursts)}, {WORDS[squeaks.kind]} for most of the time."
     elif found.frequency is not None:
@@ -120,7 +123,11 @@ def hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]
         rows += [
             ["crest factor", f"{impulses.crest_factor:.3g}", "largest magnitude over RMS; 1.41 of a sine"],
             ["kurtosis", f"{impulses.kurtosis:.3g}", "3 of normal noise, 1.5 of a sine, large of pulses"],
-            ["pulses", f"{impulses.rate:.3g} in a second", "maxima in windows of 2 ms, 10 dB over the median level"],
+            [
+                "pulses",
+                _or_none(impulses.rate, ".3g") + " in a second",
+                "in windows of 2 ms, 10 dB over the valleys beside",
+            ],
         ]
     return ["", "value", "what it is"], rows
 

@@ -414,7 +414,7 @@ class _Listener:
         if unit == "1":
             told.append(
                 f"Channel {self.name} is not calibrated: its levels are relative to 1, and no sound pressure level is "
-                'told; state its sensitivity when reading, as in channels={"sound": "sound * 2.5 [Pa]"}.'
+                f'told; state its sensitivity when reading, as in channels={{"sound": "{self.name} * 2.5 [Pa]"}}.'
             )
         if self.motion.velocity is None:
             told.append("No forced motion is recorded beside it: phase and sliding speed can not be told.")

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
+from stickslip.laws.base import finite
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
 from stickslip.squeak.hearing import filtered
 from stickslip.squeak.spectra import coherence_by_chance, stretches
 from stickslip.statistics import student
+from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]
@@ -24,6 +26,7 @@ Waves = NDArray[np.complex128]
 MOTIONS = ("a", "normal_acceleration", "torsion_velocity", "friction", "sound")
 CYCLES = 8.0  # of the tone in a segment: its line is an eighth of its frequency wide
 FEWEST = 4  # segments
+ENERGIES = ("energy_per_cycle", "dissipated_per_cycle", "energy_to_torsion", "energy_to_normal")
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,10 @@ class Coupling:
         feeds it, negative where it takes energy from it; None without velocity and friction.
     dissipated_per_cycle : Estimate or None
         What the friction force takes from the whole motion meanwhile, in a cycle of the squeak [J].
+    energy_to_torsion : Estimate or None
+        Work of the friction force on the torsion in a cycle of the squeak [J], by the lever stated; None without one.
+    energy_to_normal : Estimate or None
+        Work of the normal force on the normal motion in a cycle of the squeak [J]; None where either is not recorded.
     segments : int
         Stretches in the bursts that were averaged.
     compared : str
@@ -98,13 +105,15 @@ class Coupling:
     pairs: tuple[Pair, ...]
     energy_per_cycle: Estimate | None
     dissipated_per_cycle: Estimate | None
+    energy_to_torsion: Estimate | None
+    energy_to_normal: Estimate | None
     segments: int
     compared: str
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """The energies that are known."""
-        return tuple(each for each in (self.energy_per_cycle, self.dissipated_per_cycle) if each is not None)
+        return tuple(each for each in (getattr(self, name) for name in ENERGIES) if each is not None)
 
     def of(self, first: str, second: str) -> Pair:
         """The pair of two channels, in this order."""
@@ -116,7 +125,7 @@ class Coupling:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        energies = {"energy_per_cycle": self.energy_per_cycle, "dissipated_per_cycle": self.dissipated_per_cycle}
+        energies = {name: getattr(self, name) for name in ENERGIES}
         return {
             "frequency": self.frequency,
             "segments": self.segments,
@@ -133,7 +142,7 @@ class Coupling:
         return "\n  ".join([f"Coupling at {self.frequency:.4g} Hz", *rows])
 
 
-def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
+def coupling(record: Record, *, squeaks: Squeaks | None = None, lever: float | str | None = None) -> Coupling:
     r"""Which motions move together while it squeaks, and does friction feed them?
 
     The tone of each channel is taken from segments of eight cycles, Hann's window, without overlap: one complex number
@@ -144,7 +153,9 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
     is told within half a period alone: which leads is a convention there, not a cause.
 
     Friction opposes positive velocity (m a = ... - f), so its work on the vibration is minus the mean of f v in the
-    band of the squeak.
+    band of the squeak. By a lever l it works on the torsion too, with minus the mean of l f times its velocity.
+    Friction does no work in the normal direction: there it is the normal force, positive where it presses and the
+    motion positive where it raises it, with minus the mean of N times the velocity, integrated from the acceleration.
 
     Parameters
     ----------
@@ -152,6 +163,9 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
         With two at least of a, normal_acceleration, torsion_velocity, friction, sound.
     squeaks : Squeaks, optional
         What :func:`find_squeaks` found in it; found where left out.
+    lever : float or str, optional
+        Distance of the friction force from the axis of the torsion [m], positive where positive friction turns it
+        back. Of several contacts at distances of their own the total force has none, and this work can not be told.
 
     Returns
     -------
@@ -202,7 +216,9 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None) -> Coupling:
         _pair(one, other, inside, outside if len(beyond) >= FEWEST else None, frequency)
         for one, other in itertools.combinations(names, 2)
     ]
-    return Coupling(frequency, tuple(pairs), *_energies(record, bursts, frequency), len(within), where.words)
+    arm = None if lever is None else finite("lever", parse_value(lever, "m"), unit="m")
+    energies = _Work(record, bursts, frequency).energies(arm)
+    return Coupling(frequency, tuple(pairs), **energies, segments=len(within), compared=where.words)
 
 
 def _tones(values: Array, rows: list[int], size: int, frequency: float) -> Waves:
@@ -233,18 +249,53 @@ def _coherence(one: Waves, other: Waves) -> tuple[float, float]:
     return (float(np.abs(cross) ** 2 / power) if power else 0.0), float(np.angle(cross))
 
 
-def _energies(record: Record, squeaks: tuple[Squeak, ...], frequency: float) -> tuple[Estimate | None, Estimate | None]:
-    """Work of the friction force in a cycle of the squeak: on the vibration, and minus that on the whole motion."""
-    if "friction" not in record or "v" not in record:
-        return None, None
-    band = (0.7 * frequency, min(1.4 * frequency, 0.49 * record.fs))
-    shaken, beating = filtered(record["v"], record.fs, band), filtered(record["friction"], record.fs, band)
-    rows = [slice(*np.searchsorted(record.time, [burst.start, burst.end])) for burst in squeaks]
-    given = [float(-np.mean(beating[part] * shaken[part]) / frequency) for part in rows]
-    taken = [float(np.mean(record["friction"][part] * record["v"][part]) / frequency) for part in rows]
-    return _mean("energy that friction gives the vibration in a cycle", given), _mean(
-        "energy that friction takes from the motion in a cycle", taken
-    )
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """Work in a cycle of the squeak, burst by burst."""
+
+    record: Record
+    bursts: tuple[Squeak, ...]
+    frequency: float
+
+    def energies(self, lever: float | None) -> dict[str, Estimate | None]:
+        record = self.record
+        told: dict[str, Estimate | None] = dict.fromkeys(ENERGIES)
+        if "friction" in record and "v" in record:
+            friction, velocity = self.tone("friction"), self.tone("v")
+            told["energy_per_cycle"] = self.mean(
+                -friction * velocity, "energy that friction gives the vibration in a cycle"
+            )
+            taken = record["friction"] * record["v"]
+            told["dissipated_per_cycle"] = self.mean(taken, "energy that friction takes from the motion in a cycle")
+        if "friction" in record and "torsion_velocity" in record and lever is not None:
+            work = -lever * self.tone("friction") * self.tone("torsion_velocity")
+            told["energy_to_torsion"] = self.mean(work, "energy that friction gives the torsion in a cycle")
+        if "normal" in record and "normal_acceleration" in record:
+            work = -self.tone("normal") * self.integrated("normal_acceleration")
+            told["energy_to_normal"] = self.mean(
+                work, "energy that the normal force gives the normal motion in a cycle"
+            )
+        return told
+
+    @property
+    def band(self) -> tuple[float, float]:
+        return 0.7 * self.frequency, min(1.4 * self.frequency, 0.49 * self.record.fs)
+
+    def tone(self, name: str) -> Array:
+        return filtered(self.record[name], self.record.fs, self.band)
+
+    def integrated(self, name: str) -> Array:
+        """Velocity of an acceleration in the band of the squeak."""
+        values = self.tone(name)
+        spectrum, turns = np.fft.rfft(values), 2 * np.pi * np.fft.rfftfreq(len(values), 1 / self.record.fs)
+        inside = turns > np.pi * self.band[0]
+        spectrum[inside] /= 1j * turns[inside]
+        return np.asarray(np.fft.irfft(np.where(inside, spectrum, 0), len(values)))
+
+    def mean(self, power: Array, name: str) -> Estimate:
+        """The mean of a power [W] over each burst, as the work in a cycle."""
+        ends = [np.searchsorted(self.record.time, [burst.start, burst.end]) for burst in self.bursts]
+        return _mean(name, [float(np.mean(power[first:last]) / self.frequency) for first, last in ends])
 
 
 def _mean(name: str, values: list[float]) -> Estimate:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, RecordError
 from stickslip.record.record import Record
-from stickslip.squeak.bursts import chosen_channel
-from stickslip.squeak.hearing import DEEP, PULSE, clipped_rows, short_time_level
+from stickslip.squeak.bursts import LOWEST, chosen_channel
+from stickslip.squeak.hearing import PULSE, clipped_rows, filtered, short_time_level
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,8 @@ NEEDED = 48_000  # Hz, of the methods
 ROUGH = 0.2  # s, of a roughness's window
 SHORTEST = 0.05  # s, of which a loudness over time can be told
 EXCEEDED = 5.0  # % of the time: N5
-ABOVE = 10.0  # dB over the median level that a pulse rises
+ABOVE = 10.0  # dB over the valleys beside it that a pulse rises
+RESOLVED = 20  # samples in a window, below which noise has pulses
 DEAF = 1e-2  # sone: quieter has no sharpness
 
 
@@ -76,8 +77,9 @@ class Impulsiveness:
     kurtosis : float
         Fourth moment over the square of the second; 3 of normal noise, 1.5 of a sine, large of pulses.
     rate : float
-        Pulses in a second [1/s]: maxima of the level in windows of 2 ms, 2 ms apart at least, that rise 10 dB over its
-        median and stand 6 dB above the valleys beside them.
+        Pulses in a second [1/s]: maxima of the level of what lies above 50 Hz, in windows of 2 ms, that rise over the
+        level of the whole, stand 10 dB above the valleys beside them, and are 2 ms apart. NaN below 10 kHz: there such
+        a window holds too few samples, and noise has pulses.
     pulses : ndarray, shape (p,)
         When they come [s].
     channel : str
@@ -92,7 +94,8 @@ class Impulsiveness:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {**vars(self), "pulses": self.pulses.tolist()}
+        rate = None if math.isnan(self.rate) else self.rate
+        return {**vars(self), "rate": rate, "pulses": self.pulses.tolist()}
 
 
 def sound_quality(record: Record, *, channel: str = "sound") -> SoundQuality:
@@ -201,16 +204,19 @@ def impulsiveness(record: Record, *, channel: str | None = None) -> Impulsivenes
     name = chosen_channel(record, channel)
     record.require_clean(name, question="pulses", samples=64)
     _require_peaks(record, name)
+    if np.ptp(record[name]) == 0:
+        raise RecordError(f"channel {name} never changes", "pulses are told in what changes", "name another channel=")
     values = record[name] - record[name].mean()
     power = float(np.mean(values**2))
-    if power == 0:
-        raise RecordError(f"channel {name} never changes", "pulses are told in what changes", "name another channel=")
-    level = short_time_level(values, record.fs)
-    peaks, _ = find_peaks(level, prominence=DEEP, height=float(np.median(level)) + ABOVE, distance=_apart(record.fs))
+    resolved = PULSE * record.fs >= RESOLVED
+    heard = filtered(values, record.fs, (LOWEST, 0.45 * record.fs)) if resolved else np.zeros(len(values))
+    loud = 10 * math.log10(max(float(np.mean(heard**2)), np.finfo(float).tiny))
+    apart = max(1, round(PULSE * record.fs))
+    peaks, _ = find_peaks(short_time_level(heard, record.fs), prominence=ABOVE, height=loud, distance=apart)
     return Impulsiveness(
         crest_factor=float(np.max(np.abs(values)) / math.sqrt(power)),
         kurtosis=float(np.mean(values**4) / power**2),
-        rate=len(peaks) / record.duration,
+        rate=len(peaks) / record.duration if resolved else math.nan,
         pulses=record.time[peaks],
         channel=name,
     )
@@ -222,10 +228,6 @@ def _require_peaks(record: Record, channel: str) -> None:
             f"channel {channel} is clipped", "loudness and pulses are told by what was cut off",
             "record it at a lower gain",
         )  # fmt: skip
-
-
-def _apart(fs: float) -> int:
-    return max(1, round(PULSE * fs))
 
 
 def _at_needed_rate(values: Array, fs: float) -> Array:
