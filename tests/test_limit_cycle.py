@@ -164,11 +164,14 @@ def test_the_map_of_the_rig_over_load_and_slope() -> None:
     [
         (lambda: ss.limit_cycle(sticking(0.5), speed=0.0), "speed = 0"),
         (lambda: ss.limit_cycle(sticking(0.5), push=0.0), "push = 0"),
+        (lambda: ss.limit_cycle(sticking(0.5), speed="fast"), "speed = 'fast'"),  # type: ignore[arg-type]
+        (lambda: ss.limit_cycle(3), "Oscillator or a Structure"),  # type: ignore[arg-type]
+        (lambda: ss.limit_cycles(sticking(0.5), "drive.speed", values="all"), "finite numbers"),
         (lambda: ss.limit_cycle(sticking(0.5), patience=3), "patience = 3"),
         (lambda: ss.limit_cycle(sticking(0.5).having(drive=ss.Release())), "driven by Release"),
         (lambda: ss.limit_cycle(sticking(0.5).having(stiffness=0.0)), "no spring holds"),
         (lambda: ss.limit_cycles(sticking(0.5), "drive.speed", values=[0.3, 0.2, 0.4]), "numbers that rise"),
-        (lambda: ss.limit_cycles(sticking(0.5), "drive.speed", values=[0.3, 0.4]), "at least three"),
+        (lambda: ss.limit_cycles(sticking(0.5), "drive.speed", values=[0.3, 0.4]), "at least 3"),
         (lambda: ss.limit_cycles(sticking(0.5), "drive.sped", values=[0.3, 0.4, 0.5]), "sped"),
     ],
 )

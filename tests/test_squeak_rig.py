@@ -49,6 +49,24 @@ def test_driven_at_five_hertz_it_sounds_as_it_should(surface: str, load: float) 
     assert np.mean(np.abs(friction)) == pytest.approx({"dry": 20, "wet": 8}[surface] * load / 6.13, rel=0.15)
 
 
+def uncoupled(rig: ss.Structure) -> ss.Structure:
+    """The same springs, but friction that does not follow the load."""
+    pressed = sum(contact.stiffness * np.outer(contact.normal, contact.normal) for contact in rig.contacts)
+    contacts = [ss.Contact(one.law, one.tangent, preload=one.preload) for one in rig.contacts]
+    return rig.having(stiffness=np.asarray(rig.stiffness) + pressed, contacts=contacts)
+
+
+def test_driven_it_squeaks_without_the_slope_but_not_without_the_coupling() -> None:
+    rig = ss.squeak_rig(*SQUEAKS)
+    found = ss.stability(rig, speed=-0.1)
+    for other, growth, squeaks in (
+        (rig.having(slope=0.0), found.without_slope, True),
+        (uncoupled(rig), found.without_coupling, False),
+    ):
+        assert ss.stability(other, speed=-0.1).growth == pytest.approx(growth, rel=1e-9)
+        assert (np.std(normal_acceleration(ss.simulate(other, duration=2.0))) > 30) == squeaks
+
+
 def test_it_squeaks_at_the_frequency_that_bending_and_torsion_share() -> None:
     frequencies, power = welch(normal_acceleration(driven(*SQUEAKS)), 1e4, nperseg=4096)
     assert 475 < frequencies[np.argmax(power)] < 500

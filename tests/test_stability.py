@@ -166,7 +166,9 @@ def test_a_contact_that_would_lift_off_is_named() -> None:
         (lambda: ss.stability(block(ss.LuGre(1.0, 1.5, speed=0.1, stiffness=1e4))), "LuGre"),
         (lambda: ss.stability(block(ss.StateVariable(1.0, rate=10.0))), "remembers"),
         (lambda: ss.critical_value(inclined(), "kinetic", between=(0.1, 0.2)), "stable at 257 values"),
-        (lambda: ss.critical_value(inclined(), "kinetic", between=(0.2, 0.1)), "lower value comes first"),
+        (lambda: ss.critical_value(inclined(), "kinetic", between=(0.2, 0.1)), "the lower one first"),
+        (lambda: ss.critical_value(inclined(), "kinetic", between=(0.2,)), "two values"),  # type: ignore[arg-type]
+        (lambda: ss.stability_map(inclined(), grid={"kinetic": ["a"]}), "finite numbers"),  # type: ignore[list-item]
         (lambda: ss.critical_value(inclined(), "kinetik", between=(0.1, 0.2)), "kinetik"),
         (lambda: ss.stability_map(inclined(), grid={}), "a map has values"),
         (lambda: ss.stability_map(inclined(), grid={"kinetic": []}), "a map has values"),

@@ -597,6 +597,8 @@ STATE = StateVariable(1.1, rate=2.0)
         (lambda: Structure(**{**GOOD, "mass": [[math.nan, 0.0], [0.0, 1.0]]}), "finite"),
         (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.0]]}), "mass of shape"),
         (lambda: Structure(**{**GOOD, "stiffness": np.eye(3)}), "2 by 2"),
+        (lambda: Structure(**{**GOOD, "mass": [1.0, 2.0]}), "2 by 2"),
+        (lambda: Structure(**{**GOOD, "stiffness": [[3.0, 2.0], [0.5, 1.0]]}), "springs is symmetric"),
         (lambda: Structure(**{**GOOD, "damping": 1.0}), "2 by 2"),
         (lambda: Structure(**{**GOOD, "mass": [[1.0, 0.0], [0.0]]}), "rows of equal length"),
         (lambda: Structure(**{**GOOD, "stiffness": [["soft", 0.0], [0.0, 1.0]]}), "stiffness = "),

@@ -23,6 +23,7 @@ from stickslip.laws.tabulated import Tabulated
 from stickslip.parameters import changed
 
 Array = NDArray[np.float64]
+ROUNDED = 1e-6  # of the largest stiffness: an asymmetry below it is no one's intention
 LOADED = (Coulomb, LinearSlope, Tabulated, CompliantContact)  # laws that may be told as a coefficient of friction
 
 
@@ -166,7 +167,7 @@ class Structure:
     damping : array_like (n, n)
         C [N s/m].
     stiffness : array_like (n, n)
-        K [N/m], without the contacts'.
+        K [N/m], symmetric, without the contacts'.
     contacts : sequence of Contact
         Where it rubs.
     drive : Drive
@@ -217,6 +218,7 @@ class Structure:
                 "a mass matrix is symmetric and positive definite",
                 "correct mass=: every degree of freedom needs a mass",
             )
+        _require_symmetric(np.asarray(self.stiffness))
         if isinstance(self.contacts, Contact) or not all(isinstance(contact, Contact) for contact in self.contacts):
             raise ModelError(f"contacts = {self.contacts!r}", "contacts are a list of Contact", "give contacts=[...]")
         object.__setattr__(self, "contacts", tuple(self.contacts))
@@ -286,6 +288,18 @@ def _of_speed(quantity: Row) -> Row:
     return {"always" if name == "1" else name: share for name, share in quantity.items()}
 
 
+def _require_symmetric(stiffness: Array) -> None:
+    """Refuse springs that do not push both ends alike, beyond what a program that wrote them has rounded."""
+    apart = np.abs(stiffness - stiffness.T)
+    i, j = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    if apart[i, j] > ROUNDED * np.max(np.abs(stiffness)):
+        raise ModelError(
+            f"stiffness with {stiffness[i, j]:g} N/m in row {i + 1}, column {j + 1} but {stiffness[j, i]:g} N/m across",
+            "a matrix of springs is symmetric",
+            "correct stiffness=; friction that follows a load belongs to a Contact with normal=",
+        )
+
+
 def _positive(mass: Array) -> bool:
     """Whether a symmetric matrix is positive definite beyond rounding, whatever the units of its rows."""
     units = np.sqrt(np.maximum(np.diag(mass), 0.0))
@@ -312,7 +326,7 @@ def _direction(name: str, values: ArrayLike) -> Array:
 def _matrix(name: str, values: ArrayLike, size: int | None = None) -> Array:
     """A square matrix; of `size` rows where given."""
     matrix = np.atleast_2d(_numbers(name, values))
-    count = len(matrix) if size is None else size
+    count = max(matrix.shape) if size is None else size
     if matrix.shape != (count, count) or not np.all(np.isfinite(matrix)):
         raise ModelError(
             f"{name} of shape {matrix.shape}: {matrix.tolist()}",

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.drives import Belt
 from stickslip.errors import ModelError
 from stickslip.squeak.limit_cycle import LimitCycle, limit_cycle
-from stickslip.squeak.stability import System, Threshold, critical_value, stability
+from stickslip.squeak.stability import System, Threshold, critical_value, numbers, stability
 
 Array = NDArray[np.float64]
 
 SMALL, HALF, LARGE = 1e-3, 0.5, 1.5  # `push`: mostly, close to the threshold, and where no small one lasts
+LEAST = 3  # values of a parameter
 UNTOLD = "cannot be told"
 NEARBY = (1e-3, 1e-2)  # of the range: how far from the threshold the kind of the bifurcation is looked at
 ROOT, JUMP = (0.35, 0.65), 0.2  # powers of the distance: an amplitude that starts like a root, and one that jumps
@@ -118,9 +119,9 @@ def limit_cycles(
     >>> {one.status for one in found.up}, [one.status for one in found.down], found.both
     ({'steady sliding'}, ['periodic', 'periodic', 'periodic', 'steady sliding'], (0.3, 0.5))
     """
-    places = np.asarray(values, dtype=np.float64)
-    if places.ndim != 1 or len(places) < 3 or not np.all(np.isfinite(places)) or np.any(np.diff(places) <= 0):
-        raise ModelError(f"values = {values!r}", "they are at least three finite numbers that rise", "sort them")
+    places = numbers("values", values)
+    if places.ndim != 1 or len(places) < LEAST or np.any(np.diff(places) <= 0):
+        raise ModelError(f"values = {values!r}", f"they are at least {LEAST} numbers that rise", "sort them")
 
     def at(value: float) -> System:
         found = parameter(value) if callable(parameter) else system.having(**{parameter: value})

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.drives import Belt
 from stickslip.errors import ModelError
+from stickslip.laws.base import finite
 from stickslip.solve.autonomous import settled_cycle
 from stickslip.solve.energy import EnergyFlow, energy_flow
 from stickslip.solve.poincare import Table, end_of, stretch, tables
@@ -129,17 +130,16 @@ def limit_cycle(
     >>> found.status, found.stick_share[0] > 0, round(found.growth / found.sliding.growth, 6)
     ('periodic', True, 1.0)
     """
+    sliding = stability(system, speed=speed)
     if speed is not None:
         system = system.having(drive=Belt(speed))
-    sliding = stability(system)
     if not np.all(np.isfinite(sliding.place)):
         raise ModelError(
             "a system that no spring holds", "a limit cycle is about steady sliding", "give it a stiffness"
         )
     if not (isinstance(patience, int | np.integer) and patience >= FIRST):
         raise ModelError(f"patience = {patience}", f"it is a whole number of at least {FIRST} cycles", "raise it")
-    if not (math.isfinite(push) and push > 0):
-        raise ModelError(f"push = {push}", "a vibration has a size above zero", "give a share such as 0.001")
+    finite("push", push, unit="of what lifts or stops a contact", positive=True)
     table = tables(system)
     cycle = 1 / (sliding.frequency or system.frequency)
     state, mode = opening(table, _pushed(system, table, sliding, push) if start is None else start)

@@ -9,11 +9,11 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from stickslip.drives import Belt
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit
+from stickslip.laws.base import Exit, finite
 from stickslip.laws.curved import lifted, symbol
 from stickslip.oscillator import Oscillator
 from stickslip.structure import Contact, Structure
@@ -53,7 +53,7 @@ class SlidingMode:
     def damping_ratio(self) -> float:
         """Share of critical damping; negative where the motion grows."""
         size = math.hypot(self.growth, 2 * math.pi * self.frequency)
-        return -self.growth / size if size else 0.0
+        return -self.growth / size if size and self.growth else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,9 +259,10 @@ def critical_value(
     def excess(value: float) -> float:
         return margin(_whole(at(value), speed))
 
-    low, high = map(float, between)
-    if not low < high:
-        raise ModelError(f"between = {between}", "the lower value comes first", "turn them round")
+    bounds = numbers("between", between)
+    if bounds.shape != (2,) or not bounds[0] < bounds[1]:
+        raise ModelError(f"between = {between}", "it is two values, the lower one first", "turn them round")
+    low, high = map(float, bounds)
     values = np.linspace(low, high, SCANNED + 1)
     signs = np.array([excess(value) > ROUNDING for value in values])
     changes = np.flatnonzero(signs[1:] != signs[:-1])
@@ -315,7 +316,7 @@ def stability_map(
     """
     import xarray
 
-    axes = {name: np.asarray(values, dtype=np.float64) for name, values in grid.items()}
+    axes = {name: numbers(name, values) for name, values in grid.items()}
     if not axes or not all(values.ndim == 1 and len(values) for values in axes.values()):
         raise ModelError(
             f"grid = {dict(grid)!r}", "a map has values for each of its parameters", "give lists of numbers"
@@ -335,6 +336,17 @@ def stability_map(
         "mechanism": told(lambda one: one.mechanism, str),
     }
     return xarray.Dataset(data, coords=axes)
+
+
+def numbers(name: str, values: ArrayLike) -> Array:
+    """Values of a parameter; refused where they are no numbers."""
+    try:
+        found = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = np.array([math.nan])
+    if not np.all(np.isfinite(found)):
+        raise ModelError(f"{name} = {values!r}", "the values of a parameter are finite numbers", "correct them")
+    return found
 
 
 def margin(matrices: Matrices) -> float:
@@ -423,6 +435,8 @@ def _whole(system: System, speed: float | None) -> Matrices:
 
 def _parts(system: System, speed: float | None) -> tuple[Array, Array, Array, list[_Rubbing]]:
     """M, C, K without contacts, and the contacts."""
+    if not isinstance(system, Oscillator | Structure):
+        raise ModelError(f"a system {system!r}", "what slides is an Oscillator or a Structure", "give one")
     if speed is None:
         if not isinstance(system.drive, Belt):
             raise ModelError(
@@ -431,7 +445,7 @@ def _parts(system: System, speed: float | None) -> tuple[Array, Array, Array, li
                 "give it drive=Belt(speed), or say speed=",
             )
         speed = system.drive.speed
-    if not math.isfinite(speed) or speed == 0:
+    if finite("speed", speed, unit="m/s", signed=True) == 0:
         raise ModelError(
             f"speed = {speed} m/s", "a counter-face that slides has a speed", "give a number that is not 0"
         )
