@@ -104,6 +104,43 @@ def test_the_cycle_is_what_a_long_simulation_ends_in() -> None:
     assert np.mean(np.diff(last)) * found.frequency == pytest.approx(1.0, rel=1e-7)
 
 
+HOFFMANN = [[23.25, 3.8971143170299739], [3.8971143170299739, 7.75]]
+
+
+def inclined(law: Any = None, *, speed: float = 1.0) -> ss.Structure:
+    """MC-1 with some damping."""
+    pad = ss.Contact(law or ss.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=10.0)
+    return ss.Structure(np.eye(2), 0.05 * np.eye(2), HOFFMANN, contacts=[pad], drive=ss.Belt(speed))
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.3])
+@pytest.mark.parametrize(
+    "law",
+    [ss.Coulomb(0.6), ss.LinearSlope(0.4, slope=-0.05, static=0.6), ss.CompliantContact(0.6, stiffness=300.0)],
+    ids=["rigid", "falling", "compliant"],
+)
+def test_a_cycle_is_repeated_when_it_is_simulated_again(law: Any, speed: float) -> None:
+    system = inclined(law, speed=speed)
+    found = ss.limit_cycle(system)
+    assert found.status == "periodic"
+    assert found.growth == pytest.approx(found.sliding.growth, rel=1e-8)
+    own = dict(zip(("x1", "x2", "v1", "v2"), map(float, found.motion.states[0]), strict=False))
+    mode, period = found.motion.table.modes[found.motion.modes[0]].name, found.motion.duration
+    run = ss.simulate(system, duration=20 * period, start={**own, "mode": mode})
+    late = run.sample(period * (10 + np.arange(320) / 32), ("x", "v"))[0].reshape(4, 10, 32)
+    known = found.motion.sample(period * np.arange(32) / 32, ("x", "v"))[0]
+    assert np.allclose(late, known[:, None], rtol=0, atol=1e-8 * np.ptp(known, axis=1).max())
+
+
+def test_hoffmanns_model_squeaks_on_below_its_critical_friction() -> None:
+    found = ss.limit_cycles(inclined(), "kinetic", values=[0.4, 0.46, 0.5, 0.6])
+    assert found.kind == "subcritical"
+    assert [one.vibrates for one in found.up] == [False, False, True, True]
+    assert [one.vibrates for one in found.down] == [False, True, True, True]
+    assert abs(found.down[1].multipliers[0]) < 1
+    assert found.down[1].sliding.stable
+
+
 def test_friction_feeds_torsion_and_the_contacts_carry_it_to_bending() -> None:
     energy = rig(6.13).energy
     _, bending, torsion = energy.friction + energy.contacts + energy.springs + energy.damping

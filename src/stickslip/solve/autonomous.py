@@ -65,7 +65,7 @@ def closed(
         gap = (end - state)[:count]
         miss = float(np.max(np.abs(gap) / np.maximum(size, 1e-300), initial=0.0, where=size > 0))
         jacobian = derivative(orbit, after)[0][:count, :count]
-        if closes(orbit, miss):
+        if closes(orbit, miss) and after == orbit.modes[0]:
             return orbit, _across(jacobian)
         if not miss < best or not np.all(spread > 0):
             return None

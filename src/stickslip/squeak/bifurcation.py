@@ -134,7 +134,7 @@ def limit_cycles(
     try:
         threshold = critical_value(at(ends[0]), at, between=ends)
     except ModelError:
-        words = f"steady sliding is {'' if up[0].sliding.stable else 'not '}stable at every value"
+        words = f"steady sliding is {'' if up[0].sliding.stable else 'un'}stable at every value"
         if beside:
             words += f"; a vibration lasts beside it from {beside[0]:.4g} to {beside[-1]:.4g}"
         both = (beside[0], beside[-1]) if beside else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,9 @@ from stickslip.structure import Structure
 Array = NDArray[np.float64]
 
 FIRST = 64  # cycles of a small vibration before a cycle is looked for
-SMALL = 1e-4  # of the vibration that would lift or stop a contact: what the growth is measured on
-DYING = 0.3  # of a vibration that is left after a round in which it dies away
+SMALL = 1e-5  # of the vibration that would lift or stop a contact: what the growth is measured on
+LEAST = 1e-2  # of that vibration: a cycle is looked for beyond it
+DYING = 0.3  # of the vibration at the beginning: what is left of one that dies away
 UNSETTLED = 0.1  # change of the size in the last round of a motion that has no size of its own yet
 SAMPLES = 4096  # of a cycle whose extremes are looked for
 
@@ -37,7 +39,8 @@ class LimitCycle:
     ----------
     status : str
         "periodic", "steady sliding" (the vibration dies away), "held" (every contact sticks or has lifted off),
-        "not periodic" (it lasts and does not repeat), or "not settled" (it still grew or died away when it was left).
+        "not periodic" (it lasts and does not repeat), or "not settled" (it still grew or died away when it was left, or
+        does neither for want of damping).
     frequency : float
         At which the motion repeats [Hz]; of one that does not, of its strongest line; 0 where nothing vibrates.
     amplitudes : ndarray (n,)
@@ -142,8 +145,8 @@ def limit_cycle(
     finite("push", push, unit="of what lifts or stops a contact", positive=True)
     table = tables(system)
     cycle = 1 / (sliding.frequency or system.frequency)
-    state, mode = opening(table, _pushed(system, table, sliding, push) if start is None else start)
-    status, motion, multipliers = _followed(system, table, sliding, (state, mode), cycle, patience)
+    begin = _pushed(system, table, sliding, push) if start is None else opening(table, start)
+    status, motion, multipliers = _followed(system, table, sliding, begin, cycle, patience)
     shares, still = _shares(motion), status in ("steady sliding", "held")
     swing, slide = (np.zeros(len(sliding.place)), 0.0) if still else _swings(motion)
     return LimitCycle(
@@ -167,25 +170,27 @@ def _followed(
     """Status, one cycle or the last stretch, multipliers."""
     state, mode = begin
     none, physical = np.zeros(0, dtype=np.complex128), table.physical
-    done, count = 0, FIRST
+    done, count, opened = 0, FIRST, 0.0
     while True:
         motion = stretch(system, table, state, mode, span=(0.0, count * cycle))
         end, after = end_of(motion)
-        first, last = (_size(motion, sliding, begin, cycle) for begin in (0.0, motion.duration - cycle))
+        part = count / 4
+        first, last = (_size(motion, sliding, begin * cycle, part, cycle) for begin in (0.0, count - part))
         if _held(motion):
             return "held", motion, none
-        if sliding.stable and last < 1.0 and last < DYING * min(first, 1.0):
+        opened = opened or first
+        if sliding.stable and last < DYING * min(opened, 1.0):
             return "steady sliding", motion, none
-        if last > 1e-2:
+        if last > LEAST:
             found = settled_cycle(motion, cycle)
-            if found is not None and abs(found[1][0]) < 1 and _size(found[0], sliding, 0.0, cycle) > 1e-2:
+            if found is not None and abs(found[1][0]) < 1 and _size(found[0], sliding, 0.0, 1.0, cycle) > LEAST:
                 return "periodic", *found
         done += count
         if done >= patience:
-            break
+            settled = abs(last / first - 1) < UNSETTLED and sliding.growth != 0
+            return "not periodic" if settled else "not settled", motion, none
         state = state.copy()
         state[:physical], mode, count = end[:physical], after, min(done, patience - done)
-    return "not periodic" if abs(last / first - 1) < UNSETTLED else "not settled", motion, none
 
 
 def _held(motion: Trajectory) -> bool:
@@ -215,17 +220,30 @@ def _reach(sliding: Stability, system: System) -> float:
     return float(min((limit / share for limit, share in limits if share > 0 and limit > 0), default=1.0))
 
 
-def _pushed(system: System, table: Table, sliding: Stability, push: float) -> dict[str, float]:
-    """The start of a vibration."""
+def _pushed(system: System, table: Table, sliding: Stability, push: float) -> tuple[Array, int]:
+    """State and mode at the start of a vibration: what is compliant slides already, as it does in steady sliding."""
     rest = np.append(sliding.place, np.zeros(len(sliding.place)))
-    state = rest + push * _reach(sliding, system) * _vector(sliding)[1]
-    return dict(zip(table.names, map(float, state), strict=False))
+    start = rest + push * _reach(sliding, system) * _vector(sliding)[1]
+    state, mode = opening(table, dict(zip(table.names, map(float, start), strict=False)))
+    carried = [one.carried for one in system.contacts] if isinstance(system, Structure) else [1.0]
+    sides = [-np.sign(share * system.drive.speed) for share in carried]  # type: ignore[attr-defined]
+    slides = [
+        j
+        for j, joint in enumerate(table.modes)
+        if all(part.kind == "slip" and part.side == side for part, side in zip(_parts(joint), sides, strict=True))
+    ]
+    return state, slides[0] if len(slides) == 1 and push < 1 else mode
 
 
-def _size(motion: Trajectory, sliding: Stability, begin: float, cycle: float) -> float:
-    """Of the vibration in a cycle from `begin`, as a share of the one that would lift or stop a contact."""
+def _parts(mode: Any) -> tuple[Any, ...]:
+    """The mode of each contact."""
+    return tuple(getattr(mode, "parts", (mode,)))
+
+
+def _size(motion: Trajectory, sliding: Stability, begin: float, cycles: float, cycle: float) -> float:
+    """Of the vibration in cycles from `begin`, as a share of the one that would lift or stop a contact."""
     most, _ = _vector(sliding)
-    times = np.linspace(begin, min(begin + cycle, motion.duration), 65)
+    times = np.linspace(begin, min(begin + cycles * cycle, motion.duration), 1 + int(64 * cycles))
     path = motion.sample(times, ("x",))[0][most] - sliding.place[most]
     return float(np.max(np.abs(path))) / _reach(sliding, motion.system)
 
@@ -234,8 +252,8 @@ def _growth(system: System, table: Table, sliding: Stability, cycle: float) -> f
     """Of a small vibration [1/s]: how fast its share in the fastest mode grows as simulated."""
     if sliding.status != "ok":
         return math.nan
-    state, mode = opening(table, _pushed(system, table, sliding, SMALL))
-    duration = min(8 * cycle, 3 / abs(sliding.growth) if sliding.growth else math.inf)
+    state, mode = _pushed(system, table, sliding, SMALL)
+    duration = min(8 * cycle, 2 / abs(sliding.growth) if sliding.growth else math.inf)
     run = stretch(system, table, state, mode, span=(0.0, duration))
     path = run.sample([0.0, duration], ("x", "v"))[0].T - np.append(sliding.place, np.zeros(len(sliding.place)))
     columns = []
@@ -283,8 +301,7 @@ def _frequency(status: str, motion: Trajectory, sliding: Stability) -> float:
 
 def _shares(motion: Trajectory) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Share of the time that each contact holds, and is lifted off."""
-    modes = [getattr(mode, "parts", (mode,)) for mode in motion.table.modes]
-    kinds = np.array([[part.kind for part in parts] for parts in modes])[motion.modes]
+    kinds = np.array([[part.kind for part in _parts(mode)] for mode in motion.table.modes])[motion.modes]
     weights = motion.durations / motion.duration
     held = weights @ ((kinds == "stick") | (kinds == "microstick"))
     return tuple(map(float, held)), tuple(map(float, weights @ (kinds == "flight")))
