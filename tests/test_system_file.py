@@ -123,6 +123,15 @@ def test_every_parameter_is_read_in_the_unit_of_its_docstring(name: str) -> None
             assert UNITS.get(f"{name}.{field.name}", UNITS.get(field.name)) == (unit[1] if unit else None), field.name
 
 
+def test_a_tone_goes_on_top_of_a_drive(tmp_path: Path) -> None:
+    inner = 'drive = { name = "Belt", speed = "100 mm/s" }\n'
+    outer = 'name = "Dithered"\namplitude = 5e-6\nfrequency = 200\n'
+    case = read_system(written(tmp_path, WHOLE.replace(DRIVE, outer + inner)))
+    assert case.system.drive == ss.Dithered(ss.Belt(0.1), amplitude=5e-6, frequency=200.0)
+    with pytest.raises(ModelError, match="a drive within a drive is a table"):
+        read_system(written(tmp_path, WHOLE.replace(DRIVE, outer + 'drive = "Belt"\n')))
+
+
 def test_a_recorded_base_comes_from_a_file_beside(tmp_path: Path) -> None:
     time = np.arange(400) / 200
     z = 1e-3 * np.sin(2 * np.pi * time)

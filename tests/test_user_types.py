@@ -45,7 +45,7 @@ drives: list[ss.Oscillator] = [
     for drive in (
         ss.Release(), ss.HarmonicBase(1e-3, frequency=2.5), ss.HarmonicForce(1.0, frequency=2.5),
         ss.MultiTone([(1.0, 2.0, 0.0)]), ss.Belt(0.1), ss.Ramp(0.1), ss.RecordedBase([0.0, 1.0, 0.0, 1.0], fs=10.0),
-        ss.SpeedProfile([0.0, 1.0], [0.0, 0.1]),
+        ss.SpeedProfile([0.0, 1.0], [0.0, 0.1]), ss.Dithered(ss.Belt(0.1), amplitude=1e-5, frequency=200.0),
     )
 ]
 run: ss.Trajectory = ss.simulate(lugre, duration=1.0, start={"x": 0.1})

@@ -13,7 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.drives import Belt, HarmonicBase, HarmonicForce, MultiTone, Ramp, RecordedBase, Release, SpeedProfile
+from stickslip.drives import (
+    Belt,
+    Dithered,
+    HarmonicBase,
+    HarmonicForce,
+    MultiTone,
+    Ramp,
+    RecordedBase,
+    Release,
+    SpeedProfile,
+)
 from stickslip.errors import ModelError
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
@@ -49,7 +59,7 @@ LAWS: dict[str, Callable[..., Any]] = {
 DRIVES: dict[str, Callable[..., Any]] = {
     "Release": Release, "HarmonicBase": HarmonicBase, "HarmonicForce": HarmonicForce, "MultiTone": MultiTone,
     "Belt": Belt, "Ramp": Ramp, "RecordedBase": RecordedBase,
-    "SpeedProfile": SpeedProfile,
+    "SpeedProfile": SpeedProfile, "Dithered": Dithered,
 }  # fmt: skip
 
 
@@ -239,8 +249,9 @@ def _named(register: Mapping[str, Callable[..., Any]], values: Mapping[str, Any]
     """The law or drive that plain data name, with what it holds."""
     given = dict(values)
     make = register[given.pop("name")]
-    if isinstance(given.get("law"), Mapping):
-        given["law"] = _named(LAWS, given["law"])
+    for part, known in (("law", LAWS), ("drive", DRIVES)):
+        if isinstance(given.get(part), Mapping):
+            given[part] = _named(known, given[part])
     if "curve" in given:
         given["curve"] = Formula(given["curve"])
     return make(**given)

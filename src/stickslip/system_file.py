@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, BeforeValidator, Field, create_model
 
 from stickslip import scenarios
+from stickslip.drives import Drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
@@ -366,8 +367,9 @@ def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mappi
         raise ModelError(f"{where} {told}", f"a {table.rpartition('.')[2]} is one of {', '.join(register)}", next_step)
     factory = register[name]
     parameters = {key: value for key, value in values.items() if key != "name"}
-    if isinstance(parameters.get("law"), Mapping):
-        parameters["law"] = _built(f"{table}.law", LAWS, parameters["law"], source)
+    for part, known in (("law", LAWS), ("drive", DRIVES)):  # a law on a law, a tone on a drive
+        if isinstance(parameters.get(part), Mapping):
+            parameters[part] = _built(f"{table}.{part}", known, parameters[part], source)
     if name == "RecordedBase" and "record" in parameters:
         parameters |= _recorded(parameters, source)
         parameters = {key: value for key, value in parameters.items() if key not in ("record", "channel")}
@@ -422,7 +424,9 @@ def _kind(factory: type, name: str, on: str = "") -> Any:
     if hint == Curve:
         return Annotated[Any, BeforeValidator(_formula)]
     if hint in (Law, SpeedCurve):
-        return Annotated[Any, BeforeValidator(_law)]
+        return Annotated[Any, BeforeValidator(functools.partial(_table_of, "law", "{name = 'Coulomb', kinetic = 1}"))]
+    if hint is Drive:
+        return Annotated[Any, BeforeValidator(functools.partial(_table_of, "drive", "{name = 'Belt', speed = 0.1}"))]
     unit = UNITS.get(f"{factory.__name__}.{name}", UNITS.get(name, "1"))
     number = Annotated[float, quantity(unit)]
     if name == "samples" or hint == Sequence[float]:
@@ -439,9 +443,9 @@ def _formula(value: object) -> Formula:
         raise ValueError(str(error).rstrip(".")) from error
 
 
-def _law(value: object) -> object:
+def _table_of(part: str, example: str, value: object) -> object:
     if isinstance(value, str | int | float | list):
-        raise ValueError("a law within a law is a table, as in law = {name = 'Coulomb', kinetic = 1}")
+        raise ValueError(f"a {part} within a {part} is a table, as in {part} = {example}")
     return value
 
 
