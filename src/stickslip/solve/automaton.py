@@ -101,7 +101,7 @@ class Automaton:
     @cached_property
     def leap(self) -> Array:
         """What carries the state from a mode to another through modes in which no time passes (M, M, N, N)."""
-        return _leaps(len(self.modes), self.first, self.target, self.reset, len(self.names))
+        return leaps_between(self.first, self.target, self.reset[None])[0]
 
     def index(self, mode: str) -> int:
         """Number of the mode of that name."""
@@ -277,11 +277,12 @@ def derivatives(quantity: Any, flow: Any) -> list[Any]:
     return rows + [np.zeros_like(rows[-1])] * (DEGREE + 1 - len(rows))
 
 
-def _leaps(count: int, first: NDArray[np.int64], targets: NDArray[np.int64], resets: Array, size: int) -> Array:
-    """The products of resets along the shortest way from each mode to each other one."""
-    leaps = np.zeros((count, count, size, size))
+def leaps_between(first: NDArray[np.int64], targets: NDArray[np.int64], resets: Array) -> Array:
+    """The products of resets (B, E, N, N) along the shortest way from each mode to each other one (B, M, M, N, N)."""
+    count, size = len(first) - 1, resets.shape[-1]
+    leaps = np.zeros((len(resets), count, count, size, size))
     for begin in range(count):
-        leaps[begin, begin] = np.eye(size)
+        leaps[:, begin, begin] = np.eye(size)
         seen, queue = {begin}, [begin]
         while queue:
             mode = queue.pop(0)
@@ -289,7 +290,7 @@ def _leaps(count: int, first: NDArray[np.int64], targets: NDArray[np.int64], res
                 if targets[e] not in seen:
                     seen.add(targets[e])
                     queue.append(targets[e])
-                    leaps[begin, targets[e]] = resets[e] @ leaps[begin, mode]
+                    leaps[:, begin, targets[e]] = resets[:, e] @ leaps[:, begin, mode]
     return leaps
 
 

@@ -14,8 +14,8 @@ from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import DEGREE, Array, automaton
+from stickslip.solve.fleet import fleet_of, fleet_tables, kind_of_drive, kind_of_law, opened
 from stickslip.solve.kernel import CHATTER, march, measure, settle
-from stickslip.solve.phasors import fast_tables
 from stickslip.solve.simulate import opening
 
 TIRELESS = 2**62  # cells: a batch is not interrupted
@@ -104,26 +104,29 @@ def simulate_batch(
     starts = list(starts) if starts is not None else [{}] * len(systems)
     if len(systems) not in (1, len(starts)):
         raise ModelError(f"{len(systems)} systems for {len(starts)} starts", "one for all, or one each", "match them")
-    tables = [automaton(system) for system in systems]
-    if len({(t.names, *(m.name for m in t.modes), len(t.target), len(t.tones)) for t in tables}) > 1:
+    fleet = fleet_of(systems)
+    if len({kind_of_law(law) for law in fleet.laws}) > 1 or len({kind_of_drive(drive) for drive in fleet.drives}) > 1:
         raise ModelError("the systems have different modes", "a batch has one kind of law and drive", "split it")
-    if any(t.motion.knots is not None for t in tables):
-        raise ModelError("a drive has knots", "a batch runs without stops", "run them one by one")
-    size, count = len(tables[0].names), len(starts)
+    if kind_of_law(fleet.laws[0]) is None or kind_of_drive(fleet.drives[0]) is None:
+        raise ModelError("a law is curved, or a drive has knots or several tones",
+                         "a batch runs through linear modes without stops", "run them one by one")  # fmt: skip
+    tables = fleet_tables(fleet)
+    size, count = len(tables.names), len(starts)
     which = np.zeros(count, np.int64) if len(systems) == 1 else np.arange(count)
-    opened = [opening(tables[j], start) for j, start in zip(which, starts, strict=True)]
-    periods = np.array([t.motion.period for t in tables])
-    ends = np.empty((len(tables), 2))
-    for j, (period, system) in enumerate(zip(periods, systems, strict=True)):
+    single = [automaton(system) for system in systems] if any(starts) else []
+    if single:
+        begun = [opening(single[j], start) for j, start in zip(which, starts, strict=True)]
+        states, modes = np.array([state for state, _ in begun]), np.array([mode for _, mode in begun])
+    else:
+        states, modes = (part[which] for part in opened(tables, {}))
+    ends = np.empty((len(systems), 2))
+    for j, (period, system) in enumerate(zip(tables.period, systems, strict=True)):
         laps = float(math.floor(cycles)) if math.isfinite(period) else 0.0
         unit = period if math.isfinite(period) else 1 / system.frequency if system.frequency else math.nan
         ends[j] = laps, (cycles - laps) * unit
     if not np.all(np.isfinite(ends)):
         raise ModelError(f"cycles = {cycles}", "a system without period has no cycles", "give it a drive or a spring")
-    given = (
-        which, np.array([mode for _, mode in opened]), np.array([state for state, _ in opened]), periods, ends,
-        _stacked([t.tables for t in tables]), _stacked([fast_tables(t) for t in tables]),
-    )  # fmt: skip
+    given = which, modes, states, tables.period, ends, tables.arrays, tables.phasors.tables
     out = Batch(
         np.zeros(count, np.int64), np.zeros(count, np.int64), np.empty((count, room), np.int32),
         np.empty((count, room)), np.empty((count, room), np.int16), np.empty((count, room)),
@@ -135,16 +138,16 @@ def simulate_batch(
     return out
 
 
-def _stacked(tables: Sequence[tuple[NDArray[Any], ...]]) -> tuple[NDArray[Any], ...]:
-    """The tables of all systems in one array each; a shorter table of nodes is filled up with zeros."""
-    stacks = []
-    for arrays in zip(*tables, strict=True):
-        longest = max(len(a) for a in arrays)
-        stack = np.zeros((len(arrays), longest, *arrays[0].shape[1:]), arrays[0].dtype)
-        for row, values in zip(stack, arrays, strict=True):
-            row[: len(values)] = values
-        stacks.append(stack)
-    return tuple(stacks)
+@compiled(**OPTIONS)
+def slow_of(slow, j):
+    """The tables of system j as :func:`stickslip.solve.kernel.march` reads them."""
+    return (slow[0][j], slow[1][j], slow[2][j], slow[3][j], slow[4], slow[5], slow[6][j], slow[7], slow[8][j])
+
+
+@compiled(**OPTIONS)
+def fast_of(fast, j):
+    """The tables of system j as :func:`stickslip.solve.phasors.glide` reads them."""
+    return fast[0][j], fast[1][j], fast[2][j], fast[3][j], fast[4][j], fast[5][fast[6][j, 0] : fast[6][j, 1]]
 
 
 @compiled(**OPTIONS)
@@ -154,9 +157,7 @@ def march_one(i, given, out, scratch):
     counts, statuses, laps, offsets, entered, durations, states, exits, final = out
     works, names, times, parts, rings, clocks = scratch
     j = which[i]
-    tables = (slow[0][j], slow[1][j], slow[2][j], slow[3][j], slow[4][j], slow[5][j], slow[6][j], slow[7][j],
-              slow[8][j])  # fmt: skip
-    quick = (fast[0][j], fast[1][j], fast[2][j], fast[3][j], fast[4][j], fast[5][j])
+    tables, quick = slow_of(slow, j), fast_of(fast, j)
     past = (names[0, i], names[1, i], times[i], parts[i], rings[i])
     room = (laps[i], offsets[i], entered[i], durations[i], states[i], exits[i])
     work, state = works[i], final[i]

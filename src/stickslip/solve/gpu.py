@@ -23,8 +23,7 @@ def each(given, out, scratch):
 
 def march_all(given: tuple[Any, ...], out: tuple[Any, ...], scratch: tuple[Any, ...]) -> None:
     """March every motion on the GPU and bring home what was written."""
-    if not cuda.is_available():
-        raise SolveError("numba finds no NVIDIA GPU", "gpu=True needs one and its driver", "leave gpu=False")
+    require_gpu("gpu=False")
     written = carried(out)
     each[math.ceil(len(given[0]) / THREADS), THREADS](carried(given), written, carried(scratch))
     for array, found in zip(out, written, strict=True):
@@ -34,3 +33,9 @@ def march_all(given: tuple[Any, ...], out: tuple[Any, ...], scratch: tuple[Any, 
 def carried(values: tuple[Any, ...]) -> tuple[Any, ...]:
     """Arrays, however nested, on the GPU."""
     return tuple(carried(v) if isinstance(v, tuple) else cuda.to_device(v) for v in values)
+
+
+def require_gpu(instead: str) -> None:
+    """Refuse to go on where numba finds no GPU that it can drive; `instead` is what to take."""
+    if not cuda.is_available():
+        raise SolveError("numba finds no NVIDIA GPU", "this needs one and its driver", f"take {instead}")

@@ -290,6 +290,9 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
             if tones.shape[0] == 1:
                 set_tones(tones, held, clock[1] + gone)
                 tail[int(tones[0, 0])], tail[int(tones[0, 1])] = 0.0, 0.0
+            if gone > 2.0 * period and _rests(flow[mode], tones):
+                gone = left  # held through two periods of the drive: held for good
+                break
             if spent - begun == patience:
                 break
         durations[count] = gone
@@ -315,6 +318,9 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
         if leaving < 0 and gone < left:
             return FULL, count, mode
         if leaving < 0:
+            if clock[0] < limit[0]:
+                ring[1] = ring[2]
+                ring[2] = ring[0]
             clock[0], clock[1], clock[2] = limit[0], limit[1], 0.0
             set_tones(tones, state, clock[1])
             return DONE, count, mode
@@ -329,6 +335,19 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
             return CHATTER, count, target[leaving]
         if gone <= 0.0:
             return LOST, count, mode
+
+
+@compiled(**OPTIONS)
+def _rests(flow, tones):
+    """Whether nothing but the one tone of the drive moves in a mode."""
+    if tones.shape[0] != 1:
+        return False
+    for i in range(flow.shape[0]):
+        if i != int(tones[0, 0]) and i != int(tones[0, 1]):
+            for j in range(flow.shape[0]):
+                if flow[i, j] != 0.0:
+                    return False
+    return True
 
 
 @compiled(**OPTIONS)

@@ -33,24 +33,26 @@ SPLITS = 64
 
 @dataclass(frozen=True, eq=False)
 class Phasors:
-    """The tables of the fast path; M modes, E exits, C entries that rest (memory and the constant).
+    """The tables of the fast path; B systems, M modes, E exits, C entries that rest (memory and the constant).
 
     Attributes
     ----------
-    drive : ndarray (4,)
+    drive : ndarray (B, 4)
         Angular frequency [rad/s], phase [rad], nodes per second and number of nodes of the drive's table.
-    mode : ndarray (M, 12)
+    mode : ndarray (B, M, 12)
         Kind, real and imaginary part of l, real and imaginary part of the forced amplitude, 1 / (k/m), |l|, nodes
         per second, first node, number of nodes, 1 / (imaginary part of l), modulus sum of the forced amplitude.
-    level : ndarray (M, C)
+    level : ndarray (B, M, C)
         Constant forcing of each mode as a linear form of what rests.
-    exit : ndarray (E, 9)
+    exit : ndarray (B, E, 9)
         Coefficient of x and v, D (complex), W per unit of free amplitude (complex), its modulus, modulus of D, what it
         does to velocity and memory.
-    rest : ndarray (E, C)
+    rest : ndarray (B, E, C)
         G of each exit as a linear form of what rests.
     nodes : ndarray (K, 3)
         e^{i w t} and, mode by mode, e^{l t} at their nodes, and the node's time.
+    span : ndarray (B, 2)
+        First node of each system and the one after its last; it has none where it is not of the kind.
     """
 
     drive: Array
@@ -59,76 +61,120 @@ class Phasors:
     exit: Array
     rest: Array
     nodes: Array
+    span: NDArray[np.int64]
 
     @property
-    def tables(self) -> tuple[Array, ...]:
-        """The arrays the kernel reads, in their order."""
-        return self.drive, self.mode, self.level, self.exit, self.rest, self.nodes
+    def tables(self) -> tuple[NDArray[Any], ...]:
+        """All arrays, in their order."""
+        return self.drive, self.mode, self.level, self.exit, self.rest, self.nodes, self.span
+
+    def of(self, number: int) -> tuple[Array, ...]:
+        """The arrays of one system, as the kernel reads them."""
+        begin, end = self.span[number]
+        own = (part[number] for part in (self.drive, self.mode, self.level, self.exit, self.rest))
+        return (*own, self.nodes[begin:end])
 
 
-def phasors(table: Automaton) -> Phasors | None:
-    """The tables of the fast path, or None where the system is not of its kind."""
-    size, resting = len(table.names), slice(2, table.physical + 1)
-    if len(table.tones) != 1 or size != table.physical + 3 or len(table.target) == 0:
-        return None
-    omega, phase = table.tones[0, 2:]
-    period = 2 * math.pi / omega
-    turning = slice(size - 2, size)
-    turning_nodes = _nodes(1j * omega, period)
-    if turning_nodes is None:
-        return None
-    nodes: list[NDArray[np.complex128]] = [turning_nodes]
-    times = [_times(omega, len(nodes[0]))]
-    modes, levels, exits, rests = [], [], [], []
-    for j, flow in enumerate(table.flow):
-        if np.any(flow[resting]):
-            return None
-        rows = table.series[table.first[j] : table.first[j + 1], 0]
-        if not np.any(flow[:2]):
-            modes.append([HELD, *[0.0] * 11])
-            levels.append(np.zeros(resting.stop - 2))
-            exits += [[q[0], q[1], q[-2], -q[-1], 0.0, 0.0, 0.0, math.hypot(q[-2], q[-1])] for q in rows]
-            rests += [q[resting] for q in rows]
-            continue
-        stiffness, damping = -flow[1, 0], -flow[1, 1]
-        turn = stiffness - damping**2 / 4
-        response = stiffness - omega**2 + 1j * omega * damping
-        if turn <= 1e-3 * abs(stiffness) or abs(response) < 1e-2 * max(stiffness, omega**2) or flow[0, 1] != 1.0:
-            return None
-        free = complex(-damping / 2, math.sqrt(turn))
-        forced = complex(flow[1, turning][0], -flow[1, turning][1]) / response
-        grid = _nodes(free, period)
-        if grid is None:
-            return None
-        offset = sum(len(known) for known in nodes)
-        nodes.append(grid)
-        times.append(_times(abs(free), len(grid)))
-        modes.append([SLIDING, free.real, free.imag, forced.real, forced.imag, 1 / stiffness, abs(free),
-                      abs(free) / (2 * HALF_STEP), offset, len(grid), 1 / free.imag,
-                      abs(forced.real) + abs(forced.imag)])  # fmt: skip
-        levels.append(flow[1, resting])
-        for q in rows:
-            drive = complex(q[-2], -q[-1]) + (q[0] + 1j * omega * q[1]) * forced
-            weight = q[0] + q[1] * free
-            exits.append([q[0], q[1], drive.real, drive.imag, weight.real, weight.imag, abs(weight), abs(drive)])
-            rests.append(q[resting] + q[0] * flow[1, resting] / stiffness)
-    values = np.concatenate(nodes)
-    return Phasors(
-        np.array([omega, phase, omega / (2 * HALF_STEP), len(nodes[0])]),
-        np.array(modes),
-        np.array(levels),
-        np.column_stack([np.array(exits), [_deed(reset, table.physical) for reset in table.reset]]),
-        np.array(rests),
-        np.ascontiguousarray(np.column_stack([values.real, values.imag, np.concatenate(times)])),
-    )
+def phasors(
+    flow: Array, rows: Array, reset: Array, tones: Array, *, first: NDArray[np.int64], physical: int
+) -> Phasors:
+    """The tables of the fast path of B systems.
+
+    Parameters
+    ----------
+    flow : ndarray (B, M, N, N)
+        Flows of the modes.
+    rows : ndarray (B, E, N)
+        Quantities of the exits.
+    reset : ndarray (B, E, N, N)
+        What each exit does to the state.
+    tones : ndarray (B, J, 4)
+        What turns.
+    first : ndarray (M + 1,)
+        Exits of mode j are ``first[j]`` to ``first[j + 1]``.
+    physical : int
+        Entries of the state that belong to the oscillator and its law.
+    """
+    count, number, size = flow.shape[:3]
+    exits, resting = rows.shape[1], slice(2, physical + 1)
+    if tones.shape[1] != 1 or size != physical + 3 or exits == 0:
+        return _without(count)
+    omega, phase = tones[:, 0, 2], tones[:, 0, 3]
+    able = np.ones(count, dtype=bool)
+    modes, levels = np.zeros((count, number, 12)), np.zeros((count, number, physical - 1))
+    leaving, rests = np.zeros((count, exits, 9)), np.zeros((count, exits, physical - 1))
+    turns, sliding = [1j * omega], []
+    for j in range(number):
+        own, part = flow[:, j], slice(first[j], first[j + 1])
+        able &= ~np.any(own[:, resting], axis=(1, 2))
+        q = rows[:, part]
+        drive = q[:, :, -2] - 1j * q[:, :, -1]
+        leaving[:, part, :2], rests[:, part] = q[:, :, :2], q[:, :, resting]
+        if np.any(own[:, :2]):
+            stiffness, damping = -own[:, 1, 0], -own[:, 1, 1]
+            turn = stiffness - damping**2 / 4
+            response = stiffness - omega**2 + 1j * omega * damping
+            able &= (turn > 1e-3 * np.abs(stiffness)) & (own[:, 0, 1] == 1.0)
+            able &= np.abs(response) >= 1e-2 * np.maximum(stiffness, omega**2)
+            stiffness, response = np.where(able, stiffness, 1.0), np.where(able, response, 1.0)
+            free = -damping / 2 + 1j * np.sqrt(np.where(able, turn, 1.0))
+            forced = (own[:, 1, size - 2] - 1j * own[:, 1, size - 1]) / response
+            fast = np.abs(free)
+            sliding.append(j)
+            turns.append(free)
+            modes[:, j] = np.column_stack([
+                np.full(count, SLIDING), free.real, free.imag, forced.real, forced.imag, 1 / stiffness, fast,
+                fast / (2 * HALF_STEP), np.zeros((count, 2)), 1 / free.imag, np.abs(forced.real) + np.abs(forced.imag),
+            ])  # fmt: skip
+            levels[:, j] = own[:, 1, resting]
+            drive = drive + (q[:, :, 0] + 1j * omega[:, None] * q[:, :, 1]) * forced[:, None]
+            weight = q[:, :, 0] + q[:, :, 1] * free[:, None]
+            leaving[:, part, 4:7] = np.stack([weight.real, weight.imag, np.abs(weight)], axis=-1)
+            rests[:, part] += q[:, :, :1] * (own[:, 1, resting] / stiffness[:, None])[:, None]
+        leaving[:, part, 2:4] = np.stack([drive.real, drive.imag], axis=-1)
+        leaving[:, part, 7] = np.abs(drive)
+    leaving[:, :, 8] = _deeds(reset[:, :, 1:physical])
+    span, offsets, nodes = _all_nodes(np.stack(turns, axis=1), able)
+    modes[:, sliding, 8:10] = offsets[:, 1:]
+    drives = np.column_stack([omega, phase, omega / (2 * HALF_STEP), offsets[:, 0, 1]])
+    return Phasors(drives, modes, levels, leaving, rests, nodes, span)
 
 
 def fast_tables(table: Automaton) -> tuple[Array, ...]:
-    """The arrays of the fast path; with no nodes at all where the system has none."""
-    found = phasors(table)
-    if found is not None:
-        return found.tables
-    return np.zeros(4), np.zeros((1, 12)), np.zeros((1, 1)), np.zeros((1, 9)), np.zeros((1, 1)), np.zeros((0, 3))
+    """The arrays of the fast path of one system; with no nodes at all where it has none."""
+    one = (part[None] for part in (table.flow, table.series[:, 0], table.reset, table.tones))
+    return phasors(*one, first=table.first, physical=table.physical).of(0)
+
+
+def _without(count: int) -> Phasors:
+    """The tables of systems without a fast path."""
+    return Phasors(
+        np.zeros((count, 4)), np.zeros((count, 1, 12)), np.zeros((count, 1, 1)), np.zeros((count, 1, 9)),
+        np.zeros((count, 1, 1)), np.zeros((0, 3)), np.zeros((count, 2), np.int64),
+    )  # fmt: skip
+
+
+def _all_nodes(turns: NDArray[np.complex128], able: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array, Array]:
+    """Nodes of all that turns, the drive first: where each system's lie in the table, and in them first node and number
+    of each of its turning parts. Systems that turn alike share theirs."""
+    keys, which = np.unique(turns, axis=0, return_inverse=True)
+    spans, offsets = np.zeros((len(keys), 2), np.int64), np.zeros((*keys.shape, 2))
+    parts, length = [np.zeros((0, 3))], 0
+    wanted = np.zeros(len(keys), dtype=bool)
+    wanted[which.reshape(-1)[able]] = True
+    for j in np.flatnonzero(wanted):
+        period = 2 * math.pi / keys[j, 0].imag
+        grids = [_nodes(complex(rate), period) for rate in keys[j]]
+        if any(grid is None for grid in grids):
+            continue
+        ends = np.cumsum([len(grid) for grid in grids if grid is not None])
+        offsets[j, :, 0], offsets[j, :, 1] = np.append(0, ends[:-1]), np.diff(ends, prepend=0)
+        spans[j] = length, length + ends[-1]
+        length += ends[-1]
+        parts += [grid for grid in grids if grid is not None]
+    spans = spans[which.reshape(-1)]
+    spans[~able] = 0
+    return spans, offsets[which.reshape(-1)], np.ascontiguousarray(np.concatenate(parts))
 
 
 def blank_past() -> tuple[NDArray[Any], ...]:
@@ -138,30 +184,25 @@ def blank_past() -> tuple[NDArray[Any], ...]:
 
 
 @lru_cache(maxsize=256)
-def _nodes(rate: complex, period: float) -> NDArray[np.complex128] | None:
-    """e^{rate t} at distances that the polynomial bridges, over one period."""
+def _nodes(rate: complex, period: float) -> Array | None:
+    """e^{rate t} at distances that the polynomial bridges, over one period, and their times (K, 3)."""
     count = int(period * abs(rate) / (2 * HALF_STEP)) + 3
     if count > LONGEST:
         return None
-    steps = np.asarray(_times(abs(rate), count), dtype=np.longdouble)
+    times = np.arange(count, dtype=np.float64) * (2 * HALF_STEP / abs(rate))
+    steps = np.asarray(times, dtype=np.longdouble)
     turned = np.exp(np.longdouble(rate.real) * steps)
     angle = np.longdouble(rate.imag) * steps
-    return np.asarray(turned * np.cos(angle), np.float64) + 1j * np.asarray(turned * np.sin(angle), np.float64)
+    return np.asarray(np.column_stack([turned * np.cos(angle), turned * np.sin(angle), times]), np.float64)
 
 
-def _deed(reset: Array, physical: int) -> float:
+def _deeds(inner: Array) -> Array:
     """Whether an exit keeps velocity and memory, only stops the mass, or carries them over in another way."""
-    inner = reset[1:physical]
-    if np.array_equal(inner, np.eye(len(reset))[1:physical]):
-        return KEEPS
-    stopped = np.eye(len(reset))[1:physical]
+    unit = np.eye(inner.shape[-1])[1 : 1 + inner.shape[-2]]
+    stopped = unit.copy()
     stopped[0] = 0.0
-    return STOPS if np.array_equal(inner, stopped) else CARRIES
-
-
-def _times(rate: float, count: int) -> Array:
-    """Times of the nodes, as the compiled code sees them."""
-    return np.arange(count, dtype=np.float64) * (2 * HALF_STEP / rate)
+    kept, held = (np.all(inner == like, axis=(-2, -1)) for like in (unit, stopped))
+    return np.where(kept, KEEPS, np.where(held, STOPS, CARRIES))
 
 
 @compiled(**FAST, forceinline=True)

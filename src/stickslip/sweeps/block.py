@@ -2,39 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve.simulate import simulate
-from stickslip.sweeps.measures import AT_REST, CROWDED, MOVING, NO_SYSTEM
+from stickslip.sweeps.crowd import Watch, crowds, on_cpu, watched
+from stickslip.sweeps.measures import FAILED, NO_SYSTEM, own_name
 from stickslip.sweeps.plan import Arrays, Plan
-from stickslip.sweeps.trajectory import measured
+from stickslip.sweeps.trajectory import measured, outcome
+
+Alone = Callable[[Plan, tuple[int, ...]], Mapping[str, Any]]  # the measures of one point by itself
 
 
-def run_block(plan: Plan, number: int) -> tuple[Arrays, Arrays | None]:
-    """The answers of one block, by the names of the plan's variables, and its events where they are asked for."""
+def run_block(
+    plan: Plan, number: int, watch: Watch = on_cpu, *, alone: Alone | None = None
+) -> tuple[Arrays, Arrays | None]:
+    """The answers of one block, by the names of the plan's variables, and its events where they are asked for.
+
+    Oscillators under laws of linear modes and simple drives are marched together and counted as they go; any other
+    system is simulated, and its Trajectory measured. Both give the same answers; a test holds them together.
+    """
     shape = tuple(part.stop - part.start for part in plan.slices(number))
     points = plan.points(number)
     found: Arrays = {name: np.full(len(points), v.fill, v.dtype) for name, v in plan.variables.items()}
-    for row, steps in enumerate(points):
-        values = _point(plan, steps)
+    left = set(range(len(points)))
+    for rows, fleet, known in crowds(plan, number):
+        values = known if fleet is None else watched(plan, fleet, known, watch)
         for name in found.keys() & values.keys():
-            found[name][row] = values[name]
+            found[name][rows] = values[name]
+        left -= set(rows.tolist())
+    own = [measure for measure in plan.measures if callable(measure)]
+    for row, steps in enumerate(points):
+        if row in left or (own and found["status"][row] not in (NO_SYSTEM, FAILED)):
+            values = (alone or _alone)(plan, steps) if row in left else {own_name(m): m(_run(plan, steps)) for m in own}
+            for name in found.keys() & values.keys():
+                found[name][row] = values[name]
     return {name: values.reshape(shape) for name, values in found.items()}, None
 
 
-def _point(plan: Plan, steps: tuple[int, ...]) -> Mapping[str, Any]:
+def _run(plan: Plan, steps: tuple[int, ...]) -> Any:
+    system, start = plan.at(steps)
+    return simulate(system, cycles=plan.settle + plan.cycles, start=start)
+
+
+def _alone(plan: Plan, steps: tuple[int, ...]) -> Mapping[str, Any]:
+    """One motion simulated, and its Trajectory measured."""
     try:
-        system, start = plan.at(steps)
-        run = simulate(system, cycles=plan.settle + plan.cycles, start=start)
+        run = _run(plan, steps)
+        return {"status": outcome(run), **measured(run, plan, plan.at(steps)[1])}
     except ModelError:
         return {"status": NO_SYSTEM}
     except SolveError:
-        return {"status": CROWDED}
-    return {
-        "status": AT_REST if run.status == "at rest" else MOVING,
-        **measured(run, plan, start),
-    }
+        return {"status": FAILED}

@@ -6,11 +6,13 @@ from collections.abc import Callable, Sequence
 
 from stickslip.errors import ModelError
 from stickslip.sweeps.cluster import on_cluster
+from stickslip.sweeps.cuda import cuda
 from stickslip.sweeps.plan import Keep, Plan
 from stickslip.sweeps.serial import serial
+from stickslip.sweeps.threads import threads
 
 Engine = Callable[[Plan, Sequence[int], Keep, str | None], None]
-ENGINES: dict[str, Engine] = {"serial": serial, "dask": on_cluster}
+ENGINES: dict[str, Engine] = {"serial": serial, "threads": threads, "dask": on_cluster, "cuda": cuda}
 
 
 def read_engine(name: str) -> tuple[Engine, str | None]:

@@ -11,9 +11,10 @@ from stickslip.errors import ModelError
 from stickslip.settings import nearest
 
 Measure = str | Callable[..., float]
-OUTCOMES = ("moving", "at_rest", "too_many_events", "unproved", "no_such_system", "unbounded")
-MOVING, AT_REST, CROWDED, UNPROVED, NO_SYSTEM, UNBOUNDED = range(len(OUTCOMES))
+OUTCOMES = ("moving", "at_rest", "failed", "no_such_system")
+MOVING, AT_REST, FAILED, NO_SYSTEM = range(len(OUTCOMES))
 ORDERS = 8  # longest orbit looked for, in periods of the drive
+CLOSE = 1e-6  # of the motion's size: a return this near is one
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from stickslip.sweeps.grid import Axis, coordinates, placed
 from stickslip.sweeps.measures import Measure, Variable, variables
 
 BLOCK = 4096  # points at most that are run together
-LEAST = 64  # blocks, where there are points enough: so that several workers share the work and progress is seen
+LEAST = 16  # blocks, where there are points enough: so that several workers share the work and progress is seen
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -125,13 +125,16 @@ class Plan:
 
 
 def chunked(shape: Sequence[int]) -> tuple[int, ...]:
-    """Points of a block along each axis: whole last axes first, `BLOCK` points at most, some `LEAST` blocks."""
+    """Points of a block along each axis: much the same along each, `BLOCK` points at most, some `LEAST` blocks.
+
+    The motions of a square block share more of their laws and drives than those of a row.
+    """
     room = max(1, min(BLOCK, math.prod(shape) // LEAST))
-    chunks = []
-    for count in reversed(shape):
-        chunks.append(min(count, room))
-        room = max(1, room // count)
-    return tuple(reversed(chunks))
+    chunks = [0] * len(shape)
+    for left, axis in zip(range(len(shape), 0, -1), np.argsort(shape, kind="stable"), strict=True):
+        chunks[axis] = min(shape[axis], max(1, round(room ** (1 / left))))
+        room = max(1, room // chunks[axis])
+    return tuple(chunks)
 
 
 def blank(plan: Plan) -> Arrays:

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.solve.automaton import Array, System
+from stickslip.solve.automaton import Array, Automaton, System
 from stickslip.solve.lyapunov import lyapunov
 from stickslip.solve.poincare import derivative, end_of, lap, tables
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Structure
 from stickslip.sweeps import tally as log
-from stickslip.sweeps.measures import ORDERS, own_name
+from stickslip.sweeps.measures import AT_REST, MOVING, ORDERS, own_name
 from stickslip.sweeps.plan import Plan
+from stickslip.sweeps.watch import repeats
 
 ORDER = 12  # Gauss points of a cell
 SEEN = 8  # looks at a cell for a turn
 KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
-CLOSE = 1e-6  # of the motion's size: a return this near is one
 
 
 def measured(run: Trajectory, plan: Plan, start: Mapping[str, float | str]) -> dict[str, Any]:
@@ -42,7 +42,7 @@ def measured(run: Trajectory, plan: Plan, start: Mapping[str, float | str]) -> d
         found["order"] = order(run, settle)
     if "multipliers" in measures:
         found["multiplier"] = multiplier(run, settle)
-    if "lyapunov" in measures:
+    if "lyapunov" in measures and math.isfinite(run.table.motion.period):
         found["lyapunov"] = lyapunov(run.system, cycles=cycles, transient=settle, start=start).value
     return found | {own_name(measure): measure(run) for measure in measures if callable(measure)}
 
@@ -123,17 +123,15 @@ def order(run: Trajectory, settle: int) -> int:
     """Periods of the drive after which the motion repeats; 0 where it does not up to 8."""
     if not math.isfinite(run.table.motion.period):
         return 0
-    return repeats(run.section()[settle:])
+    return int(repeats(run.section()[settle + 1 :][-2 * ORDERS :]))
 
 
-def repeats(section: Array) -> int:
-    """The least number of rows after which the last ones are there again."""
-    size = np.max(np.abs(section), axis=0)
-    for step in range(1, min(ORDERS, len(section) // 2) + 1):
-        last = section[-2 * step :]
-        if np.all(np.abs(last[step:] - last[:step]) <= CLOSE * size):
-            return step
-    return 0
+def outcome(run: Trajectory) -> int:
+    """Whether the run still moves at its end: not where it is held through a whole period of the drive, or for good."""
+    table, mode = run.table, int(run.modes[-1])
+    still = not np.any(table.flow[mode][: table.physical]) if isinstance(table, Automaton) else False
+    held = still and math.isfinite(table.motion.period) and run.durations[-1] >= (1 - 1e-9) * table.motion.period
+    return AT_REST if held or run.status == "at rest" else MOVING
 
 
 def multiplier(run: Trajectory, settle: int) -> complex:

@@ -1,0 +1,188 @@
+"""Many motions of a block together: their tables made at once, marched and counted by the compiled watch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import ModelError
+from stickslip.oscillator import Oscillator
+from stickslip.parameters import changed, find
+from stickslip.solve.automaton import DEGREE, Array, leaps_between
+from stickslip.solve.fleet import Fleet, Tables, fleet_tables, kind_of_drive, kind_of_law, opened
+from stickslip.sweeps import tally as log
+from stickslip.sweeps.grid import START
+from stickslip.sweeps.measures import FAILED, NO_SYSTEM, ORDERS
+from stickslip.sweeps.plan import Arrays, Plan
+from stickslip.sweeps.watch import CONSTANT, LAP, ROOM, VARIES, repeats, watch_all
+
+Index = NDArray[np.int64]
+Watch = Callable[[Any, Any, int, int], None]  # march what is given into what is left; modes and physical entries
+KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
+PARTS = ("law", "drive")
+
+
+def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[str, Any]]]:
+    """The fleets of a block: which of its points, the fleet, and the start by name.
+
+    Points with no system come with the status of it and without a fleet; those that only a run on its own can tell
+    of come not at all.
+    """
+    if (
+        not isinstance(plan.system, Oscillator)
+        or "mode" in plan.start
+        or any(n == f"{START}mode" for n in _names(plan))
+    ):
+        return
+    steps = np.array(plan.points(number), dtype=np.int64).reshape(-1, len(plan.axes))
+    (laws, law), (drives, drive), (owners, own) = (_different(plan, steps, part) for part in (*PARTS, ""))
+    real = np.array([s is not None for s in laws])[law] & np.array([s is not None for s in drives])[drive]
+    real &= np.array([s is not None for s in owners])[own]
+    yield np.flatnonzero(~real), None, {"status": NO_SYSTEM}
+    kinds = [s and kind_of_law(s.law) for s in laws], [s and kind_of_drive(s.drive) for s in drives]
+    groups: dict[Any, list[int]] = {}
+    for row in np.flatnonzero(real):
+        kind = kinds[0][law[row]], kinds[1][drive[row]]
+        if None not in kind:
+            groups.setdefault(kind, []).append(int(row))
+    values = np.array([[s.mass, s.stiffness, s.damping, s.damper == "base"] if s else [0.0] * 4 for s in owners])
+    for rows in map(np.array, groups.values()):
+        used, which = np.unique(law[rows], return_inverse=True)
+        moved, whose = np.unique(drive[rows], return_inverse=True)
+        mass, stiffness, damping, base = values[own[rows]].T
+        fleet = Fleet(
+            tuple(laws[j].law for j in used), tuple(drives[j].drive for j in moved), which, whose,
+            mass, stiffness, damping, base == 1.0,
+        )  # fmt: skip
+        yield rows, fleet, {**plan.start, **_starts(plan, steps[rows])}
+
+
+def _names(plan: Plan) -> Iterator[str]:
+    return (name for axis in plan.axes for name in axis.names)
+
+
+def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Oscillator | None], Index]:
+    """The systems that differ in one part (the law, the drive, or the oscillator's own), and which each point has."""
+    own = [
+        [j for j, name in enumerate(axis.names) if not name.startswith(START) and _part(plan, name) == part]
+        for axis in plan.axes
+    ]
+    columns = [number for number, names in enumerate(own) if names]
+    keys, which = np.unique(steps[:, columns], axis=0, return_inverse=True)
+    found: list[Oscillator | None] = []
+    for key in keys:
+        axes = [(plan.axes[number], own[number], step) for number, step in zip(columns, key, strict=True)]
+        changes = {axis.names[j]: axis.values[step][j] for axis, names, step in axes for j in names}
+        try:
+            found.append(changed(plan.system, changes) if changes else plan.system)
+        except ModelError:
+            found.append(None)
+    return found, which.reshape(-1)
+
+
+def _part(plan: Plan, name: str) -> str:
+    place = find(plan.system, name)[0][0]
+    return place if place in PARTS else ""
+
+
+def _starts(plan: Plan, steps: Index) -> dict[str, Array]:
+    return {
+        name.removeprefix(START): np.array([row[j] for row in axis.values])[steps[:, number]]
+        for number, axis in enumerate(plan.axes)
+        for j, name in enumerate(axis.names)
+        if name.startswith(START)
+    }
+
+
+def watched(plan: Plan, fleet: Fleet, start: Mapping[str, Any], watch: Watch) -> Arrays:
+    """The measures of a fleet."""
+    table = fleet_tables(fleet)
+    asked = set(measure for measure in plan.measures if isinstance(measure, str))
+    states, modes = opened(table, start)
+    count, physical = len(states), table.physical
+    driven = bool(np.all(np.isfinite(table.period)))
+    natural = np.sqrt(fleet.stiffness / fleet.mass)
+    with np.errstate(divide="ignore"):
+        units = np.where(np.isfinite(table.period), table.period, 2 * np.pi / natural)
+        rest = np.where(natural > 0, 1 / natural, table.period)
+    tangents = asked & {"multipliers", "lyapunov"}
+    grown, turned = driven and "lyapunov" in asked, driven and "multipliers" in asked
+    rows = min(2 * ORDERS, plan.cycles) if driven and asked & {"period", "multipliers"} else 0
+    leaps = leaps_between(table.first, table.target, table.reset) if tangents else np.zeros((count, 1, 1, 1, 1))
+    weights = np.ones((count, physical))
+    weights[:, 1] = rest
+    wants = np.array([plan.settle, plan.cycles, grown, turned], dtype=np.int64)
+    look = _look(table, asked)
+    given = (states, modes, table.period, units, table.arrays, table.phasors.tables, look, wants, leaps, weights)
+    out = (
+        np.full(count, FAILED, np.int64), np.zeros((count, log.ENTRIES)), np.zeros((count, rows, physical)),
+        np.zeros(count), np.full((count, physical, physical), np.nan),
+    )  # fmt: skip
+    watch(given, out, states.shape[1], physical)
+    found = _answers(plan, out, units, table.period)
+    lost = out[0] == FAILED
+    for name, values in found.items():
+        values[lost] = plan.variables[name].fill if name in plan.variables else 0
+    return {"status": out[0], **found}
+
+
+def _look(table: Tables, asked: set[str]) -> tuple[NDArray[Any], ...]:
+    """What the watch looks at in each mode: kind, side, whether the mass may turn within, what friction does there,
+    whether nothing moves; and slip, displacement from the counter-face and friction as linear forms."""
+    fixed = np.arange(len(table.names)) != 0
+    still_face = not np.any(table.gap[:, fixed])
+    inner, works, still = [], [], []
+    for j, mode in enumerate(table.modes):
+        rests = not np.any(table.flow[:, j, : table.physical])
+        quantities = table.series[:, table.first[j] : table.first[j + 1], 0]
+        stops = np.any(np.all(np.delete(quantities, 1, axis=2) == 0, axis=(0, 2))) and still_face
+        constant = not np.any(np.delete(table.friction[:, j], table.physical, axis=1))
+        inner.append("amplitude" in asked and not rests and not stops)
+        works.append(0 if "energy" not in asked or mode.friction is None else CONSTANT if constant else VARIES)
+        still.append(rests)
+    kinds = [KINDS.get(mode.kind, log.SLIP) for mode in table.modes]
+    return (
+        np.array(kinds, dtype=np.int64), np.array([float(mode.side) for mode in table.modes]), np.array(inner),
+        np.array(works, dtype=np.int64), np.array(still), table.slip, table.gap, table.friction,
+        np.array([table.physical]),
+    )  # fmt: skip
+
+
+def _answers(plan: Plan, out: Sequence[NDArray[Any]], units: Array, period: Array) -> Arrays:
+    """The variables from what was counted."""
+    _, sums, sections, growths, jacobians = out
+    cycles = plan.cycles
+    with np.errstate(invalid="ignore"):
+        found = {
+            "normal_stops": sums[:, log.NORMAL] / cycles, "abnormal_stops": sums[:, log.ABNORMAL] / cycles,
+            "stick_share": sums[:, log.HELD] / (units * cycles), "micro_slips": sums[:, log.SHORT] / cycles,
+            "transition_speed": np.where(sums[:, log.FASTEST] > 0, sums[:, log.FASTEST], np.nan),
+            "amplitude": sums[:, log.REACH], "energy": sums[:, log.WORK] / cycles,
+            "lyapunov": np.where(np.isfinite(period), growths / (units * cycles), np.nan),
+        }  # fmt: skip
+    found["order"] = np.array([float(repeats(section)) for section in sections])
+    known = np.all(np.isfinite(jacobians), axis=(1, 2))
+    found["multiplier"] = np.full(len(known), complex(np.nan, np.nan))
+    if np.any(known):
+        values = np.linalg.eigvals(jacobians[known])
+        best = np.argmax(np.abs(values), axis=1)
+        found["multiplier"][known] = np.take_along_axis(values, best[:, None], axis=1)[:, 0]
+    return found
+
+
+def on_cpu(given: Any, out: Any, size: int, physical: int) -> None:
+    """One motion after another, in one scratch."""
+    watch_all(given, out, scratch(1, size, physical))
+
+
+def scratch(rows: int, size: int, physical: int) -> Any:
+    """Room for what so many motions need while they are marched."""
+    wide = max(size, DEGREE + 1, 16)
+    room = (np.zeros((rows, ROOM), np.int32), np.zeros((rows, ROOM)), np.zeros((rows, ROOM), np.int16),
+            np.zeros((rows, ROOM)), np.zeros((rows, ROOM, size)), np.zeros((rows, ROOM), np.int16))  # fmt: skip
+    return (np.zeros((rows, 17, wide)), np.zeros((2, rows, LAP), np.int64), np.zeros((rows, LAP)),
+            np.zeros((rows, LAP), np.int64), np.zeros((rows, 3), np.int64), np.zeros((rows, 3)), room,
+            np.zeros((rows, physical, size)))  # fmt: skip

@@ -1,0 +1,51 @@
+"""A block at a time on an NVIDIA GPU, one motion to a thread, in the same compiled functions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from stickslip.errors import ModelError, SolveError
+from stickslip.sweeps.block import run_block
+from stickslip.sweeps.crowd import scratch
+from stickslip.sweeps.plan import Keep, Plan
+
+
+def cuda(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = None) -> None:
+    """Run the blocks on the GPU in turn.
+
+    Raises
+    ------
+    SolveError
+        numba-cuda, a GPU or its driver is not there.
+    ModelError
+        The system is not of the kind that marches on a GPU.
+    """
+    try:
+        from stickslip.solve.gpu import carried, require_gpu
+        from stickslip.sweeps.watch_gpu import THREADS, each
+    except ImportError as absent:
+        raise SolveError(
+            "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install "stickslip[gpu]"'
+        ) from absent
+    require_gpu('engine="threads"')
+
+    def watch(given: Any, out: Any, size: int, physical: int) -> None:
+        written = carried(out)
+        each[math.ceil(len(given[0]) / THREADS), THREADS](
+            carried(given), written, carried(scratch(len(given[0]), size, physical))
+        )
+        for array, found in zip(out, written, strict=True):
+            array[...] = found.copy_to_host()
+
+    for number in numbers:
+        keep(number, *run_block(plan, number, watch, alone=_refused))
+
+
+def _refused(plan: Plan, steps: tuple[int, ...]) -> Any:
+    raise ModelError(
+        f"{type(plan.at(steps)[0].law).__name__} under {type(plan.at(steps)[0].drive).__name__}",
+        "a GPU marches one mass under laws of linear modes with at most one tone",
+        'take engine="threads"',
+    )
