@@ -13,6 +13,7 @@ import hashlib
 import os
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
 from functools import cache
 from importlib.machinery import SourceFileLoader
@@ -56,7 +57,7 @@ def generated(source: str) -> ModuleType:
     name = "generated_" + hashlib.sha256(source.encode()).hexdigest()[:16]
     file = (folder() or _passing()) / f"{name}.txt"  # no module of the package
     if not file.exists() or file.read_text("utf-8") != source:
-        part = file.with_suffix(f".{os.getpid()}")
+        part = file.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
         part.write_text(source, "utf-8")
         part.replace(file)
     loader = SourceFileLoader(f"{__package__}.{name}", str(file))

@@ -101,7 +101,7 @@ class Automaton:
     @cached_property
     def leap(self) -> Array:
         """What carries the state from a mode to another through modes in which no time passes (M, M, N, N)."""
-        return leaps_between(self.first, self.target, self.reset[None])[0]
+        return np.asarray(leaps_between(self.first, self.target, self.reset[None])[0])
 
     def index(self, mode: str) -> int:
         """Number of the mode of that name."""

@@ -117,11 +117,10 @@ def kind_of_drive(drive: Drive) -> Any:
 def fleet_of(systems: Sequence[Oscillator]) -> Fleet:
     """A fleet of oscillators given one by one."""
     each = np.arange(len(systems))
-    numbers = [np.array([getattr(s, name) for s in systems], float) for name in ("mass", "stiffness", "damping")]
     laws: Any = tuple(s.law for s in systems)
-    return Fleet(
-        laws, tuple(s.drive for s in systems), each, each, *numbers, np.array([s.damper == "base" for s in systems])
-    )
+    mass, stiffness, damping = np.array([[s.mass, s.stiffness, s.damping] for s in systems], dtype=np.float64).T
+    on_base = np.array([s.damper == "base" for s in systems])
+    return Fleet(laws, tuple(s.drive for s in systems), each, each, mass, stiffness, damping, on_base)
 
 
 class _Builder:
@@ -163,7 +162,7 @@ class _Builder:
 
     def driven(self, forms: Sequence[Mapping[str, float]]) -> Array:
         """One form of each drive."""
-        return self.rows(forms)[self.fleet.drive]
+        return np.asarray(self.rows(forms)[self.fleet.drive])
 
     def relative(self, forms: Sequence[Mapping[str, float]], friction: Array, slope: Array | None = None) -> Array:
         """One form of each law: x and v relative to the counter-face, f the friction of the mode, df its rate."""
@@ -171,7 +170,7 @@ class _Builder:
         moving = [[sum(v for n, v in form.items() if n == "x" or n in self.places), form.get("v", 0.0)] for form in own]
         carried, speed = np.array(moving)[self.fleet.law].T[:, :, None]
         f, df = np.array([[form.get("f", 0.0), form.get("df", 0.0)] for form in forms])[self.fleet.law].T[:, :, None]
-        rows = self.rows(own)[self.fleet.law] - carried * self.face[0] - speed * self.face[1] + f * friction
+        rows: Array = self.rows(own)[self.fleet.law] - carried * self.face[0] - speed * self.face[1] + f * friction
         return rows if slope is None else rows + df * slope
 
     def moved(self, name: str, order: int) -> Array:

@@ -357,7 +357,7 @@ def follow(tables, mode, state, time, work):
     cell, tail, count = cells[mode], work[2], 0
     for i in range(state.shape[0]):
         tail[i] = 0.0
-    while time - count * cell > cell:
+    while (time - count * cell if count else time) > cell:
         leap(hop[mode], state, tail, work)
         count += 1
     advance(flow[mode], state, tail, time - count * cell if count else time, work)

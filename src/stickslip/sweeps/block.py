@@ -37,9 +37,9 @@ def run_block(
     own = [measure for measure in plan.measures if callable(measure)]
     for row, steps in enumerate(points):
         if row in left or (own and found["status"][row] not in (NO_SYSTEM, FAILED)):
-            values = (alone or _alone)(plan, steps) if row in left else {own_name(m): m(_run(plan, steps)) for m in own}
-            for name in found.keys() & values.keys():
-                found[name][row] = values[name]
+            told = (alone or _alone)(plan, steps) if row in left else {own_name(m): m(_run(plan, steps)) for m in own}
+            for name in found.keys() & told.keys():
+                found[name][row] = told[name]
     return {name: values.reshape(shape) for name, values in found.items()}, None
 
 

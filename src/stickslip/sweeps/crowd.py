@@ -31,11 +31,8 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[
     Points with no system come with the status of it and without a fleet; those that only a run on its own can tell
     of come not at all.
     """
-    if (
-        not isinstance(plan.system, Oscillator)
-        or "mode" in plan.start
-        or any(n == f"{START}mode" for n in _names(plan))
-    ):
+    named = {f"{START}{name}" for name in plan.start} | {name for axis in plan.axes for name in axis.names}
+    if not isinstance(plan.system, Oscillator) or f"{START}mode" in named:
         return
     steps = np.array(plan.points(number), dtype=np.int64).reshape(-1, len(plan.axes))
     (laws, law), (drives, drive), (owners, own) = (_different(plan, steps, part) for part in (*PARTS, ""))
@@ -60,11 +57,7 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[
         yield rows, fleet, {**plan.start, **_starts(plan, steps[rows])}
 
 
-def _names(plan: Plan) -> Iterator[str]:
-    return (name for axis in plan.axes for name in axis.names)
-
-
-def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Oscillator | None], Index]:
+def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Any], Index]:
     """The systems that differ in one part (the law, the drive, or the oscillator's own), and which each point has."""
     own = [
         [j for j, name in enumerate(axis.names) if not name.startswith(START) and _part(plan, name) == part]
@@ -72,7 +65,7 @@ def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Oscillator | N
     ]
     columns = [number for number, names in enumerate(own) if names]
     keys, which = np.unique(steps[:, columns], axis=0, return_inverse=True)
-    found: list[Oscillator | None] = []
+    found: list[Any] = []
     for key in keys:
         axes = [(plan.axes[number], own[number], step) for number, step in zip(columns, key, strict=True)]
         changes = {axis.names[j]: axis.values[step][j] for axis, names, step in axes for j in names}
@@ -100,7 +93,7 @@ def _starts(plan: Plan, steps: Index) -> dict[str, Array]:
 def watched(plan: Plan, fleet: Fleet, start: Mapping[str, Any], watch: Watch) -> Arrays:
     """The measures of a fleet."""
     table = fleet_tables(fleet)
-    asked = set(measure for measure in plan.measures if isinstance(measure, str))
+    asked = {measure for measure in plan.measures if isinstance(measure, str)}
     states, modes = opened(table, start)
     count, physical = len(states), table.physical
     driven = bool(np.all(np.isfinite(table.period)))

@@ -45,7 +45,7 @@ def cuda(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = N
 
 def _refused(plan: Plan, steps: tuple[int, ...]) -> Any:
     raise ModelError(
-        f"{type(plan.at(steps)[0].law).__name__} under {type(plan.at(steps)[0].drive).__name__}",
+        repr(plan.at(steps)[0]),
         "a GPU marches one mass under laws of linear modes with at most one tone",
         'take engine="threads"',
     )

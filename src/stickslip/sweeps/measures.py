@@ -42,6 +42,7 @@ class Variable:
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
 
+EVENTS = {"stops", "stick_share", "micro_slips", "transition_speed"}  # measures that count events of one contact
 STATUS = Variable(
     "1", "what became of the motion", "int8", -1,
     {"flag_values": list(range(-1, len(OUTCOMES))), "flag_meanings": " ".join(("not_run", *OUTCOMES))},

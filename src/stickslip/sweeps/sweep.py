@@ -10,10 +10,16 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import ModelError
+from stickslip.laws.time_delay import TimeDelay
+from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import System
+from stickslip.solve.lyapunov import BATCHES
+from stickslip.solve.poincare import tables
+from stickslip.solve.simulate import opening
+from stickslip.structure import Structure
 from stickslip.sweeps.engines import read_engine
 from stickslip.sweeps.grid import Grid, read_grid
-from stickslip.sweeps.measures import Measure, read_measures
+from stickslip.sweeps.measures import EVENTS, Measure, read_measures
 from stickslip.sweeps.plan import Arrays, Plan, assemble, blank, chunked, required
 from stickslip.sweeps.store import Store
 
@@ -26,7 +32,7 @@ def sweep(
     cycles: int = 50,
     settle: int = 200,
     start: Mapping[str, float | str] | None = None,
-    engine: str = "serial",
+    engine: str = "threads",
     store: str | Path | None = None,
 ) -> Any:
     """How does the motion change with the parameters of the system?
@@ -53,7 +59,8 @@ def sweep(
     start : mapping, optional
         State at time 0, as :func:`simulate` takes it.
     engine : str
-        Where the blocks are run: "serial", "dask" (the cores of this machine), "dask://host:port" (the workers of the
+        Where the blocks are run: "threads" (the processors of this machine), "serial" (one of them), "cuda" (an NVIDIA
+        GPU), "dask" (the cores of this machine), "dask://host:port" (the workers of the
         scheduler there).
     store : path, optional
         A Zarr group where each finished block is kept, so that a sweep that was ended, or killed, goes on there when
@@ -115,7 +122,18 @@ def planned(
     axes = read_grid(system, grid)
     chunks = chunked([len(axis.values) for axis in axes])
     plan = Plan(system, axes, read_measures(measures), int(cycles), int(settle), dict(start or {}), chunks)
-    plan.at([0] * len(axes))
+    asked = {measure for measure in plan.measures if isinstance(measure, str)}
+    system, begun = plan.at([0] * len(axes))
+    if begun and not (isinstance(system, Oscillator) and isinstance(system.law, TimeDelay)):
+        opening(tables(system), begun)
+    if "lyapunov" in asked and cycles < BATCHES:
+        raise ModelError(f"cycles = {cycles}", f"a Lyapunov exponent needs {BATCHES} at least", "raise cycles=")
+    if asked & EVENTS and isinstance(system, Structure) and len(system.contacts) != 1:
+        raise ModelError(
+            f"{', '.join(sorted(asked & EVENTS))} of {len(system.contacts)} contacts",
+            "these measures are of systems with one contact",
+            "measure with a function of the Trajectory",
+        )
     return plan
 
 

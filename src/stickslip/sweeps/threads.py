@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from itertools import islice
 
 from stickslip.sweeps.block import run_block
 from stickslip.sweeps.plan import Keep, Plan
@@ -24,16 +25,12 @@ def threads(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None 
     count = int(address) if address else processors()
     left = iter(numbers)
     with ThreadPoolExecutor(count, "sweep") as pool:
-        running = {
-            pool.submit(run_block, plan, number): number for number, _ in zip(left, range(2 * count), strict=False)
-        }
+        running = {pool.submit(run_block, plan, number): number for number in islice(left, 2 * count)}
         try:
             while running:
                 for task in wait(running, return_when=FIRST_COMPLETED).done:
                     keep(running.pop(task), *task.result())
-                    for number in left:
-                        running[pool.submit(run_block, plan, number)] = number
-                        break
+                    running |= {pool.submit(run_block, plan, number): number for number in islice(left, 1)}
         except KeyboardInterrupt:
             for task, number in running.items():
                 if not task.cancel():

@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import ModelError
 from stickslip.solve.automaton import Array, Automaton, System
 from stickslip.solve.lyapunov import lyapunov
 from stickslip.solve.poincare import derivative, end_of, lap, tables
 from stickslip.solve.trajectory import Trajectory
-from stickslip.structure import Structure
 from stickslip.sweeps import tally as log
-from stickslip.sweeps.measures import AT_REST, MOVING, ORDERS, own_name
+from stickslip.sweeps.measures import AT_REST, EVENTS, MOVING, ORDERS, own_name
 from stickslip.sweeps.plan import Plan
 from stickslip.sweeps.watch import repeats
 
@@ -29,7 +27,7 @@ def measured(run: Trajectory, plan: Plan, start: Mapping[str, float | str]) -> d
     measures, settle, cycles = plan.measures, plan.settle, plan.cycles
     begin = settle * period(run.system, run)
     found: dict[str, Any] = {}
-    if set(measures) & {"stops", "stick_share", "micro_slips", "transition_speed"}:
+    if set(measures) & EVENTS:
         sums = counted(run, begin)
         found |= {"normal_stops": sums[log.NORMAL] / cycles, "abnormal_stops": sums[log.ABNORMAL] / cycles,
                   "stick_share": sums[log.HELD] / (run.duration - begin), "micro_slips": sums[log.SHORT] / cycles,
@@ -55,11 +53,6 @@ def period(system: System, run: Trajectory) -> float:
 
 def counted(run: Trajectory, begin: float) -> Array:
     """The event log counted from a time on."""
-    if isinstance(run.system, Structure) and len(run.system.contacts) != 1:
-        raise ModelError(
-            f"stops of {len(run.system.contacts)} contacts", "this measure is of systems with one contact",
-            "ask a function of the Trajectory for what you need",
-        )  # fmt: skip
     modes = run.table.modes
     parts = [getattr(mode, "parts", (mode,))[0] for mode in modes]
     kinds = np.array([KINDS.get(part.kind, log.SLIP) for part in parts])

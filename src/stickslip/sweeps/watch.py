@@ -239,7 +239,7 @@ def _inside(tables, mode, held, span, turns, varies, friction, slip, sums, work)
     """The farthest turn within a piece, and the work of a friction that changes in it, cell by cell."""
     flow, n = tables[0][mode], held.shape[0]
     scratch, here, tail = work[7:9, :n], work[9, :n], work[10, :n]
-    steps = max(1, int(math.ceil(2.0 * span / tables[1][mode]))) if math.isfinite(tables[1][mode]) else 1
+    steps = 1 + int(2.0 * span / tables[1][mode])
     step = span / steps
     for _ in range(steps):
         before, reached = held[1], 0.0

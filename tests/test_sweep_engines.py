@@ -1,0 +1,218 @@
+"""Every engine gives the answers of one motion simulated by itself, and the known ones."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.errors import ModelError, SolveError
+from stickslip.scenarios import forced, grid
+from stickslip.solve.automaton import automaton
+from stickslip.solve.fleet import fleet_of, fleet_tables
+from stickslip.sweeps.block import _alone, run_block
+from stickslip.sweeps.measures import MEASURES
+from stickslip.sweeps.sweep import planned
+from stickslip.sweeps.threads import threads
+
+xarray = pytest.importorskip("xarray")
+CIRCLE = 2 * math.pi
+RIGID = ss.Oscillator(
+    mass=2.42, stiffness=2310, damping=0.12, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5)
+)
+COMPLIANT = RIGID.having(law=ss.CompliantContact(1.1, 192000, 23.9))
+BELT = ss.Oscillator(mass=1, stiffness=1, damping=0.1, law=ss.Coulomb(1.0, static=1.5), drive=ss.Belt(0.5))
+CASES: dict[str, tuple[ss.Oscillator, dict[Any, Any], int, int]] = {
+    "rigid": (RIGID, {"frequency": [1.3, 5.61, 20.0], "kinetic": [0.3, 1.1, 1.6]}, 30, 40),
+    "compliant": (COMPLIANT, {"frequency": [2.5, 5.61], "kinetic": [0.7, 1.28]}, 30, 40),
+    "starts": (RIGID, {("start.x", "start.v"): [(0, 0), (1e-3, 0.02)], "mass": [1.0, 2.42]}, 30, 40),
+    "laws": (RIGID, {"law": [ss.Coulomb(1.0), COMPLIANT.law, ss.LinearSlope(1.0, 0.5)]}, 30, 40),
+    "a belt": (BELT, {"speed": [0.1, 0.5]}, 30, 40),
+    "free": (ss.Oscillator(mass=1, stiffness=4, law=ss.Coulomb(1.0)), {"start.x": [1.25, 3.7]}, 2, 30),
+}
+
+
+@pytest.mark.parametrize(
+    "systems",
+    [
+        [RIGID.having(frequency=f, kinetic=k) for f in (2.5, 9.0) for k in (0.5, 1.1)],
+        [COMPLIANT.having(kinetic=k, mass=m) for k in (0.5, 1.1) for m in (1.0, 2.42)],
+        [BELT.having(speed=v, damping=c) for v in (0.1, 0.5) for c in (0.0, 0.1)],
+        [RIGID.having(law=ss.PositionLoad(1.0, gradient=g)) for g in (0.5, 1.5)],
+    ],
+    ids=["rigid", "compliant", "belt", "position"],
+)
+def test_a_fleet_has_the_tables_of_its_oscillators(systems: list[ss.Oscillator]) -> None:
+    table = fleet_tables(fleet_of(systems))
+    for row, system in enumerate(systems):
+        one = automaton(system)
+        for name in ("flow", "cell", "series", "reset", "friction", "tones", "opening"):
+            assert np.allclose(getattr(table, name)[row], getattr(one, name), rtol=1e-14, atol=0), name
+        hop, known = (np.sum(part.astype(np.longdouble), axis=1) for part in (table.hop[row], one.hop))
+        assert np.allclose(hop, known, rtol=1e-17, atol=1e-19 * float(np.max(np.abs(known))))
+        assert np.array_equal(table.target, one.target)
+        assert table.entry == one.entry
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_marched_together_they_are_as_each_alone(name: str) -> None:
+    """The counted march against a Trajectory of each motion, whose measures are taken in another way."""
+    system, values, settle, cycles = CASES[name]
+    plan = planned(system, values, measures=list(MEASURES), cycles=cycles, settle=settle, start={})
+    for number in plan.blocks:
+        found, _ = run_block(plan, number)
+        for row, steps in enumerate(plan.points(number)):
+            known = _alone(plan, steps)
+            for key, column in found.items():
+                assert column.ravel()[row] == pytest.approx(
+                    known.get(key, math.nan), rel=1e-11, abs=1e-15, nan_ok=True
+                ), key
+
+
+@pytest.mark.parametrize("engine", ["threads", "threads://1", "threads://5"])
+def test_threads_give_the_same_bytes(engine: str) -> None:
+    values = {"frequency": np.linspace(2, 9, 9), "kinetic": np.linspace(0.2, 1.6, 9)}
+    one, other = (
+        ss.sweep(COMPLIANT, values, measures=list(MEASURES), settle=20, cycles=30, engine=e) for e in ("serial", engine)
+    )
+    for name in one.data_vars:
+        assert one[name].values.tobytes() == other[name].values.tobytes(), name
+
+
+def test_the_grid_of_stops() -> None:
+    """Stops over frequency ratio and friction (Hong and Liu 2000), undamped, from rest."""
+    known = grid("HL-1")
+    values = {"frequency": np.array(known["ratios"]) / CIRCLE, "kinetic": known["loads"]}
+    found = ss.sweep(forced(0.5, 0.5), values, measures=["stops"], settle=4000, cycles=4)
+    assert np.array_equal(found.normal_stops, np.array(known["normal"], float))
+    assert np.array_equal(found.abnormal_stops, np.array(known["abnormal"], float))
+
+
+@pytest.mark.parametrize("resonant", [False, True], ids=["away from resonance", "next to it"])
+def test_den_hartogs_boundary_by_bisection(resonant: bool) -> None:
+    """Where the stops begin, halved down to 1e-8 in sweeps of all rows together; next to resonance motion settles late."""
+    rows = [row for row in grid("DH-2")["boundary"] if abs(1 / row[0] / 2 - round(1 / row[0] / 2)) > 1e-12]
+    rows = [row for row in rows if (abs(row[0] - 1) < 0.02) == resonant]
+    edge = np.array([row[2] for row in rows])
+    low, high = edge * (1 - 1e-3), edge * (1 + 1e-3)
+    while np.max((high - low) / edge) > 1e-8:
+        middle = (low + high) / 2
+        points = [
+            {"frequency": ratio / CIRCLE, "damping": 2 * damping, "kinetic": force}
+            for (ratio, damping, _), force in zip(rows, middle, strict=True)
+        ]
+        settle = 20_000 if resonant else 4000
+        found = ss.sweep(forced(0.5, 0.5), points, measures=["stops"], settle=settle, cycles=4, start={"x": 2.0})
+        stops = (found.normal_stops + found.abnormal_stops).values > 0
+        low, high = np.where(stops, low, middle), np.where(stops, middle, high)
+    assert np.max(np.abs((low + high) / 2 - edge) / edge) < 1e-8
+
+
+def test_the_exponent_of_chaos() -> None:
+    """Feeny and Moon's load that grows with position: 0.596 +- 0.004 per forcing period."""
+    case = ss.scenarios.get("FM-1")
+    period = 1 / case.system.drive.frequency
+    starts = {"start.x": np.linspace(0.4, 0.6, 8)}
+    found = ss.sweep(case.system, starts, measures=["lyapunov", "period"], settle=200, cycles=20_000)
+    assert float(found.lyapunov.mean()) * period == pytest.approx(0.596, abs=0.004)
+    assert not found.order.any()
+
+
+def test_the_band_in_which_steady_sliding_is_lost() -> None:
+    """ST-1: Stribeck's curve, exponent 2; 0.005013 < V < 0.190840 m/s."""
+    law = ss.Stribeck(kinetic=1.0, static=1.5, speed=0.1, exponent=2.0, viscous=0.2)
+    slider = ss.Oscillator(mass=1, stiffness=1, damping=0.3, law=law, drive=ss.Belt(0.1))
+    speeds = [0.1908 * 0.97, 0.1908 * 1.03]
+    found = ss.sweep(
+        slider, [{"speed": v, "start.x": 1.2} for v in speeds], measures=["stick_share"], settle=60, cycles=5
+    )
+    assert (found.stick_share > 0).values.tolist() == [True, False]
+
+
+def test_an_interrupt_keeps_what_is_done() -> None:
+    calls: list[int] = []
+
+    def stop(run: ss.Trajectory) -> float:
+        calls.append(1)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+        return float(len(run.events))
+
+    found = ss.sweep(RIGID, {"kinetic": np.linspace(0.2, 1.6, 8)}, measures=[stop], settle=1, cycles=1, engine="serial")
+    assert found.attrs["status"].startswith("interrupted: 4 of 8")
+    assert np.isfinite(found.stop).sum() == 4
+
+
+def test_a_failed_point_does_not_stop_the_threads() -> None:
+    def broken(run: ss.Trajectory) -> float:
+        raise ZeroDivisionError("a user's mistake is a user's")
+
+    with pytest.raises(ZeroDivisionError):
+        ss.sweep(RIGID, {"kinetic": [0.5, 1.0]}, measures=[broken], settle=1, cycles=1, engine="threads")
+
+
+def test_no_gpu_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    numba_cuda = pytest.importorskip("numba.cuda")
+    monkeypatch.setattr(numba_cuda, "is_available", lambda: False)
+    with pytest.raises(SolveError, match=r"finds no NVIDIA GPU.*threads"):
+        ss.sweep(RIGID, {"kinetic": [0.5]}, engine="cuda", settle=1, cycles=1)
+
+
+SIMULATED = {name: CASES[name] for name in ("rigid", "compliant", "a belt")}
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What the simulated GPU gives for some cases, from a process of its own."""
+    if importlib.util.find_spec("numba.cuda") is None:
+        pytest.skip("numba has no CUDA target: pip install stickslip[gpu]")
+    folder = tmp_path_factory.mktemp("cuda")
+    environment = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
+    command = [sys.executable, "-W", "error", __file__, str(folder)]
+    run = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=250)
+    assert run.returncode == 0, run.stderr[-3000:]
+    return {name: dict(np.load(folder / f"{j}.npz")) for j, name in enumerate(SIMULATED)}
+
+
+def on_gpu(name: str, engine: str) -> Any:
+    system, values, _, _ = SIMULATED[name]
+    few = {key: list(column)[-2:] for key, column in values.items()}
+    return ss.sweep(system, few, measures=[m for m in MEASURES if m != "lyapunov"], settle=2, cycles=4, engine=engine)
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_a_gpu_gives_the_same(name: str, simulated: dict[str, Any]) -> None:
+    here = on_gpu(name, "serial")
+    for key in here.data_vars:
+        values, other = here[key].values, simulated[name][key]
+        if key in ("status", "normal_stops", "abnormal_stops", "micro_slips", "order"):
+            assert np.array_equal(values, other), key
+        assert np.allclose(values, other, rtol=1e-12, atol=1e-16, equal_nan=True), key
+
+
+def test_a_gpu_refuses_what_it_cannot_march(monkeypatch: pytest.MonkeyPatch) -> None:
+    numba_cuda = pytest.importorskip("numba.cuda")
+    monkeypatch.setattr(numba_cuda, "is_available", lambda: True)
+    slider = RIGID.having(law=ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=2e5, damping=20.0))
+    with pytest.raises(ModelError, match=r'LuGre.*take engine="threads"'):
+        ss.sweep(slider, {"kinetic": [1.0]}, engine="cuda", settle=1, cycles=1)
+
+
+def test_the_threads_engine_is_the_default_of_this_machine() -> None:
+    plan = planned(RIGID, {"kinetic": [0.5, 0.7, 0.9]}, measures=["stops"], cycles=2, settle=2, start={})
+    kept: dict[int, Any] = {}
+    threads(plan, plan.blocks, lambda number, arrays, events: kept.update({number: arrays}))
+    assert sorted(kept) == list(plan.blocks)
+
+
+if __name__ == "__main__":
+    for j, case in enumerate(SIMULATED):
+        np.savez(Path(sys.argv[1]) / f"{j}.npz", **{k: v.values for k, v in on_gpu(case, "cuda").data_vars.items()})
