@@ -98,7 +98,7 @@ def test_the_grid_of_stops() -> None:
 
 @pytest.mark.parametrize("resonant", [False, True], ids=["away from resonance", "next to it"])
 def test_den_hartogs_boundary_by_bisection(resonant: bool) -> None:
-    """Where the stops begin, halved down to 1e-8 in sweeps of all rows together; next to resonance motion settles late."""
+    """Where the stops begin, halved down to 1e-8 for all rows together; next to resonance motion settles late."""
     rows = [row for row in grid("DH-2")["boundary"] if abs(1 / row[0] / 2 - round(1 / row[0] / 2)) > 1e-12]
     rows = [row for row in rows if (abs(row[0] - 1) < 0.02) == resonant]
     edge = np.array([row[2] for row in rows])
@@ -130,11 +130,12 @@ def test_the_band_in_which_steady_sliding_is_lost() -> None:
     """ST-1: Stribeck's curve, exponent 2; 0.005013 < V < 0.190840 m/s."""
     law = ss.Stribeck(kinetic=1.0, static=1.5, speed=0.1, exponent=2.0, viscous=0.2)
     slider = ss.Oscillator(mass=1, stiffness=1, damping=0.3, law=law, drive=ss.Belt(0.1))
-    speeds = [0.1908 * 0.97, 0.1908 * 1.03]
-    found = ss.sweep(
-        slider, [{"speed": v, "start.x": 1.2} for v in speeds], measures=["stick_share"], settle=60, cycles=5
-    )
-    assert (found.stick_share > 0).values.tolist() == [True, False]
+    points = []
+    for speed in (0.00501 * 0.97, 0.00501 * 1.03, 0.19084 * 0.97, 0.19084 * 1.03):
+        steady = ss.steady_sliding(slider.having(drive=ss.Belt(speed))).state["x"]
+        points.append({"drive.speed": speed, "start.x": steady + 1e-5, "start.v": 0.0})
+    found = ss.sweep(slider, points, measures=["stick_share"], settle=600, cycles=5)
+    assert (found.stick_share > 0).values.tolist() == [False, True, True, False]
 
 
 def test_an_interrupt_keeps_what_is_done() -> None:

@@ -57,13 +57,9 @@ def counted(run: Trajectory, begin: float) -> Array:
     parts = [getattr(mode, "parts", (mode,))[0] for mode in modes]
     kinds = np.array([KINDS.get(part.kind, log.SLIP) for part in parts])
     sides = np.array([part.side for part in parts], dtype=np.float64)
-    ends = np.append(run.starts, run.duration)
-    values, _ = run.sample(ends, ("slip", "x", "face"))
-    slip, x, face = values[0], values[1], values[-1]
+    slip = run.sample(run.starts, ("slip",))[0][0]
     sums = np.zeros(log.ENTRIES)
-    log.tally(
-        kinds, sides, run.modes, run.starts - begin, run.durations, np.abs(np.diff(x - face)), np.abs(slip[:-1]), sums
-    )
+    log.tally(kinds, sides, run.modes, run.starts - begin, run.durations, _paths(run), np.abs(slip), sums)
     return sums
 
 
@@ -93,14 +89,26 @@ def _moved(run: Trajectory, times: Array) -> tuple[Array, int]:
     return values.reshape(3, -1, len(times)), len(values) // 3
 
 
+def _paths(run: Trajectory) -> Array:
+    """How far the contact slips in each piece [m]."""
+    starts, widths = run.cells
+    (slip,), weights = _on_cells(run, starts, widths, ("slip",))
+    piece = np.searchsorted(run.starts, starts + widths / 2, side="right") - 1
+    return np.abs(np.bincount(piece, np.sum((slip * weights).reshape(-1, ORDER), axis=1), len(run.starts)))
+
+
 def work(run: Trajectory, begin: float) -> float:
     """Work that friction takes from the motion after a time [J]."""
-    starts, widths = _cells(run, begin)
+    values, weights = _on_cells(run, *_cells(run, begin), ("friction", "slip"))
+    force, slip = np.split(values, 2)
+    return float(np.sum(np.sum(force * slip, axis=0) * weights))
+
+
+def _on_cells(run: Trajectory, starts: Array, widths: Array, outputs: tuple[str, ...]) -> tuple[Array, Array]:
+    """Outputs at the Gauss points of cells, and what each point weighs [s]."""
     nodes, weights = np.polynomial.legendre.leggauss(ORDER)
     times = np.minimum(starts[:, None] + widths[:, None] * (nodes + 1) / 2, run.duration)
-    values, _ = run.sample(times.ravel(), ("friction", "slip"))
-    force, slip = values.reshape(2, -1, times.size)
-    return float(np.sum(np.sum(force * slip, axis=0) * (widths[:, None] * weights / 2).ravel()))
+    return run.sample(times.ravel(), outputs)[0], (widths[:, None] * weights / 2).ravel()
 
 
 def _cells(run: Trajectory, begin: float) -> tuple[Array, Array]:
