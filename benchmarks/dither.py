@@ -4,8 +4,9 @@
 
 Random oscillators that stick and slip: rigid and compliant contacts, on belts and ramps, with a shaken base or a force.
 The dither of each is checked by four runs three times as long from random starts, and against brute force: amplitudes
-from a fifth of the one found upwards, in steps of 10 % and, from a half, of 2 %, until one removes every macroscopic
-stick from each of three starts. Each line is kept in the folder, and a second call goes on where the first was stopped.
+from a fifth of the one found upwards, in steps of 10 % and, from a half, of 3 %, until one removes every macroscopic
+stick from each of the starts that ``dither`` names. Each line is kept in the folder, and a second call goes on where
+the first was stopped.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ import numpy as np
 
 import stickslip as ss
 
-GRID = np.append(np.geomspace(0.2, 0.5, 11)[:-1], np.geomspace(0.5, 1.0, 36)[:-1])
-# amplitudes of the brute force over the one found: steps of 10 % up to a half, of 2 % from there
+GRID = np.append(np.geomspace(0.2, 0.5, 11)[:-1], np.geomspace(0.5, 1.0, 25)[:-1])
+# amplitudes of the brute force over the one found: steps of 10 % up to a half, of 3 % from there
 
 
 def random_system(number: int) -> ss.Oscillator:
@@ -86,7 +87,9 @@ def looked_at(number: int) -> Line:
     rng = np.random.default_rng([8, 3, number])
     far, fast = float(np.max(np.abs(x))), float(np.max(np.abs(v)))
     removed = removes(amplitude, 3.0, [{"x": far * rng.uniform(-1, 1), "v": fast * rng.uniform(-1, 1)} for _ in "1234"])
-    starts = [{}, {"x": 0.9 * far, "v": 0.0}, {"x": -0.6 * far, "v": 0.5 * fast}]
+    at_rest = [{"x": share * far, "v": 0.0} for share in (1.0, -1.0, 0.5, -0.5, 0.0)]
+    fastest = {name: float(row[np.argmax(np.abs(v))]) for name, row in (("x", x), ("v", v))}
+    starts = [{}, fastest, *at_rest]
     smallest = next((share for share in GRID if removes(share * amplitude, 1.0, starts)), 1.0)
     return Line(number, True, removed, 1 / smallest, kind)
 
