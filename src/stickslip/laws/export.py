@@ -8,11 +8,12 @@ from typing import Any
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
-from stickslip.laws.c_code import c_code, modes_of
+from stickslip.laws.c_code import c_code
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.curved import CurvedLaw, lifted, symbol
 from stickslip.laws.formula import Formula
 from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.python_code import python_code
 from stickslip.laws.rough import RoughSurface
 from stickslip.laws.stribeck import FrictionCurve
 from stickslip.laws.tabulated import Tabulated
@@ -54,11 +55,12 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
     """How is a friction law written for another program?
 
     * ``"toml"``: the table ``[law]`` of a system's file, as :func:`read_system` reads it back;
-    * ``"python"``: an expression for each mode, and for the rates of its memory;
+    * ``"python"``: a function of the speed, or a class that is led step by step where the law has a memory; each runs
+      as it stands;
     * ``"c"``: C99 code of the friction in each mode, of what ends a mode, and a test vector that it checks itself by;
     * ``"mujoco"``, ``"modelica"``, ``"simulink"``: a block of parameters with the formula beside. Where the program has
       friction of that kind, in its own words: MuJoCo's joints Coulomb and viscous friction, Modelica's
-      ``SupportFriction`` and Simulink's lookup table any friction over the speed.
+      ``SupportFriction``, which the model then extends, and Simulink's lookup table any friction over the speed.
 
     Parameters
     ----------
@@ -140,20 +142,7 @@ def _toml_value(value: Any) -> str:
 
 
 def _python(law: Law | CurvedLaw) -> str:
-    lines = [f"# {formula_of(law)}"]
-    lines.append("# friction [N] by mode; x [m], v [m/s] against the counter-face; hold [N]: what keeps it at rest")
-    modes = modes_of(law)
-    level = breakaway_of(law)
-    if level is not None and [mode.name for mode in modes] == ["back", "stuck", "forward"]:
-        back, _, forward = (written(mode.friction or {}) for mode in modes)
-        rest = f"min(max(hold, -{level!r}), {level!r})"
-        return "\n".join([*lines, f"friction = ({forward}) if v > 0 else ({back}) if v < 0 else {rest}"])
-    for mode in modes:
-        name = mode.name.replace(" ", "_")
-        lines.append(f"{name} = {'hold' if mode.friction is None else written(mode.friction)}")
-        lines += [f"{name}_{of}_rate = {written(form)}" for of, form in mode.rates.items()]
-        lines += [f"# {name} ends, and {exit_.to} begins, when {written(exit_.quantity)} > 0" for exit_ in mode.exits]
-    return "\n".join(lines)
+    return python_code(law, formula_of(law), breakaway_of(law))
 
 
 def _flat(law: object, within: str = "") -> Iterator[tuple[str, Any]]:
@@ -188,23 +177,32 @@ def _table(law: Law | CurvedLaw) -> Tabulated | None:
 def _mujoco(law: Law | CurvedLaw) -> str:
     name, static = type(law).__name__, getattr(law, "static", None)
     if isinstance(law, Coulomb | LinearSlope) and static in (None, law.kinetic) and getattr(law, "slope", 0.0) >= 0:
-        own = [f'<joint type="slide" frictionloss="{law.kinetic!r}" damping="{getattr(law, "slope", 0.0)!r}"/>']
+        where = "include this file in the body that rubs"
+        own = [f'  <joint type="slide" frictionloss="{law.kinetic!r}" damping="{getattr(law, "slope", 0.0)!r}"/>']
     else:
-        own = [
-            "<!-- no joint of MuJoCo rubs so: apply it in a callback (mjcb_passive), as in the C code -->",
-            "<custom>",
-        ]
+        where = "no joint of MuJoCo rubs so: apply it in a callback (mjcb_passive), as in the C code; include this file"
+        own = ["  <custom>"]
         for key, value in _flat(law):
             data = " ".join(map(_number, value)) if _listed(value) else value
             kind = "text" if isinstance(value, str) else "numeric"
             data = data if isinstance(data, str) else repr(float(data))
-            own.append(f'  <{kind} name="{name}_{key}" data="{data}"/>')
-        own.append("</custom>")
-    return "\n".join([f"<!-- {formula_of(law)} -->", *own])
+            own.append(f'    <{kind} name="{name}_{key}" data="{data}"/>')
+        own.append("  </custom>")
+    told = formula_of(law).replace("--", "- -")  # which ends no comment
+    return "\n".join(["<mujocoinclude>", f"  <!-- {told} -->", f"  <!-- {where} -->", *own, "</mujocoinclude>"])
 
 
 def _modelica(law: Law | CurvedLaw) -> str:
-    lines = [f"// {formula_of(law)}", f"record {type(law).__name__}"]
+    name, table = type(law).__name__, _table(law)
+    rubs = table is not None and table.forces[0] > 0
+    lines = [f"// {formula_of(law)}", f"{'model' if rubs else 'record'} {name}Friction"]
+    if table is not None and rubs:
+        speeds, forces = list(table.speeds), list(table.forces)
+        if isinstance(law, Tabulated):  # level beyond the last: Modelica goes on as the last two points
+            speeds, forces = [*speeds, 2 * speeds[-1]], [*forces, forces[-1]]
+        rows = "; ".join(f"{speed!r}, {force!r}" for speed, force in zip(speeds, forces, strict=True))
+        lines.append(f"{_strays(table, '  //')}  extends Modelica.Mechanics.Translational.Components.SupportFriction(")
+        lines.append(f"    f_pos = [{rows}],\n    peak = {table.breakaway / table.forces[0]!r});")
     for key, value in _flat(law):
         if isinstance(value, str | bool):
             kind = "String" if isinstance(value, str) else "Boolean"
@@ -212,12 +210,7 @@ def _modelica(law: Law | CurvedLaw) -> str:
         else:
             data = f"{{{', '.join(map(_number, value))}}}" if _listed(value) else _number(value)
             lines.append(f"  parameter Real {key}{'[:]' if _listed(value) else ''} = {data};")
-    lines.append(f"end {type(law).__name__};")
-    if (table := _table(law)) is not None and table.forces[0] > 0:
-        rows = "; ".join(f"{speed!r}, {force!r}" for speed, force in zip(table.speeds, table.forces, strict=True))
-        lines.append(_strays(table, "//") + "Modelica.Mechanics.Translational.Components.SupportFriction friction(")
-        lines.append(f"  f_pos = [{rows}],\n  peak = {table.breakaway / table.forces[0]!r});")
-    return "\n".join(lines)
+    return "\n".join([*lines, f"end {name}Friction;"])
 
 
 def _simulink(law: Law | CurvedLaw) -> str:
