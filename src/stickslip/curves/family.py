@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 SETTLED = 1e-8  # of a parameter: far below what any record tells
 MOST = 60  # steps: more are taken along a valley that has no lowest point
 FEW, RUN = 4000, 20000  # samples that a start is sought with: of all, or in a row
+WANDERS = 0.1  # of the velocity's square, that differs between cycles: more is no motion that repeats
 QUARTERS = 4  # of a cycle: the parts whose scatter tells, where cycles are few
 
 
@@ -200,6 +201,32 @@ def scatter(influence: Array, alone: Array, residual: Array, samples: Samples) -
         told = [(each * shrinkage, q) for each, q in told] + [(alone[index] * np.sqrt(len(residual) / left), left)]
         sd[index], freedom[index] = max(told, key=lambda each: student(each[1]) * each[0])
     return sd, freedom
+
+
+def model_error(residual: Array, samples: Samples) -> float:
+    """Root mean square of what a curve leaves and noise does not explain [N].
+
+    Where the motion repeats, what is left of the mean cycle, less what the scatter between cycles lets it be; else what
+    stands above the broadband noise.
+    """
+    cells = np.unique(samples.cycle * BLOCKS + samples.block, return_inverse=True)[1]
+    block = samples.block[np.unique(cells, return_index=True)[1]]
+    count = np.bincount(block, minlength=BLOCKS)
+    several = count > 1
+
+    def between(values: Array) -> tuple[Array, Array]:
+        """Mean over the cycles of each block's mean, and its variance between them."""
+        means = np.bincount(cells, values) / np.bincount(cells)
+        mean = np.bincount(block, means, BLOCKS) / np.maximum(count, 1)
+        squares = np.bincount(block, (means - mean[block]) ** 2, BLOCKS)
+        return mean, squares / np.maximum(count - 1, 1)
+
+    weight = np.bincount(samples.block, minlength=BLOCKS) * several
+    _, wander = between(samples.velocity)
+    if weight.sum() < len(residual) / 2 or weight @ wander > WANDERS * weight.sum() * np.mean(samples.velocity**2):
+        return float(np.sqrt(max(0.0, np.mean(residual**2) - samples.noise**2)))
+    mean, scatter_ = between(residual)
+    return float(np.sqrt(max(0.0, weight @ (mean**2 - scatter_ / np.maximum(count, 1)) / weight.sum())))
 
 
 def _quarters(samples: Samples) -> NDArray[np.intp]:

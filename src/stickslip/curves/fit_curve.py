@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stickslip.curves import presliding as presliding_curves
 from stickslip.curves import speed as speed_curves
 from stickslip.curves.data import Samples, require_resisting, require_reversals, require_speeds, samples_of
-from stickslip.curves.family import Family, Member, best_member
+from stickslip.curves.family import Family, Member, best_member, model_error
 from stickslip.curves.velocity_step import velocity_step
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
@@ -28,6 +28,8 @@ from stickslip.units import parse_value
 Array = NDArray[np.float64]
 
 LEAVES = 0.3  # of the friction's norm: more than that is worth a word
+MISSES = 0.1  # of the friction that is missed beyond noise and scatter, from which on it does not follow the curve
+FILLED = 0.1  # of the samples, that were not measured: more than that is worth a word
 LOST = 7.0  # half an interval of a logarithm from which on nothing is known of its number
 TIED = 0.99  # correlation of two parameters from which on they are told together alone
 OVER_WAY = ("dahl", "jenkins", "iwan", "maxwell")
@@ -61,6 +63,9 @@ class CurveFit(Result):
         Root mean square [N, or N m] of what is left.
     unexplained : float
         Norm of what is left over the norm of the friction.
+    model_error : float
+        Share of the friction's norm that the curve misses beyond noise: what repeats in every cycle and is not in the
+        curve; where the motion does not repeat, what stands above the sensor's noise.
     correlations : ndarray, shape (p, p)
         Of the parameters, in their order.
     along : str
@@ -77,12 +82,18 @@ class CurveFit(Result):
     formula: str
     residual: float
     unexplained: float
+    model_error: float
     correlations: Array
     along: str
     at: Array
     measured: Array
     fitted: Array
     status: str
+
+    @property
+    def follows(self) -> bool:
+        """Whether friction follows the curve."""
+        return self.model_error < MISSES
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -183,7 +194,7 @@ def fit_curve(
     load = finite("normal", parse_value(normal, "N"), unit="N", positive=True)
     whole, sliding = samples_of(data, contact=contact, frequency=frequency, smoothed=curve in OVER_WAY)
     family, member = best_member(*CURVES[curve](Request(curve, whole, sliding, int(elements), load)))
-    return _answer(curve, family, member)
+    return _answer(curve, family, member, filled=_filled(data))
 
 
 def _over_speed(family: Family) -> Callable[[Request], tuple[Family, Samples]]:
@@ -234,16 +245,29 @@ CURVES: dict[str, Callable[[Request], tuple[Family, Samples]]] = {
 }
 
 
-def _answer(curve: str, family: Family, member: Member) -> CurveFit:
+def _filled(data: Record | Loops) -> float:
+    """Share of the friction's samples that were filled in for measured ones."""
+    if isinstance(data, Loops):
+        return 0.0
+    filled = sum(int(step.arguments.get("filled", {}).get("friction", 0)) for step in data.history)
+    return min(1.0, filled / len(data))
+
+
+def _answer(curve: str, family: Family, member: Member, *, filled: float) -> CurveFit:
     samples = member.samples
     left = samples.friction - member.fitted
+    missed = model_error(left, samples) / float(np.sqrt(np.mean(samples.friction**2)))
     method = f"least squares of '{curve}'"
     checks = (f"{len(left)} samples in {samples.cycles} cycles",)
     found = {
         name: _estimate(name, value, sd, freedom, samples.in_units(family.units[name]), method, checks)
         for (name, value), sd, freedom in zip(member.values.items(), member.sd, member.freedom, strict=True)
     }
-    worries = _worries(member, samples, family.along)
+    worries = _worries(member, samples, family.along, missed)
+    if missed > MISSES:
+        found = {name: replace(each, status=f"of a curve that misses {missed:.0%}") for name, each in found.items()}
+    if filled > FILLED:
+        worries.append(f"{filled:.0%} of the samples were not measured, but filled in between others")
     for names, word in family.beware(found, samples):
         worries.append(word)
         found |= {name: replace(found[name], status=word) for name in names}
@@ -255,7 +279,7 @@ def _answer(curve: str, family: Family, member: Member) -> CurveFit:
     return CurveFit(
         curve=curve, parameters=found, law=law, formula=family.formula,
         residual=float(np.sqrt(np.mean(left**2))),
-        unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)),
+        unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)), model_error=missed,
         correlations=member.correlations, along=family.along,
         at={"v": samples.velocity, "x": samples.displacement, "t": samples.time}[family.along],
         measured=samples.friction, fitted=member.fitted, status="; ".join(worries) or "ok",
@@ -274,7 +298,7 @@ def _estimate(
     return replace(made, interval=(value / times, value * times))
 
 
-def _worries(member: Member, samples: Samples, along: str) -> list[str]:
+def _worries(member: Member, samples: Samples, along: str, missed: float) -> list[str]:
     """What the samples can not bear."""
     names, words = list(member.values), []
     cyclic = along != "t"
@@ -287,7 +311,12 @@ def _worries(member: Member, samples: Samples, along: str) -> list[str]:
     if cyclic and samples.drives:
         words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
     left = float(np.linalg.norm(samples.friction - member.fitted) / np.linalg.norm(samples.friction))
-    if left > LEAVES:
+    if missed > MISSES:
+        words.append(
+            f"the friction does not follow the curve: {missed:.0%} of it is neither in the curve nor noise; "
+            "another curve, or another mass, may leave less"
+        )
+    elif left > LEAVES:
         words.append(f"the curve leaves {100 * left:.0f} % of the friction: another one, or less noise, may leave less")
     for i, j in zip(*np.nonzero(np.triu(np.abs(member.correlations), 1) > TIED), strict=True):
         words.append(f"{names[i]} and {names[j]} are told together alone (correlation {member.correlations[i, j]:.3f})")

@@ -265,7 +265,7 @@ def fill_missing(record: Record, *channels: str, longest: int | None = None) -> 
     """
     names = channels or tuple(record)
     record.require(*names, question="fill_missing")
-    samples, parts = dict(record.samples), []
+    samples, parts, counts = dict(record.samples), [], {}
     for name in names:
         lost = ~np.isfinite(record[name])
         if lost.all():
@@ -281,9 +281,11 @@ def fill_missing(record: Record, *channels: str, longest: int | None = None) -> 
         samples[name] = np.where(flaws.rows_of((*long, *ends), len(record)), np.nan, bridge(record[name], lost))
         filled = sum(last - first + 1 for first, last in short)
         where = f" ({in_words(short)})" if short else ""
+        counts[name] = filled
         parts.append("; ".join([f"{filled} {'value' if filled == 1 else 'values'} of {name} filled{where}", *stay]))
     outcome = "; ".join(parts) or "no value was missing"
-    return _mended(record, samples, Step("fill_missing", {"channels": list(names), "longest": longest}, outcome))
+    arguments = {"channels": list(names), "longest": longest, "filled": counts}
+    return _mended(record, samples, Step("fill_missing", arguments, outcome))
 
 
 def remove_spikes(record: Record, *channels: str) -> Record:
