@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
@@ -17,6 +18,11 @@ from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
     from stickslip import CurveFit, LawComparison, Record, RigSettings
+
+
+CURVES = (
+    "coulomb", "viscous", "stribeck", "asymmetric", "tabulated", "dahl", "jenkins", "iwan", "maxwell", "aging", "slip",
+)  # fmt: skip
 
 
 @click.command()
@@ -35,9 +41,11 @@ if TYPE_CHECKING:
 @click.option("--calibration", type=float, default=0.01, show_default=True, help="By what part gains may be wrong.")
 @click.option(
     "--curve",
+    type=click.Choice(CURVES),
     metavar="NAME",
-    help="Fit a curve over velocity or displacement instead: coulomb, viscous, stribeck, asymmetric, tabulated, dahl, "
-    "jenkins, iwan, maxwell. The choice where a file holds friction and velocity but no motion of the mass.",
+    help="Fit a curve of friction instead: coulomb, viscous, stribeck, asymmetric, tabulated over the velocity, dahl, "
+    "jenkins, iwan, maxwell over the displacement, aging, slip after a step of the speed. Friction is measured, or "
+    "found from the motion, the force and --mass. The choice where a file holds friction and no displacement.",
 )
 @result_options("FILE-stickslip")
 @reading_options
@@ -59,25 +67,61 @@ def fit(
     """
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
+    asked = click.get_current_context().get_parameter_source("laws") is not ParameterSource.DEFAULT
+    _require_one_question(groups, curve, asked=asked)
     folder = output or (None if as_json else default_folder(groups))
     with progress(3) as tell:
         tell("reading", 0)
         records = [read(group, rig) for group in groups]
-        result = _answer(records, rig, laws, calibration, curve, tell)
+        result = _answer(records, rig, laws, calibration, curve or _only_curve(records[0], asked=asked), tell)
         tell("drawing and writing", 2)
         name = name_of(groups[0]) if len(groups) == 1 else f"{len(groups)} records"
         written = ss.publish_fit(result, folder=folder, records=records, name=name) if folder else None
     _show(result, records, name, written, as_json=as_json)
 
 
+def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked: bool) -> None:
+    if curve is not None and asked:
+        raise click.BadParameter("a curve or laws are fitted, not both; leave one out", param_hint="--curve, --laws")
+    if curve is not None and len(groups) > 1:
+        raise click.BadParameter(f"a curve is fitted to one record, not to {len(groups)}", param_hint="FILES")
+
+
+def _only_curve(record: Record, *, asked: bool) -> str | None:
+    """The curve of a record that holds friction and velocity alone, unless laws were asked for."""
+    if not asked and "x" not in record and {"friction", "coefficient"} & set(record):
+        return "stribeck"
+    if not {"x", "v"} & set(record):
+        raise ss.RecordError(
+            f"no motion of the mass (the record has {', '.join(record)})",
+            "a law is fitted to the displacement x or the velocity v of the mass, in an oscillator that its base or its "
+            "own release moves (a belt or a ramp: in Python, as fit_law's drive)",
+            'name its column, as in channels={"x": "COLUMN [mm]"}',
+        )  # fmt: skip
+    return None
+
+
+def _with_friction(record: Record, rig: RigSettings) -> Record:
+    """The record with friction: measured, or what the motion leaves of the forces where the mass is known."""
+    if {"friction", "coefficient"} & set(record):
+        return record
+    if rig.mass is None:
+        raise ss.RecordError(
+            f"neither friction nor a mass (the record has {', '.join(record)})",
+            "a curve is fitted to friction: measured, or what the motion leaves of the forces on a known mass",
+            'name its column, as in channels={"friction": "COLUMN [N]"}, or give mass= and stiffness= '
+            "(0 where there is no spring)",
+        )  # fmt: skip
+    told = {name: value for name in ("damping", "damper", "contact") if (value := getattr(rig, name)) is not None}
+    return ss.friction_force(record, mass=rig.mass, stiffness=rig.stiffness, **told)
+
+
 def _answer(
     records: list[Record], rig: RigSettings, laws: str, calibration: float, curve: str | None, tell: Any
 ) -> LawComparison | CurveFit:
-    if curve is not None or not {"x", "v"} & set(records[0]) or ("x" not in records[0] and "friction" in records[0]):
-        if len(records) > 1:
-            raise ss.ModelError("a curve of several files", "a curve is fitted to one record", "name one file")
+    if curve is not None:
         tell("fitting", 1)
-        return ss.fit_curve(records[0], curve=curve or "stribeck", contact=rig.contact)
+        return ss.fit_curve(_with_friction(records[0], rig), curve=curve, contact=rig.contact)
     constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
     if missing := [name for name, value in constants.items() if value is None]:
         raise ss.ModelError(

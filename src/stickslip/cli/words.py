@@ -12,6 +12,7 @@ _SPOKEN = (
     (r"\brecord\.check\(\)", "stickslip check"),
     (r"\brecord\.rows\(\)", "--rows"),
     (r"\brecord\.between\([^)]*\)", "--rows"),
+    (r", or trust='samples'[^;.]*", ""),
     (r"\bask friction_loops\(record\)", "ask stickslip analyze"),
     (r", or ask (?:extreme|fit)_decay\(record\)[^;.]*", ""),
     (r', or choose form="plain"[^;.]*', ""),
@@ -35,7 +36,8 @@ def spoken(words: object) -> str:
         word = _REPAIRS.get(call[1])
         return call[0] if word is None else f"--repair {word}" + (f":{call[2]}" if call[2] else "")
 
-    text = re.sub(r'\b(\w+)\(record(?:, "(\w+)")?\)', repair, str(words))
+    text = re.sub(r"\bfill_gaps\(record\) and fill_missing\(record\)", "--repair gaps,missing", str(words))
+    text = re.sub(r'\b(\w+)\(record(?:, "(\w+)")?\)', repair, text)
     for said, option in _SPOKEN:
         text = re.sub(said, option, text)
     return text

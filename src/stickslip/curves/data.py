@@ -12,6 +12,7 @@ from stickslip.identify.loops import LEAST_SPREAD, Loops
 from stickslip.identify.motion import (
     AUDIBLE,
     CREEP,
+    FORCES,
     away_from,
     contact_motion,
     find_cycles,
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 BLOCKS = 200  # of a cycle, or of a motion without one, whose residuals are told apart
 LEAST = 50  # samples
 REVERSED = 0.05  # of the fastest speed: what goes back slower than that does not reverse
+COEFFICIENT = {"N": "1", "N s/m": "s/m", "N/m": "1/m"}  # what stands for a unit where friction has none
 TURNING = {"N": "N m", "N s/m": "N m s/rad", "N/m": "N m/rad", "m": "rad", "m/s": "rad/s"}
 
 
@@ -49,6 +51,8 @@ class Samples:
         Standard deviation of the friction's broadband noise.
     unit : str
         Of the displacement, "m" or "rad".
+    force : str
+        Of the friction, "N", "N m" or "1".
     skipped : int
         Samples at the start that set the memory of a curve that has one, and are not compared.
     blur : int
@@ -64,6 +68,7 @@ class Samples:
     cycles: int
     noise: float
     unit: str
+    force: str = "N"
     skipped: int = 0
     blur: int = 1
 
@@ -78,7 +83,9 @@ class Samples:
         return replace(self, **{name: getattr(self, name)[chosen] for name in arrays})
 
     def in_units(self, unit: str) -> str:
-        """A unit along a path, or what stands for it round an axis."""
+        """A unit along a path, or what stands for it round an axis, or for a coefficient."""
+        if self.force == "1":
+            return COEFFICIENT.get(unit, unit)
         return TURNING.get(unit, unit) if self.unit == "rad" else unit
 
     @property
@@ -110,11 +117,17 @@ def require_resisting(samples: Samples) -> None:
 
 
 def samples_of(
-    data: Record | Loops, *, contact: str | None, frequency: float | str | None, smoothed: bool = False
+    data: Record | Loops,
+    *,
+    contact: str | None,
+    frequency: float | str | None,
+    smoothed: bool = False,
+    normal: float | None = None,
 ) -> tuple[Samples, Samples]:
     """All samples of the complete cycles, the first of several to set a memory, and those of them that slide.
 
     A displacement that trembles by its noise makes an element give way and come back: `smoothed`, it does not.
+    A coefficient of friction is turned into a force where the load `normal` [N] is known.
     """
     if isinstance(data, Loops):
         return _of_loops(data)
@@ -123,13 +136,17 @@ def samples_of(
             f"a curve of {type(data).__name__}", "it is fitted to a Record or to friction_loops of one", "give either"
         )
     question = "the fit of a friction curve"
-    data.require_clean("friction", question=question, samples=LEAST)
-    if np.ptp(data["friction"]) == 0:
-        raise EstimateError("channel friction never changes", f"{question} needs one that does", "check its column")
-    record = without_delays(data, *motion_channels(data, contact), "friction", question=question)
+    rubs = "coefficient" if "coefficient" in data and "friction" not in data else "friction"
+    data.require_clean(rubs, question=question, samples=LEAST)
+    if np.ptp(data[rubs]) == 0:
+        raise EstimateError(f"channel {rubs} never changes", f"{question} needs one that does", "check its column")
+    record = without_delays(data, *motion_channels(data, contact), rubs, question=question)
     motion = contact_motion(record, contact=contact, question=question)
-    require_fit(record, "friction", length=motion.unit, question=question)
-    friction = record["friction"]
+    friction, force = record[rubs], record.channels[rubs].unit
+    if rubs == "friction":
+        require_fit(record, rubs, length=motion.unit, question=question)
+    elif normal is not None:
+        friction, force = normal * friction, "N"
     label, edges = np.zeros(len(friction), dtype=np.intp), np.array([0.0, len(friction)])
     try:
         cycles = find_cycles(record, motion, frequency=frequency)
@@ -146,7 +163,7 @@ def samples_of(
         time=record.start + rows / record.fs, displacement=place, velocity=motion.velocity,
         friction=friction, cycle=label, block=np.clip((BLOCKS * share).astype(np.intp), 0, BLOCKS - 1),
         cycles=len(edges) - 1, noise=noise_level(friction, record.fs), unit=motion.unit,
-        blur=motion.blur,
+        force=force, blur=motion.blur,
     )  # fmt: skip
     fast = np.abs(motion.velocity) > max(CREEP * peak, AUDIBLE * motion.noise)
     clear = fast & away_from(~fast, motion.blur)
@@ -165,6 +182,7 @@ def _of_loops(loops: Loops) -> tuple[Samples, Samples]:
         friction=loops.friction, cycle=np.zeros(count, dtype=np.intp),
         block=(BLOCKS * loops.phase_grid).astype(np.intp), cycles=len(loops.cycles),
         noise=float(np.median(loops.scatter)) / np.sqrt(len(loops.cycles)), unit=loops.unit,
+        force=FORCES[loops.unit],
     )  # fmt: skip
     fast = np.abs(loops.velocity) > CREEP * float(np.abs(loops.velocity).max())
     twice = samples.rows(np.tile(np.arange(count), 2))  # once round to set the memory

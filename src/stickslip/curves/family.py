@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -224,9 +225,10 @@ def model_error(residual: Array, samples: Samples) -> float:
     weight = np.bincount(samples.block, minlength=BLOCKS) * several
     _, wander = between(samples.velocity)
     if weight.sum() < len(residual) / 2 or weight @ wander > WANDERS * weight.sum() * np.mean(samples.velocity**2):
-        return float(np.sqrt(max(0.0, np.mean(residual**2) - samples.noise**2)))
+        return math.sqrt(max(0.0, float(np.mean(residual**2)) - samples.noise**2))
     mean, scatter_ = between(residual)
-    return float(np.sqrt(max(0.0, weight @ (mean**2 - scatter_ / np.maximum(count, 1)) / weight.sum())))
+    repeats = weight @ (mean**2 - scatter_ / np.maximum(count, 1)) / weight.sum()
+    return math.sqrt(max(0.0, float(repeats)))
 
 
 def _quarters(samples: Samples) -> NDArray[np.intp]:

@@ -32,6 +32,7 @@ MISSES = 0.1  # of the friction that is missed beyond noise and scatter, from wh
 FILLED = 0.1  # of the samples, that were not measured: more than that is worth a word
 LOST = 7.0  # half an interval of a logarithm from which on nothing is known of its number
 TIED = 0.99  # correlation of two parameters from which on they are told together alone
+NOT_FOLLOWED = "of a curve that the friction does not follow"
 OVER_WAY = ("dahl", "jenkins", "iwan", "maxwell")
 POSITIVE = ("speed", "exponent", "width", "distance")  # found by their logarithm: so is their interval
 NAMES = {
@@ -40,7 +41,7 @@ NAMES = {
     "kinetic_forward": "sliding friction forward", "kinetic_back": "sliding friction back",
     "viscous_forward": "viscous friction forward", "viscous_back": "viscous friction back",
     "friction": "coefficient of friction", "direct": "direct effect a", "evolution": "evolution effect b",
-    "rate_dependence": "rate dependence a - b", "distance": "way of renewal",
+    "rate_dependence": "rate dependence a - b", "distance": "slip that renews the contact Dc",
 }  # fmt: skip
 
 
@@ -59,8 +60,10 @@ class CurveFit(Result):
         that no law can have: `status` says why).
     formula : str
         The curve, in the parameters' names.
+    unit : str
+        Of the friction: "N", "N m", or "1" for a coefficient.
     residual : float
-        Root mean square [N, or N m] of what is left.
+        Root mean square of what is left, in that unit.
     unexplained : float
         Norm of what is left over the norm of the friction.
     model_error : float
@@ -80,6 +83,7 @@ class CurveFit(Result):
     parameters: dict[str, Estimate]
     law: Law | CurvedLaw | None
     formula: str
+    unit: str
     residual: float
     unexplained: float
     model_error: float
@@ -123,7 +127,7 @@ def fit_curve(
     contact: str | None = None,
     frequency: float | str | None = None,
     elements: int = 8,
-    normal: float | str = 1.0,
+    normal: float | str | None = None,
 ) -> CurveFit:
     r"""Which numbers of a friction curve explain a measured friction best?
 
@@ -155,7 +159,8 @@ def fit_curve(
     Parameters
     ----------
     data : Record or Loops
-        With ``friction`` and the motion, as for :func:`friction_loops`; or its answer, whose mean cycle is then fitted.
+        With ``friction``, or the ``coefficient`` of friction, and the motion, as for :func:`friction_loops`; or its
+        answer, whose mean cycle is then fitted.
     curve : str
         One of the names above.
     contact : {"ground", "base"}, optional
@@ -164,8 +169,9 @@ def fit_curve(
         Forcing frequency [Hz]; found from the record when not given.
     elements : int
         Points of a tabulated curve; classes of Iwan's; elements of Maxwell's to begin with.
-    normal : float or str
-        Normal load N [N] under rate-and-state friction; 1 where the channel holds the coefficient of friction.
+    normal : float or str, optional
+        Normal load N [N], by which a coefficient becomes a force. Where it is not given, the numbers
+        are those of the coefficient, and the law is that under 1 N.
 
     Returns
     -------
@@ -191,9 +197,11 @@ def fit_curve(
         raise EstimateError(f"curve = '{curve}'", f"it is one of {', '.join(CURVES)}", nearest(str(curve), CURVES))
     if not isinstance(elements, (int, np.integer)) or not 2 <= elements <= 50:
         raise EstimateError(f"elements = {elements}", "points of a table, or elements, are 2 to 50", "leave it at 8")
-    load = finite("normal", parse_value(normal, "N"), unit="N", positive=True)
-    whole, sliding = samples_of(data, contact=contact, frequency=frequency, smoothed=curve in OVER_WAY)
-    family, member = best_member(*CURVES[curve](Request(curve, whole, sliding, int(elements), load)))
+    load = None if normal is None else finite("normal", parse_value(normal, "N"), unit="N", positive=True)
+    whole, sliding = samples_of(
+        data, contact=contact, frequency=frequency, smoothed=curve in OVER_WAY, normal=load
+    )  # fmt: skip
+    family, member = best_member(*CURVES[curve](Request(curve, whole, sliding, int(elements), load or 1.0)))
     return _answer(curve, family, member, filled=_filled(data))
 
 
@@ -249,7 +257,7 @@ def _filled(data: Record | Loops) -> float:
     """Share of the friction's samples that were filled in for measured ones."""
     if isinstance(data, Loops):
         return 0.0
-    filled = sum(int(step.arguments.get("filled", {}).get("friction", 0)) for step in data.history)
+    filled = sum(max(step.arguments.get("filled", {}).values(), default=0) for step in data.history)
     return min(1.0, filled / len(data))
 
 
@@ -265,7 +273,7 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
     }
     worries = _worries(member, samples, family.along, missed)
     if missed > MISSES:
-        found = {name: replace(each, status=f"of a curve that misses {missed:.0%}") for name, each in found.items()}
+        found = {name: replace(each, status=NOT_FOLLOWED) for name, each in found.items()}
     if filled > FILLED:
         worries.append(f"{filled:.0%} of the samples were not measured, but filled in between others")
     for names, word in family.beware(found, samples):
@@ -277,7 +285,7 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
         law = None
         worries.append(f"no law has these values: {refused.value}")
     return CurveFit(
-        curve=curve, parameters=found, law=law, formula=family.formula,
+        curve=curve, parameters=found, law=law, formula=family.formula, unit=samples.force,
         residual=float(np.sqrt(np.mean(left**2))),
         unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)), model_error=missed,
         correlations=member.correlations, along=family.along,
@@ -314,10 +322,10 @@ def _worries(member: Member, samples: Samples, along: str, missed: float) -> lis
     if missed > MISSES:
         words.append(
             f"the friction does not follow the curve: {missed:.0%} of it is neither in the curve nor noise; "
-            "another curve, or another mass, may leave less"
+            "another curve may leave less, or another mass"
         )
     elif left > LEAVES:
         words.append(f"the curve leaves {100 * left:.0f} % of the friction: another one, or less noise, may leave less")
     for i, j in zip(*np.nonzero(np.triu(np.abs(member.correlations), 1) > TIED), strict=True):
-        words.append(f"{names[i]} and {names[j]} are told together alone (correlation {member.correlations[i, j]:.3f})")
+        words.append(f"{names[i]} and {names[j]} can only be told together (correlation {member.correlations[i, j]:.3f})")
     return words

@@ -135,7 +135,10 @@ def channel_unit(text: str, channel: str) -> Unit:
         except RecordError as error:
             refusals.append(error)
     first = refusals[0]
-    raise RecordError(f"channel {channel}: {first.value}", first.rule, first.next_step) from first
+    step = first.next_step
+    if channel == "friction" and "measured in 1" in first.value:
+        step = "a coefficient of friction is the channel coefficient, as in coefficient=COLUMN [1]"
+    raise RecordError(f"channel {channel}: {first.value}", first.rule, step) from first
 
 
 def apply_sensitivity(text: str, measured: Unit, channel: str) -> Unit:

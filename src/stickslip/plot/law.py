@@ -134,13 +134,17 @@ def plot_curve(found: CurveFit, *, ax: Axes | None = None) -> Axes:
     words, unit = ALONG[found.along]
     factor, unit = prefixed(found.at, unit)
     order = np.argsort(found.at, kind="stable") if found.along == "v" else np.arange(len(found.at))
-    force, force_unit = prefixed(found.measured, "N")
+    force, force_unit = prefixed(found.measured, found.unit)
     ax.plot(
         factor * found.at, force * found.measured, ".", color=FAINT, markersize=2, label="measured", rasterized=True
     )
-    ax.plot(factor * found.at[order], force * found.fitted[order], color=ORANGE, linewidth=1.4,
-            label=f"fitted: {found.curve}")  # fmt: skip
-    ax.set(xlabel=axis_label(words, unit), ylabel=axis_label("friction", force_unit))
+    at, fitted = factor * found.at[order], force * found.fitted[order]
+    if found.along == "v" and at[0] < 0 < at[-1]:  # the curve of neither direction goes through zero
+        middle = int(np.searchsorted(at, 0.0))
+        at, fitted = np.insert(at, middle, 0.0), np.insert(fitted, middle, np.nan)
+    ax.plot(at, fitted, color=ORANGE, linewidth=1.4, label=f"fitted: {found.curve}")
+    said = "coefficient of friction" if found.unit == "1" else "friction"
+    ax.set(xlabel=axis_label(words, unit), ylabel=axis_label(said, force_unit))
     ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
     return ax
 

@@ -24,6 +24,7 @@ VOCABULARY: dict[str, Quantity] = {
     "v": Quantity("velocity", ("m/s",)),
     "a": Quantity("acceleration", ("m/s^2",)),
     "friction": Quantity("friction force, positive against positive velocity", ("N", "N m")),
+    "coefficient": Quantity("coefficient of friction, positive against positive velocity", ("1",)),
     "load": Quantity("load cell", ("N", "N m")),
     "force": Quantity("applied force", ("N", "N m")),
     "normal": Quantity("normal force", ("N",)),

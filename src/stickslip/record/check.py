@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.record import flaws
-from stickslip.record.clock import Stamps, fit_line, inspect, is_uniform
+from stickslip.record.clock import BRIDGED, Stamps, fit_line, inspect, is_uniform
 from stickslip.record.flaws import Runs
 
 if TYPE_CHECKING:
@@ -247,6 +247,22 @@ def cure(values: Array) -> str:
     if short:
         cures.append(("fill the others" if cures else "fill them") + " with fill_missing(record)")
     return "; ".join(cures)
+
+
+def clock_cure(stamps: Array) -> str:
+    """What to do about time stamps that are not uniform."""
+    clock = inspect(stamps)
+    if clock.held or len(clock.missing) or len(clock.repeated) or len(clock.backward):
+        return "mend the clock with repair_clock(record)"
+    if len(clock.slower):
+        edges = np.concatenate([[0], clock.slower + 1, [len(stamps)]])
+        longest = int(np.argmax(np.diff(edges)))
+        one_rate = f"record.rows({edges[longest]}, {edges[longest + 1]})"
+        return f"keep those of one rate with {one_rate}, or fill in with fill_gaps(record) and fill_missing(record)"
+    if len(clock.gaps):
+        long = bool(np.any(np.diff(stamps)[clock.gaps] > BRIDGED * clock.step))
+        return f"fill the gaps with fill_gaps(record){' and fill_missing(record)' * long}"
+    return "mend the clock with repair_clock(record)"
 
 
 def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:

@@ -18,6 +18,7 @@ NEGLIGIBLE = 1e-3  # of a sampling interval: such a timing error moves a sine at
 COARSEST_SNAP = 2e-3  # a rate is taken as round only where the stamps fix it this well
 GAP = 1.9  # an interval this many times the usual one lost a sample; slower loops of a host stay below
 TOLERANCE = 0.02  # relative deviation of an interval that no analysis of friction would notice
+BRIDGED = 6  # sampling intervals over which samples are interpolated by their stamps
 STEADY = 10  # gaps this close together are no accident
 
 

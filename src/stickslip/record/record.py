@@ -226,10 +226,12 @@ class Record:
                 f"the record has {len(self)} samples", f"{question} needs at least {samples}", "give a longer record"
             )
         if self.stamps is not None:
+            from stickslip.record.check import clock_cure
+
             raise RecordError(
                 "the time stamps are not uniform",
                 f"{question} needs one sampling rate",
-                "see record.check() and mend the clock with repair_clock(record) or fill_gaps(record)",
+                f"see record.check() and {clock_cure(self.stamps)}",
             )
         for name in names:
             bad = np.flatnonzero(~np.isfinite(self.samples[name]))

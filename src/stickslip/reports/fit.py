@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from stickslip.curves.fit_curve import CurveFit
@@ -59,11 +59,7 @@ def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], 
     }  # fmt: skip
     cautions = [*([f"{result.status}."] if result.status != "ok" else []), *doubts(result.estimates)]
     if isinstance(result, CurveFit):
-        headline = [
-            f'The friction follows the curve "{result.curve}": {result.formula}.',
-            f"It leaves {result.unexplained:.1%} of the friction, {number(result.residual, result.residual / 100, 'N')}"
-            " root mean square.",
-        ]
+        headline = [*_curve_told(result)]
         return Summary(name, headline, cautions, lines=lines, settings=settings,
                        channels=list(first.channels.values()), history=first.history)  # fmt: skip
     verdicts = [(each.name, f"{each.standing.verdict} ({_values(each.oscillator.law)})") for each in result.candidates]
@@ -71,6 +67,14 @@ def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], 
         name, [result.verdict], cautions, lines=lines, notes=[*result.checks, *result.fit.checks], settings=settings,
         verdicts=verdicts, channels=list(first.channels.values()), history=result.history,
     )  # fmt: skip
+
+
+def _curve_told(found: CurveFit) -> Iterator[str]:
+    follows = "follows" if found.follows else "does not follow"
+    yield f'The friction {follows} the curve "{found.curve}": {found.formula}.'
+    left = f"{found.unexplained:.1%} of the friction, {number(found.residual, found.residual / 100, found.unit)}"
+    what = "It leaves" if found.follows else "The best of that kind leaves"
+    yield f"{what} {left} root mean square; {found.model_error:.1%} is no noise."
 
 
 def _values(law: object) -> str:
@@ -166,6 +170,7 @@ def fit_numbers(result: LawComparison | CurveFit) -> dict[str, object]:
         return result.to_dict()
     return {
         "curve": result.curve, "formula": result.formula, "residual": result.residual,
-        "unexplained": result.unexplained, "status": result.status,
+        "unexplained": result.unexplained, "model_error": result.model_error, "follows": result.follows,
+        "unit": result.unit, "status": result.status,
         "estimates": [each.to_dict() for each in result.estimates],
     }  # fmt: skip

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stickslip.errors import RecordError
 from stickslip.record import flaws
 from stickslip.record.check import SHARP_UNITS, in_words
-from stickslip.record.clock import Line, fit_line, inspect
+from stickslip.record.clock import BRIDGED, Line, fit_line, inspect
 from stickslip.record.record import Record, Step
 from stickslip.signals.interpolate import band_limited, bridge
 
@@ -198,7 +198,7 @@ def _from_stamps(
     stamps = record.time
     keep = np.isfinite(stamps) & np.concatenate([[True], np.diff(stamps) > 0])
     times = stamps[keep]
-    limit = 6 / fs if longest is None else float(longest)
+    limit = BRIDGED / fs if longest is None else float(longest)
     grid = times[0] + np.arange(int(np.floor((times[-1] - times[0]) * fs * (1 + 1e-12) + 1e-6)) + 1) / fs
     grid = np.minimum(grid, times[-1])
     nearest = np.clip(np.searchsorted(times, grid), 1, len(times) - 1)
