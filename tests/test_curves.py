@@ -7,7 +7,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from stickslip import EstimateError, LinearSlope, Record, RecordError, Stribeck, fit_curve, friction_loops
+from stickslip import (
+    EstimateError,
+    LinearSlope,
+    Record,
+    RecordError,
+    Stribeck,
+    fill_missing,
+    fit_curve,
+    friction_loops,
+)
 from stickslip.estimate import NORMAL_95
 
 FS, CYCLES = 1000, 12
@@ -175,3 +184,48 @@ def test_friction_that_does_not_rise_has_a_law_without_viscosity() -> None:
     kinds = [fit_curve(sweep(seed, viscous=0.0)) for seed in range(6)]
     assert all(found.law is not None for found in kinds)
     assert any("viscous" not in found.parameters for found in kinds)
+
+
+def test_a_curve_that_friction_does_not_follow_is_said_so() -> None:
+    """What repeats in every cycle is the curve's own error; noise is not, however loud."""
+    record = sweep(static=3.0, viscous=0.0)
+    found = fit_curve(record, curve="coulomb")
+    assert not found.follows
+    assert found.model_error == pytest.approx(found.unexplained, rel=0.1)
+    assert "does not follow the curve" in found.status
+    assert {each.status for each in found.estimates} == {"of a curve that the friction does not follow"}
+    assert fit_curve(record, curve="stribeck").follows
+    loud = fit_curve(sweep(static=1.0, viscous=0.0, noise=0.4), curve="coulomb")
+    assert loud.follows
+    assert loud.unexplained > 0.3
+    assert loud.model_error < 0.05
+
+
+def test_the_curves_error_is_told_of_motion_that_never_repeats() -> None:
+    rng = np.random.default_rng(3)
+    t = np.arange(20 * FS) / FS
+    v = sum(0.05 * np.sin(2 * np.pi * f * t + p) for f, p in zip((0.3, 0.71, 1.13), rng.uniform(0, 6, 3), strict=True))
+    even, uneven = np.sign(v), np.sign(v) * (1 + 2 * np.exp(-np.abs(v) / 0.02))
+    for friction, follows in ((even, True), (uneven, False)):
+        noisy = friction + rng.normal(0, 0.2, t.size)
+        assert fit_curve(Record.of({"v": v, "friction": noisy}, fs=FS), curve="coulomb").follows is follows
+
+
+def test_a_coefficient_is_fitted_as_it_is_or_under_its_load() -> None:
+    record = sweep()
+    given = {"v": record["v"], "coefficient": record["friction"] / 10}
+    wanted = fit_curve(record, curve="viscous")
+    alone = fit_curve(Record.of(given, fs=FS), curve="viscous")
+    assert (alone.unit, [each.unit for each in alone.estimates]) == ("1", ["1", "s/m", "1"])
+    assert alone.parameters["kinetic"].value == pytest.approx(wanted.parameters["kinetic"].value / 10)
+    loaded = fit_curve(Record.of(given, fs=FS), curve="viscous", normal="10 N")
+    assert (loaded.unit, loaded.estimates[1].unit) == ("N", "N s/m")
+    assert loaded.law.kinetic == pytest.approx(wanted.law.kinetic)
+
+
+def test_samples_that_were_filled_in_are_told() -> None:
+    record = sweep()
+    lost = np.where(np.arange(1, len(record) + 1) % 5 > 2, np.nan, record["friction"])
+    found = fit_curve(fill_missing(Record.of({"v": record["v"], "friction": lost}, fs=FS)), curve="coulomb")
+    assert "40% of the samples were not measured" in found.status
+    assert "measured" not in fit_curve(record, curve="coulomb").status

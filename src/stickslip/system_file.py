@@ -279,6 +279,11 @@ def read_system(path: str | Path) -> Case:
     path = Path(path)
     values, lines = read_toml(path, what="a system is")
     source = _Source(path.name, lines, path.parent)
+    if "law" in values and "system" not in values:
+        raise ModelError(
+            f"{path.name} holds a law alone", "a law is simulated in a system",
+            "add [system] with mass = and stiffness =, and a [drive]; a fit that is told the mass writes them itself",
+        )  # fmt: skip
     whole = checked(_File, values, source=source.name, lines=lines)
     drive = _built("drive", DRIVES, whole.drive, source)
     several = whole.contacts is not None or isinstance(whole.system.get("mass"), list)

@@ -73,7 +73,10 @@ def fit(
     with progress(3) as tell:
         tell("reading", 0)
         records = [read(group, rig) for group in groups]
-        result = _answer(records, rig, laws, calibration, curve or _only_curve(records[0], asked=asked), tell)
+        curve = curve or _only_curve(records[0], asked=asked)
+        if curve is not None:
+            records = [_with_friction(records[0], rig)]
+        result = _answer(records, rig, laws, calibration, curve, tell)
         tell("drawing and writing", 2)
         name = name_of(groups[0]) if len(groups) == 1 else f"{len(groups)} records"
         written = ss.publish_fit(result, folder=folder, records=records, name=name) if folder else None
@@ -94,8 +97,7 @@ def _only_curve(record: Record, *, asked: bool) -> str | None:
     if not {"x", "v"} & set(record):
         raise ss.RecordError(
             f"no motion of the mass (the record has {', '.join(record)})",
-            "a law is fitted to the displacement x or the velocity v of the mass, in an oscillator that its base or its "
-            "own release moves (a belt or a ramp: in Python, as fit_law's drive)",
+            "a law is fitted to the displacement x or the velocity v of the mass",
             'name its column, as in channels={"x": "COLUMN [mm]"}',
         )  # fmt: skip
     return None
@@ -121,7 +123,7 @@ def _answer(
 ) -> LawComparison | CurveFit:
     if curve is not None:
         tell("fitting", 1)
-        return ss.fit_curve(_with_friction(records[0], rig), curve=curve, contact=rig.contact)
+        return ss.fit_curve(records[0], curve=curve, contact=rig.contact)
     constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
     if missing := [name for name, value in constants.items() if value is None]:
         raise ss.ModelError(

@@ -272,6 +272,9 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
         for (name, value), sd, freedom in zip(member.values.items(), member.sd, member.freedom, strict=True)
     }
     worries = _worries(member, samples, family.along, missed)
+    for name, each in found.items():
+        if not all(map(math.isfinite, each.interval)):
+            found[name] = replace(each, status="the record tells nothing of it")
     if missed > MISSES:
         found = {name: replace(each, status=NOT_FOLLOWED) for name, each in found.items()}
     if filled > FILLED:
@@ -327,5 +330,7 @@ def _worries(member: Member, samples: Samples, along: str, missed: float) -> lis
     elif left > LEAVES:
         words.append(f"the curve leaves {100 * left:.0f} % of the friction: another one, or less noise, may leave less")
     for i, j in zip(*np.nonzero(np.triu(np.abs(member.correlations), 1) > TIED), strict=True):
-        words.append(f"{names[i]} and {names[j]} can only be told together (correlation {member.correlations[i, j]:.3f})")
+        words.append(
+            f"{names[i]} and {names[j]} can only be told together (correlation {member.correlations[i, j]:.3f})"
+        )
     return words

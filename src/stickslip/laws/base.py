@@ -126,7 +126,7 @@ def static_level(static: float | None, kinetic: float) -> float:
     level = kinetic if static is None else finite("static", static, unit="N")
     if level < kinetic:
         raise ModelError(
-            f"static = {level} N below kinetic = {kinetic} N",
+            f"static = {level:.6g} N below kinetic = {kinetic:.6g} N",
             "static friction is at least the kinetic friction",
             "raise static=, or leave it out to make both equal",
         )

@@ -128,8 +128,13 @@ def _values(law: object) -> Iterator[tuple[str, Any]]:
 
 
 def _toml(law: Law | CurvedLaw) -> str:
-    lines = [f"{name} = {_toml_value(value)}" for name, value in _values(law)]
-    return "\n".join([f"# {formula_of(law)}", "[law]", f'name = "{type(law).__name__}"', *lines])
+    return f"# {formula_of(law)}\n{toml_table('law', law)}"
+
+
+def toml_table(heading: str, thing: object) -> str:
+    """A law or a drive of numbers and words as a table of a system's file."""
+    lines = [f"{name} = {_toml_value(value)}" for name, value in _values(thing)]
+    return "\n".join([f"[{heading}]", f'name = "{type(thing).__name__}"', *lines])
 
 
 def _toml_value(value: Any) -> str:

@@ -62,7 +62,7 @@ class LuGre(Sliding):
         finite("exponent", self.exponent, unit="", positive=True)
         if self.static < self.kinetic:
             raise ModelError(
-                f"static = {self.static} N below kinetic = {self.kinetic} N",
+                f"static = {self.static:.6g} N below kinetic = {self.kinetic:.6g} N",
                 "static friction is at least the kinetic friction",
                 "raise static=",
             )

@@ -68,7 +68,7 @@ class Stribeck(Rigid):
         finite("viscous", self.viscous, unit="N s/m")
         if self.static < self.kinetic:
             raise ModelError(
-                f"static = {self.static} N below kinetic = {self.kinetic} N",
+                f"static = {self.static:.6g} N below kinetic = {self.kinetic:.6g} N",
                 "static friction is at least the kinetic friction",
                 "raise static=",
             )

@@ -6,22 +6,15 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from stickslip.curves.fit_curve import CurveFit
-from stickslip.errors import ModelError
 from stickslip.fit.which_law import LawComparison
-from stickslip.laws.base import Law
-from stickslip.laws.curved import CurvedLaw
-from stickslip.laws.export import export_law
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Record
 from stickslip.reports.folder import check_folder, results_folder, write_figures
+from stickslip.reports.law_files import write_law
 from stickslip.reports.page import Section, render
 from stickslip.reports.summary import Line, Summary
 from stickslip.reports.words import doubts, interval_of, number, value_of
 
-FILES = {
-    "toml": "law.toml", "python": "friction.py", "c": "friction.c", "mujoco": "mujoco.xml", "modelica": "friction.mo",
-    "simulink": "friction.m",
-}  # fmt: skip
 UNITS = {"kinetic": "N", "static": "N", "speed": "m/s", "stiffness": "N/m", "damping": "N s/m", "steepness": "s/m"}
 
 
@@ -130,21 +123,8 @@ def publish_fit(
         (draft / "report.html").write_text(render([Section(summary, plates)]), encoding="utf-8")
         (draft / "figures").mkdir()
         write_figures(draft / "figures", "", plates)
-        _write_law(draft, result.law if isinstance(result, CurveFit) else result.fit.law)
+        write_law(draft, result, records)
     return folder
-
-
-def _write_law(draft: Path, law: Law | CurvedLaw | None) -> None:
-    """The law in every form that it has."""
-    if law is None:
-        return
-    (draft / "law").mkdir()
-    for form, file in FILES.items():
-        try:
-            text = export_law(law, format=form)
-        except ModelError:  # this law has no such form
-            continue
-        (draft / "law" / file).write_text(text, encoding="utf-8")
 
 
 def fit_numbers(result: LawComparison | CurveFit) -> dict[str, object]:
