@@ -132,7 +132,12 @@ class SqueakFindings(Result):
             "normal_load": self.normal,
             "squeaks": {key: value for key, value in self.squeaks.to_dict().items() if key not in ("notes", "history")},
             "beside": {
-                each.channel: {"kind": each.kind, "squeaks": len(each.of("squeak", "squeal"))} for each in self.beside
+                each.channel: {
+                    "kind": each.kind,
+                    "reference": each.reference,
+                    "bursts": [burst.to_dict() for burst in each.bursts],
+                }
+                for each in self.beside
             },
             "coupling": None if self.coupling is None else self.coupling.to_dict(),
             "sound_quality": None if self.quality is None else self.quality.to_dict(),

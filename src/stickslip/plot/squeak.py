@@ -262,6 +262,8 @@ def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
 def plot_conditions(comparison: SqueakComparison) -> Figure:
     """Friction and its slope against speed in each condition, with their 95 % intervals; where it squeaks is orange.
 
+    Both over the load, where it is known in every condition.
+
     Parameters
     ----------
     comparison : SqueakComparison
@@ -276,7 +278,13 @@ def plot_conditions(comparison: SqueakComparison) -> Figure:
     conditions = [each for each in comparison.conditions if each.level is not None]
     figure = Figure(figsize=(WIDTH, 1.5 + 0.34 * len(conditions)), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
-    for ax, name, words in ((left, "level", "sliding friction"), (right, "slope", "slope against speed")):
+    over_load = all(each.coefficient is not None for each in conditions)
+    drawn = (
+        (("coefficient", "friction coefficient"), ("slope_of_coefficient", "its slope against speed"))
+        if over_load
+        else (("level", "sliding friction"), ("slope", "its slope against speed"))
+    )
+    for ax, (name, words) in zip((left, right), drawn, strict=True):
         estimates = [getattr(each, name) for each in conditions]
         unit = estimates[0].unit
         for place, (each, estimate) in enumerate(zip(conditions, estimates, strict=True)):
@@ -384,7 +392,8 @@ def plates_of_conditions(comparison: SqueakComparison) -> list[Plate]:
         return []
     return [
         plate("conditions", plot_conditions(comparison), "Friction, and how it changes with speed",
-              "Left: sliding friction. Right: its slope against speed; left of zero it falls with speed."),
+              "Left: sliding friction, over the load where all loads are known. Right: its slope against speed; left "
+              "of zero it falls with speed."),
         plate("loops", plot_condition_loops(comparison), "Friction against displacement and velocity",
               "Each condition in a row, each row with a scale of its own. Grey: cycles; orange: their mean; dots: the "
               "mean at each velocity. The number is the slope against speed with its 95 % interval."),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from stickslip.analysis.squeak_comparison import Condition, SqueakComparison
 from stickslip.analysis.squeaks import SqueakFindings, trend_of
 from stickslip.estimate import Estimate, decimals
@@ -44,17 +46,16 @@ def headline(found: SqueakFindings) -> Iterator[str]:
         joined = [pair for pair in found.coupling.pairs if pair.coupled]
         told = f"{len(joined)} of {len(found.coupling.pairs)} pairs of channels move together beyond chance"
         yield f"While it squeaks, {told}."
-        energy = found.coupling.energy_per_cycle
-        if energy is not None and not energy.includes(0.0):
-            verb = "feeds" if energy.value > 0 else "damps"
-            yield f"Friction {verb} the tangential vibration: {value_of(energy)} in each of its cycles."
+        fed = {"tangential vibration": found.coupling.energy_per_cycle, "torsion": found.coupling.energy_to_torsion}
+        for motion, energy in fed.items():
+            if energy is not None and not energy.includes(0.0):
+                verb = "feeds" if energy.value > 0 else "damps"
+                yield f"Friction {verb} the {motion}: {value_of(energy)} in each cycle of the squeak."
     if found.loops is not None:
         slope = found.loops.slope
         trend = trend_of(slope)
         sure = f" {trend}" if trend in ("falls", "rises") else " can not be told to change"
-        yield (
-            f"Friction is {value_of(found.loops.level)} and{sure} with speed: {value_of(slope)} ({interval_of(slope)})."
-        )
+        yield (f"Friction is {value_of(found.loops.level)} and{sure} with speed: {value_of(slope)} ({_ends(slope)}).")
 
 
 def _of_one(burst: Squeak, squeaks: Squeaks) -> str:
@@ -108,6 +109,18 @@ def burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
             *([_or_none(burst.phase, ".2f"), _or_none(burst.speed, ".3f")] if moves else []), burst.friction,
         ])  # fmt: skip
     return headings, rows
+
+
+def channel_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each channel that vibrates."""
+    rows = []
+    for squeaks in (found.squeaks, *found.beside):
+        heard = squeaks.of("squeak", "squeal")
+        frequency = f"{np.mean([burst.frequency for burst in heard]):.1f}" if heard else NONE
+        levels = [burst.level for burst in heard or squeaks.bursts if not math.isnan(burst.level)]
+        level = f"{max(levels):.1f} re {squeaks.reference}" if levels else NONE
+        rows.append([squeaks.channel, squeaks.kind, str(len(heard)), frequency, level])
+    return ["channel", "what it is", "squeaks", "Hz", "loudest, dB"], rows
 
 
 def hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
@@ -179,13 +192,18 @@ def condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[l
 def _condition(each: Condition) -> list[str]:
     forcing = "" if math.isnan(each.forcing) else f"{each.forcing:.3g} Hz"
     stroke = "" if math.isnan(each.stroke) else f"±{number(each.stroke, each.stroke / 100, 'm')}"
-    slope = NONE if each.slope is None else f"{value_of(each.slope)} ({interval_of(each.slope)})"
+    slope = NONE if each.slope is None else f"{value_of(each.slope)} ({_ends(each.slope)})"
     return [
         each.name, NONE if each.normal is None else number(each.normal, 0.0, "N"),
         ", ".join(part for part in (forcing, stroke) if part) or NONE, _value(each.level), slope,
         f"{each.count} ({each.rate:.2g} in a second)" if each.squeaks else "none",
         NONE if each.frequency is None else f"{each.frequency.value:.1f}", _or_none(each.sound, ".1f"),
     ]  # fmt: skip
+
+
+def _ends(estimate: Estimate) -> str:
+    """The interval without the unit, which stands beside the value."""
+    return interval_of(estimate).removesuffix(value_of(estimate).lstrip("-.0123456789e"))
 
 
 def _value(estimate: Estimate | None) -> str:

@@ -212,6 +212,8 @@ def _of_squeaks(found: SqueakFindings) -> Summary:
         more = f", the first {squeak.MOST}" if len(bursts) > squeak.MOST else ""
         title = f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}{more}, levels re {found.squeaks.reference}"
         tables.append(Table(title, *squeak.burst_table(found)))
+    if found.beside:
+        tables.append(Table("In every channel that vibrates", *squeak.channel_table(found)))
     if found.quality is not None or found.impulses is not None:
         tables.append(Table("How it is heard", *squeak.hearing_table(found), squeak.hearing_note(found)))
     if found.coupling is not None:
