@@ -75,12 +75,12 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
     figure, (top, bottom) = new_figure(2, height=4.6, heights=(3, 1))
     factor, unit = prefixed(np.concatenate([each.points[:, 0] for each in (*found.up, *found.down)]), "m")
     looks = (("down", ORANGE, "o", 5.0, "none"), ("up", BLUE, ".", 4.0, BLUE))
+    crowded = max(len(each.points) for each in (*found.up, *found.down)) > 20
     for name, colour, marker, size, face in looks:
         way = getattr(found, name)
         places = np.repeat(found.values, [len(each.points) for each in way])
         heights = factor * np.concatenate([each.points[:, 0] for each in way])
         style = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
-        crowded = len(places) > 20 * len(found.values)
         top.plot(places, heights, markersize=1.2 if crowded else size, markeredgewidth=0.7,
                  label=f"followed {name}", zorder=3 if name == "up" else 2, **style)  # fmt: skip
         bottom.plot(found.values, [_largest(each) for each in way], markersize=size, markeredgewidth=0.7, **style)
@@ -102,7 +102,7 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
     bottom.set_ylabel("largest\nmultiplier")
     top.set_ylabel(axis_label("displacement at phase zero", unit))
     bottom.set_xlabel(_named(found.up[0].orbit.orbit.system, found.parameter))
-    top.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=4, borderaxespad=0.2)
+    top.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=4, borderaxespad=0.2, markerscale=3 if crowded else 1)
     return figure
 
 
