@@ -92,6 +92,13 @@ def test_the_rig_squeaks_by_lifting_a_contact(load: float) -> None:
     assert found.frequency == pytest.approx(found.sliding.frequency, rel=0.03)
 
 
+def test_the_steady_state_on_a_belt_is_the_cycle() -> None:
+    found = ss.steady_state(ss.squeak_rig("wet", 3.0).having(drive=ss.Belt(-0.1)))
+    assert found.status == "unique"
+    assert 1 / found.period == pytest.approx(rig(3.0).frequency, rel=1e-9)
+    assert np.allclose(np.abs(found.multipliers[:-1]), np.abs(rig(3.0).multipliers), rtol=1e-6)
+
+
 def test_the_cycle_is_what_a_long_simulation_ends_in() -> None:
     found = rig(3.0)
     belt = ss.squeak_rig("wet", 3.0).having(drive=ss.Belt(-0.1))

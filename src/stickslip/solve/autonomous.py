@@ -43,7 +43,7 @@ def _shortest(orbit: Trajectory, multipliers: NDArray[np.complex128]) -> tuple[T
         if np.all(np.abs(end - begin) < ALIKE * spread):
             part = closed(orbit.system, orbit.table, state, int(orbit.modes[0]), orbit.duration / parts)
             if part is not None:
-                return part
+                return _shortest(*part)
     return orbit, multipliers
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve.automaton import Array, System, exponential
+from stickslip.solve.autonomous import settled_cycle
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.poincare import CLOSED, Table, closes, derivative, end_of, extent, lap, stretch, tables
 from stickslip.solve.simulate import opening
@@ -187,8 +188,9 @@ def steady_state(
 
     The exact map over a period of the drive is iterated through a transient, then closed by Newton's method with its
     exact derivative; that of a curved law is differenced, and its multipliers are known to some 1e-9. A system without
-    a periodic drive (a belt, a ramp) is followed until a stick ends as the one before did, or, where the law never
-    holds the mass, until two turns of the mass on a belt are alike.
+    a periodic drive (a belt, a ramp) is followed until a stick ends as the one before did; where contacts lift off and
+    none sticks, until Newton's method closes the cycle; where the law never holds the mass, until two turns of the mass
+    on a belt are alike.
 
     Parameters
     ----------
@@ -404,7 +406,7 @@ def judged(orbit: Trajectory, order: int, jacobian: Array, slowest: float) -> St
 
 
 def _self_excited(system: System, table: Table, start: Mapping[str, float | str], transient: int) -> SteadyState:
-    """The orbit between two equal ends of a stick."""
+    """The orbit between two equal ends of a stick, or, without sticks, the one that closes."""
     if not table.motion.rates:
         raise SolveError("nothing drives the system", "only a driven motion repeats", "give a drive=")
     state, mode = opening(table, start)
@@ -426,11 +428,25 @@ def _self_excited(system: System, table: Table, start: Mapping[str, float | str]
             gap = np.abs(motion.states[last, own] - motion.states[first, own])
             if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, own]), axis=0)):
                 return _between(motion, first, last)
+        if not isinstance(table, Tape) and (not ends or motion.starts[ends[-1]] < duration / 2):
+            found = _without_sticks(motion)
+            if found is not None:
+                return found
         duration *= 2
     none = np.full(table.physical, np.nan, dtype=np.complex128)
     steady = len(motion.modes) == 1 or motion.durations[-1] > 0.5 * duration
     return SteadyState("rest" if steady and table.modes[motion.modes[-1]].side == 0 else "not periodic",
                        math.nan, 0, motion, none)  # fmt: skip
+
+
+def _without_sticks(motion: Trajectory) -> SteadyState | None:
+    """The orbit that a motion of linear modes ends in; between events nothing bounds it, so it has some."""
+    found = settled_cycle(motion, 2 * math.pi * float(np.min(motion.table.cell)))
+    if found is None or len(found[0].modes) == 1:
+        return None
+    orbit, across = found
+    multipliers = np.append(across, 0.0)  # along the orbit nothing grows: its phase is free
+    return SteadyState("unique" if abs(across[0]) < 1 else "unstable", orbit.duration, 1, orbit, multipliers)
 
 
 def _between_turns(system: System, table: Tape, state: Array, mode: int, duration: float) -> SteadyState:
