@@ -36,6 +36,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/rig.py --draws 5
 	$(BIN)/python benchmarks/events.py --draws 2
 	$(BIN)/python benchmarks/breakaway.py --draws 2
+	$(BIN)/python benchmarks/kills.py
 	$(BIN)/python benchmarks/delay.py 5
 	$(BIN)/python benchmarks/curves.py 20
 	$(BIN)/python benchmarks/law.py --draws 2
