@@ -42,6 +42,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/law.py --draws 2
 	$(BIN)/python benchmarks/laws.py --draws 1 --laws "Coulomb,compliant,state variable"
 	$(BIN)/python benchmarks/squeak.py 40
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/sweep.py
 	$(BIN)/python benchmarks/squeak_model.py
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 SSQ_PARALLEL=0 MALLOC_TOP_PAD_=268435456 \
 	  MALLOC_MMAP_THRESHOLD_=17179869184 MALLOC_TRIM_THRESHOLD_=17179869184 $(BIN)/python benchmarks/wavelet.py

@@ -248,7 +248,9 @@ if TYPE_CHECKING:
     from stickslip.squeak.bifurcation import CycleBranches as CycleBranches, limit_cycles as limit_cycles
     from stickslip.squeak.limit_cycle import LimitCycle as LimitCycle, limit_cycle as limit_cycle
     from stickslip.squeak.virtual_rig import squeak_rig as squeak_rig
+    from stickslip.sweeps.grid_file import SweepFile as SweepFile, read_sweep as read_sweep
     from stickslip.sweeps.sweep import sweep as sweep
+    from stickslip.plot.maps import plot_map as plot_map
     from stickslip.structure import Contact as Contact, Structure as Structure
     from stickslip.system_file import Case as Case, read_system as read_system, scenario_case as scenario_case
     from stickslip.laws.dahl import Dahl as Dahl
@@ -322,7 +324,7 @@ _ROOMS = {
     "InSeries": "laws.series", "TimeDelay": "laws.time_delay",
     "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
-    "sweep": "sweeps.sweep",
+    "sweep": "sweeps.sweep", "SweepFile": "sweeps.grid_file", "read_sweep": "sweeps.grid_file", "plot_map": "plot.maps",
     "squeak_rig": "squeak.virtual_rig", "sound_pressure": "squeak.sound", "squeak_record": "squeak.sound",
     "find_squeaks": "squeak.bursts", "Squeaks": "squeak.bursts", "Squeak": "squeak.bursts",
     "sound_quality": "squeak.quality", "SoundQuality": "squeak.quality",

@@ -14,6 +14,7 @@ from stickslip.cli.fit import fit
 from stickslip.cli.rig import rig
 from stickslip.cli.simulate import INTERRUPTED, simulate
 from stickslip.cli.squeak import squeak
+from stickslip.cli.sweep import sweep
 from stickslip.cli.thesis import thesis
 from stickslip.cli.wavelet import wavelet
 from stickslip.cli.words import spoken
@@ -46,5 +47,5 @@ def main() -> None:
     """
 
 
-for _command in (analyze, check, convert, datasets, decay, demo, fit, rig, simulate, squeak, thesis, wavelet):
+for _command in (analyze, check, convert, datasets, decay, demo, fit, rig, simulate, squeak, sweep, thesis, wavelet):
     main.add_command(_command)

@@ -21,6 +21,7 @@ from stickslip.sweeps.engines import read_engine
 from stickslip.sweeps.grid import Grid, read_grid
 from stickslip.sweeps.measures import EVENTS, Measure, read_measures
 from stickslip.sweeps.plan import Arrays, Plan, assemble, blank, chunked, required
+from stickslip.sweeps.progress import told
 from stickslip.sweeps.store import Store
 
 
@@ -95,7 +96,8 @@ def sweep(
     with nullcontext(Memory(plan)) if store is None else Store(store, plan) as kept:
         before, status = len(kept.missing), "complete"
         try:
-            run(plan, kept.missing, kept.keep, address)
+            with told(kept.keep, len(plan.blocks) - before, len(plan.blocks)) as keep:
+                run(plan, kept.missing, keep, address)
         except KeyboardInterrupt:
             if len(kept.missing) == before:
                 raise

@@ -1,0 +1,143 @@
+"""Maps of a sweep: one measure over two parameters, with Den Hartog's boundary where it applies."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stickslip.errors import ModelError
+from stickslip.identify.sliding_balance import Slider
+from stickslip.oscillator import Oscillator
+from stickslip.plot.style import BLUE, INK, ORANGE, Array, axes_of, axis_label, prefixed, styled
+from stickslip.solve.automaton import System
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+RISING = "cividis"
+FEW = 16  # values of a count that are told apart by colour
+MOSTLY = 0.95  # of the points have whole numbers of a count: on a border they may not
+WIDE, SPAN = 100.0, 1e4  # a range this wide is drawn by its logarithm, and as much of it
+
+
+@styled
+def plot_map(atlas: Any, *, variable: str | None = None, system: System | None = None, ax: Axes | None = None) -> Axes:
+    """One measure of a sweep: in colour over two parameters, as a curve over one.
+
+    Parameters
+    ----------
+    atlas : xarray.Dataset
+        What :func:`stickslip.sweep` returned.
+    variable : str, optional
+        Which of its variables; the stops, both kinds together, where left out and there.
+    system : Oscillator or Structure, optional
+        What moved: with rigid Coulomb friction over frequency and friction, Den Hartog's boundary of the motion
+        without stops is drawn over the map.
+    ax : Axes, optional
+        Where to draw; a new figure where left out.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ModelError
+        The variable is not there, or the map has more than two dimensions.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.scenarios.forced(0.8, 0.5)
+    >>> grid = {"frequency": [0.1, 0.13, 0.16], "kinetic": [0.3, 0.6, 0.9]}
+    >>> atlas = ss.sweep(slider, grid, measures=["stops"], settle=40, cycles=10)
+    >>> plot_map(atlas, system=slider).get_xlabel()
+    'frequency [Hz]'
+    """
+    values, words, unit = _shown(atlas, variable)
+    if values.ndim not in (1, 2):
+        raise ModelError(
+            f"a map over {', '.join(values.dims)}", "one or two dimensions can be drawn", "choose with sel()"
+        )
+    ax = axes_of(ax, height=4.2)
+    across, scale, label = _axis(atlas, values.dims[0])
+    factor, spelled = prefixed(values.values[np.isfinite(values.values)], unit)
+    if values.ndim == 1:
+        ax.plot(across, factor * values.values, ".-", color=BLUE)
+        ax.set_xlabel(label)
+        ax.set_ylabel(axis_label(words, spelled))
+        return ax
+    up, lift, upward = _axis(atlas, values.dims[1])
+    _colour(ax, across, up, factor * values.values.T, axis_label(words, spelled))
+    curve = None if system is None else den_hartog(system, values.dims, across / scale)
+    if curve is not None:
+        ax.plot(across, lift * curve, color=ORANGE, linewidth=1.8, label="Den Hartog (1931): no stops below")
+        ax.set_ylim(up[0], up[-1])
+        ax.legend(loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
+    ax.set_xlabel(label)
+    ax.set_ylabel(upward)
+    return ax
+
+
+def _shown(atlas: Any, variable: str | None) -> tuple[Any, str, str]:
+    """The values, what they are, and their unit."""
+    if variable is None and {"normal_stops", "abnormal_stops"} <= set(atlas.data_vars):
+        return atlas.normal_stops + atlas.abnormal_stops, "stops per period", "1"
+    name = variable if variable is not None else next(iter(set(atlas.data_vars) - {"status"}), "status")
+    if name not in atlas.data_vars:
+        raise ModelError(
+            f"the map has no '{name}'", f"it has {', '.join(map(str, atlas.data_vars))}", "name one of them"
+        )
+    values = abs(atlas[name]) if np.iscomplexobj(atlas[name]) else atlas[name]
+    return values, atlas[name].attrs.get("long_name", name), atlas[name].attrs.get("units", "1")
+
+
+def _axis(atlas: Any, dim: str) -> tuple[Array, float, str]:
+    """Values along a dimension as drawn, their scale to SI, and the label."""
+    known = atlas[dim] if dim in atlas.coords and atlas[dim].dtype.kind == "f" else None
+    if known is None:
+        return np.arange(float(atlas.sizes[dim])), 1.0, dim
+    factor, unit = prefixed(known.values, known.attrs.get("units", "1"))
+    return factor * known.values, factor, axis_label(dim.replace(".", " ").replace("_", " "), unit)
+
+
+def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str) -> None:
+    """The map in colour; a count of few values in steps."""
+    import matplotlib as mpl
+    from matplotlib.colors import BoundaryNorm, LogNorm
+
+    known = values[np.isfinite(values)]
+    whole = np.unique(np.round(known))
+    options: dict[str, Any] = {"cmap": RISING}
+    if 0 < len(whole) <= FEW and np.mean(known == np.round(known)) > MOSTLY:
+        edges = np.append(whole - 0.5, whole[-1] + 0.5)
+        options = {"cmap": mpl.colormaps[RISING].resampled(len(whole)), "norm": BoundaryNorm(edges, len(whole))}
+    elif len(known) and np.min(known) > 0 and np.max(known) > WIDE * np.min(known):
+        options["norm"] = LogNorm(max(np.min(known), np.max(known) / SPAN), np.max(known))
+    drawn = ax.pcolormesh(
+        across, up, np.ma.masked_invalid(values), shading="nearest", rasterized=True, linewidth=0, **options
+    )
+    ax.grid(visible=False)
+    bar = ax.figure.colorbar(drawn, ax=ax, label=words)
+    if isinstance(options.get("norm"), BoundaryNorm):
+        bar.set_ticks([(low + high) / 2 for low, high in pairwise(edges)])
+        bar.set_ticklabels([f"{count:g}" for count in whole])
+    bar.outline.set_edgecolor(INK)
+
+
+def den_hartog(system: System, dims: tuple[str, ...], frequencies: Array) -> Array | None:
+    """The friction above which rigid sliding stops on its way [N], over frequencies; None where it does not apply."""
+    if dims != ("frequency", "kinetic") or not isinstance(system, Oscillator):
+        return None
+    law, drive = system.law, system.drive
+    rigid = type(law).__name__ == "Coulomb" and getattr(law, "static", None) in (None, getattr(law, "kinetic", None))
+    grounded = getattr(drive, "contact", "ground") == "ground" and system.damper == "ground"
+    factors = {"HarmonicForce": 1.0, "HarmonicBase": system.stiffness}
+    if not (rigid and grounded and type(drive).__name__ in factors):
+        return None
+    force = float(getattr(drive, "amplitude", math.nan)) * factors[type(drive).__name__]
+    sliders = [Slider(system.mass, system.stiffness, 2 * math.pi * f, system.damping) for f in frequencies]
+    return np.array([force * slider.boundary() for slider in sliders])

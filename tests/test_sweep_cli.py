@@ -1,0 +1,109 @@
+"""A sweep written down, run from the command line, and drawn."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import stickslip as ss
+from stickslip.cli.program import main
+from stickslip.errors import ModelError
+from stickslip.plot.maps import den_hartog
+from stickslip.scenarios import forced, grid
+
+pytest.importorskip("xarray")
+pytest.importorskip("zarr")
+SLIDER = """
+system = { mass = 2.42, stiffness = "2.31 N/mm", damping = 0.12 }
+law = { name = "Coulomb", kinetic = 1.1 }
+drive = { name = "HarmonicBase", amplitude = "0.65 mm", frequency = 2.5 }
+"""
+GRID = """
+system = "slider.toml"
+measures = ["stops", "amplitude"]
+cycles = 4
+settle = 40
+[grid]
+frequency = { from = "2 Hz", to = 9, points = 8 }
+kinetic = ["200 mN", 0.7, 1.2]
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "slider.toml").write_text(SLIDER)
+    (tmp_path / "grid.toml").write_text(GRID)
+    return tmp_path / "grid.toml"
+
+
+def test_a_file_is_the_sweep_it_says(file: Path) -> None:
+    asked = ss.read_sweep(file)
+    assert asked.case.system.drive.amplitude == pytest.approx(0.65e-3)  # type: ignore[union-attr]
+    assert np.allclose(asked.grid["frequency"], np.linspace(2, 9, 8))
+    assert asked.grid["kinetic"] == [0.2, 0.7, 1.2]
+    assert (asked.measures, asked.cycles, asked.settle) == (("stops", "amplitude"), 4, 40)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("points = 8", "points = 0", "line 7.*points = 0"),
+        ('"2 Hz"', '"2 mm"', "line 7.*mm"),
+        ("[0", '["', "TOML|TOML file"),
+        ("kinetic =", "kinetc =", "no parameter is called 'kinetc'"),
+        ("cycles = 4", "cyles = 4", "key 'cyles'.*cycles"),
+        ('["200 mN", 0.7, 1.2]', "1.0", "a list"),
+        ("to = 9, points = 8", 'to = -9, points = 8, scale = "log"', "logarithmic"),
+    ],
+)
+def test_a_mistake_in_the_file_is_named(file: Path, old: str, new: str, words: str) -> None:
+    file.write_text(GRID.replace(old, new))
+    if old == "[0":
+        file.write_text(GRID + '\nbroken = "')
+    with pytest.raises(ModelError, match=words):
+        ss.read_sweep(file)
+
+
+def test_the_command_maps_keeps_and_draws(file: Path, tmp_path: Path) -> None:
+    store = tmp_path / "map.zarr"
+    command = ["sweep", str(file), "--store", str(store), "--output", str(tmp_path / "maps"), "--json"]
+    run = CliRunner().invoke(main, command, catch_exceptions=False)
+    assert run.exit_code == 0, run.output
+    told = json.loads(run.output)
+    assert told["status"] == "complete"
+    assert told["variables"]["amplitude"]["known"] == 24
+    assert {path.name for path in (tmp_path / "maps").iterdir()} == {"stops.png", "amplitude.png"}
+    again = CliRunner().invoke(main, ["sweep", str(file), "--store", str(store)], catch_exceptions=False)
+    assert again.exit_code == 0
+    assert "8 x 3 points, complete" in again.output
+    wrong = CliRunner().invoke(main, ["sweep", str(file), "--engine", "gpu"], catch_exceptions=False)
+    assert wrong.exit_code == 2
+
+
+def test_the_curve_over_the_map_is_den_hartogs() -> None:
+    for ratio, damping, boundary in grid("DH-2")["boundary"]:
+        curve = den_hartog(
+            forced(ratio, 0.5, damping_ratio=damping), ("frequency", "kinetic"), np.array([ratio]) / (2 * np.pi)
+        )
+        assert curve is not None
+        assert curve[0] == pytest.approx(boundary, rel=1e-4)  # as fine as it is drawn
+    assert den_hartog(forced(0.8, 0.5, static_ratio=1.2), ("frequency", "kinetic"), np.array([1.0])) is None
+
+
+def test_the_map_is_drawn_over_its_parameters() -> None:
+    slider = forced(0.8, 0.5)
+    values = {"frequency": np.linspace(0.08, 0.3, 12), "kinetic": np.linspace(0.1, 1.2, 10)}
+    atlas = ss.sweep(slider, values, measures=["stops", "amplitude", "multipliers"], settle=60, cycles=20)
+    ax = ss.plot_map(atlas, system=slider)
+    drawn = ax.collections[0].get_array()
+    assert np.array_equal(np.ravel(drawn), np.ravel((atlas.normal_stops + atlas.abnormal_stops).values.T))
+    assert [line.get_label() for line in ax.lines] == ["Den Hartog (1931): no stops below"]
+    assert len(ss.plot_map(atlas, variable="multiplier").collections) == 1
+    curve = ss.plot_map(atlas.isel(kinetic=3), variable="amplitude")
+    assert np.allclose(curve.lines[0].get_xdata(), values["frequency"])
+    with pytest.raises(ModelError, match="has no 'stick'"):
+        ss.plot_map(atlas, variable="stick")
