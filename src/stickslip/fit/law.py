@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
 from stickslip.fit.search import Knob, Point, Problem, descend
-from stickslip.fit.start import Shown, best_start, better_start, free_names, knob, seen_profile, thinned, value_of
+from stickslip.fit.start import Shown, best_start, better_start, free_names, knob, seen_profile, thinned_out, value_of
 from stickslip.fit.stretch import channels_of
 from stickslip.fit.surety import Surety, surety
 from stickslip.laws.base import Law
@@ -196,7 +196,7 @@ def fit_law(
     for number, each in enumerate(shown):
         rows = each.slides()
         _require_sliding(each, rows)
-        stretches.append(each.stretch(number, (int(rows[0]), len(each.record) - 1), oscillator))
+        stretches.append(each.stretch(number, (int(rows[0]), len(each.record) - 1)))
     fastest = max(each.fastest for each in shown)
     oscillator, profile = better_start(oscillator, names, shown), None
     if names:
@@ -210,7 +210,7 @@ def fit_law(
     problem = Problem.of(oscillator, stretches, knobs, profile)
     point = problem.begin(np.zeros(len(knobs)))
     if profile:
-        few = replace(problem, stretches=tuple(map(thinned, stretches)))
+        few = thinned_out(problem)
         first = descend(few, few.begin(point.u), tell=tell)
         states = zip(first.starts, point.starts, strict=True)
         point = problem.at(first.u, tuple(np.append(a, b[len(a) :]) for a, b in states))

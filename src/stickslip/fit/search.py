@@ -159,6 +159,13 @@ class Problem:
             starts.append(np.append(state, np.zeros(len(stretch.drive.unsure))))
         return self.at(u, tuple(starts))
 
+    def own(self, starts: Sequence[Array]) -> tuple[Array, ...]:
+        """Starts of the same stretches with another trust in the drive: the states alone, the drive as measured."""
+        return tuple(
+            np.append(start[: len(scale)], np.zeros(len(stretch.drive.unsure)))
+            for start, scale, stretch in zip(starts, self.scales, self.stretches, strict=True)
+        )
+
     def at(self, u: Array, starts: tuple[Array, ...]) -> Point:
         """Simulate all stretches; chi squared is infinite where the engine refuses."""
         raw, pieces, residuals = [], [], []
@@ -172,7 +179,7 @@ class Problem:
             run = attempted(stretch, system, self.start(j, starts[j]), off)
             if run is None:
                 return Point(u, starts, (), (), (), math.inf)
-            told = [sensor.predicted(run, delays.get(sensor.channel.name, 0.0)) for sensor in stretch.sensors]
+            told = stretch.told(run, delays)
             raw.append(tuple(values for values, _ in told))
             pieces.append(tuple(piece for _, piece in told))
             left = [
@@ -213,6 +220,10 @@ class Problem:
                     ]
                     shared[j].append(np.concatenate([*told, np.zeros(len(stretch.drive.unsure))]))
                 continue
+            if knob.kind == "delay":
+                for j in range(len(self.stretches)):
+                    shared[j].append(self._later(point, j, knob, gains))
+                continue
             moved = point.u.copy()
             moved[k] += STEP
             near = self.at(moved, point.starts)
@@ -237,6 +248,18 @@ class Problem:
                 left, right = np.vstack([left, trust]), np.vstack([right, np.zeros((len(trust), right.shape[1]))])
             found.append(Slopes(left, right))
         return found
+
+    def _later(self, point: Point, j: int, knob: Knob, gains: Mapping[str, float]) -> Array:
+        """What a delay changes: the slope over time, where the reading does not jump."""
+        columns = []
+        for sensor, values, piece in zip(self.stretches[j].sensors, point.raw[j], point.pieces[j], strict=True):
+            name, slope = sensor.channel.name, np.zeros(len(values))
+            if name == knob.name.rpartition(".")[0]:
+                slope = -knob.scale * gains.get(name, 1.0) * np.gradient(values, sensor.time)
+                if piece is not None:
+                    slope[np.gradient(piece) != 0] = 0.0
+            columns.append(sensor.freed(slope))
+        return np.concatenate([*columns, np.zeros(len(self.stretches[j].drive.unsure))])
 
     def _difference(self, point: Point, near: Point, j: int, gains: Mapping[str, float]) -> Array:
         columns = []

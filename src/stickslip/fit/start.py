@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError, RecordError
-from stickslip.fit.drive import measured_drive
+from stickslip.fit.drive import DriveFrom, measured_drive
 from stickslip.fit.search import ABOVE, Knob, Point, Problem, Profile, descend
 from stickslip.fit.stretch import Sensor, Stretch
 from stickslip.oscillator import Oscillator
@@ -48,6 +48,7 @@ class Shown:
     late: float
     felt: Array
     level: float
+    drive: DriveFrom
 
     @classmethod
     def of(cls, record: Record, channels: Sequence[str], oscillator: Oscillator) -> Shown:
@@ -73,7 +74,8 @@ class Shown:
             velocity = values
             displacement = np.cumsum(values - values.mean()) / record.fs
         felt = _felt(record, velocity, oscillator)
-        return cls(record, tuple(channels), displacement, velocity, late, felt, _level(felt, velocity))
+        drive = measured_drive(record, oscillator.drive)
+        return cls(record, tuple(channels), displacement, velocity, late, felt, _level(felt, velocity), drive)
 
     @property
     def fastest(self) -> float:
@@ -87,14 +89,14 @@ class Shown:
         rows = np.flatnonzero(np.abs(self.velocity) > FAST * self.fastest)
         return rows[(rows >= cut) & (rows < len(self.velocity) - cut)]
 
-    def stretch(self, number: int, rows: tuple[int, int], oscillator: Oscillator) -> Stretch:
+    def stretch(self, number: int, rows: tuple[int, int]) -> Stretch:
         """The stretch between two rows, the mass sliding at the first."""
         record = self.record
         span = (rows[0] / record.fs - self.late, rows[1] / record.fs - self.late)
         sensors = tuple(Sensor.of(record, name, span, self.noise(name)) for name in self.channels)
         start = {"x": float(self.displacement[rows[0]]), "v": float(self.velocity[rows[0]])}
         scales = np.array([np.ptp(self.displacement) / 2, self.fastest])
-        return Stretch(number, span, sensors, measured_drive(record, oscillator.drive), start, scales)
+        return Stretch(number, span, sensors, self.drive, start, scales)
 
     def noise(self, name: str) -> float:
         """Standard deviation of a channel's noise, as stated or as found."""
@@ -210,6 +212,11 @@ def thinned(stretch: Stretch) -> Stretch:
         sensors.append(replace(sensor, time=sensor.time[each], readings=sensor.readings[each], known=known))
     drive = replace(stretch.drive, unsure=())  # type: ignore[type-var]
     return replace(stretch, sensors=tuple(sensors), drive=drive)
+
+
+def thinned_out(problem: Problem) -> Problem:
+    """The problem with fewer readings."""
+    return replace(problem, stretches=tuple(map(thinned, problem.stretches)))
 
 
 def best_start(

@@ -24,8 +24,24 @@ Array = NDArray[np.float64]
 SENSED = {"x": "x", "v": "v", "a": "a", "friction": "friction", "load": "friction"}  # of a channel, in the run
 JUMPS = ("a", "friction")
 RTOL = 1e-9  # of curved laws
-NODES = 2  # of the quadrature through a mount: it turns a part of a radian between two samples
+NODES = 3  # of the quadrature through a mount, which turns little between two samples
 GLIDE, HEAVY = 0.5, 1e9  # s and kg: a mass that slides on at a steady speed until the law has no memory of before
+
+
+class Motion:
+    """What sensors feel of a run: those that ask for the same instants share the answer."""
+
+    def __init__(self, run: Trajectory, outputs: tuple[str, ...]) -> None:
+        self.run, self.outputs, self.breaks = run, outputs, run.starts
+        self.known: dict[bytes, tuple[dict[str, Array], NDArray[np.int64]]] = {}
+
+    def __call__(self, at: Array) -> tuple[dict[str, Array], NDArray[np.int64]]:
+        """Values by name, and the piece that each instant falls in."""
+        key = at.tobytes()
+        if key not in self.known:
+            values, piece = self.run.sample(np.clip(at, 0.0, self.run.duration), self.outputs)
+            self.known[key] = dict(zip(self.outputs, values, strict=True)), piece
+        return self.known[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,23 +89,22 @@ class Sensor:
             channel, slice(first, last), time, record[name][first:last], noise, known[:, sizes > 1e-6 * sizes[0]]
         )
 
-    def predicted(self, run: Trajectory, late: float) -> tuple[Array, NDArray[np.int64] | None]:
+    def predicted(self, run: Motion, late: float) -> tuple[Array, NDArray[np.int64] | None]:
         """What it would read of a run, but for its gain and what is `known`; `late` [s] beyond the stated delay.
 
         Of what may jump from one sample to the next, also the piece of the run that each sample falls in.
         """
         source, inertia = SENSED[self.channel.name], self.channel.inertia
-        outputs = (source, "a") if inertia else (source,)
 
         def sensed(at: Array) -> Array:
-            values, _ = run.sample(np.clip(at, 0.0, run.duration), outputs)
-            return np.asarray(values[0] + inertia * values[1] if inertia else values[0])
+            values, _ = run(at)
+            return values[source] + inertia * values["a"] if inertia else values[source]
 
         response = _response(self.channel)
         if response.poles:
-            return respond(sensed, breaks=run.starts, times=self.time - late, response=response, nodes=NODES), None
-        values, piece = run.sample(np.clip(self.time - late, 0.0, run.duration), outputs)
-        return (values[0] + inertia * values[1] if inertia else values[0]), piece if source in JUMPS else None
+            return respond(sensed, breaks=run.breaks, times=self.time - late, response=response, nodes=NODES), None
+        at = self.time - late
+        return sensed(at), run(at)[1] if source in JUMPS else None
 
     def freed(self, values: Array) -> Array:
         """Values in units of the noise, less what is known; columns where there are several."""
@@ -128,6 +143,13 @@ class Stretch:
         end = max(float(sensor.time[-1]) for sensor in self.sensors)
         driven = replace(oscillator, drive=self.drive(self.span[0], self.span[0] + end, off))
         return simulate(driven, duration=end, start=start, rtol=RTOL)
+
+    def told(self, run: Trajectory, delays: Mapping[str, float]) -> list[tuple[Array, NDArray[np.int64] | None]]:
+        """What each sensor would read of a run, as :meth:`Sensor.predicted`; `delays` [s] by channel."""
+        outputs = {SENSED[sensor.channel.name] for sensor in self.sensors}
+        outputs |= {"a"} if any(sensor.channel.inertia for sensor in self.sensors) else set()
+        motion = Motion(run, tuple(sorted(outputs)))
+        return [sensor.predicted(motion, delays.get(sensor.channel.name, 0.0)) for sensor in self.sensors]
 
     def face_speed(self, oscillator: Oscillator) -> float:
         """Velocity [m/s] of the counter-face at the first instant."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.fit.search import Knob, Point, Problem, Slopes, descend, rows_of, without_starts
+from stickslip.fit.start import thinned_out
 from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
@@ -52,9 +53,13 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
     ends = point.u[:, None] + np.outer(quantile * sd, [-1.0, 1.0])
     strays = float(np.median((sd[seen] / widths[seen]) ** 2)) if seen.any() else 1.0
     excess = max(1.0, point.chi2 / sum(map(len, point.residuals)), strays)
-    for k, knob in enumerate(problem.knobs):
-        if sd[k] > UNSURE and knob.kind in ("log", "above"):
-            ends[k] = [_end(problem, point, k, side, 3.84 * excess, tell) for side in (-1.0, 1.0)]
+    faint = [k for k, knob in enumerate(problem.knobs) if sd[k] > UNSURE and knob.kind in ("log", "above")]
+    if faint:
+        part = thinned_out(problem)
+        near = descend(part, part.at(point.u, part.own(point.starts)), passes=2, tell=tell)
+        allowed = 3.84 * excess * sum(map(len, near.residuals)) / sum(map(len, point.residuals))
+        for k in faint:
+            ends[k] = [_end(part, near, k, side, allowed, tell) for side in (-1.0, 1.0)]
     return Surety(sd, freedom, ends, correlations)
 
 

@@ -74,7 +74,7 @@ def squares(left: Left) -> dict[Key, float]:
     return {key: float(np.mean(values**2)) for key, values in left.items()}
 
 
-def weighed(shown: Shown, number: int, oscillator: Oscillator, calibration: float, *, whole: bool = False) -> Stretch:
+def weighed(shown: Shown, number: int, calibration: float, *, whole: bool = False) -> Stretch:
     """What a record shows from its first slide on, each channel counted by its noise and its calibration's error."""
     rows = shown.slides()
     if len(rows) == 0:
@@ -82,7 +82,7 @@ def weighed(shown: Shown, number: int, oscillator: Oscillator, calibration: floa
             "the mass does not slide away from the record's ends", "laws are told apart by sliding and stopping",
             "give a longer record, or drive harder",
         )  # fmt: skip
-    every = shown.stretch(number, (int(rows[0]), len(shown.record) - 1), oscillator)
+    every = shown.stretch(number, (int(rows[0]), len(shown.record) - 1))
     stretch = every if whole else thinned(every)
     sensors = tuple(
         replace(each, noise=math.hypot(each.noise, calibration * float(np.std(each.readings))))

@@ -240,7 +240,7 @@ def compare_laws(
     seen = Seen.of(records, oscillator)
 
     def stretch(each: Shown, number: int) -> Stretch:
-        return weighed(each, number, oscillator, calibration)
+        return weighed(each, number, calibration)
 
     def tried(names: Sequence[tuple[str, list[Any]]], passes: int) -> dict[str, Trial]:
         stretches = [stretch(each, number) for number, each in enumerate(shown)]
@@ -256,7 +256,7 @@ def compare_laws(
     rough = tried(_apart(kinds), 2)
     if rough:
         shown = tuned(shown, min(rough.values(), key=lambda each: each.point.chi2), stretch, tell)
-    trials = tried(kinds, PASSES)
+    trials = tried([(name, [rough[name].system.law] if name in rough else given) for name, given in kinds], PASSES)
     if not trials:
         raise EstimateError(
             "no law can be simulated along these records", "a search starts from a motion that exists",
@@ -273,7 +273,7 @@ def compare_laws(
         ahead = squares(predicted(trial, tell)) if leave_out and len(records) > 1 and near else None
         misfits.append(Misfit(trial.name, trial.count, left, ahead))
     told, confidence = standings(misfits, evidence, excess=rigid, calibration=calibration)
-    whole = [weighed(each, number, oscillator, calibration, whole=True) for number, each in enumerate(shown)]
+    whole = [weighed(each, number, calibration, whole=True) for number, each in enumerate(shown)]
     fit = _fit(trials[told[0].name], shown, whole, tell)
     if progress:
         progress(1.0)
@@ -292,11 +292,7 @@ def _left(trial: Trial) -> dict[str, float]:
 def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tell: Callable[[], None]) -> LawFit:
     """The law's parameters with their intervals, by all readings; of its misfit the noise alone is the measure."""
     problem = replace(trial.problem, stretches=tuple(stretches))
-    starts = tuple(
-        np.append(start[: len(scale)], np.zeros(len(stretch.drive.unsure)))  # a search takes the drive as measured
-        for start, scale, stretch in zip(trial.point.starts, problem.scales, stretches, strict=True)
-    )
-    point = descend(problem, problem.at(trial.point.u, starts), passes=2, tell=tell)
+    point = descend(problem, problem.at(trial.point.u, problem.own(trial.point.starts)), passes=2, tell=tell)
     with np.errstate(all="ignore"):  # of a parameter without effect
         fit = answered(problem, point, surety(problem, point, tell), shown)
     noise = {name: max(each.noise(name) for each in shown if name in each.channels) for name in fit.residual}

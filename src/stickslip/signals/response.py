@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-TURN = 1.0  # radians that no pole turns further in a stretch of the quadrature
+TURN = 1.5  # radians that no pole turns further in a stretch of the quadrature
 NODES = 6  # of Gauss in a stretch
 BLOCK = 1 << 16  # samples at a time
 CRITICAL = 1e-7  # a damping ratio as near to 1 is moved away from it: a double pole has no partial fractions
@@ -103,7 +104,9 @@ def respond(
     if not response.poles or len(times) < 2:
         return response.direct * values(after)
     began = float(values(np.zeros(1))[0])
-    out = response.direct * (values(after) - began) + began * np.exp(-response.leak * after)
+    out = began * np.exp(-response.leak * after)
+    if response.direct:
+        out += response.direct * (values(after) - began)
     step = float(times[-1] - times[0]) / (len(times) - 1)
     ahead = max(0, math.ceil(times[0] / step))
     grid = times[0] + step * np.arange(-ahead - 1, len(times))
@@ -115,6 +118,13 @@ def respond(
         if low < high:
             out[low - ahead : high - ahead] += written[low - first :]
     return out
+
+
+@cache
+def gauss(count: int) -> tuple[Array, Array]:
+    """Nodes and weights of Gauss's quadrature from -1 to 1."""
+    roots, weights = np.polynomial.legendre.leggauss(count)
+    return roots, weights
 
 
 def _convolved(
@@ -129,26 +139,31 @@ def _convolved(
     """The poles' part of the response at ``grid[1:]``; `kept` holds their states, and is updated."""
     from scipy.signal import lfilter
 
-    roots, weights = np.polynomial.legendre.leggauss(count)
-    step = grid[1] - grid[0]
+    roots, weights = gauss(count)
+    step = float(grid[1] - grid[0])
     pieces = max(1, math.ceil(max(abs(pole) for pole in response.poles) * step / TURN))
-    inside = breaks[(breaks > grid[0]) & (breaks < grid[-1])]
-    fine = (grid[:-1, None] + step * np.arange(pieces) / pieces).ravel()
-    edges = np.unique(np.concatenate([fine, grid[-1:], inside, np.zeros(1)]))
-    edges = edges[(edges >= max(grid[0], 0.0)) & (edges <= grid[-1])]
-    total = np.zeros(len(grid) - 1)
-    length = np.diff(edges)
-    nodes = edges[:-1, None] + length[:, None] * (roots + 1) / 2
-    changed = (
-        (values(nodes.ravel()).reshape(nodes.shape) - began) * (weights / 2) * length[:, None]
-        if len(length)
-        else np.zeros((0, count))
+    at = (step / pieces) * (np.arange(pieces)[:, None] + (roots + 1) / 2).ravel()
+    nodes = np.maximum(grid[:-1, None] + at, 0.0)
+    changed = (values(nodes.ravel()).reshape(nodes.shape) - began) * np.tile(weights * step / (2 * pieces), pieces)
+    inside = np.append(breaks[(breaks > grid[0]) & (breaks < grid[-1])], np.zeros(int(grid[0] < 0 < grid[-1])))
+    split = np.unique(np.searchsorted(grid, inside, side="right") - 1)
+    changed[split] = 0.0
+    fine = grid[split][:, None] + step * np.arange(pieces) / pieces
+    edges = np.unique(np.concatenate([fine.ravel(), grid[split + 1], inside]))
+    length, middle = np.diff(edges), (edges[:-1] + edges[1:]) / 2
+    into = np.searchsorted(grid, middle) - 1
+    own = np.isin(into, split) & (middle > 0)
+    length, into = length[own], into[own]
+    finer = edges[:-1][own, None] + length[:, None] * (roots + 1) / 2
+    beside = (
+        (values(finer.ravel()).reshape(finer.shape) - began) * (weights / 2) * length[:, None] if len(length) else finer
     )
-    into = np.clip(np.searchsorted(grid, edges[:-1] + length / 2) - 1, 0, len(grid) - 2)
+    total = np.zeros(len(grid) - 1)
     for j, (pole, residue) in enumerate(zip(response.poles, response.residues, strict=True)):
-        carried = (changed * np.exp(pole * (grid[into + 1][:, None] - nodes))).sum(axis=1)
-        driven = np.bincount(into, carried.real, len(total)) + 1j * np.bincount(into, carried.imag, len(total))
-        turned = np.exp(pole * step)
-        state, kept[j] = lfilter([1.0], [1.0, -turned], driven, zi=kept[j])
-        total += (residue * state).real
+        if pole.imag < 0:
+            continue  # its conjugate speaks for both
+        driven = changed @ np.exp(pole * (step - at))
+        np.add.at(driven, into, (beside * np.exp(pole * (grid[into + 1][:, None] - finer))).sum(axis=1))
+        state, kept[j] = lfilter([1.0], [1.0, -np.exp(pole * step)], driven, zi=kept[j])
+        total += (1 + (pole.imag > 0)) * (residue * state).real
     return total

@@ -123,7 +123,19 @@ def automaton(system: System) -> Automaton:
             "this question needs a law of linear modes",
             "ask simulate(), or make a polygon of the curve with Tabulated.of()",
         )
-    return _Builder(system, system.law).build()
+    return _known(system) if by_value(system) else _built(system)
+
+
+def by_value(system: Oscillator) -> bool:
+    """Whether an equal system is the same one: law and drive are compared by their values."""
+    return all(type(part).__hash__ not in (None, object.__hash__) for part in (system.law, system.drive))
+
+
+def _built(system: Oscillator) -> Automaton:
+    return _Builder(system, system.law).build()  # type: ignore[arg-type]
+
+
+_known = lru_cache(maxsize=32)(_built)  # a fit asks for the same system from many starts
 
 
 class _Builder:
@@ -305,14 +317,19 @@ def fastest(flow: Array) -> float:
 
 def _eigenvalues(flow: Array) -> Any:
     """Eigenvalues of the strongly connected parts of the flow: exact zeros stay zero."""
-    size = len(flow)
-    reach = (flow != 0) | np.eye(size, dtype=bool)
+    parts = _parts((flow != 0).tobytes(), len(flow))
+    return np.concatenate([
+        flow[part[0], part] if len(part) == 1 else np.linalg.eigvals(flow[np.ix_(part, part)]) for part in parts
+    ])  # fmt: skip
+
+
+@lru_cache(maxsize=256)
+def _parts(pattern: bytes, size: int) -> list[tuple[int, ...]]:
+    """Strongly connected parts of a flow, by where it is not zero."""
+    reach = np.frombuffer(pattern, dtype=bool).reshape(size, size) | np.eye(size, dtype=bool)
     for _ in range(max(1, size.bit_length())):
         reach = reach @ reach
-    parts = {tuple(np.flatnonzero(reach[j] & reach[:, j])) for j in range(size)}
-    return np.concatenate(
-        [flow[part, part] if len(part) == 1 else np.linalg.eigvals(flow[np.ix_(part, part)]) for part in sorted(parts)]
-    )
+    return sorted({tuple(np.flatnonzero(reach[j] & reach[:, j]).tolist()) for j in range(size)})
 
 
 def halved(matrix: Any) -> Array:

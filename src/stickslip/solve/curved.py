@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -87,10 +88,8 @@ class CurvedTrajectory(Trajectory):
         out, step = np.empty((len(names), len(times))), np.empty(len(times), dtype=np.int64)
         count = int(np.max(np.diff(table.watched[8])))
         march.sample(
-            *expansion(table.nodes, table.kept, self.order), *expansion(table.watched, table.shown, 0),
-            self.order, self.step_starts, self.step_lengths, self.step_modes, self.step_states,
-            self.step_leaps, self.leaps, self.reach, times,
-            nodes, out, step,
+            *_viewed(table, self.order), self.order, self.step_starts, self.step_lengths, self.step_modes,
+            self.step_states, self.step_leaps, self.leaps, self.reach, times, nodes, out, step,
             (np.empty(count * (self.order + 1)), np.empty(self.step_states.shape[1]), np.empty(count)),
         )  # fmt: skip
         piece = np.searchsorted(self.starts, self.step_starts[step], side="right") - 1
@@ -117,10 +116,17 @@ class Code(NamedTuple):
     scheme: tuple[Array, Array, Array]
 
 
+@lru_cache(maxsize=32)
 def code(table: Tape, order: int) -> Code:
     """The code that steps of an order need."""
     rates, _ = expansion(table.nodes, table.kept, 1)
     return Code(*expansion(table.nodes, table.kept, order), rates, collocation.method())
+
+
+@lru_cache(maxsize=32)
+def _viewed(table: Tape, order: int) -> tuple[Any, Array, Any, Array]:
+    """The code that values between the steps need, and that of the outputs."""
+    return *expansion(table.nodes, table.kept, order), *expansion(table.watched, table.shown, 0)
 
 
 def _march(table: Tape, order: int) -> March:

@@ -364,8 +364,40 @@ def follow(tables, mode, state, time, work):
 
 
 @compiled(**OPTIONS)
-def sample(tables, begin, modes, states, times, rows, piece, out, work):
-    """Values of linear forms at increasing `times` [s].
+def outputs(flow, state, tail, rows, cell, c, work):
+    """Taylor coefficients of linear forms of the state, by time over the cell; returns how many there are.
+
+    `rows` is (R, N), `c` (R, DEGREE + 1), `work` (2, N).
+    """
+    n = state.shape[0]
+    for i in range(n):
+        work[0, i] = state[i]
+    for k in range(c.shape[1]):
+        for r in range(rows.shape[0]):
+            total = 0.0
+            for i in range(n):
+                total += rows[r, i] * work[0, i]
+            if k == 0:
+                for i in range(n):
+                    total += rows[r, i] * tail[i]
+            c[r, k] = total
+        small = True
+        for i in range(n):
+            total = 0.0
+            for j in range(n):
+                total += flow[i, j] * work[0, j]
+            work[1, i] = total * (cell / (k + 1))
+            small = small and state[i] + work[1, i] == state[i]
+        for i in range(n):
+            work[0, i] = work[1, i]
+        if small and k > 4:
+            return k + 1
+    return c.shape[1]
+
+
+@compiled(**OPTIONS)
+def sample(tables, begin, modes, states, times, rows, piece, out, work, c):
+    """Values of linear forms at increasing `times` [s], one polynomial of time for each cell.
 
     Parameters
     ----------
@@ -381,20 +413,21 @@ def sample(tables, begin, modes, states, times, rows, piece, out, work):
         Set to the piece each time falls in.
     out : ndarray (R, T)
         Set to the values.
-    work : ndarray (6, N)
+    work : ndarray (4, N)
+        Scratch.
+    c : ndarray (R, DEGREE + 1)
         Scratch.
     """
     flow, cells, hop, _, _, _, _, _, _ = tables
     n, last = states.shape[1], begin.shape[0] - 1
-    scratch, held, tail, state, rest = work[:2], work[2], work[3], work[4], work[5]
-    j, count = 0, 0
-    for i in range(n):
-        held[i], tail[i] = states[0, i], 0.0
+    scratch, held, tail = work[:2], work[2], work[3]
+    j, count, known = -1, 0, 0
     for t in range(times.shape[0]):
-        if j < last and begin[j + 1] <= times[t]:
+        if j < 0 or (j < last and begin[j + 1] <= times[t]):
+            j = max(j, 0)
             while j < last and begin[j + 1] <= times[t]:
                 j += 1
-            count = 0
+            count, known = 0, 0
             for i in range(n):
                 held[i], tail[i] = states[j, i], 0.0
         mode = modes[j]
@@ -403,12 +436,14 @@ def sample(tables, begin, modes, states, times, rows, piece, out, work):
         while time - count * cell > cell:
             leap(hop[mode], held, tail, scratch)
             count += 1
-        for i in range(n):
-            state[i], rest[i] = held[i], tail[i]
-        advance(flow[mode], state, rest, time - count * cell if count else time, scratch)
+            known = 0
+        unit = cell if cell < math.inf else 1.0
+        if known == 0:
+            known = outputs(flow[mode], held, tail, rows[mode], unit, c, scratch)
+        share = (time - count * cell if count else time) / unit
         piece[t] = j
         for r in range(rows.shape[1]):
             total = 0.0
-            for i in range(n):
-                total += rows[mode, r, i] * state[i]
+            for k in range(known - 1, -1, -1):
+                total = total * share + c[r, k]
             out[r, t] = total

@@ -140,6 +140,7 @@ def phasors(
     return Phasors(drives, modes, levels, leaving, rests, nodes, span)
 
 
+@lru_cache(maxsize=32)
 def fast_tables(table: Automaton) -> tuple[Array, ...]:
     """The arrays of the fast path of one system; with no nodes at all where it has none."""
     one = (part[None] for part in (table.flow, table.series[:, 0], table.reset, table.tones))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from stickslip.errors import ModelError
 from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
 from stickslip.oscillator import Oscillator
 from stickslip.solve import taylor
+from stickslip.solve.automaton import by_value
 
 Array = NDArray[np.float64]
 Form = tuple[dict[int, float], float]  # weights of nodes, and a constant
@@ -217,7 +219,14 @@ def combined(terms: Any) -> Form:
 
 def tape(system: Oscillator) -> Tape:
     """The flat arrays of a system with a curved law."""
+    return _known(system) if by_value(system) else _built(system)
+
+
+def _built(system: Oscillator) -> Tape:
     return _Builder(system).build()
+
+
+_known = lru_cache(maxsize=32)(_built)
 
 
 class _Builder:

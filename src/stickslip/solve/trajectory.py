@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import SolveError
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
-from stickslip.solve.automaton import Array, Automaton, System
+from stickslip.solve.automaton import DEGREE, Array, Automaton, System
 from stickslip.solve.kernel import sample
 
 MOST = 1e10  # samples of a record; more fit no desk
@@ -210,8 +210,8 @@ class Trajectory:
             raise SolveError("instants that run back", "they are looked up in the order of time", "sort them")
         rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
         out, piece = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
-        work = np.empty((6, self.states.shape[1]))
-        sample(self.table.tables, self.starts, self.modes, self.states, times, rows, piece, out, work)
+        work, c = np.empty((4, self.states.shape[1])), np.empty((len(out), DEGREE + 1))
+        sample(self.table.tables, self.starts, self.modes, self.states, times, rows, piece, out, work, c)
         return out, piece
 
     @property
