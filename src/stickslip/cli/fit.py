@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
@@ -17,7 +16,7 @@ from stickslip.cli.show import table
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip import CurveFit, LawComparison, Record, RigSettings
+    from stickslip import CurveFit, LawComparison, Oscillator, Record, RigSettings
 
 
 CURVES = (
@@ -33,10 +32,17 @@ CURVES = (
 @click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
 @click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
 @click.option(
+    "--system",
+    type=click.Path(path_type=Path),
+    metavar="SYSTEM.TOML",
+    help="File of the oscillator, as stickslip simulate reads it: its constants, and the drive where z is not recorded "
+    "(a base at a known amplitude and frequency, a belt, a ramp). The time of the drive is that of the record.",
+)
+@click.option(
     "--laws",
-    default="Coulomb,static,Stribeck,compliant,state variable,LuGre",
-    show_default=True,
-    help="The laws to compare, with commas.",
+    metavar="LIST",
+    help="The laws to compare, with commas: Coulomb, static, Stribeck, compliant, state variable, LuGre; all of them "
+    "unless given.",
 )
 @click.option("--calibration", type=float, default=0.01, show_default=True, help="By what part gains may be wrong.")
 @click.option(
@@ -50,7 +56,8 @@ CURVES = (
 @result_options("FILE-stickslip")
 @reading_options
 def fit(
-    files: tuple[str, ...], output: Path | None, as_json: bool, laws: str, calibration: float, curve: str | None,
+    files: tuple[str, ...], output: Path | None, as_json: bool, laws: str | None, calibration: float,
+    curve: str | None, system: Path | None,
     **options: Any,
 ) -> None:  # fmt: skip
     """Find which friction law it is, with its parameters.
@@ -67,7 +74,7 @@ def fit(
     """
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
-    asked = click.get_current_context().get_parameter_source("laws") is not ParameterSource.DEFAULT
+    asked = bool(laws or system)
     _require_one_question(groups, curve, asked=asked)
     folder = output or (None if as_json else default_folder(groups))
     with progress(3) as tell:
@@ -76,7 +83,7 @@ def fit(
         curve = curve or _only_curve(records[0], asked=asked)
         if curve is not None:
             records = [_with_friction(records[0], rig)]
-        result = _answer(records, rig, laws, calibration, curve, tell)
+        result = _answer(records, rig, laws, calibration, curve, system, tell)
         tell("drawing and writing", 2)
         name = name_of(groups[0]) if len(groups) == 1 else f"{len(groups)} records"
         written = ss.publish_fit(result, folder=folder, records=records, name=name) if folder else None
@@ -85,7 +92,9 @@ def fit(
 
 def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked: bool) -> None:
     if curve is not None and asked:
-        raise click.BadParameter("a curve or laws are fitted, not both; leave one out", param_hint="--curve, --laws")
+        raise click.BadParameter(
+            "a curve or laws are fitted, not both; leave one out", param_hint="--curve, --laws, --system"
+        )
     if curve is not None and len(groups) > 1:
         raise click.BadParameter(f"a curve is fitted to one record, not to {len(groups)}", param_hint="FILES")
 
@@ -119,11 +128,30 @@ def _with_friction(record: Record, rig: RigSettings) -> Record:
 
 
 def _answer(
-    records: list[Record], rig: RigSettings, laws: str, calibration: float, curve: str | None, tell: Any
-) -> LawComparison | CurveFit:
+    records: list[Record], rig: RigSettings, laws: str | None, calibration: float, curve: str | None,
+    system: Path | None, tell: Any,
+) -> LawComparison | CurveFit:  # fmt: skip
     if curve is not None:
         tell("fitting", 1)
         return ss.fit_curve(records[0], curve=curve, contact=rig.contact)
+    names = [name for name in laws.split(",") if name.strip()] if laws else None
+    words = f"{len(names) if names else 'six'} laws"
+    return ss.compare_laws(
+        records, _slider(rig, system), laws=names, calibration=calibration,
+        progress=lambda share: tell(f"fitting and comparing {words}, {share:.0%}", 1 + share),
+    )  # fmt: skip
+
+
+def _slider(rig: RigSettings, system: Path | None) -> Oscillator:
+    """The oscillator as a file has it, or as the options state it."""
+    if system is not None:
+        slider = ss.read_system(system).system
+        if not isinstance(slider, ss.Oscillator):
+            raise ss.ModelError(
+                f"{system}", "a law is fitted to an oscillator of one mass", "give a file of such a one"
+            )
+        stated = {name: getattr(rig, name) for name in ("mass", "stiffness", "damping")}
+        return slider.having(**{name: value for name, value in stated.items() if value is not None})
     constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
     if missing := [name for name, value in constants.items() if value is None]:
         raise ss.ModelError(
@@ -131,12 +159,7 @@ def _answer(
             f"give {' and '.join(f'{name}=' for name in missing)}",
         )  # fmt: skip
     drive = ss.HarmonicBase(0.0, frequency=1.0, contact=rig.contact) if rig.contact == "base" else ss.Release()
-    slider = ss.Oscillator(**constants, damping=rig.damping or 0.0, damper=rig.damper, law=ss.Coulomb(1.0), drive=drive)
-    names = [name for name in laws.split(",") if name.strip()]
-    return ss.compare_laws(
-        records, slider, laws=names, calibration=calibration,
-        progress=lambda share: tell(f"fitting and comparing {len(names)} laws, {share:.0%}", 1 + share),
-    )  # fmt: skip
+    return ss.Oscillator(**constants, damping=rig.damping or 0.0, damper=rig.damper, law=ss.Coulomb(1.0), drive=drive)
 
 
 def _show(

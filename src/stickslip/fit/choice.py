@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,12 +42,18 @@ class Misfit:
         Mean square of what is left of each channel of each record [unit of the channel, squared].
     predicted : mapping of (str, int) to float, or None
         The same where each record is predicted by a fit to the others.
+    excess : float
+        By what part its static friction exceeds its kinetic.
+    stiff : bool
+        Whether its contact gives way so little that it is a rigid one's limit.
     """
 
     name: str
     count: int
     squares: Mapping[Key, float]
     predicted: Mapping[Key, float] | None = None
+    excess: float = 0.0
+    stiff: bool = False
 
     @property
     def family(self) -> str:
@@ -73,6 +79,8 @@ class Standing:
         Whether the records leave it possible.
     verdict : str
         In words.
+    limit : bool
+        Whether its contact is so stiff that a rigid law says the same.
     """
 
     name: str
@@ -82,6 +90,7 @@ class Standing:
     prediction: float
     kept: bool
     verdict: str
+    limit: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,22 +121,41 @@ def standings(
 ) -> tuple[list[Standing], float]:
     """The laws, the best one first, those kept that the records leave possible; and the confidence in that."""
     order = sorted(misfits, key=lambda each: evidence.criterion(each.squares, each.count))
+    limits = _limits(order, evidence)
+    order.sort(key=lambda each: each.name in limits)
     best = order[0]
     ratios = {each.name: evidence.over(each.squares, best.squares) for each in order}
     forecasts = _forecasts(order, evidence)
     inner, sure = _within([each for each in order if each.family == best.family], evidence, excess, calibration)
-    others = {each.name for each in order if each.family != best.family}
+    others = {each.name for each in order if each.family != best.family} - limits
     near = {name for name in others if ratios[name] <= SEPARATED or forecasts[name] < 1}
     level = evidence.criterion(best.squares, best.count)
     told = []
     for each in order:
         kept = each.name in (near if each.name in others else inner)
-        words = inner.get(each.name) or ("not rejected" if kept else f"rejected: misfit {times(ratios[each.name])}")
+        words = inner.get(each.name) or ("not rejected" if kept else f"rejected: {_why(ratios[each.name])}")
+        limit = each.name in limits
+        if limit:
+            words = "so stiff that it is a rigid contact, and explains nothing more"
         worse = evidence.criterion(each.squares, each.count) - level
-        told.append(Standing(each.name, each.family, ratios[each.name], worse, forecasts[each.name], kept, words))
+        told.append(
+            Standing(each.name, each.family, ratios[each.name], worse, forecasts[each.name], kept, words, limit)
+        )
+    rivals = [each for each in order if each.name not in limits]
     nearest = {name: min(ratio, forecasts[name]) if forecasts[name] < 1 else ratio for name, ratio in ratios.items()}
-    odds = math.fsum(ratio**-SHARPNESS for ratio in _nearest(order, nearest, best.family))
+    odds = math.fsum(ratio**-SHARPNESS for ratio in _nearest(rivals, nearest, best.family))
     return told, min(CERTAIN, sure / (1 + odds))
+
+
+def _limits(order: Sequence[Misfit], evidence: Evidence) -> set[str]:
+    """Laws whose contact is next to rigid, where a rigid law leaves as little: what they say is said by that."""
+    rigid = [each for each in order if each.family == "rigid"]
+    return {each.name for each in order if rigid and each.stiff
+            and evidence.over(rigid[0].squares, each.squares) <= SEPARATED}  # fmt: skip
+
+
+def _why(ratio: float) -> str:
+    return f"misfit {times(ratio)}" if ratio > 1.1 else "its further parameters explain nothing more"
 
 
 def times(ratio: float) -> str:
@@ -155,14 +183,14 @@ def _within(
 ) -> tuple[dict[str, str], float]:
     """The laws of one family that are not rejected, with words; from the simplest on, a richer one has to earn it."""
     steps = sorted(family, key=lambda each: each.count)
-    low, high = excess.interval if excess is not None else (0.0, math.inf)
+    high = excess.interval[1] if excess is not None else math.inf
     least = CALIBRATIONS * calibration
     chosen, doubted, sure = steps[0], list[Misfit](), 1.0
     for richer in steps[1:]:
         gain = evidence.criterion(chosen.squares, chosen.count) - evidence.criterion(richer.squares, richer.count)
         odds = math.exp(max(-50.0, min(50.0, gain / 2)))
         better = odds / (1 + odds)
-        if gain > 0 and low > 0 and excess is not None and excess.value > least:
+        if gain > 0 and _shown(richer, excess, least):
             chosen, doubted, sure = richer, [], sure * better
         elif (gain > 0 or chosen is steps[0]) and high > least:
             doubted.append(richer)
@@ -171,3 +199,15 @@ def _within(
             sure *= 1 - better
     words = {chosen.name: "not rejected" if doubted else "best"}
     return words | {each.name: "not rejected" for each in doubted}, sure
+
+
+def _shown(richer: Misfit, excess: Estimate | None, least: float) -> bool:
+    """Whether static friction is seen to exceed the kinetic by more than the calibration hides."""
+    if richer.name == "Stribeck":
+        return richer.excess > least
+    return excess is not None and excess.interval[0] > 0 and excess.value > least
+
+
+def undescribed(told: Sequence[Standing]) -> list[Standing]:
+    """The laws where even the best one does not describe the records: none of them is rejected by such a misfit."""
+    return [replace(each, kept=True, verdict=f"misfit {times(each.misfit)}") for each in told]

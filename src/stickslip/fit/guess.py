@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.drives import Release
 from stickslip.errors import EstimateError
 from stickslip.identify.force import friction_force
 from stickslip.laws.compliant import CompliantContact
@@ -74,9 +75,12 @@ class Seen:
         fast = np.abs(speed) > FAST * np.abs(speed).max()
         level = float(np.median((friction * np.sign(speed))[fast]))
         if not level > 0:
+            still = not any({"z", "force"} & set(record) for record in records) and oscillator.drive == Release()
             raise EstimateError(
-                f"friction of {level:.3g} N while it slides", "friction opposes the velocity",
-                "correct the signs of the channels, or mass= and stiffness=",
+                f"friction of {level:.3g} N while it slides" + (", the base taken to be at rest" if still else ""),
+                "friction opposes the velocity",
+                "give the base's motion as channel z, or the drive" if still
+                else "correct the signs of the channels, or mass= and stiffness=",
             )  # fmt: skip
         way = float(np.std(np.concatenate(ways)))
         return cls(np.concatenate(slips), speed, friction, np.concatenate(steps), level, float(np.std(speed)) / way)

@@ -23,6 +23,8 @@ from stickslip.signals.noise import noise_level
 Array = NDArray[np.float64]
 
 FAST = 0.5  # of the largest speed: then the contact slides for certain
+TURNED = 0.1  # of the largest speed, beyond which a motion has turned
+UNTURNED, STEADY = 0.005, 0.1  # of the samples that noise may carry through zero; of the largest speed, a stop's
 EDGE = 0.02  # of the record at its ends, where a derivative is poor
 FINEST = 1e-5  # of a channel's range: noise below it is not asked for
 AUDIBLE = 2.0  # times its noise that a motion must stray
@@ -88,6 +90,35 @@ class Shown:
         cut = max(1, int(EDGE * len(self.velocity)))
         rows = np.flatnonzero(np.abs(self.velocity) > FAST * self.fastest)
         return rows[(rows >= cut) & (rows < len(self.velocity) - cut)]
+
+    @property
+    def turns(self) -> NDArray[np.intp]:
+        """Rows at which the motion has turned."""
+        moving = np.flatnonzero(np.abs(self.velocity) > TURNED * self.fastest)
+        return np.asarray(moving[1:][np.diff(np.sign(self.velocity[moving])) != 0])
+
+    def turned(self, first: int, count: int) -> int:
+        """The row at which the motion has turned so many times after a first one; the last row where it has not."""
+        after = self.turns[self.turns > first]
+        return int(after[count]) if len(after) > count else len(self.velocity) - 1
+
+    def require_sliding(self) -> None:
+        """Refuse a motion that can not tell friction from an offset."""
+        rows, velocity = self.slides(), self.velocity
+        if len(rows) == 0:
+            raise EstimateError(
+                "the mass does not slide away from the record's ends", "a law is fitted to sliding",
+                "give a longer record, or drive harder",
+            )  # fmt: skip
+        cut = max(1, len(velocity) // 50)
+        inner = velocity[cut:-cut]
+        low, high = sorted(abs(end) for end in np.quantile(inner, (UNTURNED, 1 - UNTURNED)))
+        if np.quantile(inner, UNTURNED) * np.quantile(inner, 1 - UNTURNED) > 0 and low > STEADY * high:
+            raise EstimateError(
+                f"the mass slides one way at {low:.3g} to {high:.3g} m/s without a stop",
+                "friction is told from an offset where the motion stops or turns",
+                "let it turn: drive the base to and fro, or let it stick and slip",
+            )
 
     def stretch(self, number: int, rows: tuple[int, int]) -> Stretch:
         """The stretch between two rows, the mass sliding at the first."""

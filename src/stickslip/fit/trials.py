@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.fit.choice import Evidence, Key, independent
 from stickslip.fit.search import Knob, Point, Problem, descend, rows_of
 from stickslip.fit.start import Shown, free_names, knob, thinned
 from stickslip.fit.stretch import Stretch
+from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.lugre import LuGre
 from stickslip.laws.stribeck import Stribeck
 from stickslip.oscillator import Oscillator
 
@@ -28,9 +29,12 @@ FINALISTS = 2  # starts that are followed
 CONTENDING = 10.0  # times the least misfit of the others: a law beyond is not followed to its end
 PASSES, FEW = 12, 3  # of a descent: of a law, and of one that stands near its end
 EXCESSES = (0.0, 0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.32, 0.5)
+RIGID = 1e-3  # of the smallest stroke, by which a contact gives way that can hardly be told from a rigid one
+STIFFEST = 1e-5  # of the stroke: what a contact that is next to rigid gives way
 FALLS = (0.01, 0.05)  # of the largest speed, within which a Stribeck curve falls
-TURNED = 0.1  # of the largest speed, beyond which a motion has turned
+TURNS = 24  # of the motion, after which a record tells laws apart no better
 DETUNED = tuple(1 + 0.0025 * step for step in range(-10, 11))  # a mount, against what is stated
+SILENT = 0.2  # of a channel's size, left by the best law: nothing is known of such a sensor
 HALVINGS = 2  # of the way to the neighbours of the best excess
 STILL = 1e-12  # scale of a knob that is not turned
 RISE = 3.84  # of minus twice the logarithm of the likelihood, at the ends of a 95 % interval
@@ -55,6 +59,23 @@ class Trial:
         return len(free_names(self.problem.oscillator, None))
 
     @property
+    def excess(self) -> float:
+        """By what part its static friction exceeds its kinetic."""
+        law: Any = self.system.law
+        static = getattr(law, "static", None)
+        return 0.0 if static is None else float(static / law.kinetic - 1)
+
+    @property
+    def stiff(self) -> bool:
+        """Whether the contact gives way next to nothing of the smallest stroke."""
+        law: Any = self.system.law
+        stiffness, stroke = (
+            getattr(law, "stiffness", None),
+            min(float(each.scales[0]) for each in self.problem.stretches),
+        )
+        return stiffness is not None and law.kinetic < RIGID * stiffness * stroke
+
+    @property
     def left(self) -> Left:
         """What is left of each channel of each record [unit of the channel]."""
         return left_of(self.problem, self.point)
@@ -76,13 +97,10 @@ def squares(left: Left) -> dict[Key, float]:
 
 def weighed(shown: Shown, number: int, calibration: float, *, whole: bool = False) -> Stretch:
     """What a record shows from its first slide on, each channel counted by its noise and its calibration's error."""
-    rows = shown.slides()
-    if len(rows) == 0:
-        raise EstimateError(
-            "the mass does not slide away from the record's ends", "laws are told apart by sliding and stopping",
-            "give a longer record, or drive harder",
-        )  # fmt: skip
-    every = shown.stretch(number, (int(rows[0]), len(shown.record) - 1))
+    first, last = int(shown.slides()[0]), len(shown.record) - 1
+    if not whole:
+        last = min(last, shown.turned(first, TURNS))
+    every = shown.stretch(number, (first, last))
     stretch = every if whole else thinned(every)
     sensors = tuple(
         replace(each, noise=math.hypot(each.noise, calibration * float(np.std(each.readings))))
@@ -126,12 +144,27 @@ def searched(
 
 
 def from_simpler(name: str, trials: Mapping[str, Trial]) -> list[Any]:
-    """Starts of a law at the end of a simpler one's search: with what it adds tried at several sizes."""
-    if name == "Stribeck" and "static" in trials:
-        law: Any = trials["static"].system.law
+    """Starts of a law at the end of a simpler one's search, which it contains: what it adds hardly felt."""
+    laws = {each: trial.system.law for each, trial in trials.items()}
+    if name == "static" and "Coulomb" in laws:
+        level = laws["Coulomb"].kinetic  # type: ignore[union-attr]
+        return [Coulomb(level, static=(1 + EXCESSES[1]) * level)]
+    if name == "Stribeck" and "static" in laws:
+        law: Any = laws["static"]
         fastest = max(float(each.scales[1]) for each in trials["static"].problem.stretches)
         static = max(law.static, 1.02 * law.kinetic)
         return [Stribeck(law.kinetic, static, speed=share * fastest) for share in FALLS]
+    if name == "compliant" and "Coulomb" in laws:
+        rigid: Any = trials["Coulomb"].system
+        stroke = max(float(each.scales[0]) for each in trials["Coulomb"].problem.stretches)
+        stiffness = rigid.law.kinetic / (STIFFEST * stroke)
+        damping = 0.2 * math.sqrt(stiffness * rigid.mass)
+        return [CompliantContact(rigid.law.kinetic, stiffness=stiffness, damping=damping)]
+    if name == "LuGre" and "compliant" in laws:
+        held: Any = laws["compliant"]
+        fastest = max(float(each.scales[1]) for each in trials["compliant"].problem.stretches)
+        static = (1 + EXCESSES[1]) * held.kinetic
+        return [LuGre(held.kinetic, static, speed=FALLS[-1] * fastest, stiffness=held.stiffness, damping=held.damping)]
     return []
 
 
@@ -222,14 +255,28 @@ def _ends(tried: Mapping[float, float]) -> tuple[float, float]:
 def evidence_of(trial: Trial, shown: Sequence[Shown]) -> Evidence:
     """How much each channel counts: the error of a model tells at most one story from one reversal to the next."""
     left = trial.left
-    counts = {key: min(float(reversals(shown[key[1]])), independent(values)) for key, values in left.items()}
+    counts = {
+        key: min(float(min(TURNS, max(1, len(shown[key[1]].turns)))), independent(values))
+        for key, values in left.items()
+    }
     return Evidence(counts, {key: shown[key[1]].noise(key[0]) for key in left})
 
 
-def reversals(shown: Shown) -> int:
-    """How often the motion turns."""
-    moving = np.sign(shown.velocity[np.abs(shown.velocity) > TURNED * shown.fastest])
-    return max(1, int(np.count_nonzero(np.diff(moving))))
+def unexplained(trial: Trial, shown: Sequence[Shown]) -> dict[str, float]:
+    """Shares of the channels of which even the best law leaves much, where nothing is stated of the sensor.
+
+    The motion itself, x or v, always counts.
+    """
+    found: dict[str, float] = {}
+    for (name, number), values in trial.left.items():
+        channel, readings = shown[number].record.channels[name], shown[number].record[name]
+        size = max(float(np.std(readings)), 1e-300)
+        share = float(np.std(values)) / size
+        noise = shown[number].noise(name) / size
+        told = channel.mount or channel.delay or channel.discharge or channel.inertia
+        if name not in "xv" and not told and share > math.hypot(SILENT, noise):
+            found[name] = max(share, found.get(name, 0.0))
+    return found
 
 
 def tuned(shown: Sequence[Shown], trial: Trial, stretch: Callable[[Shown, int], Stretch], tell: Tell) -> list[Shown]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit.choice import CALIBRATIONS, FAMILIES, SEPARATED, Misfit, Standing, standings, times
+from stickslip.fit.choice import CALIBRATIONS, FAMILIES, SEPARATED, Misfit, Standing, standings, times, undescribed
 from stickslip.fit.guess import GUESSES, Seen
 from stickslip.fit.law import LawFit, answered
 from stickslip.fit.search import descend
@@ -30,6 +30,7 @@ from stickslip.fit.trials import (
     squares,
     static_of,
     tuned,
+    unexplained,
     weighed,
 )
 from stickslip.laws.coulomb import Coulomb
@@ -54,7 +55,9 @@ SAID = {
     "state variable": "that of a state variable, which lags behind the velocity",
     "LuGre": "that of bristles (LuGre)",
 }
-BAD = 0.3  # of a channel's own size: a law that leaves more describes little
+BAD = 0.3  # of a channel's own size: a law that leaves more beyond the noise describes little
+LEFT = 0.05  # of it: so much comes of more than the chance that an interval knows
+OFF = 0.05  # of a gain, beyond which it is no calibration's error
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +238,8 @@ def compare_laws(
         raise ModelError(f"calibration = {calibration}", "it is a part of 1, as 0.01 for 1 %", "correct calibration=")
     kinds = _kinds(laws)
     shown = [Shown.of(each, channels_of(each, None), oscillator) for each in records]
-    known = tuple(nuisance) if nuisance is not None else _nuisance(shown)
+    for each in shown:
+        each.require_sliding()
     tell = _teller(progress, len(kinds))
     seen = Seen.of(records, oscillator)
 
@@ -244,6 +248,7 @@ def compare_laws(
 
     def tried(names: Sequence[tuple[str, list[Any]]], passes: int) -> dict[str, Trial]:
         stretches = [stretch(each, number) for number, each in enumerate(shown)]
+        known = tuple(nuisance) if nuisance is not None else _nuisance(shown)
         found: dict[str, Trial] = {}
         for name, given in names:
             begun = [*(given or GUESSES[name](seen)), *from_simpler(name, found)]
@@ -253,9 +258,12 @@ def compare_laws(
                 found[name] = trial
         return found
 
-    rough = tried(_apart(kinds), 2)
+    rough, silent = tried(_apart(kinds), 2), dict[str, float]()
     if rough:
-        shown = tuned(shown, min(rough.values(), key=lambda each: each.point.chi2), stretch, tell)
+        nearest = min(rough.values(), key=lambda each: each.point.chi2)
+        silent = unexplained(nearest, shown)
+        shown = [replace(each, channels=tuple(n for n in each.channels if n not in silent)) for each in shown]
+        shown = tuned(shown, nearest, stretch, tell)
     trials = tried([(name, [rough[name].system.law] if name in rough else given) for name, given in kinds], PASSES)
     if not trials:
         raise EstimateError(
@@ -271,14 +279,29 @@ def compare_laws(
     for trial in trials.values():
         left, near = squares(trial.left), trial.point.chi2 < CONTENDING * first.point.chi2
         ahead = squares(predicted(trial, tell)) if leave_out and len(records) > 1 and near else None
-        misfits.append(Misfit(trial.name, trial.count, left, ahead))
+        misfits.append(Misfit(trial.name, trial.count, left, ahead, trial.excess, trial.stiff))
     told, confidence = standings(misfits, evidence, excess=rigid, calibration=calibration)
     whole = [weighed(each, number, calibration, whole=True) for number, each in enumerate(shown)]
     fit = _fit(trials[told[0].name], shown, whole, tell)
+    doubt = _doubt(fit, calibration)
+    if doubt:
+        told, confidence = undescribed(told), 0.0
+    if told[0].name == "Stribeck":
+        rigid = _excess(fit)
     if progress:
         progress(1.0)
     candidates = tuple(Candidate(each, trials[each.name].system, _left(trials[each.name])) for each in told)
-    return _answer(candidates, confidence, fit, rigid, calibration, records)
+    return _answer(candidates, confidence, fit, rigid, calibration, records, doubt, silent)
+
+
+def _excess(fit: LawFit) -> Estimate:
+    """By what part the static friction of a fitted Stribeck curve exceeds the kinetic."""
+    level, static = fit.parameters["kinetic"].value, fit.parameters["static"]
+    low, high = (end / level - 1 for end in static.interval)
+    return replace(
+        static, name="excess of static friction", value=static.value / level - 1, interval=(max(0.0, low), high),
+        sd=static.sd / level, unit="1",
+    )  # fmt: skip
 
 
 def _left(trial: Trial) -> dict[str, float]:
@@ -299,7 +322,21 @@ def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tel
     checks = tuple(
         f"{name} is left with {left / noise[name]:.3g} times its noise" for name, left in fit.residual.items()
     )
+    name, share = _worst(fit, noise)
+    if share > LEFT:
+        words = f"its interval leaves out why the law leaves {share:.0%} of {name}"
+        told = {key: replace(one, status=words) if one.status == "ok" else one for key, one in fit.parameters.items()}
+        fit = replace(fit, parameters=told)
     return replace(fit, noise=noise, checks=checks)
+
+
+def _worst(fit: LawFit, noise: Mapping[str, float]) -> tuple[str, float]:
+    """The channel of which a law leaves the largest share beyond the noise, and that share."""
+    shares = {}
+    for name, left in fit.residual.items():
+        size = float(np.std(np.concatenate([each.measured[name] for each in fit.traces])))
+        shares[name] = math.sqrt(max(0.0, left**2 - noise[name] ** 2)) / max(size, 1e-300)
+    return max(shares.items(), key=lambda each: each[1])
 
 
 def _nuisance(shown: Sequence[Shown]) -> tuple[str, ...]:
@@ -364,6 +401,8 @@ def _answer(
     excess_: Estimate | None,
     calibration: float,
     records: Sequence[Record],
+    doubt: str,
+    silent: Mapping[str, float],
 ) -> LawComparison:
     told = [each.standing for each in candidates]
     kept = [each for each in told if each.kept]
@@ -374,26 +413,38 @@ def _answer(
         + (f", of records left out {times(each.prediction)}" if math.isfinite(each.prediction) else "")
         for each in told
     )
+    left_out = "; ".join(
+        f"{name} is left out: the best law leaves {share:.0%} of it, and no mount or delay of its sensor is stated"
+        for name, share in silent.items()
+    )
     step = Step(
         "compare_laws", {"laws": [each.name for each in candidates], "calibration": calibration},
         f"{', '.join(each.name for each in kept)} not rejected",
     )  # fmt: skip
     return LawComparison(
-        candidates, kept[0].name if len(kept) == 1 else None, families[0] if len(families) == 1 else None,
+        candidates, kept[0].name if len(kept) == 1 and not doubt else None,
+        families[0] if len(families) == 1 and not doubt else None,
         tuple(each.name for each in kept), confidence,
-        " ".join(_sentences(told, families, excess_, calibration, confidence)), fit, excess_, _status(fit), checks,
+        f"None of the laws tried describes these records: {doubt}." if doubt
+        else " ".join(_sentences(told, families, excess_, calibration, confidence)),
+        fit, excess_, doubt or left_out or "ok", checks,
         (*records[0].history, step),
     )  # fmt: skip
 
 
-def _status(fit: LawFit) -> str:
-    """Whether the best law describes the records at all."""
-    sizes = {name: float(np.std(np.concatenate([t.measured[name] for t in fit.traces]))) for name in fit.residual}
-    shares = {name: fit.residual[name] / size for name, size in sizes.items() if size > 0}
-    worst = max(shares, key=lambda name: shares[name])
-    if shares[worst] <= BAD:
-        return "ok"
-    return f"even the best law leaves {shares[worst]:.0%} of {worst}: the friction may follow none of those tried"
+def _doubt(fit: LawFit, calibration: float) -> str:
+    """Why even the best law is none for these records; nothing where it is."""
+    gains = {name[:-5]: each.value for name, each in fit.parameters.items() if name.endswith(".gain")}
+    far = [name for name, gain in gains.items() if abs(gain - 1) > max(OFF, 5 * calibration)]
+    if far:
+        told = ", ".join(f"the gain of {name} comes out as {gains[name]:.3g}" for name in far)
+        return (
+            f"{told}, where calibrations are off by {calibration:.0%}: check mass=, stiffness= and the channels' units"
+        )
+    name, share = _worst(fit, fit.noise)
+    if share <= BAD:
+        return ""
+    return f"even the best law leaves {share:.0%} of {name}: the friction may follow none of those tried"
 
 
 def _sentences(
@@ -402,7 +453,8 @@ def _sentences(
     """The verdict, to be pasted into a report."""
     best = told[0]
     kept = [each.name for each in told if each.kept]
-    rivals = [each for each in told if each.family != best.family]
+    rivals = [each for each in told if each.family != best.family and not each.limit]
+    limits = [each.name for each in told if each.limit]
     if len(families) > 1:
         yield (
             f"These records can not tell {_either(kept)} apart: none leaves more than {SEPARATED:g} times the misfit "
@@ -411,7 +463,8 @@ def _sentences(
     else:
         yield f"The friction is {SAID.get(best.family, best.family)}" + (
             f": the misfit of any other family tried is at least {times(min(each.misfit for each in rivals))} as large."
-            if rivals else "; no law of another family was tried."
+            if rivals else f"; {_either(limits)} would have to be as stiff as that." if limits
+            else "; no law of another family was tried."
         )  # fmt: skip
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:
         low, high = excess_.interval
@@ -419,6 +472,8 @@ def _sentences(
             f"by {excess_.value:.1%} (95 %: {low:.1%} to {high:.1%})"
             if math.isfinite(high)
             else f"by {low:.1%} or more"
+            if low > 0
+            else "by what can not be told"
         )
         if len(kept) > 1:
             yield (
@@ -430,7 +485,8 @@ def _sentences(
         else:
             falls = "at once" if kept == ["static"] else "with the speed, along a Stribeck curve"
             yield f"Static friction exceeds the kinetic {said} and falls {falls}."
-    yield f"Confidence {confidence:.1%}."
+    if len(kept) == 1:
+        yield f"Confidence {confidence:.1%}."
 
 
 def _either(names: Sequence[str]) -> str:

@@ -214,7 +214,8 @@ class Alignment:
 
     def sd(self, slope: Sequence[float]) -> float:
         """Standard deviation of what changes with theta by `slope`."""
-        return math.sqrt(float(np.dot(slope, self.covariance @ slope)) * self.widening)
+        variance = float(np.dot(slope, self.covariance @ slope))
+        return math.sqrt(max(0.0, variance) * self.widening)  # rounding may leave less than none
 
 
 def align(
