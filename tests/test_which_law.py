@@ -16,6 +16,7 @@ from stickslip.cli.program import main
 from stickslip.fit.choice import CERTAIN, Evidence, Misfit, standings
 from stickslip.fit.guess import GUESSES, Seen
 from stickslip.plot.law import law_plates
+from stickslip.record.record import Step
 
 RIG: dict[str, Any] = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12}
 FS = 2500  # Hz: more readings than a search looks at
@@ -69,6 +70,18 @@ def test_a_compliant_contact_is_told_from_a_rigid_one() -> None:
     assert shares[-1] == 1.0
     assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["law"] == "compliant"
     assert [plate.name for plate in law_plates(found)] == ["laws", "fit-1", "fit-2"]
+
+
+@pytest.mark.parametrize("name", ["state variable", "LuGre"])
+def test_a_family_is_found_through_wrong_gains(name: str) -> None:
+    """Each channel a per cent off, as calibrations are."""
+    told = record(name)
+    off = {"x": 1.01, "load": 0.99, "z": 1.0}
+    wrong = told.with_samples({key: off[key] * told[key] for key in told}, Step("calibrated badly"))
+    found = ss.compare_laws(wrong, slider(), laws=["Coulomb", name])
+    assert (found.law, found.family) == (name, name)
+    assert found.candidates[1].standing.misfit > 5
+    assert found.status == "ok"
 
 
 def test_a_comparison_is_cancelled_by_its_progress() -> None:
@@ -153,6 +166,78 @@ def test_a_richer_rigid_law_has_to_earn_its_parameter() -> None:
     assert kept(plain, rich, share=excess(0.005, 0.035))[0] == {"Coulomb", "static"}  # three calibrations hide it
     assert kept(plain, misfit("static", 2, 1.0), share=excess(0.0, 0.02))[0] == {"Coulomb"}
     assert kept(plain, misfit("static", 2, 0.99), share=excess(0.0, 0.2)) == ({"Coulomb", "static"}, 0.5)
+
+
+def stiff(name: str, count: int, size: float) -> Misfit:
+    return Misfit(name, count, misfit(name, count, size).squares, stiff=True)
+
+
+def test_a_contact_next_to_rigid_is_no_other_family() -> None:
+    told, confidence = standings(
+        [misfit("Coulomb", 1, 1.0), stiff("compliant", 3, 0.9), misfit("LuGre", 5, 50.0)], EVIDENCE, excess=None,
+        calibration=0.01,
+    )  # fmt: skip
+    assert [each.name for each in told if each.kept] == ["Coulomb"]
+    assert next(each for each in told if each.name == "compliant").limit
+    assert confidence > 0.9
+
+
+def test_a_stiff_contact_that_leaves_far_less_stands_for_itself() -> None:
+    told, _ = standings(
+        [misfit("Coulomb", 1, 3.0), stiff("compliant", 3, 1.0)], EVIDENCE, excess=None, calibration=0.01
+    )
+    assert [each.name for each in told if each.kept] == ["compliant"]
+    assert not any(each.limit for each in told)
+
+
+def test_a_stribeck_curve_stands_by_its_own_excess() -> None:
+    plain, curve = misfit("Coulomb", 1, 1.0), misfit("Stribeck", 3, 0.3)
+    above = Misfit("Stribeck", 3, curve.squares, excess=0.2)
+    assert kept(plain, misfit("static", 2, 0.9), above, share=excess(0.3, 0.7))[0] == {"Stribeck"}
+    assert "Stribeck" not in kept(plain, curve, share=excess(0.0, 0.02))[0]
+
+
+# ---- records that tell nothing
+
+
+def test_wrong_units_are_named_and_nothing_is_concluded() -> None:
+    told = record("Coulomb")
+    wrong = told.with_samples({**told.samples, "x": 1.12 * told["x"]}, Step("wrong"))
+    found = ss.compare_laws(wrong, slider(), laws=["Coulomb"])
+    assert (found.law, found.family, found.confidence) == (None, None, 0.0)
+    assert "check mass=, stiffness= and the channels' units" in found.status
+    assert "None of the laws tried describes these records" in found.verdict
+
+
+def test_a_sensor_that_nobody_stated_is_left_out() -> None:
+    """Its mount swings at 60 Hz: read as an ideal accelerometer it would choose the law."""
+    clean = ss.Oscillator(law=TRUE["Coulomb"], drive=ss.HarmonicBase(1.1e-3, frequency=8.7), **RIG)
+    rig = ss.Rig.perfect("x", "z", "a").having("x", white=1e-6).having("z", white=1e-6)
+    rig = rig.having("a", mount=ss.Mount(60.0, 0.05))
+    found = ss.compare_laws(
+        rig.measure(ss.simulate(clean, duration=2.5, rtol=1e-9), fs=FS, rng=3, start=2.0), slider(),
+        laws=["Coulomb", "compliant"],
+    )  # fmt: skip
+    assert "a is left out" in found.status
+    assert set(found.best.left) == {"x"}
+    assert found.fit.law.kinetic == pytest.approx(0.95, rel=0.02)
+
+
+def test_a_base_that_was_not_recorded_is_asked_for() -> None:
+    told = record("Coulomb")
+    alone = ss.Record.of({name: told[name] for name in ("x", "load")}, fs=FS)
+    only = ss.Record.of({"x": told["x"]}, fs=FS)
+    with pytest.raises(ss.EstimateError, match="give the base's motion as channel z"):
+        ss.compare_laws(only, slider(), laws=["Coulomb"])
+    driven = slider().having(drive=ss.HarmonicBase(1.1e-3, frequency=8.7, phase=2 * np.pi * 8.7 * 2.0))
+    assert ss.compare_laws(alone, driven, laws=["Coulomb"]).status == "ok"
+
+
+def test_one_way_without_a_stop_is_refused() -> None:
+    time = np.arange(4 * FS) / FS
+    steady = ss.Record.of({"v": 5e-3 + 3e-3 * np.sin(40 * time)}, fs=FS)
+    with pytest.raises(ss.EstimateError, match="one way"):
+        ss.compare_laws(steady, slider(), laws=["Coulomb"])
 
 
 # ---- the command

@@ -9,11 +9,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.drives import Drive, HarmonicBase, MultiTone, RecordedBase
+from stickslip.drives import Belt, Drive, HarmonicBase, MultiTone, RecordedBase
 from stickslip.errors import EstimateError
+from stickslip.laws.coulomb import Coulomb
+from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
 from stickslip.signals.differentiate import LEAST, Filter, best_bandwidth
 from stickslip.signals.noise import noise_level
+from stickslip.solve.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -92,6 +95,24 @@ def measured_drive(record: Record, given: Drive) -> DriveFrom:
         if channel in record and np.ptp(record[channel]) > 0:
             return _driven(record, channel, on, getattr(given, "contact", "ground"))
     return Known(given)
+
+
+def as_driven(record: Record, given: Drive) -> Record:
+    """The record with the base's motion z that a known drive makes, where none was measured."""
+    if {"z", "force"} & set(record) or not given.motion().base:
+        return record
+    still = Oscillator(mass=1.0, stiffness=0.0, law=Coulomb(1.0), drive=given)
+    time = np.arange(len(record)) / record.fs
+    values, _ = simulate(still, duration=float(time[-1]) or 1.0, start={}).sample(time, ("z",))
+    return record.with_channel("z", values[0], unit="m")
+
+
+def face_of(given: Drive, record: Record) -> tuple[Array | float, Array | float]:
+    """Displacement and velocity of the counter-face at each row."""
+    if getattr(given, "contact", "ground") == "base" and "z" in record:
+        return record["z"], np.asarray(np.gradient(record["z"]) * record.fs, dtype=np.float64)
+    speed = given.speed if isinstance(given, Belt) else 0.0
+    return speed * np.arange(len(record), dtype=np.float64) / record.fs, speed
 
 
 def _driven(record: Record, channel: str, on: str, contact: str) -> DriveFrom:

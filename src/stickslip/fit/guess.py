@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.drives import Release
 from stickslip.errors import EstimateError
+from stickslip.fit.drive import as_driven, face_of
 from stickslip.identify.force import friction_force
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
@@ -61,11 +62,10 @@ class Seen:
         """What the sensors of the records say together of sliding and friction."""
         slips, speeds, frictions, steps, ways = [], [], [], [], []
         for record in records:
-            told = _told(record, oscillator)
+            told = _told(as_driven(record, oscillator.drive), oscillator)
             inner = slice(EDGE, -EDGE)
-            x, v = told["x"], told["v"]
-            if getattr(oscillator.drive, "contact", "ground") == "base" and "z" in told:
-                x, v = x - told["z"], v - np.gradient(told["z"]) * told.fs
+            face, speed = face_of(oscillator.drive, told)
+            x, v = told["x"] - face, told["v"] - speed
             slips.append(np.diff(x, append=x[-1])[inner])
             speeds.append(v[inner])
             frictions.append(told["friction"][inner])

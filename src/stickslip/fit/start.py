@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError, RecordError
-from stickslip.fit.drive import DriveFrom, measured_drive
+from stickslip.fit.drive import DriveFrom, as_driven, measured_drive
 from stickslip.fit.search import ABOVE, Knob, Point, Problem, Profile, descend
 from stickslip.fit.stretch import Sensor, Stretch
 from stickslip.oscillator import Oscillator
@@ -75,7 +75,7 @@ class Shown:
         else:
             velocity = values
             displacement = np.cumsum(values - values.mean()) / record.fs
-        felt = _felt(record, velocity, oscillator)
+        felt = _felt(as_driven(record, oscillator.drive), velocity, oscillator)
         drive = measured_drive(record, oscillator.drive)
         return cls(record, tuple(channels), displacement, velocity, late, felt, _level(felt, velocity), drive)
 

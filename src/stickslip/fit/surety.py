@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.fit.search import Knob, Point, Problem, Slopes, descend, rows_of, without_starts
 from stickslip.fit.start import thinned_out
+from stickslip.fit.stretch import Sensor
 from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
@@ -33,6 +34,8 @@ class Surety:
 
 def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
     """Intervals that hold when residuals are correlated: the sandwich, summed over time as neighbours are alike.
+
+    On a rough surface neighbours are also those that pass the same place.
 
     Each row's influence on the parameters is ``G^-1 A' r``, G = A'A, A the derivatives less what the starts take over;
     the parameters vary as its sum does. A parameter that is hardly seen gets the ends of its likelihood instead.
@@ -71,14 +74,22 @@ def _sandwich(problem: Problem, point: Point, slopes: Sequence[Slopes]) -> tuple
     values = np.maximum(values, FAINT)
     bread = (vectors / values) @ vectors.T / np.outer(scale, scale)
     variance, square = np.zeros(len(scale)), np.zeros(len(scale))
+    places: dict[int, Array] = {}
     for stretch, a, r in zip(problem.stretches, left, point.residuals, strict=True):
         drive = a[sum(len(sensor.time) for sensor in stretch.sensors) :] @ bread
         scores = _over_time(stretch.sensors, a * r[:, None]) @ bread
+        if problem.profile:
+            for place, total in _over_places(stretch.sensors, scores, problem.profile.length).items():
+                places[place] = places.get(place, np.zeros(len(scale))) + total
         for k, series in enumerate(scores.T):
             sd, worth = mean_uncertainty(len(series) * series)
             variance[k] += sd**2 + float(drive[:, k] @ drive[:, k])
             square[k] += sd**4 / worth
     freedom = np.where(square > 0, variance**2 / np.maximum(square, 1e-300), 1.0)
+    if len(places) > 1:
+        again = np.sum(np.square(list(places.values())), axis=0) * len(places) / (len(places) - 1)
+        freedom = np.where(again > variance, np.minimum(freedom, len(places) - 1), freedom)
+        variance = np.maximum(variance, again)
     return bread, np.sqrt(np.maximum(variance, 1e-300)), freedom
 
 
@@ -89,6 +100,16 @@ def _over_time(sensors: Sequence[object], scores: Array) -> Array:
     for part in rows:
         total[: part.stop - part.start] += scores[part]
     return total
+
+
+def _over_places(sensors: Sequence[Sensor], scores: Array, length: float) -> dict[int, Array]:
+    """The sum over all passes of each part of a surface, where what a profile leaves comes back each time."""
+    moved = next((sensor.readings for sensor in sensors if sensor.channel.name == "x"), None)
+    if moved is None:
+        return {}
+    size = min(len(moved), len(scores))
+    part = np.floor((moved[:size] - moved.mean()) / length).astype(int)
+    return {int(place): scores[:size][part == place].sum(axis=0) for place in np.unique(part)}
 
 
 def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, tell: Callable[[], None]) -> float:
