@@ -50,7 +50,8 @@ def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], 
         "records": str(len(records)), "sampling rate": f"{first.fs:g} Hz",
         "length": ", ".join(f"{record.duration:g} s" for record in records),
     }  # fmt: skip
-    cautions = [*([f"{result.status}."] if result.status != "ok" else []), *doubts(result.estimates)]
+    told = result.status == "ok" or (isinstance(result, LawComparison) and result.status in result.verdict)
+    cautions = [*([] if told else [f"{result.status}."]), *doubts(result.estimates)]
     if isinstance(result, CurveFit):
         headline = [*_curve_told(result)]
         return Summary(name, headline, cautions, lines=lines, settings=settings,
