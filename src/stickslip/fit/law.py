@@ -29,7 +29,6 @@ WORDS = {
     "law.damping": "contact damping", "speed": "Stribeck speed", "law.mass": "contact mass",
 }  # fmt: skip
 METHOD = "least squares of what the sensors read, the motion simulated"
-REPEATS = "its interval leaves out roughness that is finer than the profile and comes back with each pass"
 MISFIT = 1.2  # times its noise that a channel's residual may be
 WORK = 60.0  # calls of progress that a fit is taken for
 
@@ -261,8 +260,7 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
     parameters = _parameters(problem, point, sure, system)
     if problem.profile:
         level = _mean_friction(problem, point, value_of(system, "kinetic"))
-        told = {name: replace(one, status=REPEATS) if one.status == "ok" else one for name, one in parameters.items()}
-        parameters = {"kinetic": level, **told}
+        parameters = {"kinetic": level, **parameters}
         system = system.having(kinetic=level.value)
     checks = tuple(f"{name} is left with {residual[name] / noise[name]:.3g} times its noise" for name in residual)
     worst = max(residual, key=lambda name: residual[name] / noise[name])

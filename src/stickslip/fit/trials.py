@@ -143,6 +143,15 @@ def searched(
     return Trial(name, *min(ends, key=lambda each: each[1].chi2)) if ends else None
 
 
+def resumed(trial: Trial, stretches: Sequence[Stretch], least: float, passes: int, tell: Tell) -> Trial | None:
+    """A search taken up again where it stood, on stretches that have changed a little; None where it can not be."""
+    problem = replace(trial.problem, stretches=tuple(stretches))
+    point = problem.at(trial.point.u, trial.point.starts)
+    if point.chi2 < CONTENDING * least:
+        point = descend(problem, point, passes=passes, tell=tell)
+    return replace(trial, problem=problem, point=point) if math.isfinite(point.chi2) else None
+
+
 def from_simpler(name: str, trials: Mapping[str, Trial]) -> list[Any]:
     """Starts of a law at the end of a simpler one's search, which it contains: what it adds hardly felt."""
     laws = {each: trial.system.law for each, trial in trials.items()}

@@ -26,6 +26,7 @@ from stickslip.fit.trials import (
     evidence_of,
     from_simpler,
     predicted,
+    resumed,
     searched,
     squares,
     static_of,
@@ -246,25 +247,26 @@ def compare_laws(
     def stretch(each: Shown, number: int) -> Stretch:
         return weighed(each, number, calibration)
 
-    def tried(names: Sequence[tuple[str, list[Any]]], passes: int) -> dict[str, Trial]:
+    def tried(names: Sequence[tuple[str, list[Any]]], passes: int, before: Mapping[str, Trial]) -> dict[str, Trial]:
         stretches = [stretch(each, number) for number, each in enumerate(shown)]
         known = tuple(nuisance) if nuisance is not None else _nuisance(shown)
         found: dict[str, Trial] = {}
         for name, given in names:
+            least = min((each.point.chi2 for each in {**before, **found}.values()), default=math.inf)
+            trial = resumed(before[name], stretches, least, passes, tell) if name in before else None
             begun = [*(given or GUESSES[name](seen)), *from_simpler(name, found)]
-            least = min((each.point.chi2 for each in found.values()), default=math.inf)
-            trial = searched(name, begun, oscillator, stretches, known, least, passes, tell)
+            trial = trial or searched(name, begun, oscillator, stretches, known, least, passes, tell)
             if trial is not None:
                 found[name] = trial
         return found
 
-    rough, silent = tried(_apart(kinds), 2), dict[str, float]()
+    rough, silent = tried(_apart(kinds), 2, {}), dict[str, float]()
     if rough:
         nearest = min(rough.values(), key=lambda each: each.point.chi2)
         silent = unexplained(nearest, shown)
         shown = [replace(each, channels=tuple(n for n in each.channels if n not in silent)) for each in shown]
         shown = tuned(shown, nearest, stretch, tell)
-    trials = tried([(name, [rough[name].system.law] if name in rough else given) for name, given in kinds], PASSES)
+    trials = tried(kinds, PASSES, {} if silent else rough)
     if not trials:
         raise EstimateError(
             "no law can be simulated along these records", "a search starts from a motion that exists",
@@ -372,7 +374,7 @@ def _kinds(laws: Sequence[Any] | None) -> list[tuple[str, list[Any]]]:
 
 def _apart(kinds: Sequence[tuple[str, list[Any]]]) -> list[tuple[str, list[Any]]]:
     """One law of each family, the simplest: enough to see how the sensors' mounts swing."""
-    return list({FAMILIES.get(name, name): (name, given) for name, given in reversed(kinds)}.values())
+    return list(reversed({FAMILIES.get(name, name): (name, given) for name, given in reversed(kinds)}.values()))
 
 
 def _name(law: Any) -> str:
