@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +17,13 @@ TILE = 64  # samples gone through at once, so that what they make stays in the p
 MOST_PHASES = 64  # values made of one sample
 SHIFT = math.pi / TILE  # [rad a sample] a band's middle may lie from zero
 WIDEST = 2.4  # [rad a sample] half of a band, which is pi where nothing is to spare
-MANY = 2  # phases a byte of a number, from which on they are gone through sample by sample
-LANES = 64  # values made at once there, at least
+WIDEST_OF_MANY = 2.0  # the same where the values are `MANY`
+MANY = 8  # phases from which on they are gone through sample by sample
+BYTES = 256  # half of the values made at once there take so many
 STEPS = 8  # widths an octave that there are weights for
 MOST_TAPS = 40
-LEAD = MOST_TAPS // 2 - 1  # samples before the first that values are made of
-TAIL = MOST_TAPS // 2 + 4  # and after the last
+LEAD = MOST_TAPS // 2 + 8  # samples before the first that values are made of
+TAIL = MOST_TAPS // 2 + 24  # and after the last
 
 
 def upsampled(
@@ -55,22 +57,23 @@ def upsampled(
         Of the weights, where the spectrum is highest.
     """
     weights = _weights(math.ceil(STEPS * math.log2(half / WIDEST)), reach, accuracy)[:: MOST_PHASES // phases]
-    around = samples[LEAD + 1 - weights.shape[1] // 2 :]
     kind = out.real.dtype
-    if phases < MANY * kind.itemsize:
+    if phases < MANY:
+        weights = np.pad(weights, ((0, 0), (1, 1))) if weights.shape[1] % 4 else weights
+        around = samples[LEAD + 1 - weights.shape[1] // 2 :]
         places = turns * (np.arange(TILE) * phases + np.arange(phases)[:, None]) % (TILE * phases)
         turn = np.exp(2j * np.pi / (TILE * phases) * places).astype(out.dtype)
         _few(around.view(kind), weights.astype(kind), turn.view(kind), np.empty(2 * TILE, dtype=kind), out.view(kind))
         return
-    together = max(1, LANES // phases)  # samples whose values are made at once
-    taps = -(-(weights.shape[1] + together - 1) // 4) * 4
-    wide = np.zeros((taps, together * phases), dtype=kind)
-    for number in range(together):
-        wide[number : number + weights.shape[1], number * phases : (number + 1) * phases] = weights.T
+    values = 2 * BYTES // kind.itemsize  # made at once
+    halves, first = _halves(weights, values)
     swing = np.exp(2j * np.pi * (turns * np.arange(TILE) % TILE) / TILE).astype(out.dtype)
-    turn = np.exp(2j * np.pi * turns / (TILE * phases) * np.arange(together * phases)).astype(out.dtype)
-    parts = np.array([turn.real, turn.imag])
-    _many(around, wide, swing, together, parts, np.empty_like(parts), out)
+    turn = np.exp(2j * np.pi * turns / (TILE * phases) * np.arange(values)).astype(out.dtype)
+    room = np.empty((8, max(halves.shape[1:])), dtype=kind)
+    _MANY[kind.itemsize](
+        samples[LEAD - first :], halves.astype(kind), (first, values // phases), swing,
+        np.array([turn.real, turn.imag]), room, np.empty_like(turn), out,
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=256)
@@ -87,7 +90,7 @@ def _weights(step: int, reach: float, accuracy: float) -> Array:
         return np.asarray(np.vstack([np.cos(turn), np.sin(turn)]) * height)
 
     target = waves(np.arange(MOST_PHASES) / MOST_PHASES)
-    for taps in range(4, MOST_TAPS + 1, 4):
+    for taps in range(4, MOST_TAPS + 1, 2):
         design = waves(np.arange(taps, dtype=float) - (taps // 2 - 1))
         weights = np.linalg.lstsq(design, target, rcond=1e-15)[0]
         if np.abs(design @ weights - target).max() < accuracy:
@@ -123,27 +126,76 @@ def _few(around, weights, turn, sums, out):
                 out[place + 1] = turn[phase, 2 * k] * sums[2 * k + 1] + turn[phase, 2 * k + 1] * sums[2 * k]
 
 
-@compiled(**FAST)
-def _many(around, weights, swing, together, turn, sums, out):
-    """Sample by sample, all phases of some samples at once; the taps are a multiple of four."""
-    taps, lanes = weights.shape
-    (cosine, sine), (real, imaginary) = (turn[0], turn[1]), (sums[0], sums[1])
-    for number in range(-(-out.size // lanes)):
-        first, to = number * together, swing[number * together % swing.size]
-        row = out[number * lanes : min((number + 1) * lanes, out.size)]
-        for i in range(lanes):
-            real[i] = imaginary[i] = 0.0
-        for j in range(0, taps, 4):
-            a, b = to * around[first + j], to * around[first + j + 1]
-            c, d = to * around[first + j + 2], to * around[first + j + 3]
-            ar, br, cr, dr, ai, bi, ci, di = a.real, b.real, c.real, d.real, a.imag, b.imag, c.imag, d.imag
-            e, f, g, h = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
-            if j < taps - 4:
-                for i in range(lanes):
-                    real[i] += ar * e[i] + br * f[i] + cr * g[i] + dr * h[i]
-                    imaginary[i] += ai * e[i] + bi * f[i] + ci * g[i] + di * h[i]
-            else:
+def _halves(weights: Array, values: int) -> tuple[Array, int]:
+    """Weights of the values made at once, in two parts: even and odd about the middle of their neighbours.
+
+    Of all but the first up to the middle one; the others mirror them. And how many samples come before the first.
+    """
+    phases, taps = weights.shape
+    together = values // phases
+    least = (taps + together) // 2
+    pairs = -(-least // 4) * 4
+    before = pairs - least
+    wide = np.zeros((2 * pairs - (taps + together - 1) % 2, values // 2))
+    for lane, column in enumerate(wide.T):
+        sample, phase = divmod(lane + 1, phases)
+        column[before + sample : before + sample + taps] = weights[phase]
+    halves = np.array([(wide + wide[::-1])[:pairs], (wide - wide[::-1])[:pairs]]) / 2
+    if len(wide) % 2:
+        halves[0, -1] /= 2  # the middle one is its own neighbour
+    return halves, before + taps // 2 - 1
+
+
+@compiled(**FAST, inline="always")
+def _sums(weights, real, imaginary, sums, sums_i, lanes):
+    """Complex values times weights, of which there is a multiple of four."""
+    for j in range(0, real.size, 4):
+        a, b, c, d = real[j], real[j + 1], real[j + 2], real[j + 3]
+        ai, bi, ci, di = imaginary[j], imaginary[j + 1], imaginary[j + 2], imaginary[j + 3]
+        e, f, g, h = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
+        if j == 0:
+            for i in range(lanes):
+                sums[i] = a * e[i] + b * f[i] + c * g[i] + d * h[i]
+                sums_i[i] = ai * e[i] + bi * f[i] + ci * g[i] + di * h[i]
+        else:
+            for i in range(lanes):
+                sums[i] += a * e[i] + b * f[i] + c * g[i] + d * h[i]
+                sums_i[i] += ai * e[i] + bi * f[i] + ci * g[i] + di * h[i]
+
+
+def _many_of(lanes: int) -> Any:
+    """The kernel for twice so many values at once: a constant of it, so that its loops are unrolled."""
+
+    @compiled(**FAST)
+    def many(around, halves, span, swing, turn, room, spare, out):
+        """All phases of some samples, half of them by the mirrored weights; the pairs are a multiple of four."""
+        (first, together), pairs = span, halves.shape[1]
+        plus, plus_i, minus, minus_i = room[0, :pairs], room[1, :pairs], room[2, :pairs], room[3, :pairs]
+        er, ei, dr, di, cosine, sine = room[4], room[5], room[6], room[7], turn[0], turn[1]
+        for number in range(-(-out.size // (2 * lanes))):
+            begin = number * together
+            to, last = swing[begin % swing.size], begin + 2 * first + together
+            for j in range(pairs):
+                one, other = to * around[begin + j], to * around[last - j]
+                plus[j], plus_i[j] = one.real + other.real, one.imag + other.imag
+                minus[j], minus_i[j] = one.real - other.real, one.imag - other.imag
+            _sums(halves[0], plus, plus_i, er, ei, lanes)
+            _sums(halves[1], minus, minus_i, dr, di, lanes)
+            row = out[2 * number * lanes : 2 * (number + 1) * lanes]
+            made = row if row.size == 2 * lanes else spare
+            made[0] = to * around[begin + first]
+            for i in range(lanes):
+                x, y = er[i] + dr[i], ei[i] + di[i]
+                made[i + 1] = complex(cosine[i + 1] * x - sine[i + 1] * y, sine[i + 1] * x + cosine[i + 1] * y)
+            for i in range(lanes):
+                x, y = er[lanes - 1 - i] - dr[lanes - 1 - i], ei[lanes - 1 - i] - di[lanes - 1 - i]
+                c, s = cosine[lanes + i], sine[lanes + i]
+                made[lanes + i] = complex(c * x - s * y, s * x + c * y)
+            if row.size < 2 * lanes:
                 for i in range(row.size):
-                    x = real[i] + (ar * e[i] + br * f[i] + cr * g[i] + dr * h[i])
-                    y = imaginary[i] + (ai * e[i] + bi * f[i] + ci * g[i] + di * h[i])
-                    row[i] = complex(cosine[i] * x - sine[i] * y, sine[i] * x + cosine[i] * y)
+                    row[i] = spare[i]
+
+    return many
+
+
+_MANY = {size: _many_of(BYTES // size) for size in (4, 8)}
