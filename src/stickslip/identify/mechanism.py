@@ -27,8 +27,11 @@ MEANINGS = {
     SWINGING: "the sticks swing, but not as one mode: friction with a memory (a state variable)",
     UNTOLD: "no mechanism stands out",
 }
+LIKELY = 0.5
 SURE = 0.7  # probability that a verdict has at least
 FASTEST = 10.0  # cycles of the mode in a window: there the search for it ends
+CHOPPED = 5.0  # micro-slips a stick: more are rather a mount's that rings than the friction's
+ALONE = 0.8  # how often it is friction, where fewer are told by an acceleration whose mount nothing is known of
 STRANGE = 4.5  # standard deviations from what the simulated records of its kind were like
 
 
@@ -42,7 +45,8 @@ class Mechanism:
         "bare spikes", "oscillation without micro-slip", "double stick-slip", "non-sinusoidal oscillation", or
         "cannot be told from this record".
     probability : float
-        Of that name, among the four; NaN where it can not be told at all.
+        Of that name, among the four; NaN where it can not be told at all. Lower for a non-sinusoidal oscillation of an
+        acceleration alone whose mount is not stated: that might ring, too.
     probabilities : mapping of str to float
         Of each of the four.
     features : mapping of str to float
@@ -140,9 +144,22 @@ def mechanism_of(ringing: Ringing) -> Mechanism:
         name, reason = UNTOLD, f"{likely[0]} or {likely[1]}"
     if name == SWINGING and ringing.blurred:
         name, reason = UNTOLD, f"{SWINGING}, or what a smoother leaves of a mount where no load cell helps it"
+    sure = float(probability[best])
     if name == SWINGING and ringing.record.channels[ringing.channel].mount is None and "x" not in ringing.record:
-        reason += "; an accelerometer whose mount rings looks alike, state its mount if it has one"
-    return Mechanism(name, float(probability[best]), probabilities, found, reason)
+        known = "state the mount, record.with_details('a', mount=(frequency, damping)), or give x"
+        if found["glides"] > CHOPPED:
+            name, reason = UNTOLD, f"{SWINGING}, or an accelerometer whose mount rings: {known}"
+        else:
+            sure, reason = ALONE * sure, f"{reason}; an accelerometer whose mount rings looks alike: {known}"
+    return Mechanism(name, sure, probabilities, found, reason)
+
+
+def not_one_mode(ringing: Ringing) -> str:
+    """In words: what swings in the sticks is no ring of a contact, where that is likely; "" otherwise."""
+    likely = mechanism_of(ringing).probabilities.get(SWINGING, 0.0)
+    if likely < LIKELY:
+        return ""
+    return f"the sticks swing, but not as one mode ({likely:.0%}), as no contact rings: see mechanism(record)"
 
 
 def features(ringing: Ringing) -> dict[str, float]:

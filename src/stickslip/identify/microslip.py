@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
-from stickslip.identify.ringing import Ringing, find_ringing
+from stickslip.identify.mechanism import not_one_mode
+from stickslip.identify.ringing import Ringing, Window, find_ringing
 from stickslip.record.record import Record
+from stickslip.signals.pieces import Piece
 from stickslip.statistics import mean_of_cycles
 
+Array = NDArray[np.float64]
+
 QUESTION = "micro-slips"
+ASTRAY = 0.27  # of a cycle of the ring: the cuts may lie so far from where a micro-slip begins and ends
+STEPS = (0.03, 0.008, 0.002)  # of the same: the search goes from coarse to fine
 
 
 @dataclass(frozen=True)
@@ -65,8 +75,9 @@ def find_microslips(
     While a compliant contact sticks it rings with the mass; where the friction limit cuts a swing off, the mass slips
     until it stops again (thesis chapters 4 and 5: micro-slip; with the slip from one stick to the next it makes double
     stick-slip). There the acceleration follows the drive alone, a parabola, and not the ring: the cuts between them are
-    found by dynamic programming, as in :func:`transition`. A micro-slip's begin is a kink of the acceleration and told
-    to a sample or two; its end is smoother and less sure.
+    found by dynamic programming, as in :func:`transition`. Begin and end are where ring, line and ring fit best that
+    meet without a jump, for friction reaches its limit and leaves it without one. The begin is a kink and told to a
+    sample or two; the end is smoother and less sure.
 
     Parameters
     ----------
@@ -109,11 +120,11 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
             "see mechanism(record) for what the sticks are like",
         )
     counts = tuple(len(window.glides) for window in ringing.windows)
-    events = tuple(
-        MicroSlip(ringing.time(window, piece.first), (piece.last - piece.first) / ringing.fs, number)
-        for number, window in enumerate(ringing.windows)
-        for piece in window.glides
-    )
+    events = []
+    for number, window in enumerate(ringing.windows):
+        for piece in window.glides:
+            begin, end = _edges(window, piece, ringing.pole / ringing.fs)
+            events.append(MicroSlip(ringing.time(window, begin), (end - begin) / ringing.fs, number))
     share = sum(count > 0 for count in counts) / len(counts)
     kind = "double stick-slip" if share > 0.5 else "some sticks slip" if share > 0 else "no micro-slips"
     per_stick = mean_of_cycles(
@@ -121,5 +132,42 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
         method="cuts between rings of one mode, by dynamic programming",
     )  # fmt: skip
     blurred = "without a load cell whose mount is stated, one may be missed or seen twice" if ringing.blurred else ""
-    status = "; ".join(word for word in (ringing.status, blurred) if word not in ("", "ok")) or "ok"
-    return MicroSlips(replace(per_stick, status=status), events, counts, kind, status)
+    status = (
+        "; ".join(word for word in (ringing.status, not_one_mode(ringing), blurred) if word not in ("", "ok")) or "ok"
+    )
+    return MicroSlips(replace(per_stick, status=status), tuple(events), counts, kind, status)
+
+
+def _edges(window: Window, glide: Piece, pole: complex) -> tuple[float, float]:
+    """Rows where a micro-slip begins and ends: where a ring, a line and a ring that meet leave the least."""
+    number, cycle = window.pieces.index(glide), 2 * math.pi / pole.imag
+    low, high = window.pieces[number - 1].first, window.pieces[number + 1].last
+    rows, values = np.arange(low, high, dtype=float), window.values[low:high]
+    begin, end, reach = float(glide.first), float(glide.last), ASTRAY * cycle
+    for step in STEPS:
+        away = np.arange(-reach, reach + step * cycle / 2, step * cycle)
+        tried = [
+            (_left(rows, values, first, last, pole), first, last)
+            for first in begin + away if first >= low + 2
+            for last in end + away if first + 1 <= last <= high - 2
+        ]  # fmt: skip
+        if tried:
+            _, begin, end = min(tried)
+        reach = step * cycle
+    return begin, end
+
+
+def _left(rows: Array, values: Array, begin: float, end: float, pole: complex) -> float:
+    """Sum of squares, but for a constant, that the ring, the line and the next ring leave."""
+    first, second = np.searchsorted(rows, (begin, end))
+    before, between, after = (
+        np.exp(pole * (rows[:first] - begin)),
+        rows[first:second],
+        np.exp(pole * (rows[second:] - end)),
+    )
+    design = np.zeros((4, len(rows)))  # level and slope where the line begins; what each ring has of its own
+    design[0, :first], design[0, first:second], design[0, second:] = before.real, 1.0, after.real
+    design[1, first:second], design[1, second:] = between - begin, (end - begin) * after.real
+    design[2, :first], design[3, second:] = before.imag, after.imag
+    along = design @ values
+    return -float(along @ np.linalg.lstsq(design @ design.T, along, rcond=None)[0])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
+from stickslip.identify.mechanism import not_one_mode
 from stickslip.identify.ringing import Ringing, Window, find_ringing
 from stickslip.record.record import Record
 from stickslip.signals.morlet import ridge_centre
@@ -161,8 +162,10 @@ def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float |
         method="of the first ring of each stick, at its begin; mean of sticks",
     )  # fmt: skip
 
+    doubt = ringing.doubt or not_one_mode(ringing)
+
     def told(estimate: Estimate) -> Estimate:
-        return replace(estimate, status=ringing.doubt) if ringing.doubt else estimate
+        return replace(estimate, status=doubt) if doubt else estimate
 
     contact, loop = _stiffness(pooled, mass, stiffness), _loop_stiffness(record, ringing, pooled)
     return Transition(
@@ -174,7 +177,7 @@ def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float |
         stiffness=told(contact) if contact is not None else None,
         loop_stiffness=told(loop) if loop is not None else None,
         sticks=sticks,
-        status=_status(ringing, pooled),
+        status=_status(ringing, pooled, doubt),
     )  # fmt: skip
 
 
@@ -396,8 +399,8 @@ def _loop_stiffness(record: Record, ringing: Ringing, mode: _Mode) -> Estimate |
     return line.estimate(0, "contact stiffness by loops", "N/m", "friction on x and v in the rings")
 
 
-def _status(ringing: Ringing, pooled: _Mode) -> str:
-    words = [] if ringing.status == "ok" else [ringing.status]
+def _status(ringing: Ringing, pooled: _Mode, doubt: str) -> str:
+    words = [each for each in (doubt, ringing.sticks.status) if each not in ("", "ok")]
     silent = len(ringing.windows) - len(pooled.windows)
     if silent:
         words.append(f"{silent} of {len(ringing.windows)} sticks hold no ringing long enough")
