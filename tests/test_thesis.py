@@ -60,11 +60,15 @@ def test_every_number_of_a_chapter_is_shown(chapter: str) -> None:
     assert shown == set(numbers(chapter))
 
 
-@CHAPTERS
+@pytest.mark.parametrize("chapter", MOVED)
 def test_numbers_follow_from_the_parameters(chapter: str) -> None:
     section, name, number = MOVED[chapter]
     before, after = numbers(chapter)[number], page.module_of(chapter).numbers(moved(section, name))[number]
     assert abs(np.ravel(after)[-1] / np.ravel(before)[-1] - 1) > 1e-4
+
+
+def test_every_chapter_with_numbers_is_moved() -> None:
+    assert {table.chapter for table in printed.tables()} == set(MOVED)
 
 
 def test_what_differs_says_why() -> None:

@@ -25,6 +25,7 @@ CHAPTERS = {
     "6": "chapter6",
     "7": "chapter7",
     "appendices": "appendices",
+    "beyond": "beyond",
 }  # scripts
 VERDICTS = (SAME, CORRECTED, NOT_REPRODUCIBLE, CHANGED)
 TEMPLATE = "thesis.html.jinja"
