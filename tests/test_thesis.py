@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import doctest
 import functools
 import json
 import re
+import types
 from copy import deepcopy
 from pathlib import Path
 
@@ -71,6 +73,13 @@ def test_every_chapter_with_numbers_is_moved() -> None:
     assert {table.chapter for table in printed.tables()} == set(MOVED)
 
 
+@pytest.mark.parametrize("module", [printed, page])
+def test_the_examples_run(module: types.ModuleType) -> None:
+    results = doctest.testmod(module)
+    assert results.attempted
+    assert not results.failed
+
+
 def test_what_differs_says_why() -> None:
     for table in printed.tables():
         for row in table.rows:
@@ -112,6 +121,7 @@ def test_the_page_shows_tables_and_figures(folder: Path) -> None:
     text = (folder / "thesis.html").read_text("utf-8")
     assert text.count("<svg") == len(list((folder / "figures").glob("*.svg"))) > 10
     assert "Simulated response of MKCF system" in text
+    assert "decay: damping</dt><dd>0.2" in text, "what it starts from"
     assert re.search(r"0\.86728.*?0\.867277", text, flags=re.DOTALL)
     assert "http" not in re.sub(r"http://www\.w3\.org[\w/.]*", "", text), "it asks nothing of a network"
 

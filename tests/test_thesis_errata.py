@@ -93,7 +93,7 @@ def test_the_third_stop_of_case_1_is_none() -> None:
 
 def test_the_accelerometer_leads_so_it_is_read_late() -> None:
     record = chapter2.free_vibration(GIVEN)
-    late, early = (np.std(chapter2._left(GIVEN, record, sign)[400:-400]) for sign in (1, -1))
+    late, early = (np.std(chapter2.resultant(GIVEN, record, sign)[400:-400]) for sign in (1, -1))
     assert late < 0.15 < 0.5 < early
 
 

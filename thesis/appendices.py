@@ -16,6 +16,7 @@ from thesis.drawing import figure, panels, tag
 from thesis.printed import Given, Ours
 
 TITLE = "Appendices: the moving average, and the discharge of the load cell"
+STARTS_FROM = ("rig", "discharge")  # sections of given.toml
 
 
 def numbers(given: Given) -> Ours:

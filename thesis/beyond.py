@@ -17,6 +17,7 @@ from thesis.drawing import around, exact, figure, panels, tag
 from thesis.printed import Given, Ours
 
 TITLE = "Beyond the thesis: what section 8.2 leaves for future studies"
+STARTS_FROM = ("beyond", "stick_slip", "sliding")  # sections of given.toml
 
 
 def numbers(given: Given) -> Ours:

@@ -20,6 +20,7 @@ from thesis.printed import Given, Ours
 Array = NDArray[np.float64]
 
 TITLE = "The comparison of direct and indirect friction signals"
+STARTS_FROM = ("rig",)  # sections of given.toml
 SETTLED = 40.0  # s: the air track hardly damps
 
 
@@ -41,7 +42,7 @@ def plates(given: Given) -> Iterator[Plate]:
     """The chapter's figures."""
     words = "The virtual rig of chapter 2; amplitude and noise are ours."
     yield figure("2.2", _free_response(given), words)
-    late, early = (np.std(_left(given, free_vibration(given), sign)[400:-400]) for sign in (1, -1))
+    late, early = (np.std(resultant(given, free_vibration(given), sign)[400:-400]) for sign in (1, -1))
     yield figure(
         "2.3",
         _balance(given, free_vibration(given), smoothed=True),
@@ -164,7 +165,7 @@ def forces(given: Given, record: ss.Record, sign: int = 1) -> dict[str, Array]:
     return found | ({"excitation": told["spring"] * record["z"]} if "z" in record else {})
 
 
-def _left(given: Given, record: ss.Record, sign: int = 1) -> Array:
+def resultant(given: Given, record: ss.Record, sign: int = 1) -> Array:
     """What does not cancel: kS_3 - kS_1 - mS_2, the friction where there is a contact."""
     found = forces(given, record, sign)
     return found.get("excitation", 0.0) - found["spring"] - found["inertia"]
@@ -193,7 +194,7 @@ def _free_response(given: Given) -> Any:
 @styled
 def _balance(given: Given, record: ss.Record, *, smoothed: bool = False) -> Any:
     """Figures 2.3 to 2.6: the forces, and what is left of them."""
-    left = _left(given, record)
+    left = resultant(given, record)
     part = slice(40, 40 + round((1.0 if smoothed else 0.8) * record.fs))
     drawn, axes = panels(2 + smoothed, height=4.6 + smoothed)
     _draw_forces(given, record, axes[0], part)
@@ -211,7 +212,7 @@ def _balance(given: Given, record: ss.Record, *, smoothed: bool = False) -> Any:
 @styled
 def _both_forces(given: Given, record: ss.Record) -> Any:
     """Figures 2.7 to 2.10: the forces; F; its average F1; F2, of the load cell less the flange's inertia, averaged."""
-    computed = _left(given, record)
+    computed = resultant(given, record)
     felt = record["load"] - float(record.channels["load"].inertia) * record["a"]
     part = slice(40, 40 + round(record.fs))
     drawn, axes = panels(4, height=7.0)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TITLE = "The effects of tangential contact stiffness on a harmonically forced oscillator: pure sliding"
+STARTS_FROM = ("sliding", "schematic")  # sections of given.toml
 CASES = (0, 1, 2)  # 5.61, 8.7 and 11.1 Hz
 
 

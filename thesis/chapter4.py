@@ -20,6 +20,7 @@ from thesis.printed import Given, Ours
 Array = NDArray[np.float64]
 
 TITLE = "The effects of tangential contact stiffness on a harmonically forced oscillator: stick-slip"
+STARTS_FROM = ("stick_slip", "state_variable", "inertial")  # sections of given.toml
 FRICTIONS = (1.06, 1.10, 1.28)  # Table 3.2's, for the map of micro-slips
 DAMPINGS = np.linspace(0, 400, 81)
 

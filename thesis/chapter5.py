@@ -21,6 +21,7 @@ from thesis.printed import Given, Ours
 Array = NDArray[np.float64]
 
 TITLE = "Wavelet analysis of stick-slip in an oscillator with dry friction"
+STARTS_FROM = ("wavelet", "stick_slip")  # sections of given.toml
 CYCLES = 4
 
 

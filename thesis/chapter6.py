@@ -21,6 +21,7 @@ from thesis.printed import Given, Ours
 Array = NDArray[np.float64]
 
 TITLE = "Estimating Coulomb and viscous friction from free-vibration decrements"
+STARTS_FROM = ("decay", "errors", "paper", "bearing")  # sections of given.toml
 KINDS = ("random", "quantisation", "sampling")
 COUNT = 12  # extremes in Table 6.1
 FIRST = 2  # i of the tables

@@ -18,6 +18,7 @@ from thesis.printed import Given, Ours
 Array = NDArray[np.float64]
 
 TITLE = "Squeak mechanism of a rubber-on-steel contact"
+STARTS_FROM = ("squeak", "bearing")  # sections of given.toml
 CONDITIONS = (("dry", "heavy"), ("wet", "heavy"), ("dry", "light"), ("wet", "light"))
 SIGNALS = {
     "a": ("tangential acceleration [m/s²]", PURPLE), "friction": ("friction [N]", ORANGE),

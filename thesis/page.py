@@ -43,12 +43,15 @@ class Chapter:
         "6", and what it is about.
     tables : tuple of (Table, entries)
         For each entry of each row our number and the verdict.
+    start : mapping of str to mapping
+        What it starts from: sections of given.toml.
     plates : tuple of Plate
         Its figures.
     """
 
     name: str
     title: str
+    start: Given
     tables: tuple[tuple[Table, list[list[tuple[float | None, str]]]], ...]
     plates: tuple[Plate, ...] = ()
 
@@ -78,9 +81,8 @@ def run_chapter(name: str, *, start: Given | None = None, draw: bool = True, tel
         plates.append(drawn)
         if tell:
             tell(f"chapter {name}, {drawn.title.lower()}", len(plates))
-    return Chapter(
-        name, module.TITLE, tuple((t, judged(t, ours)) for t in tables() if t.chapter == name), tuple(plates)
-    )
+    verdicts = tuple((table, judged(table, ours)) for table in tables() if table.chapter == name)
+    return Chapter(name, module.TITLE, {each: start[each] for each in module.STARTS_FROM}, verdicts, tuple(plates))
 
 
 def module_of(name: str) -> ModuleType:
