@@ -106,11 +106,11 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=1_000_000)
     parser.add_argument("--frequencies", type=int, default=200)
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--together", type=int, help="frequencies of one call, where not all maps fit into memory")
+    parser.add_argument("--together", type=int, default=40, help="frequencies of one call: not all fit into memory")
     given = parser.parse_args()
     values = signal(given.samples)
     scales = ridge_centre(CENTRE, "energy") / (2 * np.pi * np.geomspace(HIGHEST, LOWEST, given.frequencies))
-    step = given.together or len(scales)
+    step = given.together
     calls = [scales[at : at + step] for at in range(0, len(scales), step)]
     peers = [candidates(values, some) for some in calls]
     seconds: dict[str, list[float]] = {name: [0.0] * given.rounds for name in peers[0]}
