@@ -229,3 +229,29 @@ def test_samples_that_were_filled_in_are_told() -> None:
     found = fit_curve(fill_missing(Record.of({"v": record["v"], "friction": lost}, fs=FS)), curve="coulomb")
     assert "40% of the samples were not measured" in found.status
     assert "measured" not in fit_curve(record, curve="coulomb").status
+
+
+def test_one_speed_one_way_tells_no_curve() -> None:
+    t = np.arange(8 * FS) / FS
+    rng = np.random.default_rng(0)
+    record = Record.of(
+        {"x": 5e-3 * t + rng.normal(0, 1e-7, t.size), "friction": 1 + rng.normal(0, 0.02, t.size)}, fs=FS
+    )
+    found = fit_curve(record, curve="coulomb")
+    assert "let it reverse" in found.status
+    assert "let the speed vary" in found.status
+    assert "constant force is not told" in found.parameters["kinetic"].status
+    for curve in ("stribeck", "viscous", "asymmetric", "dahl", "jenkins"):
+        with pytest.raises(EstimateError, match=r"let the speed vary|give a record that reverses"):
+            fit_curve(record, curve=curve)
+
+
+def test_what_is_no_record_of_friction_is_refused() -> None:
+    record = sweep(cycles=2)
+    with pytest.raises(RecordError, match="needs at least 50"):
+        fit_curve(record.rows(0, 1), curve="coulomb")
+    lost = Record.of({"v": record["v"], "friction": np.where(record.time == 0.5, np.nan, record["friction"])}, fs=FS)
+    with pytest.raises(RecordError, match=r"a value that is no number at row 500.*fill_missing"):
+        fit_curve(lost, curve="coulomb")
+    loud = fit_curve(sweep(noise=5.0), curve="coulomb")
+    assert "noise is above the friction" in loud.status

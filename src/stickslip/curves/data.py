@@ -23,6 +23,7 @@ from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 from stickslip.signals.differentiate import smooth
 from stickslip.signals.noise import noise_level
+from stickslip.units import prefixed
 
 Array = NDArray[np.float64]
 
@@ -105,6 +106,12 @@ class Samples:
         """Whether it moves both ways."""
         fastest = float(np.abs(self.velocity).max())
         return bool(min(self.velocity.max(), -self.velocity.min()) > REVERSED * fastest)
+
+
+def told(value: float, unit: str) -> str:
+    """A number to three figures, in a readable unit."""
+    factor, text = prefixed(value, unit)
+    return f"{factor * value:.3g} {text}"
 
 
 def require_resisting(samples: Samples) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -17,7 +18,7 @@ from stickslip.curves.family import Family, Member, best_member, model_error
 from stickslip.curves.velocity_step import velocity_step
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
-from stickslip.identify.loops import Loops
+from stickslip.identify.loops import LEAST_SPREAD, Loops
 from stickslip.laws.base import Law, finite
 from stickslip.laws.curved import CurvedLaw
 from stickslip.record.record import Record
@@ -32,6 +33,7 @@ MISSES = 0.1  # of the friction that is missed beyond noise and scatter, from wh
 FILLED = 0.1  # of the samples, that were not measured: more than that is worth a word
 LOST = 7.0  # half an interval of a logarithm from which on nothing is known of its number
 TIED = 0.99  # correlation of two parameters from which on they are told together alone
+ONE_WAY = "motion goes one way: a constant force is not told from friction"
 NOT_FOLLOWED = "of a curve that the friction does not follow"
 OVER_WAY = ("dahl", "jenkins", "iwan", "maxwell")
 POSITIVE = ("speed", "exponent", "width", "distance")  # found by their logarithm: so is their interval
@@ -282,11 +284,15 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
     for names, word in family.beware(found, samples):
         worries.append(word)
         found |= {name: replace(found[name], status=word) for name in names}
+    if family.along != "t" and not samples.reverses:
+        forces = [name for name, unit in family.units.items() if unit == "N" and name in found]
+        found |= {name: replace(found[name], status=ONE_WAY) for name in forces if found[name].status == "ok"}
     try:
         law = family.law(member.values)
     except ModelError as refused:
         law = None
-        worries.append(f"no law has these values: {refused.value}")
+        rounded = re.sub(r"\d+\.\d{6,}", lambda number: f"{float(number[0]):.6g}", refused.value)
+        worries.append(f"no law has these values: {rounded}")
     return CurveFit(
         curve=curve, parameters=found, law=law, formula=family.formula, unit=samples.force,
         residual=float(np.sqrt(np.mean(left**2))),
@@ -314,11 +320,14 @@ def _worries(member: Member, samples: Samples, along: str, missed: float) -> lis
     names, words = list(member.values), []
     cyclic = along != "t"
     if cyclic and samples.cycles < len(names):
-        words.append(f"{samples.cycles} cycles for {len(names)} parameters: give more of them")
+        many = f"{samples.cycles} cycle{'s' * (samples.cycles > 1)}"
+        words.append(f"{many} for {len(names)} parameters: give more of them")
     if samples.noise > float(np.sqrt(np.mean(member.fitted**2))):
         words.append("the friction's noise is above the friction: give more cycles, or a quieter sensor")
     if cyclic and not samples.reverses:
-        words.append("motion goes one way: a constant force is not told from friction; let it reverse")
+        words.append(f"{ONE_WAY}; let it reverse")
+    if along == "v" and samples.speed_spread < LEAST_SPREAD:
+        words.append("one speed alone: whether friction changes with speed is not told; let the speed vary")
     if cyclic and samples.drives:
         words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
     left = float(np.linalg.norm(samples.friction - member.fitted) / np.linalg.norm(samples.friction))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import FAST, compiled
-from stickslip.curves.data import Samples
+from stickslip.curves.data import Samples, told
 from stickslip.curves.family import Family
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
@@ -83,20 +83,20 @@ def _half_stroke(samples: Samples) -> float:
 def _beware(*, span: Callable[[dict[str, Estimate]], float]) -> Beware:
     """The friction where the motion is too short to slide, the stiffness where it is too coarse to give way."""
 
-    def told(found: dict[str, Estimate], samples: Samples) -> list[tuple[tuple[str, ...], str]]:
+    def beware(found: dict[str, Estimate], samples: Samples) -> list[tuple[tuple[str, ...], str]]:
         length, half, unit = span(found), _half_stroke(samples), samples.unit
         step = float(np.median(np.abs(np.diff(samples.displacement))))
         if length > SLIDES * half:
-            word = f"friction still rises {half:.3g} {unit} from the middle: larger strokes tell where it slides"
+            word = f"friction still rises {told(half, unit)} from the middle: larger strokes tell where it slides"
             return [(("kinetic",), word)]
         if length < step:
             word = (
-                f"it gives way within a sample's {step:.3g} {unit}: sample faster, or move slower, to tell how stiffly"
+                f"it gives way within a sample's {told(step, unit)}: sample faster, or move slower, to tell how stiffly"
             )
             return [(("stiffness",), word)]
         return []
 
-    return told
+    return beware
 
 
 DAHL = Family(
@@ -155,8 +155,8 @@ def maxwell_slip(samples: Samples, elements: int) -> Family:
         stiff = np.array([found[f"stiffness_{number}"] for number in range(1, len(yields) + 1)])
         return ElastoSlip(stiff.tolist(), (stiff * yields).tolist())
 
-    told = ", ".join(f"{each:.3g}" for each in yields)
+    places = ", ".join(f"{each:.3g}" for each in yields)
     units = UNITS | {f"stiffness_{number}": "N/m" for number in range(1, len(yields) + 1)}
-    formula = f"elements of stiffness_1 ... stiffness_{len(yields)} that slip at deflections of {told} m, and offset"
+    formula = f"elements of stiffness_1 ... stiffness_{len(yields)} that slip at deflections of {places} m, and offset"
     beware = _beware(span=lambda found: float(yields[-1]))
     return Family(formula, "x", columns, parameters, units, law, beware=beware)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.curves.data import Samples
+from stickslip.curves.data import Samples, told
 from stickslip.curves.family import Family
 from stickslip.estimate import Estimate
 from stickslip.laws.coulomb import Coulomb
@@ -67,10 +67,10 @@ def _beware(found: dict[str, Estimate], samples: Samples) -> list[tuple[tuple[st
     """What Stribeck's curve says where nothing slid, or where friction does not fall."""
     slowest, unseen = float(np.abs(samples.velocity).min()), ("static", "speed", "exponent")
     if found["static"].value - found["kinetic"].value <= found["static"].interval[1] - found["static"].value:
-        word = f"friction does not fall with speed above {slowest:.3g} {samples.unit}/s more than its scatter"
+        word = f"friction does not fall with speed above {told(slowest, f'{samples.unit}/s')} more than its scatter"
         return [(unseen, f"{word}: slide slower to tell a static friction and a Stribeck speed")]
     if slowest > found["speed"].value:
-        word = f"the slowest sliding, {slowest:.3g} {samples.unit}/s, is above the Stribeck speed: slide slower"
+        word = f"the slowest sliding, {told(slowest, f'{samples.unit}/s')}, is above the Stribeck speed: slide slower"
         return [(unseen, word)]
     return []
 
@@ -122,9 +122,9 @@ def table(samples: Samples, points: int) -> Family:
     def law(found: dict[str, float]) -> Tabulated:
         return Tabulated([0.0, *nodes], [found[names[0]], *(found[name] for name in names)])
 
-    told = ", ".join(f"{node:.3g}" for node in nodes)
+    places = ", ".join(f"{node:.3g}" for node in nodes)
     return Family(
-        f"f = F(|v|) sign(v) + offset, F a polygon through force_1 ... force_{points} at {told} m/s", "v", columns,
+        f"f = F(|v|) sign(v) + offset, F a polygon through force_1 ... force_{points} at {places} m/s", "v", columns,
         _parameters(*names), _named(*names, "offset"), law, fitted=lambda made, data: _monotone(made, data, points),
     )  # fmt: skip
 

@@ -15,6 +15,7 @@ from stickslip.reports.page import Section, render
 from stickslip.reports.summary import Line, Summary
 from stickslip.reports.words import doubts, interval_of, number, value_of
 
+LOUD = 0.3  # of the friction, that a curve leaves for noise
 UNITS = {"kinetic": "N", "static": "N", "speed": "m/s", "stiffness": "N/m", "damping": "N s/m", "steepness": "s/m"}
 
 
@@ -51,7 +52,8 @@ def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], 
         "length": ", ".join(f"{record.duration:g} s" for record in records),
     }  # fmt: skip
     told = result.status == "ok" or (isinstance(result, LawComparison) and result.status in result.verdict)
-    cautions = [*([] if told else [f"{result.status}."]), *doubts(result.estimates)]
+    unsaid = [each for each in result.estimates if each.status not in result.status]
+    cautions = [*([] if told else [f"{result.status}."]), *doubts(unsaid)]
     if isinstance(result, CurveFit):
         headline = [*_curve_told(result)]
         return Summary(name, headline, cautions, lines=lines, settings=settings,
@@ -64,8 +66,10 @@ def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], 
 
 
 def _curve_told(found: CurveFit) -> Iterator[str]:
-    follows = "follows" if found.follows else "does not follow"
-    yield f'The friction {follows} the curve "{found.curve}": {found.formula}.'
+    follows = "the friction follows" if found.follows else "the friction does not follow"
+    if found.follows and found.unexplained > LOUD:
+        follows = f"as far as its noise lets it be seen, {follows}"
+    yield f'{follows[0].upper()}{follows[1:]} the curve "{found.curve}": {found.formula}.'
     left = f"{found.unexplained:.1%} of the friction, {number(found.residual, found.residual / 100, found.unit)}"
     what = "It leaves" if found.follows else "The best of that kind leaves"
     yield f"{what} {left} root mean square; {found.model_error:.1%} is no noise."
