@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -113,3 +114,48 @@ def test_the_answer_says_what_made_it() -> None:
     assert found.kinetic.units == "N"
     other = ss.sweep(UNIT, {"kinetic": [0.5 * (1 + 1e-16 * 4)]}, settle=2, cycles=2)
     assert other.attrs["checksum"] != found.attrs["checksum"]
+
+
+def test_a_border_is_refined_with_few_runs_and_none_wrong() -> None:
+    slider = ss.scenarios.forced(0.8, 0.5)
+    coarse = {"frequency": np.linspace(0.08, 0.3, 9), "kinetic": np.linspace(0.1, 1.2, 9)}
+    found = ss.refine(slider, coarse, halvings=3, settle=200, cycles=10)
+    fine = {name: found[name].values for name in coarse}
+    whole = ss.sweep(slider, fine, measures=["stops"], settle=200, cycles=10)
+    for name in ("normal_stops", "abnormal_stops", "status"):
+        assert np.array_equal(np.round(found[name]), np.round(whole[name])), name
+    assert found.run.sum() < found.run.size / 5
+    with pytest.raises(ModelError, match="halvings = 0"):
+        ss.refine(slider, coarse, halvings=0)
+    with pytest.raises(ModelError, match="has 1 values"):
+        ss.refine(slider, {"kinetic": [0.5]})
+
+
+def test_a_design_tells_what_an_answer_depends_on() -> None:
+    pytest.importorskip("SALib")
+
+    def of_two(run: ss.Trajectory) -> float:
+        return run.system.mass + 2 * run.system.stiffness  # type: ignore[union-attr, operator, return-value]
+
+    points = ss.design({"mass": (1.0, 2.0), "stiffness": (1.0, 2.0), "kinetic": (0.1, 0.2)}, count=64)
+    assert len(points) == 64 * 5
+    found = ss.sensitivity(ss.sweep(UNIT, points, measures=[of_two], settle=0, cycles=1), variable="of_two")
+    for name, share in (("mass", 0.2), ("stiffness", 0.8), ("kinetic", 0.0)):  # variances 1 : 4 : 0
+        assert found[name]["total"].value == pytest.approx(share, abs=0.03)
+        assert found[name]["first"].value == pytest.approx(share, abs=0.05)
+    with pytest.raises(ModelError, match="power of two"):
+        ss.design({"mass": (1.0, 2.0)}, count=3)
+    with pytest.raises(ModelError, match="lowest and a higher"):
+        ss.design({"mass": (2.0, 1.0)}, count=4)
+    random = ss.sweep(UNIT, ss.design({"mass": (1.0, 2.0)}, count=5, kind="random"), settle=0, cycles=1)
+    with pytest.raises(ss.EstimateError, match="Sobol design"):
+        ss.sensitivity(random, variable="amplitude")
+
+
+def test_a_map_that_does_not_fit_is_refused_before_it_starts(tmp_path: Path) -> None:
+    grid = {name: np.linspace(1, 2, 50_000) for name in ("kinetic", "mass", "stiffness")}
+    with pytest.raises(ModelError, match=r"125000000000000 points.*memory"):
+        ss.sweep(UNIT, grid)
+    with pytest.raises(ModelError, match=r"125000000000000 points.*disk"):
+        ss.sweep(UNIT, grid, store=tmp_path / "map.zarr")
+    assert not list(tmp_path.iterdir())

@@ -249,6 +249,8 @@ if TYPE_CHECKING:
     from stickslip.squeak.limit_cycle import LimitCycle as LimitCycle, limit_cycle as limit_cycle
     from stickslip.squeak.virtual_rig import squeak_rig as squeak_rig
     from stickslip.sweeps.grid_file import SweepFile as SweepFile, read_sweep as read_sweep
+    from stickslip.sweeps.design import design as design, sensitivity as sensitivity
+    from stickslip.sweeps.refine import refine as refine
     from stickslip.sweeps.sweep import sweep as sweep
     from stickslip.plot.maps import plot_map as plot_map
     from stickslip.structure import Contact as Contact, Structure as Structure
@@ -324,6 +326,7 @@ _ROOMS = {
     "InSeries": "laws.series", "TimeDelay": "laws.time_delay",
     "Stribeck": "laws.stribeck", "FrictionCurve": "laws.stribeck", "Dahl": "laws.dahl", "LuGre": "laws.lugre",
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
+    "refine": "sweeps.refine", "design": "sweeps.design", "sensitivity": "sweeps.design",
     "sweep": "sweeps.sweep", "SweepFile": "sweeps.grid_file", "read_sweep": "sweeps.grid_file", "plot_map": "plot.maps",
     "squeak_rig": "squeak.virtual_rig", "sound_pressure": "squeak.sound", "squeak_record": "squeak.sound",
     "find_squeaks": "squeak.bursts", "Squeaks": "squeak.bursts", "Squeak": "squeak.bursts",

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import os
+import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -77,7 +80,7 @@ def sweep(
     ------
     ModelError
         The grid is empty or names a parameter that the system does not have; a measure or an engine is unknown; the
-        store holds something else.
+        map fits neither memory nor disk; the store holds something else.
     SolveError
         The store can not be written or another process writes there; no scheduler answers.
 
@@ -93,6 +96,7 @@ def sweep(
     required("xarray")
     run, address = read_engine(engine)
     plan = planned(system, grid, measures=measures, cycles=cycles, settle=settle, start=start)
+    require_room(plan, store)
     with nullcontext(Memory(plan)) if store is None else Store(store, plan) as kept:
         before, status = len(kept.missing), "complete"
         try:
@@ -137,6 +141,29 @@ def planned(
             "measure with a function of the Trajectory",
         )
     return plan
+
+
+def require_room(plan: Plan, store: str | Path | None) -> None:
+    """Refuse a map that fits neither this machine's memory nor, with a store, the disk there."""
+    need = plan.size * sum(np.dtype(variable.dtype).itemsize for variable in plan.variables.values())
+    place = Path(store or ".").absolute()
+    while not place.exists():
+        place = place.parent
+    room = {"memory": _memory()} if store is None else {"disk": float(shutil.disk_usage(place).free)}
+    for word, size in room.items():
+        if need > size:
+            raise ModelError(
+                f"{plan.size} points take {need / 1e9:.3g} GB, and the {word} has {size / 1e9:.3g} GB",
+                "a map fits where it is kept", "ask for fewer points or measures",
+            )  # fmt: skip
+
+
+def _memory() -> float:
+    """Memory of this machine [bytes]; infinite where it does not tell."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return math.inf
 
 
 class Memory:

@@ -1,0 +1,131 @@
+"""Points spread over ranges of parameters, and which parameter an answer depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import Estimate
+from stickslip.sweeps.plan import required
+
+DESIGNS = ("sobol", "random")
+
+
+def design(
+    bounds: Mapping[str, tuple[float, float]], *, count: int, kind: str = "sobol", seed: int = 0
+) -> list[dict[str, float]]:
+    """Which points tell how an answer depends on several parameters?
+
+    Parameters
+    ----------
+    bounds : mapping
+        Lowest and highest value by parameter.
+    count : int
+        Of a Sobol design the number of base samples, a power of two: it has ``count * (k + 2)`` points for k
+        parameters, as :func:`sensitivity` needs them. Of a random one the number of points.
+    kind : {"sobol", "random"}
+        Saltelli's extension of Sobol's sequence (SALib), or independent uniform numbers.
+    seed : int
+        The same seed, the same points.
+
+    Returns
+    -------
+    list of dict
+        A grid for :func:`sweep`.
+
+    Raises
+    ------
+    ModelError
+        A range has no width, the kind is unknown, or the count is none.
+
+    Examples
+    --------
+    >>> points = design({"kinetic": (0.5, 1.5), "mass": (1.0, 2.0)}, count=8)
+    >>> len(points), sorted(points[0])
+    (32, ['kinetic', 'mass'])
+    """
+    names = list(bounds)
+    ranges = np.array([tuple(bounds[name]) for name in names], dtype=np.float64).reshape(len(names), -1)
+    if not names or ranges.shape[1] != 2 or not np.all(ranges[:, 0] < ranges[:, 1]) or not np.all(np.isfinite(ranges)):
+        raise ModelError(
+            f"bounds = {dict(bounds)}", "each parameter has a lowest and a higher finite value", "give both"
+        )
+    if kind not in DESIGNS:
+        raise ModelError(f"no design is called '{kind}'", f"there are {', '.join(DESIGNS)}", "choose one of them")
+    if not (isinstance(count, int | np.integer) and count >= 1):
+        raise ModelError(f"count = {count}", "a design has one point at least", "raise count=")
+    if kind == "random":
+        rows = np.random.default_rng(seed).uniform(ranges[:, 0], ranges[:, 1], (count, len(names)))
+    elif count & (count - 1):
+        raise ModelError(f"count = {count}", "a Sobol design has a power of two base samples", "take 64, 128, 256 ...")
+    else:
+        required("SALib")
+        from SALib.sample import sobol
+
+        problem = {"num_vars": len(names), "names": names, "bounds": ranges.tolist()}
+        rows = sobol.sample(problem, count, calc_second_order=False, seed=seed)
+    return [dict(zip(names, map(float, row), strict=True)) for row in rows]
+
+
+def sensitivity(atlas: Any, *, variable: str, seed: int = 0) -> dict[str, dict[str, Estimate]]:
+    """How much of an answer's variance is each parameter's?
+
+    Sobol's indices: the share of the variance that a parameter has alone ("first") and with all others together
+    ("total").
+
+    Parameters
+    ----------
+    atlas : xarray.Dataset
+        A sweep over the points of a Sobol :func:`design`.
+    variable : str
+        Which of its variables.
+    seed : int
+        Of the bootstrap that gives the intervals.
+
+    Returns
+    -------
+    dict
+        By parameter, the Estimates "first" and "total" with their 95 % intervals.
+
+    Raises
+    ------
+    EstimateError
+        The sweep was not over a Sobol design, the answer is not known at every point, or it is the same at all.
+
+    Examples
+    --------
+    >>> from stickslip import scenarios, sweep
+    >>> points = design({"kinetic": (0.1, 0.4), "mass": (0.9, 1.1)}, count=16)
+    >>> atlas = sweep(scenarios.forced(0.6, 0.2), points, measures=["energy"], settle=40, cycles=4)
+    >>> shares = sensitivity(atlas, variable="energy")
+    >>> shares["kinetic"]["total"].value > shares["mass"]["total"].value
+    True
+    """
+    required("SALib")
+    from SALib.analyze import sobol
+
+    names = [str(name) for name in atlas.coords]
+    answers = np.asarray(atlas[variable].values, dtype=np.float64) if variable in atlas else np.zeros(0)
+    base, rest = divmod(len(answers), len(names) + 2) if atlas.sizes.keys() == {"point"} else (0, 1)
+    if rest or base < 2 or base & (base - 1):
+        raise EstimateError(f"{len(answers)} points of '{variable}' over {', '.join(names)}",
+                            "the indices need the points of a Sobol design", "sweep over design(...)")  # fmt: skip
+    if not np.all(np.isfinite(answers)) or np.ptp(answers) == 0:
+        raise EstimateError(f"{variable} is not known at every point, or the same at all",
+                            "a share of a variance needs one", "narrow the bounds, or ask another")  # fmt: skip
+    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
+    found = sobol.analyze(problem, answers, calc_second_order=False, seed=seed)
+    return {
+        name: {
+            words: _share(f"{words} Sobol index of {name}", found[key][j], found[f"{key}_conf"][j])
+            for words, key in (("first", "S1"), ("total", "ST"))
+        }
+        for j, name in enumerate(names)
+    }
+
+
+def _share(name: str, value: Any, half: Any) -> Estimate:
+    return Estimate.normal(name, float(value), sd=float(half) / 1.96, unit="1", method="Saltelli's design, bootstrap")
