@@ -274,7 +274,14 @@ class Problem:
         return np.concatenate([*columns, off / unsure])
 
 
-def descend(problem: Problem, point: Point, *, passes: int = PASSES, tell: Callable[[], None] | None = None) -> Point:
+def descend(
+    problem: Problem,
+    point: Point,
+    *,
+    passes: int = PASSES,
+    settled: float = SETTLED,
+    tell: Callable[[], None] | None = None,
+) -> Point:
     """Levenberg and Marquardt's descent, each stretch's start eliminated from the common step."""
     damping = DAMPED
     for _ in range(passes):
@@ -292,7 +299,7 @@ def descend(problem: Problem, point: Point, *, passes: int = PASSES, tell: Calla
                 damping, point = max(1e-9, damping / 10), tried
                 break
             damping *= 10
-        if before - point.chi2 < max(SETTLED, SHARE * before):
+        if before - point.chi2 < max(settled, SHARE * before):
             return point
     return point
 

@@ -57,6 +57,7 @@ SAID = {
     "LuGre": "that of bristles (LuGre)",
 }
 BAD = 0.3  # of a channel's own size: a law that leaves more beyond the noise describes little
+RETUNED = 8  # times that mounts and law are found in turn
 LEFT = 0.05  # of it: so much comes of more than the chance that an interval knows
 OFF = 0.05  # of a gain, beyond which it is no calibration's error
 
@@ -260,12 +261,12 @@ def compare_laws(
                 found[name] = trial
         return found
 
-    rough, silent = tried(_apart(kinds), 2, {}), dict[str, float]()
+    rough, silent, stated = tried(_apart(kinds), 2, {}), dict[str, float](), shown
     if rough:
         nearest = min(rough.values(), key=lambda each: each.point.chi2)
         silent = unexplained(nearest, shown)
         shown = [replace(each, channels=tuple(n for n in each.channels if n not in silent)) for each in shown]
-        shown = tuned(shown, nearest, stretch, tell)
+        stated, shown = shown, tuned(shown, nearest, stretch, tell)
     trials = tried(kinds, PASSES, {} if silent else rough)
     if not trials:
         raise EstimateError(
@@ -283,8 +284,15 @@ def compare_laws(
         ahead = squares(predicted(trial, tell)) if leave_out and len(records) > 1 and near else None
         misfits.append(Misfit(trial.name, trial.count, left, ahead, trial.excess, trial.stiff))
     told, confidence = standings(misfits, evidence, excess=rigid, calibration=calibration)
+    best = trials[told[0].name]
+    for _ in range(RETUNED if rough else 0):  # the mounts by the law that was found, not by the first look
+        before, shown = shown, tuned(stated, best, stretch, tell)
+        if [each.record.channels for each in before] == [each.record.channels for each in shown]:
+            break
+        again = resumed(best, [stretch(each, number) for number, each in enumerate(shown)], math.inf, PASSES, tell)
+        best = again or best
     whole = [weighed(each, number, calibration, whole=True) for number, each in enumerate(shown)]
-    fit = _fit(trials[told[0].name], shown, whole, tell)
+    fit = _fit(best, shown, whole, tell)
     doubt = _doubt(fit, calibration)
     if doubt:
         told, confidence = undescribed(told), 0.0
@@ -317,7 +325,9 @@ def _left(trial: Trial) -> dict[str, float]:
 def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tell: Callable[[], None]) -> LawFit:
     """The law's parameters with their intervals, by all readings; of its misfit the noise alone is the measure."""
     problem = replace(trial.problem, stretches=tuple(stretches))
-    point = descend(problem, problem.at(trial.point.u, problem.own(trial.point.starts)), passes=2, tell=tell)
+    begun = problem.at(trial.point.u, problem.own(trial.point.starts))
+    # channels counted by their calibration leave a sum of squares that is small, and by far more than it can settle
+    point = descend(problem, begun, passes=PASSES, settled=0.0, tell=tell)
     with np.errstate(all="ignore"):  # of a parameter without effect
         fit = answered(problem, point, surety(problem, point, tell), shown)
     noise = {name: max(each.noise(name) for each in shown if name in each.channels) for name in fit.residual}
