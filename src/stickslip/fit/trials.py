@@ -29,7 +29,7 @@ FINALISTS = 2  # starts that are followed
 CONTENDING = 10.0  # times the least misfit of the others: a law beyond is not followed to its end
 PASSES, FEW = 12, 3  # of a descent: of a law, and of one that stands near its end
 EXCESSES = (0.0, 0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.32, 0.5)
-RIGID = 1e-3  # of the smallest stroke, by which a contact gives way that can hardly be told from a rigid one
+RIGID = 1e-2  # of the smallest stroke, by which a contact gives way that counts as rigid where a rigid law does as well
 STIFFEST = 1e-5  # of the stroke: what a contact that is next to rigid gives way
 FALLS = (0.01, 0.05)  # of the largest speed, within which a Stribeck curve falls
 TURNS = 24  # of the motion, after which a record tells laws apart no better
@@ -67,13 +67,13 @@ class Trial:
 
     @property
     def stiff(self) -> bool:
-        """Whether the contact gives way next to nothing of the smallest stroke."""
+        """Whether friction is there before the contact has moved by a noticeable part of the smallest stroke."""
         law: Any = self.system.law
-        stiffness, stroke = (
-            getattr(law, "stiffness", None),
-            min(float(each.scales[0]) for each in self.problem.stretches),
-        )
-        return stiffness is not None and law.kinetic < RIGID * stiffness * stroke
+        scales = np.array([each.scales for each in self.problem.stretches])
+        stroke, fastest = scales.min(axis=0)
+        if hasattr(law, "stiffness"):
+            return bool(law.kinetic < RIGID * stroke * law.stiffness)
+        return hasattr(law, "rate") and bool(fastest < RIGID * stroke * law.rate * law.kinetic)
 
     @property
     def left(self) -> Left:
