@@ -300,7 +300,10 @@ def compare_laws(
         rigid = _excess(fit)
     if progress:
         progress(1.0)
-    candidates = tuple(Candidate(each, trials[each.name].system, _left(trials[each.name])) for each in told)
+    candidates = tuple(
+        Candidate(each, fit.oscillator if each is told[0] else trials[each.name].system, _left(trials[each.name]))
+        for each in told
+    )
     return _answer(candidates, confidence, fit, rigid, calibration, records, doubt, silent)
 
 

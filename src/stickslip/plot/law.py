@@ -104,12 +104,11 @@ def plot_fit(comparison: LawComparison, *, record: int = 0) -> Figure:
         ax.plot(*envelope(time[near], factor * fitted[near]), color=ORANGE, linewidth=1.0, linestyle="--",
                 label=f"fitted: {comparison.best.name}")  # fmt: skip
         ax.set_ylabel(axis_label(words, unit, "\n"))
-        size = float(np.std(measured)) or 1.0
-        share = 100 * (measured - fitted)[near] / size
-        below.plot(*envelope(time[near], share), color=colour, linewidth=0.8, label=words)
+        left = (measured - fitted)[near] / comparison.fit.noise[name]
+        below.plot(*envelope(time[near], left), color=colour, linewidth=0.8, label=words)
     axes[0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
     below.axhline(0, color=FAINT, linewidth=0.8)
-    below.set(xlabel="time [s]", ylabel="left over\n[% of size]")
+    below.set(xlabel="time [s]", ylabel="left over,\ntimes the noise")
     below.legend(ncols=len(names), loc="upper right")
     figure.align_ylabels(list(axes))
     return figure
