@@ -103,6 +103,32 @@ def test_each_mechanism_is_told_by_switching_it_off() -> None:
     assert both.without_coupling < 0
 
 
+@pytest.mark.parametrize(
+    ("damping", "stiffness"),
+    [
+        ([[-1, 0], [0, 0.1]], [[23, 4], [4, 8]]),
+        ([[0, 0.5], [0.5, 0]], [[23, 4], [4, 8]]),
+        (np.zeros((2, 2)), [[-23, 0], [0, 8]]),
+    ],
+)
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_what_grows_without_friction_is_the_structure(damping: Any, stiffness: Any, friction: float) -> None:
+    pad = ss.Contact(ss.Coulomb(friction), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    found = ss.stability(ss.Structure(np.eye(2), damping, stiffness, contacts=[pad], drive=ss.Belt(1.0)))
+    assert not found.stable
+    assert found.mechanism == "the structure itself"
+
+
+def test_one_mass_neither_couples_nor_jams() -> None:
+    fed = ss.stability(block(ss.Coulomb(1.0)).having(damping=-0.3))
+    assert fed.mechanism == "the structure itself"
+    steep = ss.stability(block(ss.LinearSlope(10.0, slope=-5.0)))
+    assert (steep.frequency, steep.mechanism) == (0.0, "falling friction")
+    buckles = lambda k: ss.Structure(np.eye(2), np.zeros((2, 2)), [[k, 0], [0, 8.0]], contacts=inclined().contacts)  # noqa: E731
+    found = ss.critical_value(buckles(1.0), buckles, between=(-1.0, 1.0), speed=1.0)
+    assert (found.value, found.frequency) == (pytest.approx(0.0, abs=1e-9), 0.0)
+
+
 def test_a_slope_counts_with_the_load() -> None:
     damped = inclined(0.0, slope=-0.01).having(damping=0.05 * np.eye(2))
     found = ss.critical_value(damped, "preload", between=(0.1, 50.0))

@@ -26,7 +26,7 @@ Matrices = tuple[Array, Array, Array]
 System = Oscillator | Structure
 
 ROUNDING = 1e-11  # of the largest eigenvalue: growth below it is none
-JAMS = "jamming"
+JAMS, ITSELF = "jamming", "the structure itself"
 FINEST = 4 * float(np.finfo(float).eps)
 SCANNED = 256  # values between which a threshold is looked for before it is closed in on
 
@@ -68,8 +68,9 @@ class Stability:
         Those that grow fastest first.
     mechanism : str
         "stable", or what feeds the growth: "mode coupling", "falling friction", "mode coupling and falling friction
-        together" (neither alone is enough), "mode coupling, and falling friction too" (each alone is enough), or
-        "jamming" (the contact draws itself in without oscillating, as a sprag does).
+        together" (neither alone is enough), "mode coupling, and falling friction too" (each alone is enough),
+        "jamming" (the contact draws itself in without oscillating, as a sprag does), or "the structure itself" (it
+        grows without any friction: dampers that feed it, springs that buckle).
     growth : float
         Fastest growth [1/s].
     without_coupling, without_slope : float
@@ -195,12 +196,13 @@ def stability(system: System, *, speed: float | None = None) -> Stability:
     falls = sum((r.slope * np.outer(r.tangent, r.tangent) for r in rubbing), np.zeros_like(mass))
     whole = (mass, damping + falls, pressed + follows)
     uncoupled, unsloped = (mass, damping + falls, pressed), (mass, damping, pressed + follows)
+    bare = (mass, damping, pressed)
     modes = _modes(whole)
     place, loads, status = _rest(pressed + follows, rubbing)
     return Stability(
         stable=margin(whole) <= ROUNDING,
         modes=modes,
-        mechanism=_mechanism(whole, uncoupled, unsloped, modes),
+        mechanism=_mechanism(whole, bare, uncoupled, unsloped, modes),
         growth=modes[0].growth,
         without_coupling=_modes(uncoupled)[0].growth,
         without_slope=_modes(unsloped)[0].growth,
@@ -278,7 +280,7 @@ def critical_value(
     signed = all(abs(excess(end)) > ROUNDING for end in ends) and excess(ends[0]) * excess(ends[1]) < 0
     value = float(brentq(excess, *ends, xtol=1e-300, rtol=FINEST)) if signed else _bisected(excess, *ends)
     beyond = stability(at(ends[0] if signs[first] else ends[1]), speed=speed)
-    frequency = 0.0 if beyond.mechanism == JAMS else _marginal_frequency(_whole(at(value), speed))
+    frequency = 0.0 if beyond.frequency == 0 else _marginal_frequency(_whole(at(value), speed))
     return Threshold(value, frequency, beyond.mechanism, not signs[first])
 
 
@@ -400,12 +402,16 @@ def _marginal_frequency(matrices: Matrices) -> float:
     return math.sqrt(abs((a + b).real) / 2) / (2 * math.pi)
 
 
-def _mechanism(whole: Matrices, uncoupled: Matrices, unsloped: Matrices, modes: Sequence[SlidingMode]) -> str:
+def _mechanism(
+    whole: Matrices, bare: Matrices, uncoupled: Matrices, unsloped: Matrices, modes: Sequence[SlidingMode]
+) -> str:
     if margin(whole) <= ROUNDING:
         return "stable"
-    if modes[0].frequency == 0:
-        return JAMS
+    if margin(bare) > ROUNDING:
+        return ITSELF
     grows_by_slope, grows_by_coupling = margin(uncoupled) > ROUNDING, margin(unsloped) > ROUNDING
+    if modes[0].frequency == 0 and grows_by_coupling:
+        return JAMS
     if grows_by_slope and grows_by_coupling:
         return "mode coupling, and falling friction too"
     if not grows_by_slope and not grows_by_coupling:
