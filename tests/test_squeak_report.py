@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -77,6 +78,42 @@ def test_a_condition_says_what_drove_it() -> None:
     assert each.stroke == pytest.approx((x.max() - x.min()) / 2)
     assert each.rate == pytest.approx(each.count / 2.0)
     assert each.to_dict()["trend"] == each.trend
+
+
+def of_sound(values: np.ndarray, name: str) -> ss.SqueakFindings:
+    return ss.analyze_squeaks(ss.Record.of({"sound": values}, fs=FS), name=name)
+
+
+def test_what_creaks_or_whistles_is_not_called_silent() -> None:
+    t = np.arange(int(FS)) / FS
+    creak = np.exp(-np.mod(t, 1 / 25) / 0.002) * np.random.default_rng(3).standard_normal(len(t))
+    whistle = np.sin(2 * np.pi * 800 * t) * np.exp(-(((t - 0.5) / 0.2) ** 2)) + 1e-3 * creak
+    found = [
+        of_sound(*each) for each in ((tone(), "Chalk"), (creak * (t > 0.1) * (t < 0.9), "Door"), (whistle, "Pipe"))
+    ]
+    together = ss.compare_squeaks(found)
+    assert [each.answer for each in together.conditions] == ["squeals", "does not squeak", "can not be told"]
+    assert together.verdicts == ("Chalk squeals; Door does not squeak.", "Whether Pipe squeaks can not be told.")
+    assert [row[5] for row in ss.summary(together).tables[0].rows][1:] == ["none", "can not be told"]
+    assert ss.compare_squeaks(found[1:2] * 2).verdicts == ("No condition squeaks.",)
+    assert ss.compare_squeaks(found[2:] * 2).verdicts == ("Whether Pipe and Pipe squeak can not be told.",)
+
+
+def test_no_squeak_is_said_with_what_sounds_instead() -> None:
+    told = ss.summary(findings("dry", 6.13)).headline
+    count = len(findings("dry", 6.13).squeaks.bursts)
+    assert told[0] == f"No squeak. {count} bursts, tonal, with no sign of friction."
+
+
+def test_friction_falls_too_only_where_it_is_known_to_fall_in_what_squeaks() -> None:
+    pair = findings("wet", 6.13), findings("wet", 1.23)
+    slope = pair[0].loops.slope
+    for low, too in ((-3.0, True), (-4.0, False)):
+        ends = replace(slope, value=-2.0, interval=(low, -4.0 - low))
+        squeaking = replace(pair[0], loops=replace(pair[0].loops, slope=ends))
+        (told,) = (each for each in ss.compare_squeaks([squeaking, pair[1]]).verdicts if "falls" in each)
+        assert (" too," in told) == too
+        assert "a falling friction alone is not enough" in told
 
 
 def test_one_record_is_no_comparison() -> None:

@@ -96,6 +96,35 @@ def test_the_sampling_rate_does_not_matter(fs: float) -> None:
     assert found.start == pytest.approx(0.354, abs=0.015)
 
 
+@pytest.mark.parametrize(
+    ("orders", "length", "words"),
+    [
+        ((1,), 0.4, "no overtone in a whole ratio"),
+        ((1, 2), 0.4, "one overtone in a whole ratio"),
+        ((1, 2, 3), 0.4, "2 overtones in whole ratios"),
+        ((1, 2, 3), 0.08, "cycles, and whole ratios are told in 100"),
+    ],
+)
+def test_a_tone_says_which_reason_it_was(orders: tuple[int, ...], length: float, words: str) -> None:
+    t = np.arange(10_000) / FS
+    envelope = np.exp(-((np.maximum(0, np.abs(t - 0.5) - length / 2) / 0.01) ** 2))
+    wave = sum(np.sin(2 * np.pi * order * 700 * t) / order**2 for order in orders)
+    sound = envelope * wave + 1e-4 * np.random.default_rng(0).standard_normal(len(t))
+    (found,) = ss.find_squeaks(ss.Record.of({"sound": sound}, fs=FS)).bursts
+    assert words in found.evidence
+    assert found.kind == ("squeal" if words.startswith("2") else "tonal")
+
+
+@pytest.mark.parametrize(("centre", "words"), [(1.25, "nothing slides meanwhile"), (1.36, "% of it, less than")])
+def test_what_sounds_while_the_motion_dwells_says_how_much_of_it_slides(centre: float, words: str) -> None:
+    t = np.arange(30_000) / FS
+    ring = np.exp(-(((t - centre) / 0.06) ** 8)) * np.sin(2 * np.pi * 900 * t)
+    record = ss.Record.of({"x": 3e-3 * np.clip(2 * np.sin(2 * np.pi * t), -1, 1), "sound": ring}, fs=FS)
+    (found,) = ss.find_squeaks(record).bursts
+    assert words in found.evidence
+    assert (found.kind, found.friction) == ("tonal", "no")
+
+
 def test_pulses_at_even_intervals_are_a_creak() -> None:
     t = np.arange(20_000) / 20_000
     rng = np.random.default_rng(3)

@@ -157,7 +157,6 @@ class _Structure(BaseModel):
     damping: list[list[Damping]] | None = None
     acts_on: list[float] | None = None
     damper: Literal["ground", "base"] = "ground"
-    rotations: list[int] = []
 
 
 class _Contact(BaseModel):

@@ -34,6 +34,8 @@ class Condition:
         Change of the sliding friction with speed; below zero where it falls.
     coefficient, slope_of_coefficient : Estimate or None
         Both over the normal load, where it is known.
+    answer : str
+        Whether it "squeaks", "squeals" or "does not squeak", or that this "can not be told", as :attr:`Squeaks.answer`.
     kind : str
         What most of the sounding time is, as :attr:`Squeaks.kind`.
     count : int
@@ -56,6 +58,7 @@ class Condition:
     slope: Estimate | None
     coefficient: Estimate | None
     slope_of_coefficient: Estimate | None
+    answer: str
     kind: str
     count: int
     rate: float
@@ -120,7 +123,7 @@ def compare_squeaks(findings: Sequence[SqueakFindings]) -> SqueakComparison:
     Each record is a condition: wet or dry, light or heavy, as in the thesis's figures 7.3 and 7.6. Of each are told the
     excitation, the friction and its slope against speed with their intervals, and the squeaks. What the conditions say
     together holds for these records: which squeak; whether friction that falls with speed, found in a condition that is
-    silent, is too little for a squeak; and whether one squeaks in which it rises.
+    not heard to squeak, is too little for one; and whether one squeaks in which it rises.
 
     Parameters
     ----------
@@ -164,33 +167,44 @@ def _condition(found: SqueakFindings) -> Condition:
         stroke=float(np.nanmax(record[path]) - np.nanmin(record[path])) / 2 if path else float("nan"),
         level=None if loops is None else loops.level, slope=None if loops is None else loops.slope,
         coefficient=found.coefficient, slope_of_coefficient=found.slope_of_coefficient,
-        kind=squeaks.kind, count=len(heard), rate=len(heard) / record.duration, frequency=found.frequency,
-        sound=max(levels, default=float("nan")), reference=squeaks.reference,
+        answer=squeaks.answer, kind=squeaks.kind, count=len(heard), rate=len(heard) / record.duration,
+        frequency=found.frequency, sound=max(levels, default=float("nan")), reference=squeaks.reference,
     )  # fmt: skip
 
 
 def _verdicts(conditions: Sequence[Condition]) -> list[str]:
+    """Which squeak, and what their slopes say of that."""
     loud = [each for each in conditions if each.squeaks]
-    silent = [each for each in conditions if not each.squeaks]
-    if not loud:
+    quiet, untold = _answering(conditions, "does not squeak"), _answering(conditions, "can not be told")
+    if not loud and not untold:
         return ["No condition squeaks."]
-    told = [f"{_names(loud)} squeak{'s' if len(loud) == 1 else ''}; {_names(silent) or 'none'} {_be(silent)} silent."]
-    falling = [each for each in silent if each.trend == "falls"]
-    if falling:
+    heard = [
+        *_say(_answering(conditions, "squeaks"), "squeaks", "squeak"),
+        *_say(_answering(conditions, "squeals"), "squeals", "squeal"),
+        *_say(quiet, "does not squeak", "do not squeak"),
+    ]
+    told = [f"{'; '.join(heard)}."] if heard else []
+    told += [f"Whether {words} can not be told." for words in _say(untold, "squeaks", "squeak")]
+    falling = [each for each in quiet if each.trend == "falls"]
+    if loud and falling:
+        too = " too" if all(each.trend == "falls" for each in loud) else ""
         told.append(
-            f"Friction falls with speed in {_names(falling)} too, and nothing squeaks there: a falling friction "
+            f"Friction falls with speed in {_names(falling)}{too}, and nothing squeaks there: a falling friction "
             "alone is not enough."
         )
     rising = [each for each in loud if each.trend == "rises"]
-    if rising:
-        told.append(f"{_names(rising)} squeak{'s' if len(rising) == 1 else ''} though friction rises with speed.")
-    return told
+    return told + [f"{words} though friction rises with speed." for words in _say(rising, "squeaks", "squeak")]
+
+
+def _answering(conditions: Sequence[Condition], answer: str) -> list[Condition]:
+    return [each for each in conditions if each.answer == answer]
+
+
+def _say(conditions: Sequence[Condition], one: str, several: str) -> list[str]:
+    """The conditions with a verb; nothing where there are none."""
+    return [f"{_names(conditions)} {several if len(conditions) > 1 else one}"] if conditions else []
 
 
 def _names(conditions: Sequence[Condition]) -> str:
     names = [each.name for each in conditions]
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-
-
-def _be(conditions: Sequence[Condition]) -> str:
-    return "are" if len(conditions) > 1 else "is"

@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from stickslip.squeak.bursts import Squeak, Squeaks
     from stickslip.squeak.spectra import BurstSpectra
 
+MARKS = {
+    "squeaks": (ORANGE, "D"), "squeals": (ORANGE, "D"), "does not squeak": (BLUE, "o"), "can not be told": (FAINT, "s"),
+}  # fmt: skip
 COLOURS = {"squeak": ORANGE, "squeal": ORANGE, "creak": PURPLE, "scrape": GREEN, "tonal": BLUE, "noise": FAINT}
 TRACED = {
     "v": GREEN, "a": BLUE, "normal_acceleration": BLUE, "torsion_velocity": PURPLE, "friction": ORANGE, "load": PURPLE,
@@ -262,7 +265,7 @@ def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
 def plot_conditions(comparison: SqueakComparison) -> Figure:
     """Friction and its slope against speed in each condition, with their 95 % intervals; where it squeaks is orange.
 
-    Both over the load, where it is known in every condition.
+    Grey where that can not be told. Both over the load, where it is known in every condition.
 
     Parameters
     ----------
@@ -289,10 +292,9 @@ def plot_conditions(comparison: SqueakComparison) -> Figure:
         unit = estimates[0].unit
         for place, (each, estimate) in enumerate(zip(conditions, estimates, strict=True)):
             away = np.abs(np.array(estimate.interval)[:, None] - estimate.value)
-            colour, marker = (ORANGE, "D") if each.squeaks else (BLUE, "o")
-            label = "squeaks" if each.squeaks else "silent"
+            colour, marker = MARKS[each.answer]
             ax.errorbar(
-                estimate.value, place, xerr=away, fmt=marker, color=colour, capsize=3, markersize=5, label=label
+                estimate.value, place, xerr=away, fmt=marker, color=colour, capsize=3, markersize=5, label=each.answer
             )
         ax.axvline(0, color=INK, linewidth=0.8)
         ax.set_xlabel(axis_label(f"{words}, 95 %", unit, between="\n"))

@@ -17,6 +17,7 @@ from stickslip.units import prefixed
 
 MOST = 40  # bursts in a table
 NONE = "–"
+NO_SQUEAK = {"does not squeak": "none", "can not be told": "can not be told"}
 
 
 def headline(found: SqueakFindings) -> Iterator[str]:
@@ -27,18 +28,19 @@ def headline(found: SqueakFindings) -> Iterator[str]:
     if not squeaks.bursts:
         yield f"Nothing sounds{where}: no burst in {record.duration:.4g} s."
         return
-    untold = [burst for burst in squeaks.bursts if burst.kind == "tonal" and burst.friction == "not told"]
     creaks = [f"{burst.rate:.3g}" for burst in squeaks.of("creak")]
     if not heard and creaks:
         yield f"It creaks{where}: stick-slip pulses, {' and '.join(creaks)} in a second."
-    elif not heard and untold:
-        yield f"Whether it squeaks{where} can not be told: {len(untold)} tonal burst{'s' if len(untold) > 1 else ''}."
+    elif squeaks.answer == "can not be told":
+        many = f"{len(squeaks.untold)} tonal burst{'s' if len(squeaks.untold) > 1 else ''}"
+        yield f"Whether it squeaks{where} can not be told: {many}."
     elif not heard:
-        yield f"No squeak{where}. {_counted(squeaks.bursts)}, {WORDS[squeaks.kind]} for most of the time."
+        kinds = [(squeaks.of(kind), words) for kind, words in WORDS.items()]
+        yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {words}' for of, words in kinds if of)}."
     elif found.frequency is not None:
-        word = "squeals" if len(squeaks.of("squeal")) > len(squeaks.of("squeak")) else "squeaks"
         many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"
-        yield f"It {word}{where} {many}, at {number(found.frequency.value, found.frequency.value / 500, 'Hz')}."
+        tone = found.frequency.value
+        yield f"It {squeaks.answer}{where} {many}, at {number(tone, tone / 500, 'Hz')}."
     loudest = found.loudest
     if loudest is not None:
         yield _of_one(loudest, squeaks)
@@ -196,7 +198,7 @@ def _condition(each: Condition) -> list[str]:
     return [
         each.name, NONE if each.normal is None else number(each.normal, 0.0, "N"),
         ", ".join(part for part in (forcing, stroke) if part) or NONE, _value(each.level), slope,
-        f"{each.count} ({each.rate:.2g} in a second)" if each.squeaks else "none",
+        f"{each.count} ({each.rate:.2g} in a second)" if each.squeaks else NO_SQUEAK[each.answer],
         NONE if each.frequency is None else f"{each.frequency.value:.1f}", _or_none(each.sound, ".1f"),
     ]  # fmt: skip
 

@@ -22,7 +22,7 @@ LOWEST = 50.0  # Hz
 GROWN = 12.0  # cycles of growth to the peak: what is struck is there within fewer
 EVEN = 0.35  # of a burst's length at which half of its energy has come: a ring that dies away has it earlier
 SUSTAINED = 0.25  # s: a squeak is shorter
-LOCKED, WEAK = 2, -35.0  # harmonics that a contact's limit cycle has, and dB below the fundamental at which they count
+LOCKED, WEAK = 2, -35.0  # overtones that a contact's limit cycle has, and dB below the fundamental at which they count
 TOLD = 100.0  # cycles in which partials at whole ratios are told from those of a bell
 SWINGS = 0.25  # of the friction's level: beneath a squeak it swings by a third, beneath a free ringing by a sixth
 THROUGH = 1.5  # periods of the forced motion: what sounds longer goes on through reversals
@@ -30,6 +30,7 @@ QUIET = 45.0  # dB re 20 uPa: less is not heard beside a running rig
 RINGS = 30.0  # cycles around a burst that a filter about its tone needs
 PARTIALS = 0.1  # of the power in steady lines
 RISEN = 0.1  # of the largest sliding speed: slower is no sliding
+MOSTLY = 0.5  # of a burst that the contact slides through
 ALIKE = 0.1  # of a rate: two that differ by less are the same
 TANGENTIAL = ("a", "v", "x", "friction", "load", "force")  # channels in which dry friction jumps at every reversal
 FRICTION = ("squeak", "squeal", "creak", "scrape")
@@ -149,6 +150,18 @@ class Squeaks:
         """Whether any burst is a squeak or a squeal."""
         return any(burst.kind in ("squeak", "squeal") for burst in self.bursts)
 
+    @property
+    def untold(self) -> tuple[Squeak, ...]:
+        """The tonal bursts of which it can not be told whether friction makes them."""
+        return tuple(burst for burst in self.of("tonal") if burst.friction == "not told")
+
+    @property
+    def answer(self) -> str:
+        """Whether it "squeaks", "squeals" or "does not squeak", or that this "can not be told"."""
+        if self.squeaking:
+            return "squeals" if len(self.of("squeal")) > len(self.of("squeak")) else "squeaks"
+        return "can not be told" if self.untold else "does not squeak"
+
     def of(self, *kinds: str) -> tuple[Squeak, ...]:
         """The bursts of some kinds."""
         return tuple(burst for burst in self.bursts if burst.kind in kinds)
@@ -183,7 +196,7 @@ def find_squeaks(
       level at that frequency;
     - motion alone: those that are not struck (they grow for twelve cycles, or half of their energy comes later than a
       third of their length) while the contact slides;
-    - sound alone: those that moreover last for a hundred cycles and have two harmonics at least in whole ratios, as the
+    - sound alone: those that moreover last for a hundred cycles and have two overtones at least in whole ratios, as the
       limit cycle of a contact has. A reed or a voice has them too; the evidence says so.
 
     Parameters
@@ -268,12 +281,14 @@ class ForcedMotion:
         turn = np.angle(hilbert(sosfiltfilt(place, values))) / (2 * np.pi)
         return cls(frequency, velocity, np.mod(turn - (0.25 if name == "v" else 0.0), 1.0))
 
-    def slides(self, first: int, last: int) -> bool:
-        """Whether it slides for most of the rows."""
-        if self.velocity is None:
-            return False
-        fast = RISEN * np.max(np.abs(self.velocity))
-        return bool(np.mean(np.abs(self.velocity[first:last]) > fast) > 0.5)
+    @property
+    def slowest(self) -> float:
+        """Speed [m/s] below which nothing slides."""
+        return math.nan if self.velocity is None else float(RISEN * np.max(np.abs(self.velocity)))
+
+    def sliding(self, first: int, last: int) -> float:
+        """Share of the rows in which it slides."""
+        return 0.0 if self.velocity is None else float(np.mean(np.abs(self.velocity[first:last]) > self.slowest))
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,11 +350,15 @@ class _Listener:
     def _kind(self, part: Span, rate: float, harmonics: tuple[tuple[float, float], ...]) -> tuple[str, str, str]:
         """Its kind, whether friction makes it, and why."""
         duration = (part.last - part.first) / self.record.fs
-        slides = self.motion.slides(part.first, part.last)
+        sliding = self.motion.sliding(part.first, part.last)
+        slides = sliding > MOSTLY
         if not part.tonal:
             return self._broad(part, rate, slides)
         if self.motion.velocity is not None and not slides:
-            return "tonal", "no", "nothing slides meanwhile"
+            much = (
+                f"the contact slides (faster than {1e3 * self.motion.slowest:.2g} mm/s) for {100 * sliding:.0f} % of it"
+            )
+            return "tonal", "no", f"{much}, less than a squeak needs" if sliding else "nothing slides meanwhile"
         kind = "squeal" if duration * self.motion.frequency > THROUGH else "squeak"
         if self.motion.velocity is not None and "friction" in self.record:
             share = self._modulation(part)
@@ -353,14 +372,17 @@ class _Listener:
             return "tonal", "no", f"it is there after {part.growth:.1f} cycles and dies away: it is struck, not fed"
         if self.motion.velocity is not None:
             return kind, "likely", f"it grows for {part.growth:.0f} cycles while the contact slides"
-        locked = sum(strength > WEAK for _, strength in harmonics)
-        if locked < LOCKED or duration * part.line < TOLD:
-            return "tonal", "not told", "of sound alone: no harmonics in whole ratios, or too short to tell"
+        locked, cycles = sum(strength > WEAK for _, strength in harmonics), duration * part.line
+        if cycles < TOLD:
+            return "tonal", "not told", f"of sound alone: {cycles:.0f} cycles, and whole ratios are told in {TOLD:g}"
+        if locked < LOCKED:
+            many = "one overtone" if locked else "no overtone"
+            return "tonal", "not told", f"of sound alone: {many} in a whole ratio, and a rubbing contact has {LOCKED}"
         return (
             "squeal" if duration > SUSTAINED else "squeak",
             "likely",
             (
-                f"{locked} harmonics in whole ratios, as a rubbing contact has; sound alone does not prove "
+                f"{locked} overtones in whole ratios, as a rubbing contact has; sound alone does not prove "
                 "friction: a reed or a voice has them too"
             ),
         )
