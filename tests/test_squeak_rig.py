@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from scipy.signal import welch
 
 import stickslip as ss
 from squeak_peer import Rig, dop853, taylor
+from stickslip.plot.trajectory import plot_motion, plot_phase
 
 CASES = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
 SQUEAKS = ("wet", 6.13)
@@ -120,3 +122,22 @@ def test_the_scenario_is_the_rig(surface: str, load: float) -> None:
 def test_what_has_no_meaning_is_refused(change: dict[str, object], words: str) -> None:
     with pytest.raises(ss.ModelError, match=words):
         ss.squeak_rig(**change)  # type: ignore[arg-type]
+
+
+def test_the_angle_is_told_in_radians() -> None:
+    run = ss.simulate(ss.squeak_rig("wet"), duration=0.05)
+    record = run.record(fs=1000.0)
+    assert [record.channels[name].unit for name in ("x2", "x3", "v3", "a3")] == ["m", "rad", "rad/s", "rad/s^2"]
+    assert record.channels["v3"].quantity == "angular velocity"
+    drawn = [axes.get_ylabel().replace("\n", " ") for axes in plot_motion(run).axes]
+    assert drawn[2:4] == ["angle [rad]", "angular velocity [rad/s]"]
+    assert plot_phase(run, mass=2).get_xlabel() == "angle x3 [rad]"
+    told = ss.outcome(ss.scenario_case("SQUEAK wet 6.13 N"))
+    assert "rad, at up to" in told.sentences[0]
+    assert told.values["largest angular speed v3"][1] == "rad/s"
+
+
+@pytest.mark.parametrize("rotations", [[0], [4], ["x3"], 2.5])
+def test_an_angle_that_is_no_degree_of_freedom_is_refused(rotations: Any) -> None:
+    with pytest.raises(ss.ModelError, match=r"rotations = .*from 1 to 3"):
+        ss.squeak_rig().having(rotations=rotations)

@@ -177,6 +177,9 @@ class Structure:
         left out.
     damper : {"ground", "base"}
         What the dampers' other ends are fixed to.
+    rotations : sequence of int
+        Numbers, from 1, of the degrees of freedom that are angles [rad]; their rows and columns are then in kg m^2,
+        N m s and N m.
 
     Raises
     ------
@@ -205,6 +208,7 @@ class Structure:
     drive: Drive = field(default_factory=Release)
     acts_on: ArrayLike | None = None
     damper: str = "ground"
+    rotations: Sequence[int] = ()
 
     def __post_init__(self) -> None:
         mass = _matrix("mass", self.mass)
@@ -240,6 +244,14 @@ class Structure:
             raise ModelError(
                 f"damper = '{self.damper}'", "the dampers are fixed to the 'ground' or the 'base'", "choose one"
             )
+        angles = np.atleast_1d(np.asarray(self.rotations, dtype=object)).tolist()
+        if not all(isinstance(angle, int) and 1 <= angle <= size for angle in angles):
+            raise ModelError(
+                f"rotations = {self.rotations!r}",
+                f"they are numbers of degrees of freedom, from 1 to {size}",
+                "correct rotations=",
+            )
+        object.__setattr__(self, "rotations", tuple(angles))
         rigid = [contact.tangent for contact in self.contacts if any(m.friction is None for m in contact.modes())]
         if rigid and np.linalg.matrix_rank(np.array(rigid)) < len(rigid):
             raise ModelError(

@@ -157,6 +157,7 @@ class _Structure(BaseModel):
     damping: list[list[Damping]] | None = None
     acts_on: list[float] | None = None
     damper: Literal["ground", "base"] = "ground"
+    rotations: list[int] = []
 
 
 class _Contact(BaseModel):

@@ -212,10 +212,11 @@ def _background(ax: Axes, run: Trajectory, across: str, times: Array) -> list[tu
     """The whole curve of every mass, and the dots that run along: artist, places, their colour if not by contact."""
     up, count = ("x" if across == "time" else "v"), len(run.labels("x"))
     first, last = float(times[0]), float(times[-1])
-    rows = range(count if across == "time" else 1)
+    alike = [j for j in range(count) if run.units("x")[j] == run.units("x")[0]]  # angles have no place on an axis of mm
+    rows = alike if across == "time" else [0]
     drawn = [curve(run, (("x", j), (up, j)), first=first, last=last) for j in rows]
-    x_factor, x_unit = (1.0, "s") if across == "time" else prefixed(drawn[0][1][0], "m")
-    y_factor, y_unit = prefixed(np.concatenate([values[1] for _, values in drawn]), "m" if up == "x" else "m/s")
+    x_factor, x_unit = (1.0, "s") if across == "time" else prefixed(drawn[0][1][0], run.units("x")[0])
+    y_factor, y_unit = prefixed(np.concatenate([values[1] for _, values in drawn]), run.units(up)[0])
     dots = []
     for j, (instants, values) in zip(rows, drawn, strict=True):
         colour = MASSES[j % len(MASSES)] if count > 1 else GREEN if up == "v" else BLUE

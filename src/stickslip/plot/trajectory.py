@@ -43,11 +43,11 @@ A_PIECE, MOST_PIECES = 24, 400  # instants in each piece, so that a stiff contac
 MOST_EDGES = 6000  # pieces whose both ends are drawn, so that jumps stay upright
 MOST_SHADES = 150
 MOST_DRAWN = 4  # masses with a phase portrait, contacts with a loop
-_UNITS = {"x": "m", "z": "m", "way": "m", "v": "m/s", "slip": "m/s", "friction": "N", "load": "N", "force": "N"}
 _WORDS = {
     "x": "displacement", "way": "displacement along the contact", "v": "velocity", "slip": "sliding velocity",
     "friction": "friction", "load": "normal load", "force": "force",
 }  # fmt: skip
+_TURNING = {"x": "angle", "v": "angular velocity"}
 _COLOURS = {"x": BLUE, "z": SKY, "v": GREEN, "friction": ORANGE, "load": INK, "force": PURPLE}
 MASSES = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK)
 _KINDS = {
@@ -173,7 +173,7 @@ def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = Non
     figure, axes = new_figure(len(panels), height=1.0 + 1.3 * len(panels))
     for ax, wanted in zip(axes, panels, strict=True):
         times, values = curve(run, wanted, first=first, last=last)
-        factor, unit = prefixed(np.concatenate(values), _UNITS[wanted[0][0]])
+        factor, unit = prefixed(np.concatenate(values), unit_of(run, wanted[0]))
         for quantity, row in zip(wanted, values, strict=True):
             ax.plot(times, factor * row, **_line(run, quantity, wanted))
         ax.set_ylabel(axis_label(_panel_words(run, wanted), unit, between="\n"))
@@ -196,12 +196,27 @@ def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = Non
 
 def _panels(run: Trajectory) -> list[list[Quantity]]:
     motion, every = run.table.motion, range(len(run.labels("x")))
-    panels = [[*(("x", j) for j in every), *([("z", 0)] if motion.base else [])], [("v", j) for j in every]]
+    turns = [j for j in every if unit_of(run, ("x", j)) == "rad"]
+    moves = [j for j in every if j not in turns]
+    panels = [[*(("x", j) for j in moves), *([("z", 0)] if motion.base else [])], [("v", j) for j in moves]]
+    panels += [[(name, j) for j in turns] for name in _TURNING]
+    panels = [panel for panel in panels if panel]
     for c in range(contacts_of(run)):
         panels.append([("friction", c)])
         if pressed(run, c):
             panels.append([("load", c)])
     return [*panels, *([[("force", 0)]] if motion.force else [])]
+
+
+def unit_of(run: Trajectory, quantity: Quantity) -> str:
+    """SI unit of one row of an output."""
+    name, row = quantity
+    return "m" if name == "way" else run.units(name)[row]
+
+
+def _named(run: Trajectory, quantity: Quantity) -> str:
+    """What a quantity is called in words, without its number."""
+    return (_TURNING if unit_of(run, quantity).startswith("rad") else _WORDS)[quantity[0]]
 
 
 def pressed(run: Trajectory, contact: int) -> bool:
@@ -211,7 +226,7 @@ def pressed(run: Trajectory, contact: int) -> bool:
 
 def _panel_words(run: Trajectory, wanted: list[Quantity]) -> str:
     name, row = wanted[0]
-    words = _WORDS[name] if name in ("x", "v") else numbered_words(run, _WORDS[name], name, row)
+    words = _named(run, wanted[0]) if name in ("x", "v") else numbered_words(run, _WORDS[name], name, row)
     return words.replace(", ", "\n").replace("normal load", "load")
 
 
@@ -346,7 +361,7 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
     _, before = curve(run, (across, up), first=first, last=last)
     times, values = curve(run, (across, up), first=split, last=last)
     (x_factor, x_unit), (y_factor, y_unit) = (
-        prefixed(row, _UNITS[name]) for row, (name, _) in zip(before, (across, up), strict=True)
+        prefixed(row, unit_of(run, quantity)) for row, quantity in zip(before, (across, up), strict=True)
     )
     if split > first:
         ax.plot(
@@ -372,7 +387,7 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
     if up[0] == "v" and "way" in run.table.motion.face and not isinstance(run.system, Structure):
         belt = y_factor * run.table.motion.face["way"]
         ax.axhline(belt, color=INK, linewidth=0.9, linestyle=":", zorder=1, label="belt")
-    named = (numbered_words(run, _WORDS[name], name, row) for name, row in (across, up))
+    named = (numbered_words(run, _named(run, quantity), *quantity) for quantity in (across, up))
     ax.set(xlabel=axis_label(next(named), x_unit), ylabel=axis_label(next(named), y_unit))
     ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(0, 1.0))
     return ax

@@ -289,10 +289,10 @@ def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
     }
     for j in range(len(run.labels("x"))):
         x, v = sampled(run, (("x", j), ("v", j)), times)
-        words, speed = (numbered_words(run, text, name, j) for text, name in (("displacement", "x"), ("speed", "v")))
-        values[f"{words}, from"] = (float(x.min()), "m")
-        values[f"{words}, to"] = (float(x.max()), "m")
-        values[f"largest {speed}"] = (float(np.abs(v).max()), "m/s")
+        words, speed, units = *_ways(run, j), (run.units("x")[j], run.units("v")[j])
+        values[f"{words}, from"] = (float(x.min()), units[0])
+        values[f"{words}, to"] = (float(x.max()), units[0])
+        values[f"largest {speed}"] = (float(np.abs(v).max()), units[1])
     for c in range(contacts_of(run)):
         if pressed(run, c):
             (load,) = sampled(run, (("load", c),), times)
@@ -303,6 +303,13 @@ def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
         values["work against friction"] = (work.friction, "J")
         values["energy unaccounted for, relative"] = (work.residual, "1")
     return values
+
+
+def _ways(run: Trajectory, row: int) -> tuple[str, str]:
+    """What a degree of freedom's displacement and speed are called."""
+    turns = run.units("x")[row] == "rad"
+    words = ("angle", "angular speed") if turns else ("displacement", "speed")
+    return numbered_words(run, words[0], "x", row), numbered_words(run, words[1], "v", row)
 
 
 def _shares(run: Trajectory) -> dict[str, tuple[float, str]]:
@@ -324,18 +331,25 @@ def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list
         found.append(f"Interrupted: the run holds the {_text(run.duration, 's')} simulated until then.")
     if run.status == "at rest":
         state, after = run.state(run.duration), _text(float(run.starts[-1]), "s")
-        places = [f"{_text(float(state[name]), 'm')}{f' of {name}' if len(masses) > 1 else ''}" for name in masses]
+        places = [
+            f"{_text(float(state[name]), unit)}{f' of {name}' if len(masses) > 1 else ''}"
+            for name, unit in zip(masses, run.units("x"), strict=True)
+        ]
         subject = "The mass comes" if len(masses) == 1 else "All masses come"
         found.append(f"{subject} to rest after {after}, at a displacement of {_listed(places)}.")
     else:
         ways = []
         for j, name in enumerate(masses):
-            words = numbered_words(run, "displacement", "x", j)
+            words, _ = _ways(run, j)
             low, high = (_text(*values[f"{words}, {end}"]) for end in ("from", "to"))
             ways.append(f"{'the mass moves' if len(masses) == 1 else name} between {low} and {high}")
-        speeds = [values[f"largest {numbered_words(run, 'speed', 'v', j)}"][0] for j in range(len(masses))]
+        speeds: dict[str, float] = {}
+        for j in range(len(masses)):
+            speed, unit = values[f"largest {_ways(run, j)[1]}"]
+            speeds[unit] = max(speed, speeds.get(unit, 0.0))
+        fastest = " and ".join(_text(speed, unit) for unit, speed in speeds.items())
         verb = "" if len(masses) == 1 else "the masses move: "
-        found.append(f"In the last cycle {verb}{_listed(ways)}, at up to {_text(max(speeds), 'm/s')}.")
+        found.append(f"In the last cycle {verb}{_listed(ways)}, at up to {fastest}.")
     counts = run.event_counts()
     if counts:
         told = ", ".join(f"{count} × {kind}" for kind, count in counts.most_common())

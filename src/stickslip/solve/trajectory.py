@@ -17,6 +17,11 @@ from stickslip.record.record import Record, Step
 from stickslip.solve.automaton import DEGREE, Array, Automaton, System
 from stickslip.solve.kernel import sample
 
+UNITS = {
+    "x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N",
+    "way": "m", "slip": "m/s", "load": "N",
+}  # fmt: skip
+TURNING = {"x": "angle", "v": "angular velocity", "a": "angular acceleration"}
 MOST = 1e10  # samples of a record; more fit no desk
 
 
@@ -273,6 +278,14 @@ class Trajectory:
         count = self.rows(name).shape[1]
         return (name,) if count == 1 else tuple(f"{name}{j + 1}" for j in range(count))
 
+    def units(self, name: str) -> tuple[str, ...]:
+        """Units of the rows of an output: of a structure's angles "rad", "rad/s" and "rad/s^2"."""
+        angles = getattr(self.system, "rotations", ()) if name in TURNING else ()
+        unit = UNITS[name]
+        return tuple(
+            unit.replace("m", "rad", 1) if j in angles else unit for j in range(1, 1 + self.rows(name).shape[1])
+        )
+
     def record(self, *, fs: float) -> Record:
         """The motion sampled at a rate, as a Record.
 
@@ -285,7 +298,7 @@ class Trajectory:
         -------
         Record
             Channels x, v, a, friction, and z where the base moves, force where a force acts; x1, x2 ... of a
-            structure.
+            structure, in rad where it is an angle.
 
         Raises
         ------
@@ -303,14 +316,14 @@ class Trajectory:
         names = ["x", "v", "a", "friction"]
         names += ["z"] * bool(self.table.motion.base) + ["force"] * bool(self.table.motion.force)
         values, _ = self.sample(times, tuple(names))
-        units = {"x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N"}
-        labels = {label: name for name in names for label in self.labels(name)}
-        channels = {
-            label: Channel(label, units[name], described(name, units[name]), source="simulate")
-            for label, name in labels.items()
-        }
+        labels = [
+            (label, unit, TURNING[name] if unit.startswith("rad") else described(name, unit))
+            for name in names
+            for label, unit in zip(self.labels(name), self.units(name), strict=True)
+        ]
+        channels = {label: Channel(label, unit, words, source="simulate") for label, unit, words in labels}
         step = Step("simulate", {"system": repr(self.system), "fs": fs}, f"{len(self.modes)} pieces, {self.status}")
-        samples: Mapping[str, Array] = dict(zip(labels, values, strict=True))
+        samples: Mapping[str, Array] = dict(zip(channels, values, strict=True))
         return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(self.system)})
 
     def __repr__(self) -> str:

@@ -111,6 +111,7 @@ def squeak_rig(surface: str = "wet", load: float = HEAVY, *, amplitude: float = 
         contacts=contacts,
         drive=HarmonicBase(_base(rubber.friction * load, amplitude), frequency=FORCING),
         acts_on=[1, 0, 0],
+        rotations=[3],
     )
 
 
