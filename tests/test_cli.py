@@ -322,6 +322,14 @@ def test_wrong_use_ends_in_one_sentence_and_exit_code_2(arguments: list[str]) ->
     assert sorted(Path().rglob("*")) == before
 
 
+def test_a_load_that_is_none_is_named_by_its_option() -> None:
+    slide("run.csv", rows=1000)
+    for load in ("-3", "run*=heavy"):
+        told = run("analyze", "run.csv", "--normal", load).stderr
+        assert "--normal: " in told
+        assert "normal.*" not in told
+
+
 def refused(result: Result, code: int) -> None:
     assert result.exit_code == code, result.output
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception

@@ -137,6 +137,13 @@ def test_the_angle_is_told_in_radians() -> None:
     assert told.values["largest angular speed v3"][1] == "rad/s"
 
 
+def test_what_is_no_rig_is_refused_in_words() -> None:
+    assert ss.squeak_rig("wet", "6").contacts[0].preload == 3.0  # type: ignore[arg-type]
+    for surface, load in (("wet", "heavy"), ("wet", [1, 2]), (["wet"], 6.0)):
+        with pytest.raises(ss.ModelError, match=r"load|surface"):
+            ss.squeak_rig(surface, load)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("rotations", [[0], [4], ["x3"], 2.5])
 def test_an_angle_that_is_no_degree_of_freedom_is_refused(rotations: Any) -> None:
     with pytest.raises(ss.ModelError, match=r"rotations = .*from 1 to 3"):

@@ -204,3 +204,17 @@ def test_what_has_no_answer_is_refused(call: Any, words: str) -> None:
     with pytest.raises(ss.ModelError) as refused:
         call()
     assert words in str(refused.value)
+
+
+def test_what_is_refused_says_what_would_do() -> None:
+    def rig(load: float) -> ss.Structure:
+        return inclined(preload=load)
+
+    with pytest.raises(ss.ModelError, match=r"grid over lod; .* takes load"):
+        ss.stability_map(rig, grid={"lod": [1, 2]})
+    for between, step in (((2, 2), "lowest"), ((2,), "lowest"), ((2, 1), "turn them round")):
+        with pytest.raises(ss.ModelError, match=step):
+            ss.critical_value(inclined(), "kinetic", between=between)  # type: ignore[arg-type]
+    for values, step in (([6.0], "linspace"), ([], "linspace"), ([[1, 2, 3]], "linspace"), ([1, 3, 2], "sort")):
+        with pytest.raises(ss.ModelError, match=step):
+            ss.limit_cycles(inclined(), "kinetic", values=values)

@@ -46,7 +46,8 @@ class Contact:
     tangent : array_like (n,)
         Direction of sliding, :math:`w_t`: the contact slides by :math:`w_t\cdot q` less the counter-face's motion.
     normal : array_like (n,), optional
-        Direction that presses the contact, :math:`w_n`.
+        Direction that presses the contact, :math:`w_n`; that of `tangent` where one motion slides and presses, as a
+        sprag does.
     stiffness : float
         Normal contact stiffness k_n [N/m]; positive where `normal` is given. It is not part of the structure's K.
     preload : float

@@ -58,8 +58,17 @@ def rig_of(
         given["repair"] = [word.strip() for word in repair.split(",") if word.strip()]
     if normal:  # the first pattern that fits decides
         loads = dict(pair(load, "--normal") if "=" in load else ("*", load) for load in normal)
+        for load in loads.values():
+            _require_load(load)
         given["normal"] = loads | {key: load for key, load in base.get("normal", {}).items() if key not in loads}
     return ss.rig_settings({**base, **given}, source="the command line")
+
+
+def _require_load(load: str) -> None:
+    try:
+        ss.rig_settings({"normal": {"*": load}}, source="--normal")
+    except ss.ModelError as error:
+        raise click.BadParameter(f"'{load}' is no load: {error.rule}", param_hint="--normal") from error
 
 
 def groups_of(argument: str) -> list[list[Path]]:

@@ -121,7 +121,9 @@ def limit_cycles(
     """
     places = numbers("values", values)
     if places.ndim != 1 or len(places) < LEAST or np.any(np.diff(places) <= 0):
-        raise ModelError(f"values = {values!r}", f"they are at least {LEAST} numbers that rise", "sort them")
+        few = places.ndim != 1 or len(places) < LEAST
+        step = "give a row of them, as from np.linspace" if few else "sort them, and leave out what is there twice"
+        raise ModelError(f"values = {values!r}", f"they are at least {LEAST} numbers that rise", step)
 
     def at(value: float) -> System:
         found = parameter(value) if callable(parameter) else system.having(**{parameter: value})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -263,7 +264,8 @@ def critical_value(
 
     bounds = numbers("between", between)
     if bounds.shape != (2,) or not bounds[0] < bounds[1]:
-        raise ModelError(f"between = {between}", "it is two values, the lower one first", "turn them round")
+        step = "turn them round" if bounds.shape == (2,) and bounds[0] > bounds[1] else "give between=(lowest, highest)"
+        raise ModelError(f"between = {between}", "it is two values, the lower one first", step)
     low, high = map(float, bounds)
     values = np.linspace(low, high, SCANNED + 1)
     signs = np.array([excess(value) > ROUNDING for value in values])
@@ -306,7 +308,7 @@ def stability_map(
     Raises
     ------
     ModelError
-        No grid, or as in :func:`stability`.
+        No grid, one whose names the function does not take, or as in :func:`stability`.
 
     Examples
     --------
@@ -324,6 +326,8 @@ def stability_map(
             f"grid = {dict(grid)!r}", "a map has values for each of its parameters", "give lists of numbers"
         )
     shape = tuple(len(values) for values in axes.values())
+    if callable(system):
+        _require_taken(system, axes)
     found = np.empty(shape, dtype=object)
     for place in np.ndindex(*shape):
         values = {name: float(axes[name][i]) for name, i in zip(axes, place, strict=True)}
@@ -338,6 +342,19 @@ def stability_map(
         "mechanism": told(lambda one: one.mechanism, str),
     }
     return xarray.Dataset(data, coords=axes)
+
+
+def _require_taken(system: Callable[..., System], axes: Mapping[str, Array]) -> None:
+    """Refuse a grid whose names are not what the function takes."""
+    taken = inspect.signature(system)
+    try:
+        taken.bind(**axes)
+    except TypeError as error:
+        raise ModelError(
+            f"a grid over {', '.join(axes)}",
+            f"the function that makes the system takes {', '.join(taken.parameters) or 'nothing'}",
+            "give the grid the function's names",
+        ) from error
 
 
 def numbers(name: str, values: ArrayLike) -> Array:

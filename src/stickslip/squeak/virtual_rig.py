@@ -82,10 +82,10 @@ def squeak_rig(surface: str = "wet", load: float = HEAVY, *, amplitude: float = 
     dry 1.23 stable
     wet 1.23 stable
     """
-    if surface not in SURFACES:
+    if surface not in tuple(SURFACES):
         raise ModelError(f"surface = '{surface}'", f"it is {' or '.join(SURFACES)}", "choose one of them")
-    finite("load", load, unit="N", positive=True)
-    finite("amplitude", amplitude, unit="m", positive=True)
+    load = finite("load", load, unit="N", positive=True)
+    amplitude = finite("amplitude", amplitude, unit="m", positive=True)
     rubber, turn = SURFACES[surface], 2 * math.pi
     bends, twists = BEAM * (turn * BENDING) ** 2, INERTIA * (turn * TORSION) ** 2
     stiffness = BEAM * turn**2 * (ENGAGED**2 - BENDING**2) * (load / HEAVY) ** HERTZ
