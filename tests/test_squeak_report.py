@@ -15,6 +15,7 @@ from click.testing import CliRunner, Result
 
 import stickslip as ss
 from stickslip.cli.program import main
+from stickslip.cli.words import spoken
 
 CONDITIONS = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
 SLOPES = {"dry": 2.3, "wet": -0.26}  # s/m, of the rig's laws
@@ -351,6 +352,22 @@ def test_reversals_of_dry_friction_are_no_creak() -> None:
     t = np.arange(20_000) / FS
     record = ss.Record.of({"x": 0.01 * np.sin(10 * np.pi * t), "friction": np.sign(np.cos(10 * np.pi * t))}, fs=FS)
     assert not ss.find_squeaks(record).of("creak")
+
+
+def test_of_stereo_the_other_channel_is_named(tmp_path: Path) -> None:
+    both = ss.Record.of({"ch1": 0.2 * tone(), "ch2": tone()}, fs=FS)
+    assert any("ch2 too, 14 dB louder" in note and 'channel="ch2"' in note for note in ss.find_squeaks(both).notes)
+    assert not any("ch1" in note for note in ss.find_squeaks(both, channel="ch2").notes if "alone" in note)
+    told = ss.summary(ss.analyze_squeaks(both)).cautions
+    assert [spoken(each) for each in told if "--channel ch2" in spoken(each)]
+
+
+def test_a_spike_may_be_a_contact() -> None:
+    found = ss.analyze_squeaks(ss.Record.of({"sound": tone()}, fs=FS))
+    spike = ss.Fault("spike", "a", ((3, 9),), "7 samples that stand off as spikes", "replace them")
+    cautions = ss.summary(replace(found, faults=(spike,))).cautions
+    assert any("lifts or lands" in each for each in cautions)
+    assert not any("lifts or lands" in each for each in ss.summary(found).cautions)
 
 
 def test_json_alone_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,6 +20,7 @@ _SPOKEN = (
     (r"; use log_decrement or fit_decay instead", ""),
     (r'\brestoring="pendulum"', "--restoring pendulum"),
     (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
+    (r'\bchannel="(\w+)"', r"--channel \1"),
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
     (r'\bfriction_force\(record, \.\.\., method="(\w+)"\)', r"--method \1"),
     (

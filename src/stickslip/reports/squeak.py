@@ -83,7 +83,11 @@ def _counted(bursts: Sequence[Squeak]) -> str:
 
 def cautions(found: SqueakFindings) -> list[str]:
     """What should keep the reader from trusting it."""
-    told = [note for note in found.squeaks.notes if "calibrated" in note]
+    told = [note for note in found.squeaks.notes if "calibrated" in note or "alone; the record has" in note]
+    if any(fault.kind == "spike" for fault in found.faults):
+        told.append(
+            "What stands off as a spike may be a contact that sticks, lifts or lands: look before it is replaced."
+        )
     spoilt: dict[str, list[str]] = {}
     for place, burst in enumerate(found.squeaks.bursts):
         for part in burst.status.split("; ") if burst.status != "ok" else ():

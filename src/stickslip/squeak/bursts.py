@@ -438,9 +438,25 @@ class _Listener:
                 f"Channel {self.name} is not calibrated: its levels are relative to 1, and no sound pressure level is "
                 f'told; state its sensitivity when reading, as in channels={{"sound": "{self.name} * 2.5 [Pa]"}}.'
             )
+        told += self._unheard(unit)
         if self.motion.velocity is None:
             told.append("No forced motion is recorded beside it: phase and sliding speed can not be told.")
         return told
+
+    def _unheard(self, unit: str) -> list[str]:
+        """Which channels of a stereo file were not listened to; nothing where another than the first was chosen."""
+        channels = self.record.channels
+        others = [name for name in self.record if name.startswith("ch") and channels[name].unit == unit][1:]
+        if self.name != "ch1" or not others:
+            return []
+        power = {name: float(np.mean(np.nan_to_num(self.record[name]) ** 2)) for name in others}
+        loudest = max(power, key=lambda name: power[name])
+        louder = 10 * math.log10(max(power[loudest], 1e-300) / float(np.mean(self.record[self.name] ** 2)))
+        more = f", {louder:.0f} dB louder" if louder > 1 else ""
+        return [
+            f"Heard in {self.name} alone; the record has {' and '.join(others)} too{more}: to hear another, choose it "
+            f'with channel="{loudest}".'
+        ]
 
 
 def chosen_channel(record: Record, channel: str | None) -> str:
