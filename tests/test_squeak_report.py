@@ -299,7 +299,7 @@ def written(place: Path, values: np.ndarray, **options: object) -> Path:
     ("values", "words"),
     [
         (np.zeros(5000), "channel sound is silent"),
-        (np.full(5000, 0.3), "channel sound is silent"),
+        (np.full(5000, 0.3), "channel sound is constant"),
         (tone()[:200], "the record has 200 samples"),
         (np.full(5000, np.nan), "5000 values that are not numbers"),
         (np.where(np.arange(10_000) == 77, np.nan, tone()), "--repair missing"),

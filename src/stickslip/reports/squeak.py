@@ -191,7 +191,7 @@ def _pair(pair: Pair) -> list[str]:
 
 def condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each condition."""
-    headings = ["condition", "load", "driven", "friction", "slope against speed (95 %)", "squeaks", "Hz", "dB"]
+    headings = ["condition", "load", "driven, stroke", "friction", "slope against speed (95 %)", "squeaks", "Hz", "dB"]
     return headings, [_condition(each) for each in comparison.conditions]
 
 

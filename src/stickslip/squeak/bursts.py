@@ -219,7 +219,7 @@ def find_squeaks(
     RecordError
         The channel is missing or broken, or its rate too low.
     EstimateError
-        It is silent throughout.
+        It is silent or constant throughout.
 
     Examples
     --------
@@ -243,7 +243,8 @@ def find_squeaks(
         raise RecordError(f"span = {span} dB", "a burst ends some decibel below its peak", "leave it out, or give 20")
     values = record[name] - record[name].mean()
     if not values.any():
-        raise EstimateError(f"channel {name} is silent", "a burst needs a sound", "name another channel=")
+        what = "constant" if record[name].any() else "silent"
+        raise EstimateError(f"channel {name} is {what}", "a burst needs a sound", "name another channel=")
     hearing = Hearing.of(values, record.fs, (low, high), span)
     motion = ForcedMotion.of(record)
     unit = record.channels[name].unit
