@@ -53,8 +53,12 @@ def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
 @pytest.mark.parametrize(
     ("rig", "told", "why"),
     [
-        (PERFECT.having("a", mount=ss.Mount(125, 0.1)), {}, "a mount of 126.* Hz shows in a, and none is stated"),
-        (PERFECT.having("a", mount=ss.Mount(1000, 0.02)), {}, "a mount of 100. Hz shows in a, and none is stated"),
+        (PERFECT.having("a", mount=ss.Mount(125, 0.1)), {}, "a mount of 12[56].* Hz shows in a, and none is stated"),
+        (
+            PERFECT.having("a", mount=ss.Mount(1000, 0.02)),
+            {},
+            "a mount of (999.*|100.) Hz shows in a, and none is stated",
+        ),
         (PERFECT.having("a", white=0.04), {}, "the noise of a is 1.% of its standard deviation"),
         (ss.Rig(), RIG, "x comes 1.* ms after a: state the delays.*; a mount of 12.* Hz shows in a"),
     ],
@@ -89,3 +93,12 @@ def test_an_acceleration_alone_that_swings_may_be_its_mount() -> None:
     record = measured(PERFECT.having("a", mount=ss.Mount(125, 0.1)))
     found = ss.mechanism(ss.Record.of({"a": record["a"]}, fs=record.fs))
     assert found.name == UNTOLD or "an accelerometer whose mount rings looks alike" in found.reason
+
+
+def test_sampled_kinks_of_a_clean_record_are_no_mount() -> None:
+    contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+    slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.1196, law=contact, drive=drive)
+    clean = ss.simulate(slider, duration=6).record(fs=4000).between(2, 6)
+    assert ss.mechanism(clean).name == "double stick-slip"
+    assert ss.transition(clean, mass=2.42, stiffness=2310).frequency.status == "ok"

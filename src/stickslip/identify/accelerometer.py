@@ -23,6 +23,7 @@ LOUD = 0.09  # of the acceleration's standard deviation: noise that hides micro-
 ROUNDED = 0.04  # of the same: by so much the smoother rounds the kinks off
 SWINGS = 7.0  # what is left of the mounts lasts for samples, and counts as white noise so many times larger
 COMPARED = 40_000  # samples in which the accelerometer is compared with the displacement
+SAMPLED = 0.002  # of the same: what sampling makes of kinks, which between noise-free channels looks like a mount
 APART = 0.1e-3  # s between x and a, taken for one instant, that spoils what both say together
 
 
@@ -105,8 +106,10 @@ def _compared(record: Record) -> SensorDelay | None:
     """The accelerometer against the displacement, where both were measured and follow one motion."""
     if not (is_measured(record, "a") and is_measured(record, "x")):
         return None
+    part = record.rows(0, min(COMPARED, len(record)))
+    noise = max(noise_level(part["a"], part.fs), SAMPLED * float(part["a"].std()))
     try:
-        return sensor_delay(record.rows(0, min(COMPARED, len(record))))
+        return sensor_delay(part.with_details("a", noise=noise))
     except EstimateError:  # the two can not be compared: nothing is said about the mount
         return None
 
