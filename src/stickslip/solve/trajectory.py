@@ -282,9 +282,7 @@ class Trajectory:
         """Units of the rows of an output: of a structure's angles "rad", "rad/s" and "rad/s^2"."""
         angles = getattr(self.system, "rotations", ()) if name in TURNING else ()
         unit = UNITS[name]
-        return tuple(
-            unit.replace("m", "rad", 1) if j in angles else unit for j in range(1, 1 + self.rows(name).shape[1])
-        )
+        return tuple(unit.replace("m", "rad", 1) if j in angles else unit for j in range(1, 1 + len(self.labels(name))))
 
     def record(self, *, fs: float) -> Record:
         """The motion sampled at a rate, as a Record.
