@@ -95,10 +95,13 @@ def test_an_acceleration_alone_that_swings_may_be_its_mount() -> None:
     assert found.name == UNTOLD or "an accelerometer whose mount rings looks alike" in found.reason
 
 
-def test_sampled_kinks_of_a_clean_record_are_no_mount() -> None:
+def test_a_clean_record_from_rest_on_has_no_mount_and_no_offset() -> None:
     contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
     drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
     slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.1196, law=contact, drive=drive)
-    clean = ss.simulate(slider, duration=6).record(fs=4000).between(2, 6)
+    clean = ss.simulate(slider, duration=6).record(fs=4000)
+    mode = ss.transition(clean, **RIG).frequency
     assert ss.mechanism(clean).name == "double stick-slip"
-    assert ss.transition(clean, mass=2.42, stiffness=2310).frequency.status == "ok"
+    assert mode.status == "ok"
+    assert mode.value == pytest.approx(TRUE, rel=1e-4)
+    assert ss.find_microslips(clean).per_stick.value == pytest.approx(2, abs=0.1), "its start from rest is no offset"

@@ -228,10 +228,12 @@ def _spans(sticks: Sticks, record: Record, values: Array) -> list[tuple[int, int
 
 
 def _zero(values: Array, sticks: Sticks, record: Record) -> float:
-    """The accelerometer's reading of no acceleration: the mean over whole cycles."""
+    """The accelerometer's reading of no acceleration: the median of the cycles' means, spared by a start from rest."""
     cycle = record.fs / sticks.frequency.value if sticks.frequency.value > 0 else len(values)
-    whole = math.floor(len(values) / cycle) * cycle
-    return float(values[: max(1, round(whole))].mean()) if whole else float(values.mean())
+    rows = np.arange(len(values))
+    total = np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2)])
+    gained = np.diff(np.interp(np.arange(0, len(values) - 1, cycle), rows, total))
+    return float(np.median(gained) / cycle) if len(gained) else float(values.mean())
 
 
 def _shortest(pole: complex, fs: float) -> int:
