@@ -24,16 +24,13 @@ def benchmarks() -> ModuleType:
     return module
 
 
+@pytest.mark.alone
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak of a process is read from /proc")
 def test_a_million_samples_are_analysed_and_drawn_in_ten_seconds(benchmarks: ModuleType, tmp_path: Path) -> None:
-    """Counted in processor seconds, the least of three runs: what runs beside it slows the caches they share."""
+    """Counted in processor seconds, which another program's load does not add to."""
     record = benchmarks.long_record()
     assert (len(record), len(list(record))) == (1_000_000, 4)
-    file = ss.write_record(record, tmp_path / "long.parquet")
-    found = benchmarks.analyzed(file)
-    for _ in range(2):
-        if found["processor"] >= 10:
-            found = min(found, benchmarks.analyzed(file), key=lambda run: run["processor"])
+    found = benchmarks.analyzed(ss.write_record(record, tmp_path / "long.parquet"))
     assert found["samples"] == 1_000_000
     assert found["processor"] < 10
     assert found["peak"] < 1000

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 SHORTEST = 32  # samples below which no question about friction can be answered
 NAMED = 8  # constant channels named in one sentence
 DRIFT = 0.3  # rise of the trend, in amplitudes of the oscillation, from which it is told
+COMPUTED = "friction"  # has no sensor that could clip or freeze
 SHARP_UNITS = ("m/s", "rad/s", "N", "N m")  # what may have plateaus with corners by nature: sticking, saturation
 
 
@@ -277,7 +278,7 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
         what = _several(_count(spikes), "sample that stands off as a spike", "samples that stand off as spikes")
         faults.append(_fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")'))
         values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
-    measured = name != "friction"  # what is computed as friction has no sensor that could clip or freeze
+    measured = name != COMPUTED
     cut = _clipped(name, unit, values) if measured else None
     if cut is not None:
         faults.append(cut)
@@ -295,7 +296,13 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
 
 
 def find_clipping(record: Record, name: str) -> Fault | None:
-    """Where a channel of numbers alone stands at the end of its sensor's range; the one fault, without the others."""
+    """Where a channel of numbers alone stands at the end of its sensor's range; the one fault, without the others.
+
+    Unlike the check-up, this also asks of a friction that was measured.
+    """
+    if name != COMPUTED:
+        found = (fault for fault in record.check() if fault.kind == "clipped" and fault.channel == name)
+        return next(found, None)
     values = record[name]
     spikes = flaws.spikes(values)
     if spikes:

@@ -340,7 +340,7 @@ def drift(values: Array) -> float:
     period = _period(values)
     if period is None or len(values) < 8 * period:
         return 0.0
-    rows, slow = trend(values)
+    rows, slow = _trend(values, period)
     along = _parabola(slow)
     explained = float(np.var(slow - along)) < 0.1 * float(np.var(slow))
     amplitude = np.sqrt(2) * float(np.std(values[np.round(rows).astype(int)] - slow))
@@ -350,7 +350,11 @@ def drift(values: Array) -> float:
 
 def trend(values: Array) -> tuple[Array, Array]:
     """Rows (fractions allowed) and the mean around each over one period, taken twice, of the strongest oscillation."""
-    period = min(_period(values) or max(1, len(values) // 50), len(values) // 4)
+    return _trend(values, _period(values))
+
+
+def _trend(values: Array, period: int | None) -> tuple[Array, Array]:
+    period = min(period or max(1, len(values) // 50), len(values) // 4)
     slow = _running_mean(_running_mean(values, period), period)
     rows: Array = np.arange(len(slow), dtype=np.float64) + (period - 1)
     return rows, slow

@@ -69,7 +69,9 @@ def band_limited(values: Array, times: Array, *, cutoff: float = 1.0) -> Array:
 
 def _weights(distance: Array, cutoff: float) -> Array:
     inside = np.clip(1 - (distance * cutoff / LOBES) ** 2, 0, None)
-    return np.asarray(np.sinc(cutoff * distance) * np.i0(KAISER * np.sqrt(inside)) * (inside > 0))
+    from scipy.special import i0
+
+    return np.asarray(np.sinc(cutoff * distance) * i0(KAISER * np.sqrt(inside)) * (inside > 0))
 
 
 def bridge(values: Array, lost: NDArray[np.bool_]) -> Array:
