@@ -1,4 +1,4 @@
-# make demo | test | lint | docs | bench | smoke | clean
+# make demo | lab | test | lint | docs | bench | smoke | clean
 # Set-up is part of every target: the environment lives in .venv and is made when it is missing or out of date.
 PYTHON ?= python3
 VENV := .venv
@@ -9,10 +9,13 @@ ifneq ($(wildcard ../shared/data),)
 export STICKSLIP_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: demo test lint docs bench smoke clean
+.PHONY: demo lab test lint docs bench smoke clean
 
 demo: $(VENV)/.user
 	$(BIN)/stickslip demo --output stickslip-demo
+
+lab: $(VENV)/.lab
+	$(BIN)/stickslip lab
 
 test: $(VENV)/.dev
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m "not alone" -n 2 --dist loadfile
@@ -62,10 +65,15 @@ $(VENV)/.user: pyproject.toml | $(VENV)/bin/python
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[io]"
 	@touch $@
 
+$(VENV)/.lab: pyproject.toml | $(VENV)/bin/python
+	@echo "setting up $(VENV) with what the lab needs"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[io,lab]"
+	@touch $@ $(VENV)/.user
+
 $(VENV)/.dev: pyproject.toml | $(VENV)/bin/python
 	@echo "setting up $(VENV) with what the tests need"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
-	@touch $@ $(VENV)/.user
+	@touch $@ $(VENV)/.user $(VENV)/.lab
 
 $(VENV)/.docs: pyproject.toml | $(VENV)/bin/python
 	@echo "setting up $(VENV) with what the documentation needs"

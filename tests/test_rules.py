@@ -178,14 +178,15 @@ def test_nothing_is_unpickled_or_evaluated(file: Path) -> None:
     assert not imported & {"pickle", "dill", "joblib", "marshal", "shelve"}
 
 
-def test_the_command_line_uses_public_names_alone() -> None:
-    files = sorted((PACKAGE / "cli").glob("*.py"))
+@pytest.mark.parametrize("room", ["cli", "lab"])
+def test_the_command_line_and_the_page_use_public_names_alone(room: str) -> None:
+    files = sorted((PACKAGE / room).glob("*.py"))
     assert files
     inner = [
         f"{path.name}: {node.module}.{alias.name}"
         for path in files
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(node, ast.ImportFrom) and re.match(r"stickslip(?!\.cli\.)", node.module or "")
+        if isinstance(node, ast.ImportFrom) and re.match(r"stickslip(?!\.(cli|lab)\b)", node.module or "")
         for alias in node.names
         if alias.name not in stickslip.__all__
     ]

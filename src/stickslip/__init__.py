@@ -254,6 +254,7 @@ if TYPE_CHECKING:
     from stickslip.sweeps.sweep import sweep as sweep
     from stickslip.plot.maps import plot_map as plot_map
     from stickslip.structure import Contact as Contact, Structure as Structure
+    from stickslip.system_export import export_system as export_system
     from stickslip.system_file import Case as Case, read_system as read_system, scenario_case as scenario_case
     from stickslip.laws.dahl import Dahl as Dahl
     from stickslip.laws.lugre import LuGre as LuGre
@@ -361,7 +362,8 @@ _ROOMS = {
     "plot_bifurcation": "plot.bifurcation", "plot_basins": "plot.bifurcation", "plot_boundary": "plot.bifurcation",
     "plot_dither": "plot.bifurcation",
     "Rig": "rig", "Sensor": "rig", "Mount": "rig", "Noise": "rig", "Digitiser": "rig",
-    "scenarios": "scenarios", "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
+    "scenarios": "scenarios", "export_system": "system_export",
+    "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
     "outcome": "reports.simulation", "Outcome": "reports.simulation", "publish_run": "reports.simulation",
     "require_output": "reports.simulation",
     "animate": "plot.animation",

@@ -196,7 +196,7 @@ class _Source(NamedTuple):
 
     name: str
     lines: Sequence[str]
-    folder: Path
+    folder: Path | None
 
 
 def scenario_case(name: str) -> Case:
@@ -232,13 +232,13 @@ def scenario_case(name: str) -> Case:
     return Case(name, found.about, found.system, found.start, found.run or {"cycles": CYCLES}, None, found.known)
 
 
-def read_system(path: str | Path) -> Case:
-    """Read a system and its run from a TOML file.
+def read_system(path: str | Path | Mapping[str, Any]) -> Case:
+    """Read a system and its run from a TOML file, or from its tables as plain data.
 
     Parameters
     ----------
-    path : path
-        A file such as::
+    path : path or mapping
+        The tables, as from JSON, or a file such as::
 
             [system]
             mass = "2.42 kg"              # a bare number is SI
@@ -258,7 +258,8 @@ def read_system(path: str | Path) -> Case:
             cycles = 40                   # or duration, in seconds
             fs = 4000                     # of the record; chosen where left out
 
-        A drive ``RecordedBase`` takes its samples from ``record = "file.csv"`` and ``channel = "column [mm]"``.
+        A drive ``RecordedBase`` takes its samples from ``record = "file.csv"`` and ``channel = "column [mm]"``; in
+        plain data they stand themselves.
 
     Returns
     -------
@@ -277,22 +278,28 @@ def read_system(path: str | Path) -> Case:
     >>> read_system(path).system.law
     Coulomb(kinetic=1.0, static=None)
     """
+    if isinstance(path, Mapping):
+        return _case("system", dict(path), _Source("the system", (), None))
     path = Path(path)
     values, lines = read_toml(path, what="a system is")
-    source = _Source(path.name, lines, path.parent)
+    return _case(path.stem, values, _Source(path.name, lines, path.parent))
+
+
+def _case(name: str, values: dict[str, Any], source: _Source) -> Case:
+    """The system of a file's tables."""
     if "law" in values and "system" not in values:
         raise ModelError(
-            f"{path.name} holds a law alone", "a law is simulated in a system",
+            f"{source.name} holds a law alone", "a law is simulated in a system",
             "add [system] with mass = and stiffness =, and a [drive]; a fit that is told the mass writes them itself",
         )  # fmt: skip
-    whole = checked(_File, values, source=source.name, lines=lines)
+    whole = checked(_File, values, source=source.name, lines=source.lines)
     drive = _built("drive", DRIVES, whole.drive, source)
     several = whole.contacts is not None or isinstance(whole.system.get("mass"), list)
     system = _structure(whole, drive, source) if several else _oscillator(whole, drive, source)
     start = _part(_start_of(system), "start", whole.start, source)
     run = _part(_Run, "run", whole.run, source)
     fs = run.pop("fs", None)
-    case = Case(path.stem, whole.about, system, start, run or _whole_run(system), fs)
+    case = Case(name, whole.about, system, start, run or _whole_run(system), fs)
     with _placed("run", source):
         _check_run(case)
     return case
@@ -389,6 +396,8 @@ def _recorded(parameters: Mapping[str, Any], source: _Source) -> dict[str, Any]:
     from stickslip.files.read import read_record
 
     path, channel = parameters["record"], parameters.get("channel")
+    if source.folder is None:
+        raise ModelError(f"record = {path!r}", "plain data hold the samples themselves", "give samples = and fs =")
     if not isinstance(path, str) or not isinstance(channel, str):
         where = f"{source.name}{line_of(['drive', 'record'], source.lines)}"
         raise ModelError(

@@ -11,6 +11,7 @@ from stickslip.cli.analyze import analyze, demo
 from stickslip.cli.decay import decay
 from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
+from stickslip.cli.lab import lab
 from stickslip.cli.rig import rig
 from stickslip.cli.simulate import INTERRUPTED, simulate
 from stickslip.cli.squeak import squeak
@@ -47,5 +48,20 @@ def main() -> None:
     """
 
 
-for _command in (analyze, check, convert, datasets, decay, demo, fit, rig, simulate, squeak, sweep, thesis, wavelet):
+for _command in (
+    analyze,
+    check,
+    convert,
+    datasets,
+    decay,
+    demo,
+    fit,
+    lab,
+    rig,
+    simulate,
+    squeak,
+    sweep,
+    thesis,
+    wavelet,
+):
     main.add_command(_command)

@@ -1,0 +1,39 @@
+"""stickslip lab"""
+
+from __future__ import annotations
+
+import secrets
+import webbrowser
+
+import click
+
+PORT = 8723
+
+
+@click.command()
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=PORT, show_default=True, help="Where it listens; 0: any."
+)
+@click.option("--no-browser", is_flag=True, help="Print the address alone; open no browser.")
+def lab(port: int, no_browser: bool) -> None:
+    """Open the lab in the browser: play with a contact, map its regimes, drop a record and get its friction.
+
+    It runs on this machine alone, for whoever has the address that it prints; nothing leaves the machine. Ctrl-C ends
+    it.
+
+    \b
+    stickslip lab
+    stickslip lab --port 9000 --no-browser
+    """
+    from stickslip.lab.serving import listening, serve  # the server is imported where it is wanted
+
+    with listening(port) as door:
+        token = secrets.token_urlsafe(24)
+        address = f"http://127.0.0.1:{door.getsockname()[1]}/?token={token}"
+
+        def opened() -> None:
+            click.echo(f"The lab is open at {address}\nCtrl-C ends it.")
+            if not no_browser:
+                webbrowser.open(address)
+
+        serve(door, token=token, opened=opened)

@@ -1,0 +1,216 @@
+"""What the page draws of a system: its run from event to event, its spectrum, wavelet map and sound, and its texts."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import stickslip as ss
+from stickslip.lab.forms import Answer, catalog
+
+Array = NDArray[np.float64]
+GoOn = Callable[[float], None]
+
+WARM = {
+    "system": {"mass": 2.42, "stiffness": 2310},
+    "law": {"name": "CompliantContact", "kinetic": 1.1, "stiffness": 192000, "damping": 11.8},
+    "drive": {"name": "HarmonicBase", "amplitude": 0.00065, "frequency": 2.5},
+    "run": {"cycles": 40},
+}
+MOST_CYCLES, MOST_CONTACTS, MOST_MASSES = 5000, 4, 12  # played on a page
+SHOWN = 200  # cycles drawn, the last ones
+A_CYCLE, LEAST, MOST = 60, 2400, 16_000  # instants
+A_PIECE, FEW_PIECES, EDGES = 5, 400, 6000
+SPECTRUM, OF_SPECTRUM = 4096, 20  # instants and cycles of a spectrum
+MAP, COLUMNS, SPAN = 16_384, 400, 60.0  # samples, columns and dB of a wavelet map
+HEARD, LASTS, PITCH = 22_050, 3.0, 110.0  # Hz and s of a sound; Hz at which a cycle is heard
+MICROSLIP = 0.1  # of the longest slip: a shorter one is a micro-slip
+GROUPS = {"x": "displacement", "v": "velocity", "a": "acceleration", "friction": "friction"}
+KINDS = ("slip", "microstick", "stick", "flight")
+
+
+def read_case(state: Any) -> ss.Case:
+    """The system of the page's state, if it is one that a page can play."""
+    if not isinstance(state, Mapping):
+        raise ss.ModelError("a state that holds no tables", "it has the tables of a system's file", "send those")
+    case = ss.read_system(state)
+    contacts = len(case.system.contacts) if isinstance(case.system, ss.Structure) else 1
+    masses = case.system.size if isinstance(case.system, ss.Structure) else 1
+    cycles = case.duration * max(_frequency(case), 1 / case.duration)
+    for name, count, most in (
+        ("cycles", cycles, MOST_CYCLES), ("contacts", contacts, MOST_CONTACTS), ("masses", masses, MOST_MASSES),
+    ):  # fmt: skip
+        if count > most:
+            raise ss.ModelError(f"{count:g} {name}", f"the page plays up to {most} {name}", "use stickslip simulate")
+    return case
+
+
+def run(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """The motion: traces, marks of what holds, and the spectrum."""
+    case = read_case(request["state"])
+    run = ss.simulate(case.system, start=case.start, progress=go_on, **case.run)  # type: ignore[arg-type]
+    cycle = _cycle(run)
+    first, last = _window(run, cycle)
+    times = _instants(run, first, last, cycle)
+    series, values = _series(run, times)
+    marks, micro = _marks(run, first, last)
+    frequency, amplitude = _spectrum(run, last, cycle)
+    header = {
+        "status": run.status, "cycle": cycle, "first": first, "last": last, "series": series,
+        "belt": run.table.motion.face.get("way", 0.0), "spectrum": f"acceleration {run.labels('a')[0]}",
+    }  # fmt: skip
+    arrays = {"time": times, **values, **marks, "microslips": micro, "frequency": frequency, "amplitude": amplitude}
+    return header, arrays
+
+
+def tell(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """What the library says of the motion, in words and in numbers as it prints them."""
+    found = ss.outcome(read_case(request["state"]), progress=go_on)
+    return {"status": found.run.status, "sentences": found.sentences, "rows": found.rows}, {}
+
+
+def wavelet(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """The wavelet map of the acceleration over the whole run: levels in dB below the largest, as bytes."""
+    case = read_case(request["state"])
+    run = ss.simulate(case.system, start=case.start, progress=go_on, **case.run)  # type: ignore[arg-type]
+    record = run.record(fs=MAP / run.duration)
+    wavelets = ss.wavelet_overview(record, run.labels("a")[0], columns=COLUMNS, voices=6)
+    level = np.abs(wavelets.values)
+    decibel = 20 * np.log10(np.maximum(level / (level.max() or 1.0), 1e-12))
+    counts = np.clip(255 * (1 + decibel / SPAN), 0, 255).astype(np.uint8)
+    header = {"rows": len(counts), "span": SPAN, "of": f"acceleration {run.labels('a')[0]}"}
+    arrays = {"levels": counts.ravel(), "frequency": wavelets.frequency.values, "time": wavelets.time.values}
+    return header, arrays
+
+
+def sound(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """What is heard: the pressure where a surface vibrates across the contact, else friction, quickened to a pitch."""
+    case = read_case(request["state"])
+    run = ss.simulate(case.system, start=case.start, progress=go_on, **case.run)  # type: ignore[arg-type]
+    if isinstance(run.system, ss.Structure) and run.system.size > 1:
+        heard = ss.sound_pressure(run, fs=HEARD)["sound"][-int(LASTS * HEARD) :]
+        words = f"sound pressure 10 cm away, in true time, {len(heard) / HEARD:.2g} s of it"
+    else:
+        quicker = max(1.0, PITCH * _cycle(run))
+        lasts = min(LASTS, run.duration / quicker)
+        times = np.linspace(run.duration - lasts * quicker, run.duration, max(2, int(lasts * HEARD)))
+        heard = run.sample(np.clip(times, 0, run.duration), ("friction",))[0][0]
+        words = f"friction, {quicker:.3g} times as fast"
+    heard = heard - heard.mean()
+    return {"fs": HEARD, "words": words}, {"sound": heard / (np.abs(heard).max() or 1.0)}
+
+
+def preset(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """The state of a scenario."""
+    return _state(ss.scenario_case(str(request["name"]))), {}
+
+
+def export(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """The texts that reproduce what is on screen."""
+    case = read_case(request["state"])
+    return {form: ss.export_system(case, format=form) for form in ("toml", "python")}, {}
+
+
+def opened(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """The state of a system's file."""
+    try:
+        tables = tomllib.loads(str(request["text"]))
+    except tomllib.TOMLDecodeError as error:
+        raise ss.ModelError(f"the text is no TOML ({error})", "a system is a TOML file", "correct that line") from error
+    return _state(read_case(tables)), {}
+
+
+ANSWERS: dict[str, Callable[[Mapping[str, Any], GoOn], Answer]] = {
+    "catalog": catalog, "run": run, "tell": tell, "wavelet": wavelet, "sound": sound, "preset": preset,
+    "export": export, "open": opened,
+}  # fmt: skip
+
+
+def _state(case: ss.Case) -> dict[str, Any]:
+    return {"state": json.loads(ss.export_system(case, format="json"))}
+
+
+def _frequency(case: ss.Case) -> float:
+    period = case.system.drive.motion().period
+    return 1 / period if math.isfinite(period) else case.system.frequency
+
+
+def _cycle(run: ss.Trajectory) -> float:
+    """The time after which the motion repeats, or would [s]: the drive's, that of the events themselves, or natural."""
+    motion, same = run.table.motion, np.flatnonzero(run.modes == run.modes[-1])
+    if math.isfinite(motion.period):
+        return min(motion.period, run.duration)
+    if len(same) > 1 and motion.rates and motion.knots is None:  # pulled by a belt or a ramp
+        return float(run.starts[same[-1]] - run.starts[same[-2]])
+    return min(1 / run.system.frequency, run.duration) if run.system.frequency else run.duration
+
+
+def _window(run: ss.Trajectory, cycle: float) -> tuple[float, float]:
+    """First and last instant drawn: of a motion that comes to rest, of all that moved."""
+    last = run.duration
+    if run.status == "at rest" and len(run.starts) > 1:
+        moved = float(run.starts[-1])
+        last = min(last, moved + 0.15 * max(moved, cycle))
+    return max(0.0, last - SHOWN * cycle), last
+
+
+def _instants(run: ss.Trajectory, first: float, last: float, cycle: float) -> Array:
+    """Even ones, and both sides of every event, so that jumps stay upright."""
+    count = int(np.clip(A_CYCLE * (last - first) / cycle, LEAST, MOST))
+    begin, end = np.clip(run.starts, first, last), np.clip(run.starts + run.durations, first, last)
+    inside = end > begin
+    begin, end = begin[inside], end[inside]
+    parts = [np.linspace(first, last, count)]
+    if len(begin) <= EDGES:
+        parts += [begin, np.maximum(np.nextafter(begin, -np.inf), first)]
+    if len(begin) <= FEW_PIECES:
+        parts.append((begin[:, None] + np.linspace(0, 1, A_PIECE) * (end - begin)[:, None]).ravel())
+    return np.clip(np.unique(np.concatenate(parts)), first, last)
+
+
+def _series(run: ss.Trajectory, times: Array) -> tuple[list[dict[str, str]], dict[str, Array]]:
+    """Each line of the traces with its group and unit, and what moves it; "way" and "slip" are the loops' abscissae."""
+    moved = [name for name, part in (("z", "base"), ("force", "force")) if getattr(run.table.motion, part)]
+    names = [*GROUPS, *moved, "slip"]
+    values, _ = run.sample(times, tuple(names))
+    lines = [
+        (name, label, unit) for name in names for label, unit in zip(run.labels(name), run.units(name), strict=True)
+    ]
+    arrays = dict(zip((label for _, label, _ in lines), values, strict=True))
+    way = arrays["x"] if "x" in arrays else run.system.tangents[0] @ values[: len(run.labels("x"))]  # type: ignore[union-attr]
+    held = {**arrays, "way": way, "slip": arrays["slip" if "slip" in arrays else "slip1"]}
+    of = {"z": "x", "slip": "slip"}
+    return [{"name": label, "group": of.get(name, name), "unit": unit} for name, label, unit in lines], held
+
+
+def _marks(run: ss.Trajectory, first: float, last: float) -> tuple[dict[str, Any], Array]:
+    """What the contact does from when to when (several: together), and the middles of the micro-slips."""
+    number = {kind: j for j, kind in enumerate(KINDS)}
+    kinds = np.array([number.get(mode.kind, 0) for mode in run.table.modes])[run.modes]
+    ends = run.starts + run.durations
+    slips = np.flatnonzero((kinds == 0) & (np.arange(len(kinds)) > 0) & (np.arange(len(kinds)) < len(kinds) - 1))
+    lengths = run.durations[slips]
+    short = slips[lengths < MICROSLIP * lengths.max()] if len(slips) else slips
+    middles = (run.starts + ends)[short] / 2
+    seen = (ends > first) & (run.starts < last) & (run.durations > 0)
+    seen &= np.cumsum(seen[::-1])[::-1] <= EDGES
+    marks = {"begins": run.starts[seen], "ends": ends[seen], "kinds": kinds[seen].astype(np.int32)}
+    return marks, middles[(middles > first) & (middles < last)][-EDGES:]
+
+
+def _spectrum(run: ss.Trajectory, last: float, cycle: float) -> tuple[Array, Array]:
+    """Amplitude [m/s^2] of the acceleration over the frequency [Hz], of the last whole cycles under a Hann window."""
+    cycles = max(1, min(OF_SPECTRUM, math.floor(last / cycle * (1 + 1e-9)))) if run.status != "at rest" else 0
+    length = min(cycles * cycle or last, last)
+    times = last - length + np.arange(SPECTRUM) * (length / SPECTRUM)
+    values = run.sample(np.clip(times, 0, last), ("a",))[0][0]
+    weights = np.hanning(SPECTRUM + 1)[:-1]
+    amplitude = 2 * np.abs(np.fft.rfft(weights * (values - values.mean()))) / weights.sum()
+    frequency: Array = np.fft.rfftfreq(SPECTRUM, length / SPECTRUM)
+    return frequency[1:], amplitude[1:]

@@ -1,0 +1,61 @@
+"""What a map asks of a system, part by part: a grid of its parameters, or one cell on finer and finer grids."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+import stickslip as ss
+from stickslip.lab.drawn import read_case
+from stickslip.lab.forms import Answer
+
+GoOn = Callable[[float], None]
+
+SETTLE, CYCLES = 60, 12  # periods before and while it is measured
+SHOWN = {
+    "stops": ("normal_stops", "abnormal_stops"), "micro_slips": ("micro_slips",), "period": ("order",),
+    "stick_share": ("stick_share",), "amplitude": ("amplitude",),
+}  # fmt: skip
+COUNTED = ("stops", "micro_slips", "period")  # where the answer jumps, the map is refined
+MOST = 2000  # points of one part
+
+
+def sweep(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """One value at each point of a grid of two parameters."""
+    system, grid, options = _read(request)
+    found = ss.sweep(system, grid, measures=[request["measure"]], **options)
+    return _values(found, request["measure"])
+
+
+def refine(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """The same between two values of each parameter, halved where the answer changes."""
+    system, grid, options = _read(request)
+    found = ss.refine(system, grid, measure=request["measure"], halvings=int(request["halvings"]), **options)
+    return _values(found, request["measure"])
+
+
+ANSWERS: dict[str, Callable[[Mapping[str, Any], GoOn], Answer]] = {"sweep": sweep, "refine": refine}
+
+
+def _read(request: Mapping[str, Any]) -> tuple[Any, dict[str, list[float]], dict[str, Any]]:
+    """System, grid and options, if a map can be made of them."""
+    case = read_case(request["state"])
+    grid = {str(name): [float(value) for value in values] for name, values in request["grid"].items()}
+    if request["measure"] not in SHOWN:
+        raise ss.ModelError(f"a map of '{request['measure']}'", f"there are {', '.join(SHOWN)}", "choose one")
+    size = int(np.prod([len(values) for values in grid.values()]))
+    if len(grid) != 2 or not 0 < size <= MOST:
+        raise ss.ModelError(
+            f"{size} points over {len(grid)} parameters", f"a part has two and up to {MOST}", "ask less"
+        )
+    return case.system, grid, {"cycles": CYCLES, "settle": SETTLE, "start": case.start, "engine": "serial"}
+
+
+def _values(found: Any, measure: str) -> Answer:
+    """Rows over the second parameter; nan where the motion has no answer, and -1 where there is no such system."""
+    values = sum(found[name].values.astype(float) for name in SHOWN[measure])
+    values = np.where(found.status.values == found.status.attrs["flag_meanings"].split().index("no_such_system") - 1,
+                      -1.0, values)  # fmt: skip
+    return {"shape": list(values.shape)}, {"values": values.ravel()}

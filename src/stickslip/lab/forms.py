@@ -1,0 +1,56 @@
+"""What the page offers: every law and drive with its parameters, units and words, and the scenarios to begin with."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import stickslip as ss
+
+Answer = tuple[dict[str, Any], dict[str, Any]]
+CHOICE = re.compile(r"\{(.+)\}")
+UNIT = re.compile(r"\[([^\]]+)\]")
+WORD = re.compile(r"\[.*?\]|:math:`[^`]*`|``|`")
+MORE = ("law", "drive", "contacts")
+
+
+def catalog(request: Mapping[str, Any], go_on: Any) -> Answer:
+    """All that can be chosen: ``{"laws": ..., "drives": ..., "system": ..., "presets": ...}``."""
+    return {
+        "laws": {name: _part(make) for name, make in ss.scenarios.LAWS.items()},
+        "drives": {name: _part(make) for name, make in ss.scenarios.DRIVES.items()},
+        "system": _part(ss.Oscillator),
+        "contact": _part(ss.Contact),
+        "presets": [_preset(name) for name in ss.scenarios.names()],
+    }, {}
+
+
+def _preset(name: str) -> dict[str, Any]:
+    case = ss.scenario_case(name)
+    return {"name": name, "about": case.about, "parts": case.parts}
+
+
+def _part(make: Any) -> dict[str, Any]:
+    """A class by what its docstring says: in a line, and parameter by parameter."""
+    text = inspect.cleandoc(make.__doc__ or "")
+    about = " ".join(text.split("\n\n")[0].split())
+    return {"about": WORD.sub("", about), "parameters": [_parameter(field, text) for field in dataclasses.fields(make)]}
+
+
+def _parameter(field: dataclasses.Field[Any], text: str) -> dict[str, Any]:
+    found = re.search(rf"^(?:\w+, )*{field.name}(?:, \w+)* : (.*)\n((?:    .*\n?)+)", text, re.MULTILINE)
+    kind, words = (found[1], " ".join(found[2].split())) if found else ("", "")
+    choice, unit = CHOICE.match(kind), UNIT.search(words)
+    default = None if field.default is dataclasses.MISSING else field.default
+    return {
+        "name": field.name,
+        "unit": unit[1] if unit else "",
+        "words": words,
+        "default": default if isinstance(default, int | float | str | None) else None,
+        "optional": "None" in kind or field.default is not dataclasses.MISSING,
+        "choices": re.findall(r'"(.*?)"', choice[1]) if choice else [],
+        "part": field.name in MORE,
+    }

@@ -1,0 +1,126 @@
+"""A regime map while one looks: coarse in strips, then each cell across which the answer changes, finer and finer."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from starlette.routing import BaseRoute, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from stickslip.lab.frames import frame, unframed
+from stickslip.lab.play import asked, conversation, readable
+from stickslip.lab.workers import Workers
+
+WANTED = ("map", "cancel")
+COUNTED = ("stops", "micro_slips", "period")  # where an answer jumps, its border is refined
+STRIP, MOST, HALVINGS = 2, 64, 3  # columns at a time, points along an axis, of each cell
+
+
+class Unanswered(Exception):
+    """A part of the map has no answer: the message says why."""
+
+
+async def _map(socket: WebSocket) -> None:
+    """One map at a time: a new request, or the word cancel, ends the one before."""
+    newest: list[dict[str, Any]] = []
+    come = asyncio.Event()
+    drawing: list[asyncio.Task[None]] = []
+
+    def heard(message: Mapping[str, Any]) -> None:
+        newest[:] = [readable(message, WANTED)]
+        for task in drawing:
+            task.cancel()
+        come.set()
+
+    async def drawn(request: dict[str, Any]) -> None:
+        told = {"id": request["id"], "want": "map"}
+        try:
+            async for header, arrays in _parts(socket.app.state.workers, request):
+                await socket.send_bytes(frame({**told, "kind": "part", **header}, arrays))
+            await socket.send_bytes(frame({**told, "kind": "done"}))
+        except Unanswered as error:
+            await socket.send_bytes(frame({**told, "kind": "error", "error": str(error)}))
+
+    async def work() -> None:
+        while await come.wait():
+            come.clear()
+            request = newest.pop()
+            if request["want"] == "cancel":
+                await socket.send_bytes(frame({"id": request["id"], "want": "map", "kind": "cancelled"}))
+                continue
+            drawing[:] = [asyncio.create_task(drawn(request))]
+            try:
+                await asyncio.wait(drawing)
+            finally:
+                drawing.pop().cancel()
+
+    await conversation(socket, heard, work)
+
+
+async def _parts(
+    workers: Workers, request: Mapping[str, Any]
+) -> AsyncIterator[tuple[dict[str, Any], dict[str, NDArray[np.float64]]]]:
+    """Values on rectangles of the map, with the share that is done."""
+    names, (xs, ys) = _axes(request)
+    values = np.full((len(xs), len(ys)), math.nan)
+    strips = range(0, len(xs), STRIP)
+    for number, begin in enumerate(strips, start=1):
+        part = xs[begin : begin + STRIP]
+        values[begin : begin + STRIP] = await _asked(workers, request, names, part, ys, want="sweep")
+        yield {"level": "coarse", "done": number, "of": len(strips)}, {
+            "x": part, "y": ys, "values": values[begin : begin + STRIP].ravel(),
+        }  # fmt: skip
+    cells = _changing(values) if request["measure"] in COUNTED else []
+    for number, (i, j) in enumerate(cells, start=1):
+        x, y = xs[i : i + 2], ys[j : j + 2]
+        found = await _asked(workers, request, names, x, y, want="refine")
+        fine = [np.linspace(ends[0], ends[1], 2**HALVINGS + 1) for ends in (x, y)]
+        yield {"level": "fine", "done": number, "of": len(cells)}, {
+            "x": fine[0], "y": fine[1], "values": found.ravel(),
+        }  # fmt: skip
+
+
+def _axes(request: Mapping[str, Any]) -> tuple[list[str], list[NDArray[np.float64]]]:
+    """Names and values of the two parameters."""
+    names, values = [], []
+    for side in ("x", "y"):
+        axis = request.get(side)
+        try:
+            name, low, high, count = str(axis["name"]), float(axis["from"]), float(axis["to"]), int(axis["count"])  # type: ignore[index]
+        except (TypeError, KeyError, ValueError, OverflowError):
+            raise Unanswered(f"The map's {side} has a name, from, to, and count; give all four.") from None
+        if not (math.isfinite(low) and math.isfinite(high) and low < high and 2 <= count <= MOST):
+            raise Unanswered(f"The map's {side} goes from a number to a larger one in 2 to {MOST} points; correct it.")
+        names.append(name)
+        values.append(np.linspace(low, high, count))
+    if names[0] == names[1] or not isinstance(request.get("measure"), str):
+        raise Unanswered("A map is of one measure over two different parameters; choose others.")
+    return names, values
+
+
+async def _asked(
+    workers: Workers, request: Mapping[str, Any], names: list[str], x: Any, y: Any, *, want: str
+) -> NDArray[np.float64]:
+    grid = {names[0]: x.tolist(), names[1]: y.tolist()}
+    asking = {"id": request["id"], "want": want, "state": request.get("state"), "measure": request["measure"],
+              "grid": grid, "halvings": HALVINGS}  # fmt: skip
+    header, arrays = unframed(await asked(workers, asking))
+    if header["kind"] == "error":
+        raise Unanswered(header["error"])
+    found: NDArray[np.float64] = arrays["values"].reshape(header["shape"])
+    return found
+
+
+def _changing(values: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Cells whose four corners do not say the same."""
+    whole = np.nan_to_num(np.round(values), nan=-2.0)
+    corners = np.stack([whole[:-1, :-1], whole[1:, :-1], whole[:-1, 1:], whole[1:, 1:]])
+    return [(int(i), int(j)) for i, j in np.argwhere(corners.min(axis=0) != corners.max(axis=0))]
+
+
+routes: list[BaseRoute] = [WebSocketRoute("/map", _map)]

@@ -1,0 +1,147 @@
+"""The page's questions of a system: over a socket while sliders move, the newest first; the rest by plain requests."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import Callable, Coroutine, Mapping
+from typing import Any
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from stickslip.lab.frames import frame, unframed
+from stickslip.lab.openapi import described
+from stickslip.lab.workers import Worker, Workers
+
+WANTED = ("run", "tell", "export", "sound", "wavelet")  # in the order in which they are answered
+STATE = {
+    "type": "object",
+    "required": ["system"],
+    "properties": {
+        "about": {"type": "string"}, "system": {"type": "object"}, "law": {"type": "object"},
+        "contacts": {"type": "array", "items": {"type": "object"}}, "drive": {"type": "object"},
+        "start": {"type": "object"}, "run": {"type": "object"},
+    },
+}  # fmt: skip
+
+
+async def asked(workers: Workers, request: Mapping[str, Any], *, lent: list[Worker] | None = None) -> bytes:
+    """A worker's answer; what befell the worker is told in one sentence to who asked."""
+    told = {"id": request.get("id"), "want": request.get("want"), "kind": "error"}
+    try:
+        return await workers.ask(json.dumps(request).encode(), lent=lent)
+    except TimeoutError:
+        return frame({**told, "error": "This takes longer than the page waits; ask for less."})
+    except EOFError:
+        return frame({**told, "error": "The computation ended without an answer; change what was changed last."})
+
+
+def readable(message: Mapping[str, Any], wanted: tuple[str, ...]) -> dict[str, Any]:
+    """The request in a socket's message.
+
+    Raises
+    ------
+    ValueError
+        It is none; the words say what is missing.
+    """
+    try:
+        request = json.loads(message.get("text") or "")
+    except (ValueError, RecursionError) as error:
+        raise ValueError("A message to the lab is text in JSON.") from error
+    if not isinstance(request, dict) or request.get("want") not in wanted or not isinstance(request.get("id"), int):
+        raise ValueError(f"A message to the lab has a whole number as id, and wants one of {', '.join(wanted)}.")
+    return request
+
+
+async def conversation(
+    socket: WebSocket, heard: Callable[[Mapping[str, Any]], None], work: Callable[[], Coroutine[Any, Any, None]]
+) -> None:
+    """Hear each message while the work goes on, until the page has gone."""
+    await socket.accept()
+    working = asyncio.create_task(work())
+    try:
+        while (message := await socket.receive())["type"] != "websocket.disconnect":
+            try:
+                heard(message)
+            except ValueError as error:
+                await socket.send_bytes(frame({"id": None, "kind": "error", "error": str(error)}))
+    except (WebSocketDisconnect, RuntimeError):  # it went while it was spoken to
+        pass
+    finally:
+        working.cancel()
+        with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
+            await working
+
+
+async def _play(socket: WebSocket) -> None:
+    """Of each kind of request the newest is answered; a long one that is overtaken ends early."""
+    waiting: dict[str, dict[str, Any]] = {}
+    lent: list[Worker] = []
+    come = asyncio.Event()
+
+    def heard(message: Mapping[str, Any]) -> None:
+        request = readable(message, WANTED)
+        waiting[request["want"]] = request
+        if request["want"] == "run":
+            for worker in lent:
+                worker.interrupt()
+        come.set()
+
+    async def work() -> None:
+        while await come.wait():
+            come.clear()
+            while waiting:
+                request = waiting.pop(min(waiting, key=WANTED.index))
+                await socket.send_bytes(await asked(socket.app.state.workers, request, lent=lent))
+
+    await conversation(socket, heard, work)
+
+
+async def _answer(request: Request, asking: Mapping[str, Any]) -> Response:
+    header, _ = unframed(await asked(request.app.state.workers, asking))
+    if header["kind"] == "error":
+        raise HTTPException(422, header["error"])
+    return JSONResponse({name: value for name, value in header.items() if name not in ("id", "want", "kind")})
+
+
+async def _body(request: Request) -> Any:
+    try:
+        return json.loads(await request.body())
+    except (ValueError, RecursionError) as error:
+        raise HTTPException(400, "The request holds no JSON; send an object.") from error
+
+
+@described("All laws, drives and scenarios, with their parameters", answer={"type": "object"})
+async def _catalog(request: Request) -> Response:
+    return await _answer(request, {"want": "catalog"})
+
+
+@described("The state of a scenario", answer={"type": "object", "required": ["state"]})
+async def _preset(request: Request) -> Response:
+    return await _answer(request, {"want": "preset", "name": request.path_params["name"]})
+
+
+@described("A state as a system's file in TOML and as a Python program", body=STATE,
+           answer={"type": "object", "required": ["toml", "python"]})  # fmt: skip
+async def _export(request: Request) -> Response:
+    return await _answer(request, {"want": "export", "state": await _body(request)})
+
+
+@described("The state of a system's file", body={"type": "string"}, media="text/plain",
+           answer={"type": "object", "required": ["state"]})  # fmt: skip
+async def _open(request: Request) -> Response:
+    return await _answer(request, {"want": "open", "text": (await request.body()).decode("utf-8", "replace")})
+
+
+routes: list[BaseRoute] = [
+    WebSocketRoute("/play", _play),
+    Route("/catalog", _catalog),
+    Route("/scenarios/{name}", _preset),
+    Route("/export", _export, methods=["POST"]),
+    Route("/open", _open, methods=["POST"]),
+]

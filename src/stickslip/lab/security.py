@@ -1,0 +1,123 @@
+"""Who may speak with the lab: this machine's own page, with the token; and what its answers may do in a browser."""
+
+from __future__ import annotations
+
+import secrets
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocketClose
+
+HOSTS = ("127.0.0.1", "localhost")
+LIMIT = 2**20  # bytes of a request
+LIMITS = {"/files": 4 * 2**30}  # by how the path begins: records are large
+VIOLATION = 1008  # RFC 6455: against the policy
+HEADERS = {
+    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "media-src blob:; connect-src 'self' {sockets}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cache-control": "no-store",
+}
+
+
+class Guard:
+    """The door: every request states our host and origin and knows the token; none is larger than it may be.
+
+    Parameters
+    ----------
+    app : ASGI application
+        What is behind it.
+    token : str
+        The secret of this start.
+    port : int
+        Where the lab listens.
+    """
+
+    def __init__(self, app: ASGIApp, *, token: str, port: int) -> None:
+        self.app, self.token, self.cookie = app, token, f"stickslip-{port}"
+        self.hosts = {f"{host}:{port}" for host in HOSTS}
+        self.origins = {f"http://{host}" for host in self.hosts}
+        sockets = " ".join(f"ws://{host}" for host in sorted(self.hosts))
+        self.headers = {name: value.format(sockets=sockets) for name, value in HEADERS.items()}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self.app(scope, receive, send)
+            return
+        answer = self._refused(scope) or self._welcomed(scope)
+        if scope["type"] == "websocket":
+            await (WebSocketClose(VIOLATION, "not from this page") if answer else self.app)(scope, receive, send)
+            return
+        guarded = self._marked(send)
+        await (answer or self.app)(scope, receive if answer else _counted(scope, receive), guarded)
+
+    def _refused(self, scope: Scope) -> Response | None:
+        headers = Headers(scope=scope)
+        if [host.lower() for host in headers.getlist("host")] not in [[host] for host in self.hosts]:
+            return _told(400, "This lab answers at 127.0.0.1 alone; open the address that it printed.")
+        if not {origin.lower() for origin in headers.getlist("origin")} <= self.origins:
+            return _told(403, "Another page may not use this lab; open the address that it printed.")
+        return None
+
+    def _welcomed(self, scope: Scope) -> Response | None:
+        """Nothing for who knows the token; the page's address with it is exchanged for a cookie."""
+        headers = Headers(scope=scope)
+        told = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
+        if scope["type"] == "http" and scope["path"] == "/" and self._known(told):
+            page = RedirectResponse("/", status_code=303)
+            page.set_cookie(self.cookie, self.token, httponly=True, samesite="strict", path="/")
+            return page
+        scheme, _, bearer = headers.get("authorization", "").partition(" ")
+        if self._known(_cookies(headers).get(self.cookie, "")) or (scheme.lower() == "bearer" and self._known(bearer)):
+            return None
+        return _told(401, "The token is missing or of another start; open the address that 'stickslip lab' printed.")
+
+    def _known(self, told: str) -> bool:
+        return secrets.compare_digest(told.encode("utf-8", "surrogateescape"), self.token.encode())
+
+    def _marked(self, send: Send) -> Send:
+        """`send`, with the headers that hold the browser to this page."""
+
+        async def sending(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                held = MutableHeaders(scope=message)
+                for name, value in self.headers.items():
+                    held[name] = value
+            await send(message)
+
+        return sending
+
+
+def _counted(scope: Scope, receive: Receive) -> Receive:
+    """`receive`, ended where more comes than the path takes, whatever length was stated."""
+    limit = next((most for start, most in LIMITS.items() if scope["path"].startswith(start)), LIMIT)
+    taken = 0
+
+    async def receiving() -> Message:
+        nonlocal taken
+        message = await receive()
+        taken += len(message.get("body", b""))
+        if taken > limit:
+            raise HTTPException(413, f"The request is larger than the {limit / 2**20:g} MB taken here; send less.")
+        return message
+
+    return receiving
+
+
+def _cookies(headers: Headers) -> dict[str, str]:
+    try:
+        return {name: morsel.value for name, morsel in SimpleCookie(headers.get("cookie", "")).items()}
+    except CookieError:
+        return {}
+
+
+def _told(status: int, sentence: str) -> Response:
+    return JSONResponse({"error": sentence}, status)

@@ -1,0 +1,90 @@
+"""The lab's server: the page, what it asks for, and the workers behind."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import BaseRoute, Mount, Route
+from starlette.staticfiles import StaticFiles
+
+import stickslip as ss
+from stickslip.lab import maps, play
+from stickslip.lab.openapi import described, document
+from stickslip.lab.security import Guard
+from stickslip.lab.workers import Workers
+
+PAGE = Path(__file__).parent / "page"
+WORKERS = 2
+
+
+def lab_app(*, token: str, port: int) -> Starlette:
+    """The application: guarded, with its page and all that the page asks for.
+
+    Parameters
+    ----------
+    token : str
+        The secret that every request states, in its cookie or as a bearer.
+    port : int
+        Where it will listen: requests for another host or port are refused.
+
+    Returns
+    -------
+    Starlette
+    """
+    return Starlette(
+        routes=[*_routes(), Mount("/", StaticFiles(directory=PAGE, html=True))],
+        middleware=[Middleware(Guard, token=token, port=port)],
+        exception_handlers={HTTPException: _refusal, ss.StickslipError: _unanswered, Exception: _broken},
+        lifespan=_lifespan,
+    )
+
+
+def _routes() -> list[BaseRoute]:
+    return [*play.routes, *maps.routes, *_data_routes(), Route("/openapi.json", _openapi), Route("/alive", _alive)]
+
+
+def _data_routes() -> list[BaseRoute]:
+    try:
+        data = importlib.import_module("stickslip.lab.data")
+    except ModuleNotFoundError:
+        return []
+    return list(data.routes)
+
+
+@asynccontextmanager
+async def _lifespan(app: Starlette) -> AsyncIterator[None]:
+    async with AsyncExitStack() as stack:
+        app.state.workers = await stack.enter_async_context(Workers(WORKERS))
+        yield
+
+
+async def _openapi(request: Request) -> Response:
+    return JSONResponse(document(_routes()))
+
+
+@described("Is the lab there, and which version?", answer={"type": "object", "required": ["version"]})
+async def _alive(request: Request) -> Response:
+    return JSONResponse({"version": ss.__version__})
+
+
+async def _refusal(request: Request, error: Any) -> Response:
+    said = {404: f"There is nothing at {request.url.path}.", 405: f"{request.method} has no meaning at that address."}
+    sentence = said.get(error.status_code, error.detail)
+    return JSONResponse({"error": str(sentence)}, error.status_code, headers=error.headers)
+
+
+async def _unanswered(request: Request, error: Exception) -> Response:
+    return JSONResponse({"error": str(error)}, 422)
+
+
+async def _broken(request: Request, error: Exception) -> Response:
+    return JSONResponse({"error": f"The lab failed at this request ({type(error).__name__}); others go on."}, 500)

@@ -1,0 +1,61 @@
+"""The lab listens, on this machine alone."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+
+import stickslip as ss
+
+LARGEST_MESSAGE = 2**20  # bytes on a socket
+HOST = "127.0.0.1"
+
+
+def listening(port: int) -> socket.socket:
+    """The port, taken; 0 takes any that is free.
+
+    Raises
+    ------
+    ModelError
+        Another program has it.
+    """
+    door = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        door.bind((HOST, port))
+    except OSError as error:
+        door.close()
+        raise ss.ModelError(
+            f"port {port} is taken ({error.strerror})", "the lab needs one of its own", "choose another with --port"
+        ) from error
+    return door
+
+
+def serve(door: socket.socket, *, token: str, opened: Callable[[], None]) -> None:
+    """Answer at the door until Ctrl-C; `opened` is called when it does.
+
+    Raises
+    ------
+    ModelError
+        The packages of the extra [lab] are not there.
+    """
+    try:
+        import uvicorn
+
+        from stickslip.lab.server import lab_app
+    except ImportError as error:
+        raise ss.ModelError(
+            f"the lab needs the package {error.name}", "it comes with the extra [lab]", "pip install 'stickslip[lab]'"
+        ) from error
+
+    class Server(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            opened()
+
+    app = lab_app(token=token, port=door.getsockname()[1])
+    settings = uvicorn.Config(
+        app, log_level="warning", ws_max_size=LARGEST_MESSAGE, server_header=False, date_header=False,
+        timeout_graceful_shutdown=2, ws_per_message_deflate=False,
+    )  # fmt: skip
+    Server(settings).run(sockets=[door])

@@ -1,0 +1,89 @@
+"""What runs in a worker's process: requests come by its standard input, answers leave by its standard output."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import time
+from typing import Any, BinaryIO
+
+import stickslip as ss
+from stickslip.lab import drawn, explored
+from stickslip.lab.frames import frame
+from stickslip.lab.workers import HEAD
+
+MEMORY = 4 * 2**30  # bytes of data
+PATIENCE = 30.0  # s of one run
+ANSWERS = {**drawn.ANSWERS, **explored.ANSWERS}
+
+
+class Overtaken(Exception):
+    """No one waits for this answer any more."""
+
+
+class Patience:
+    """What a long run asks some ten times a second: whether to go on."""
+
+    def __init__(self) -> None:
+        self.overtaken, self.since = False, time.monotonic()
+        signal.signal(signal.SIGINT, self._interrupted)
+
+    def _interrupted(self, *_: object) -> None:
+        self.overtaken = True
+
+    def begin(self) -> None:
+        """A new request."""
+        self.overtaken, self.since = False, time.monotonic()
+
+    def __call__(self, share: float = 0.0) -> None:
+        """Go on, or raise."""
+        if self.overtaken:
+            raise Overtaken
+        if time.monotonic() - self.since > PATIENCE:
+            raise ss.SolveError(f"the run is {share:.0%} done after {PATIENCE:g} s", "the page waits no longer",
+                                "ask for fewer cycles, or run it with stickslip simulate")  # fmt: skip
+
+
+def answered(request: dict[str, Any], patience: Patience) -> bytes:
+    """The answer to a request, whatever it is."""
+    told = {"id": request.get("id"), "want": request.get("want")}
+    patience.begin()
+    try:
+        header, arrays = ANSWERS[request["want"]](request, patience)
+        return frame({**told, "kind": request["want"], **header}, arrays)
+    except Overtaken:
+        return frame({**told, "kind": "overtaken"})
+    except ss.StickslipError as error:
+        return frame({**told, "kind": "error", "error": str(error)})
+    except MemoryError:
+        return frame({**told, "kind": "error", "error": "This needs more memory than the page may take; ask for less."})
+    except Exception as error:  # noqa: BLE001  # one sentence to one user; the others go on
+        sentence = f"The lab can not answer this ({type(error).__name__}: {error}); change what was changed last."
+        return frame({**told, "kind": "error", "error": sentence})
+
+
+def serve(requests: BinaryIO, answers: BinaryIO) -> None:
+    """Answer one request after the other until there are no more."""
+    patience = Patience()
+    answered({"want": "run", "state": drawn.WARM}, patience)  # the first one is then as fast as the next
+    while len(head := requests.read(HEAD.size)) == HEAD.size:
+        answer = answered(json.loads(requests.read(HEAD.unpack(head)[0])), patience)
+        answers.write(HEAD.pack(len(answer)) + answer)
+        answers.flush()
+
+
+def main() -> None:
+    """Serve on this process's own pipes; what else is printed goes to the error stream."""
+    if os.name == "posix":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    with os.fdopen(os.dup(1), "wb") as answers:
+        os.dup2(2, 1)
+        serve(sys.stdin.buffer, answers)
+
+
+if __name__ == "__main__":
+    main()

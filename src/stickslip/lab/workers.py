@@ -1,0 +1,106 @@
+"""A few processes that compute for the page, so that none of what they meet can take the server with it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import struct
+import sys
+from types import TracebackType
+
+LONGEST = 180.0  # s of one answer, the first compilation of a law included
+HEAD = struct.Struct("<I")
+INTERRUPTIBLE = os.name == "posix"
+
+
+class Worker:
+    """One process: a request in, an answer out."""
+
+    def __init__(self) -> None:
+        self.process: asyncio.subprocess.Process | None = None
+
+    async def answer(self, request: bytes) -> bytes:
+        """The answer to a request; the process is started where it does not run, and ended where it takes too long."""
+        process = await self.started()
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            process.stdin.write(HEAD.pack(len(request)) + request)
+            await process.stdin.drain()
+            async with asyncio.timeout(LONGEST):
+                (length,) = HEAD.unpack(await process.stdout.readexactly(HEAD.size))
+                return await process.stdout.readexactly(length)
+        except BaseException:
+            await self.end()  # what it would still say belongs to no one
+            raise
+
+    async def started(self) -> asyncio.subprocess.Process:
+        """The process, running."""
+        if self.process is None or self.process.returncode is not None:
+            self.process = await asyncio.create_subprocess_exec(
+                sys.executable, "-m", "stickslip.lab.worker", stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE, limit=2**22, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            )  # fmt: skip
+        return self.process
+
+    def interrupt(self) -> None:
+        """Tell it that no one waits any more: a long run ends early, a short one is done before."""
+        if INTERRUPTIBLE and self.process is not None and self.process.returncode is None:
+            self.process.send_signal(signal.SIGINT)
+
+    async def end(self) -> None:
+        """End the process."""
+        process, self.process = self.process, None
+        if process is not None and process.returncode is None:
+            process.kill()
+            await process.wait()
+
+
+class Workers:
+    """Some of them, each lent to one request at a time.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.all = [Worker() for _ in range(count)]
+        self.free: asyncio.Queue[Worker] = asyncio.Queue()
+
+    async def __aenter__(self) -> Workers:
+        for worker in self.all:
+            await worker.started()
+            self.free.put_nowait(worker)
+        return self
+
+    async def __aexit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        for worker in self.all:
+            await worker.end()
+
+    async def ask(self, request: bytes, *, lent: list[Worker] | None = None) -> bytes:
+        """The answer of the first that is free; while it works it stands in `lent`, where it can be interrupted.
+
+        Raises
+        ------
+        TimeoutError
+            It took too long.
+        EOFError
+            The process ended over it.
+        """
+        worker = await self.free.get()
+        lent = [] if lent is None else lent
+        lent.append(worker)
+        answer = asyncio.create_task(worker.answer(request))
+        answer.add_done_callback(lambda _: self.free.put_nowait(worker))
+        try:
+            return await asyncio.shield(answer)
+        except asyncio.CancelledError:
+            worker.interrupt()  # it ends what it does, and is free then
+            raise
+        except (ConnectionError, asyncio.IncompleteReadError) as error:
+            raise EOFError("the process ended") from error
+        finally:
+            lent.remove(worker)

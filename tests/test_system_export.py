@@ -1,0 +1,25 @@
+"""A system written down again is the same system, to the last digit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import stickslip as ss
+
+# one of every law and drive that the scenarios have; a run of any of the others says no more
+SEEN: dict[str, str] = {ss.scenario_case(name).parts: name for name in ss.scenarios.names()}
+
+
+@pytest.mark.parametrize("name", SEEN.values())
+def test_what_is_written_is_read_back(name: str, tmp_path: Path) -> None:
+    case = ss.scenario_case(name)
+    text = ss.export_system(case)
+    file = tmp_path / "system.toml"
+    file.write_text(text, encoding="utf-8")
+    again = [ss.read_system(file), ss.read_system(json.loads(ss.export_system(case, format="json")))]
+    for other in again:
+        assert (other.start, other.run, other.about) == (case.start, case.run, case.about)
+        assert ss.export_system(other) == text
