@@ -212,5 +212,5 @@ def _spectrum(run: ss.Trajectory, last: float, cycle: float) -> tuple[Array, Arr
     values = run.sample(np.clip(times, 0, last), ("a",))[0][0]
     weights = np.hanning(SPECTRUM + 1)[:-1]
     amplitude = 2 * np.abs(np.fft.rfft(weights * (values - values.mean()))) / weights.sum()
-    frequency: Array = np.fft.rfftfreq(SPECTRUM, length / SPECTRUM)
-    return frequency[1:], amplitude[1:]
+    frequency = np.arange(1, SPECTRUM // 2 + 1) / length
+    return frequency, amplitude[1:]

@@ -27,6 +27,7 @@ def described(
     media: str = "application/json",
     gives: str = "application/json",
     status: int = 200,
+    query: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Callable[[Endpoint], Endpoint]:
     """Say of an endpoint what it takes and gives, as JSON schemas; what is not described is not in the document."""
 
@@ -35,6 +36,7 @@ def described(
         if status != 204:
             given["content"] = {gives: {"schema": answer or {}}}
         said: dict[str, Any] = {"summary": summary, "responses": {str(status): given}}
+        said["parameters"] = [{"name": name, "in": "query", "schema": each} for name, each in (query or {}).items()]
         if body is not None:
             said["requestBody"] = {"required": True, "content": {media: {"schema": body}}}
         endpoint.openapi = said  # type: ignore[attr-defined]
@@ -51,7 +53,7 @@ def document(routes: Sequence[BaseRoute]) -> dict[str, Any]:
         if said is None or not isinstance(route, Route):
             continue
         place = paths.setdefault(re.sub(r"{(\w+):\w+}", r"{\1}", route.path), {})
-        inputs = [
+        inputs = said["parameters"] + [
             {"name": name, "in": "path", "required": True, "schema": {"type": KINDS.get(kind, "string")}}
             for name, kind in re.findall(r"{(\w+)(?::(\w+))?}", route.path)
         ]

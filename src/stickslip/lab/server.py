@@ -49,21 +49,28 @@ def lab_app(*, token: str, port: int) -> Starlette:
 
 
 def _routes() -> list[BaseRoute]:
-    return [*play.routes, *maps.routes, *_data_routes(), Route("/openapi.json", _openapi), Route("/alive", _alive)]
+    return [
+        *play.routes,
+        *maps.routes,
+        *(_data().routes if _data() else []),
+        Route("/openapi.json", _openapi),
+        Route("/alive", _alive),
+    ]
 
 
-def _data_routes() -> list[BaseRoute]:
+def _data() -> Any:
     try:
-        data = importlib.import_module("stickslip.lab.data")
+        return importlib.import_module("stickslip.lab.data")
     except ModuleNotFoundError:
-        return []
-    return list(data.routes)
+        return None
 
 
 @asynccontextmanager
 async def _lifespan(app: Starlette) -> AsyncIterator[None]:
     async with AsyncExitStack() as stack:
         app.state.workers = await stack.enter_async_context(Workers(WORKERS))
+        if _data():
+            await stack.enter_async_context(_data().lifespan(app))
         yield
 
 
