@@ -52,5 +52,5 @@ def _parameter(field: dataclasses.Field[Any], text: str) -> dict[str, Any]:
         "default": default if isinstance(default, int | float | str | None) else None,
         "optional": "None" in kind or field.default is not dataclasses.MISSING,
         "choices": re.findall(r'"(.*?)"', choice[1]) if choice else [],
-        "part": field.name in MORE,
+        "part": field.name in MORE and not choice,
     }

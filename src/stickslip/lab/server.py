@@ -84,8 +84,9 @@ async def _alive(request: Request) -> Response:
 
 
 async def _refusal(request: Request, error: Any) -> Response:
-    said = {404: f"There is nothing at {request.url.path}.", 405: f"{request.method} has no meaning at that address."}
-    sentence = said.get(error.status_code, error.detail)
+    bare = {"Not Found": f"There is nothing at {request.url.path}.",
+            "Method Not Allowed": f"{request.method} has no meaning at that address."}  # fmt: skip
+    sentence = bare.get(error.detail, error.detail)
     return JSONResponse({"error": str(sentence)}, error.status_code, headers=error.headers)
 
 
