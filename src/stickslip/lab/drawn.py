@@ -205,8 +205,8 @@ def _marks(run: ss.Trajectory, first: float, last: float) -> tuple[dict[str, Any
 
 
 def _spectrum(run: ss.Trajectory, last: float, cycle: float) -> tuple[Array, Array]:
-    """Amplitude [m/s^2] of the acceleration over the frequency [Hz], of the last whole cycles under a Hann window."""
-    cycles = max(1, min(OF_SPECTRUM, math.floor(last / cycle * (1 + 1e-9)))) if run.status != "at rest" else 0
+    """Amplitude [m/s^2] of the acceleration over the frequency [Hz], of whole cycles in the later half, by Hann."""
+    cycles = max(1, min(OF_SPECTRUM, math.floor(last / cycle / 2 * (1 + 1e-9)))) if run.status != "at rest" else 0
     length = min(cycles * cycle or last, last)
     times = last - length + np.arange(SPECTRUM) * (length / SPECTRUM)
     values = run.sample(np.clip(times, 0, last), ("a",))[0][0]

@@ -19,6 +19,7 @@ SHOWN = {
     "stick_share": ("stick_share",), "amplitude": ("amplitude",),
 }  # fmt: skip
 COUNTED = ("stops", "micro_slips", "period")  # where the answer jumps, the map is refined
+NO_SYSTEM, AT_REST = -1.0, -2.0  # in place of a value
 MOST = 2000  # points of one part
 
 
@@ -54,8 +55,9 @@ def _read(request: Mapping[str, Any]) -> tuple[Any, dict[str, list[float]], dict
 
 
 def _values(found: Any, measure: str) -> Answer:
-    """Rows over the second parameter; nan where the motion has no answer, and -1 where there is no such system."""
+    """Rows over the second parameter; nan where there is no answer, -1 where no such system, -2 where it rests."""
     values = sum(found[name].values.astype(float) for name in SHOWN[measure])
-    values = np.where(found.status.values == found.status.attrs["flag_meanings"].split().index("no_such_system") - 1,
-                      -1.0, values)  # fmt: skip
+    status, words = found.status.values, found.status.attrs["flag_meanings"].split()
+    for word, shown in (("no_such_system", NO_SYSTEM), ("at_rest", AT_REST)):
+        values = np.where(status == words.index(word) + found.status.attrs["flag_values"][0], shown, values)
     return {"shape": list(values.shape)}, {"values": values.ravel()}

@@ -13,7 +13,12 @@ import stickslip as ss
 Answer = tuple[dict[str, Any], dict[str, Any]]
 CHOICE = re.compile(r"\{(.+)\}")
 UNIT = re.compile(r"\[([^\]]+)\]")
-WORD = re.compile(r"\[.*?\]|:math:`[^`]*`|``|`")
+TEX = (
+    (r":math:`([^`]*)`", r"\1"), (r"``?", ""), (r"\\mathrm{(\w+)}", r"\1"),
+    (r"\\dot\s*\\?(\w+)", r"\1'"), (r"\^{(.*?)}", r"^(\1)"),
+    (r"\\le\b", "≤"), (r"\\,", " "), (r"\\varphi", "φ"), (r"\\pi", "π"), (r"\\tau", "τ"), (r"\\?theta", "θ"),
+    (r"\\gamma", "γ"), (r"\\sigma", "σ"), (r"\\delta", "δ"), (r"\\alpha", "α"), (r"\\(\w+)", r"\1"),
+)  # fmt: skip
 MORE = ("law", "drive", "contacts")
 
 
@@ -36,8 +41,17 @@ def _preset(name: str) -> dict[str, Any]:
 def _part(make: Any) -> dict[str, Any]:
     """A class by what its docstring says: in a line, and parameter by parameter."""
     text = inspect.cleandoc(make.__doc__ or "")
-    about = " ".join(text.split("\n\n")[0].split())
-    return {"about": WORD.sub("", about), "parameters": [_parameter(field, text) for field in dataclasses.fields(make)]}
+    return {
+        "about": _plain(text.split("\n\n")[0]),
+        "parameters": [_parameter(field, text) for field in dataclasses.fields(make)],
+    }
+
+
+def _plain(text: str) -> str:
+    """A docstring's sentence without its marks."""
+    for found, shown in TEX:
+        text = re.sub(found, shown, text)
+    return " ".join(text.split())
 
 
 def _parameter(field: dataclasses.Field[Any], text: str) -> dict[str, Any]:
@@ -48,7 +62,7 @@ def _parameter(field: dataclasses.Field[Any], text: str) -> dict[str, Any]:
     return {
         "name": field.name,
         "unit": unit[1] if unit else "",
-        "words": words,
+        "words": _plain(words),
         "default": default if isinstance(default, int | float | str | None) else None,
         "optional": "None" in kind or field.default is not dataclasses.MISSING,
         "choices": re.findall(r'"(.*?)"', choice[1]) if choice else [],

@@ -118,7 +118,7 @@ async def _asked(
 
 def _changing(values: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Cells whose four corners do not say the same."""
-    whole = np.nan_to_num(np.round(values), nan=-2.0)
+    whole = np.nan_to_num(np.round(values), nan=-3.0)
     corners = np.stack([whole[:-1, :-1], whole[1:, :-1], whole[:-1, 1:], whole[1:, 1:]])
     return [(int(i), int(j)) for i, j in np.argwhere(corners.min(axis=0) != corners.max(axis=0))]
 

@@ -18,7 +18,8 @@ from stickslip.lab.frames import frame, unframed
 from stickslip.lab.openapi import described
 from stickslip.lab.workers import Worker, Workers
 
-WANTED = ("run", "tell", "export", "sound", "wavelet")  # in the order in which they are answered
+QUICK, SLOW = ("run", "tell"), ("sound", "wavelet", "sweep", "refine")
+WANTED = (*QUICK, "sound", "wavelet")  # of the page, in the order in which they are answered
 STATE = {
     "type": "object",
     "required": ["system"],
@@ -34,7 +35,8 @@ async def asked(workers: Workers, request: Mapping[str, Any], *, lent: list[Work
     """A worker's answer; what befell the worker is told in one sentence to who asked."""
     told = {"id": request.get("id"), "want": request.get("want"), "kind": "error"}
     try:
-        return await workers.ask(json.dumps(request).encode(), lent=lent)
+        async with workers.slow if request["want"] in SLOW else contextlib.nullcontext():
+            return await workers.ask(json.dumps(request).encode(), lent=lent)
     except TimeoutError:
         return frame({**told, "error": "This takes longer than the page waits; ask for less."})
     except EOFError:
@@ -74,32 +76,59 @@ async def conversation(
         pass
     finally:
         working.cancel()
-        with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
-            await working
+        await asyncio.wait([working])
+        failed = None if working.cancelled() else working.exception()
+        if failed is not None:
+            _require_gone(failed)
+
+
+def _require_gone(error: BaseException) -> None:
+    """Work may end because the page went; anything else is raised."""
+    inner = error.exceptions if isinstance(error, BaseExceptionGroup) else (error,)
+    if not all(isinstance(each, WebSocketDisconnect | RuntimeError) for each in inner):
+        raise error
 
 
 async def _play(socket: WebSocket) -> None:
-    """Of each kind of request the newest is answered; a long one that is overtaken ends early."""
-    waiting: dict[str, dict[str, Any]] = {}
-    lent: list[Worker] = []
-    come = asyncio.Event()
+    """Of each kind of request the newest is answered, slow ones beside the quick; what is overtaken ends early."""
+    quick, slow = _Line(socket), _Line(socket)
 
     def heard(message: Mapping[str, Any]) -> None:
         request = readable(message, WANTED)
-        waiting[request["want"]] = request
+        (quick if request["want"] in QUICK else slow).put(request)
         if request["want"] == "run":
-            for worker in lent:
+            for worker in (*quick.lent, *slow.lent):
                 worker.interrupt()
-        come.set()
 
     async def work() -> None:
-        while await come.wait():
-            come.clear()
-            while waiting:
-                request = waiting.pop(min(waiting, key=WANTED.index))
-                await socket.send_bytes(await asked(socket.app.state.workers, request, lent=lent))
+        async with asyncio.TaskGroup() as both:
+            both.create_task(quick.work())
+            both.create_task(slow.work())
 
     await conversation(socket, heard, work)
+
+
+class _Line:
+    """Requests of one page that wait for a worker one after the other, the newest of each kind."""
+
+    def __init__(self, socket: WebSocket) -> None:
+        self.socket, self.come = socket, asyncio.Event()
+        self.waiting: dict[str, dict[str, Any]] = {}
+        self.lent: list[Worker] = []
+
+    def put(self, request: dict[str, Any]) -> None:
+        """Let a request wait; an older one of its kind is forgotten."""
+        self.waiting[request["want"]] = request
+        self.come.set()
+
+    async def work(self) -> None:
+        """Answer what waits."""
+        while await self.come.wait():
+            self.come.clear()
+            while self.waiting:
+                request = self.waiting.pop(min(self.waiting, key=WANTED.index))
+                answer = await asked(self.socket.app.state.workers, request, lent=self.lent)
+                await self.socket.send_bytes(answer)
 
 
 async def _answer(request: Request, asking: Mapping[str, Any]) -> Response:

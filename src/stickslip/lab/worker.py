@@ -50,6 +50,8 @@ def answered(request: dict[str, Any], patience: Patience) -> bytes:
     """The answer to a request, whatever it is."""
     told = {"id": request.get("id"), "want": request.get("want")}
     patience.begin()
+    if not request:
+        return frame({"kind": "ready"})
     try:
         header, arrays = ANSWERS[request["want"]](request, patience)
         return frame({**told, "kind": request["want"], **header}, arrays)

@@ -1,0 +1,95 @@
+// The page itself: tabs, theme, what is said aloud, and how the lab is asked.
+import { start as startPlay } from "./play.js";
+import { start as startMap } from "./map.js";
+
+const $ = (id) => document.getElementById(id);
+const TABS = ["play", "map", "data"];
+const LEADS = {
+  play: "Move a slider: the motion is computed anew, exactly, while you drag.",
+  map: "Which motion is where: choose two parameters, then click a point to play it.",
+  data: "Drop a record: get its friction.",
+};
+const onTheme = [];
+
+export function say(words, wrong = false) {
+  $("status").textContent = words;
+  $("status").classList.toggle("wrong", wrong);
+}
+
+export async function ask(path, options = {}) {
+  const answer = await fetch(path, { credentials: "same-origin", ...options }).catch(() => {
+    throw new Error("The lab does not answer; is 'stickslip lab' still running?");
+  });
+  const held = answer.status === 204 ? {} : await answer.json().catch(() => ({}));
+  if (!answer.ok) throw new Error(held.error ?? `The lab answered ${answer.status}.`);
+  return held;
+}
+
+export function colours() {
+  const style = getComputedStyle(document.documentElement);
+  const names = ["paper", "card", "ink", "soft", "faint", "line", "blue", "orange", "green", "purple", "sky", "stick", "microstick", "flight", "accent"];
+  return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+}
+
+function theme(choice) {
+  document.documentElement.dataset.theme = choice;
+  for (const then of onTheme) then(colours());
+}
+
+export function show(name) {
+  for (const tab of TABS) {
+    const chosen = tab === name;
+    $(tab).hidden = !chosen;
+    $(`tab-${tab}`).setAttribute("aria-selected", chosen);
+    $(`tab-${tab}`).tabIndex = chosen ? 0 : -1;
+  }
+  $("lead").textContent = LEADS[name];
+  say("");
+  opened[name]?.();
+  lab.onShow[name]?.();
+}
+
+const opened = {
+  map: () => { startMap($("map"), lab); opened.map = null; },
+  data: () => {
+    opened.data = null;
+    import("./data.js").then((page) => page.start($("data"), lab), () => say("Data is not part of this lab yet.", true));
+  },
+};
+
+// A chart over time for any tab: {title, unit, time, series: [{label, values, colour, dash}]}.
+function plot(element, { title, unit, time, series }) {
+  const palette = colours();
+  const axis = { stroke: palette.soft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line } };
+  const inks = ["blue", "orange", "green", "purple", "sky", "ink"];
+  const chart = new uPlot({
+    width: element.clientWidth || 600, height: 220, title, legend: { show: true }, scales: { x: { time: false } },
+    axes: [{ ...axis, label: "time [s]" }, { ...axis, label: unit, size: 70 }],
+    series: [{ label: "time" }, ...series.map((line, j) => ({ label: line.label, stroke: line.colour ?? palette[inks[j % 6]], width: 1.4, dash: line.dash, points: { show: false } }))],
+  }, [time, ...series.map((line) => line.values)], element);
+  new ResizeObserver(() => chart.setSize({ width: element.clientWidth, height: 220 })).observe(element);
+  return chart;
+}
+
+export const lab = {
+  ask, say, colours, show, plot,
+  onTheme: (then) => onTheme.push(then),
+  openInPlay: null, // by play.js
+  onShow: {}, // by tab: what it does when it is shown again
+};
+
+for (const name of TABS) {
+  $(`tab-${name}`).addEventListener("click", () => show(name));
+  $(`tab-${name}`).addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    const next = TABS[(TABS.indexOf(name) + step + TABS.length) % TABS.length];
+    show(next);
+    $(`tab-${next}`).focus();
+  });
+}
+const dark = matchMedia("(prefers-color-scheme: dark)");
+theme(dark.matches ? "dark" : "light");
+dark.addEventListener("change", () => theme(dark.matches ? "dark" : "light"));
+$("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
+startPlay(lab);

@@ -1,0 +1,399 @@
+// Play: sliders send the state, newest first; the answer is drawn at once, the slower pictures when it rests.
+import { Controls } from "./controls.js";
+import { Conversation } from "./socket.js";
+import { Stage } from "./stage.js";
+import { axes, cividis, line, prefixed, range, shortly } from "./canvas.js";
+
+const $ = (id) => document.getElementById(id);
+const FIRST = "THESIS rigid 2.5Hz fk=1.1";
+const GROUPS = { x: "displacement", v: "velocity", a: "acceleration", friction: "friction" };
+const INKS = { x: "blue", v: "green", a: "purple", friction: "orange" };
+const MORE_INKS = ["blue", "orange", "green", "purple", "sky", "ink"];
+const HEIGHT = 118, REST = 90, IDLE = 350; // pixels of a trace; ms without a change until numbers, and until the rest
+const KINDS = ["slip", "microstick", "stick", "flight"];
+const PACES = [["one cycle in 2 s", null], ["true time", 1], ["2 × slower", 0.5], ["5 × slower", 0.2], ["10 × slower", 0.1], ["100 × slower", 0.01], ["1000 × slower", 0.001], ["10 × faster", 10]];
+
+let lab, state, controls, stage, conversation, run, charts = [], plans = {}, number = 0, flying = null, next = null;
+let changedLast = null, patience = 0, resting = 0, idling = 0, player = null;
+
+export async function start(given) {
+  lab = given;
+  lab.openInPlay = (opened) => { use(opened); lab.show("play"); };
+  stage = new Stage($("stage"), moved);
+  conversation = new Conversation("/play", heard, () => lab.say("The lab does not answer; is 'stickslip lab' still running?", true));
+  for (const [words, pace] of PACES) $("pace").add(new Option(words, pace ?? ""));
+  buttons();
+  const shared = fromLink();
+  const [catalog, first] = await Promise.all([lab.ask("/catalog"), shared ? { state: shared } : lab.ask(`/scenarios/${encodeURIComponent(FIRST)}`)]).catch((error) => { lab.say(error.message, true); return []; });
+  if (!catalog) return;
+  controls = new Controls($("parts"), catalog, (path, since) => { changedLast = path; ask(since); });
+  presets(catalog.presets, shared ? "" : FIRST);
+  use(first.state);
+  lab.onTheme(() => { if (run) { build(); drawTraces(); drawViews(); stage.show(run, lab.colours()); } });
+}
+
+function use(given) {
+  state = given;
+  state.run ??= { cycles: 40 };
+  changedLast = null;
+  controls.show(state);
+  ask(performance.now());
+}
+
+function presets(offered, chosen) {
+  const groups = new Map(), about = new Map(offered.map((each) => [each.name, each]));
+  for (const each of offered) {
+    const key = each.about.startsWith("thesis") ? "From the thesis" : each.parts.replace(/, /, " · ");
+    if (!groups.has(key)) groups.set(key, []);
+    groups.get(key).push(each);
+  }
+  $("preset").add(new Option("your own", ""));
+  for (const [key, members] of [...groups].sort(([a], [b]) => (b === "From the thesis") - (a === "From the thesis") || a.localeCompare(b))) {
+    const group = document.createElement("optgroup");
+    group.label = key;
+    for (const each of members) group.append(new Option(each.name, each.name, false, each.name === chosen));
+    $("preset").append(group);
+  }
+  const told = () => { $("about").textContent = about.get($("preset").value)?.about ?? "A system of your own, or from a link or file."; };
+  told();
+  $("preset").addEventListener("change", async () => {
+    told();
+    if (!$("preset").value) return;
+    try { use((await lab.ask(`/scenarios/${encodeURIComponent($("preset").value)}`)).state); } catch (error) { lab.say(error.message, true); }
+  });
+}
+
+// One run is under way at a time, and the newest state waits; one that takes long is overtaken.
+function ask(since) {
+  next = { since, state: structuredClone(state) };
+  clearTimeout(resting);
+  clearTimeout(idling);
+  if (flying === null || performance.now() - flying.sent > 100) send();
+}
+function send() {
+  flying = { ...next, id: ++number, sent: performance.now() };
+  next = null;
+  conversation.send({ id: flying.id, want: "run", state: flying.state });
+  clearTimeout(patience);
+  patience = setTimeout(() => lab.say("Computing … the first run of a law is compiled, which takes some seconds."), 900);
+}
+
+function heard(answer) {
+  if (answer.want === "run" || answer.kind === "error") arrived(answer);
+  else if (answer.kind === "tell") told(answer);
+  else if (answer.kind === "wavelet") { plans.map = answer; drawWavelet(); }
+  else if (answer.kind === "sound") sounded(answer);
+}
+
+function arrived(answer) {
+  if (answer.want === "run") {
+    if (flying?.id !== answer.id) return;
+    clearTimeout(patience);
+  }
+  if (answer.kind === "error") {
+    controls.fault(changedLast, answer.error);
+    lab.say(changedLast ? "" : answer.error, true);
+  } else if (answer.kind === "run") {
+    controls.fault(null);
+    lab.say("");
+    run = answer;
+    run.kinds = kinds(run.arrays);
+    drawTraces();
+    const since = flying.since;
+    queueMicrotask(() => {
+      const drawn = performance.now();
+      document.dispatchEvent(new CustomEvent("traces-drawn", { detail: { id: answer.id, took: drawn - since } }));
+      requestAnimationFrame(() => {
+        drawViews();
+        stage.show(run, lab.colours());
+        pace();
+      });
+    });
+  }
+  if (answer.want !== "run") return;
+  flying = null;
+  if (next) { send(); return; }
+  resting = setTimeout(() => conversation.send({ id: ++number, want: "tell", state }), REST);
+  idling = setTimeout(() => {
+    if (answer.kind === "run") conversation.send({ id: ++number, want: "wavelet", state });
+    history.replaceState(null, "", link());
+  }, IDLE);
+}
+
+// What the contact does at each instant.
+function kinds({ time, begins, ends, kinds: found }) {
+  const held = new Uint8Array(time.length);
+  let piece = 0;
+  for (let k = 0; k < time.length; k++) {
+    while (piece < begins.length - 1 && time[k] >= ends[piece]) piece++;
+    held[k] = found[piece] ?? 0;
+  }
+  return held;
+}
+
+/* ---------- traces ---------- */
+const shape = () => run.series.map((each) => each.name + each.unit).join();
+
+function build() {
+  for (const chart of charts) chart.destroy();
+  $("traces").replaceChildren();
+  charts = [];
+  const palette = lab.colours();
+  for (const [group, words] of Object.entries(GROUPS)) {
+    const lines = run.series.filter((each) => each.group === group || (group === "x" && each.name === "z"));
+    const box = $("traces").appendChild(document.createElement("div")), caption = box.appendChild(document.createElement("div"));
+    box.className = "trace";
+    caption.className = "caption";
+    box.setAttribute("role", "img");
+    box.setAttribute("aria-label", `${words} over time`);
+    const last = group === "friction";
+    const axis = { stroke: palette.soft, font: "12px system-ui, sans-serif", grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line, width: 1, size: 4 } };
+    const chart = new uPlot({
+      width: $("traces").clientWidth - 26, height: HEIGHT + (last ? 42 : 0), padding: [6, 8, last ? 0 : 4, 0], legend: { show: false }, scales: { x: { time: false } },
+      cursor: { sync: { key: "play" }, points: { show: false }, drag: { x: true, y: false } },
+      axes: [{ ...axis, show: true, size: last ? 24 : 0, values: last ? undefined : () => [], label: last ? "time [s]" : undefined, labelSize: 18, labelFont: "12px system-ui, sans-serif", gap: 2 },
+        { ...axis, size: 52, values: (plot, splits) => splits.map((value) => shortly(value * plot.factor)), space: 24 }],
+      series: [{}, ...lines.map((each, j) => ({ stroke: each.name === "z" ? palette.faint : palette[lines.filter((one) => one.name !== "z").length > 1 ? MORE_INKS[j % 6] : INKS[group]], width: 1.4, dash: each.name === "z" ? [5, 4] : undefined, points: { show: false } }))],
+      hooks: { drawClear: [(plot) => shade(plot, group)], setScale: [(plot, key) => { if (key === "x") zoom(plot); }] },
+    }, null, box);
+    Object.assign(chart, { lines, words, caption, group, unit: lines[0].unit, factor: 1 });
+    chart.now = chart.over.appendChild(document.createElement("div"));
+    chart.now.className = "now";
+    charts.push(chart);
+  }
+  charts.shape = shape();
+}
+
+function drawTraces() {
+  if (charts.shape !== shape()) build();
+  const { arrays } = run, whole = charts[0].scales.x, kept = charts.zoomed && whole.min >= run.first && whole.max <= run.last;
+  for (const chart of charts) {
+    const rows = chart.lines.map((each) => arrays[each.name]);
+    let most = 0;
+    for (const row of rows) for (let k = 0; k < row.length; k++) { const size = Math.abs(row[k]); if (size > most) most = size; }
+    const [factor, unit] = prefixed(most, chart.unit);
+    chart.factor = factor;
+    chart.caption.textContent = `${chart.words}${unit ? ` [${unit}]` : ""}`;
+    charts.quiet = true;
+    chart.setData([arrays.time, ...rows], !kept);
+    if (kept) chart.redraw();
+  }
+  queueMicrotask(() => { charts.quiet = false; });
+  if (!kept) charts.zoomed = false;
+}
+
+function zoom(plot) {
+  if (charts.quiet || !run) return;
+  const { min, max } = plot.scales.x;
+  charts.zoomed = max - min < 0.999 * (run.last - run.first);
+  charts.quiet = true;
+  for (const chart of charts) if (chart !== plot && (chart.scales.x.min !== min || chart.scales.x.max !== max)) chart.setScale("x", { min, max });
+  queueMicrotask(() => { charts.quiet = false; });
+}
+
+function shade(plot, group) {
+  if (!run) return;
+  const { begins, ends, kinds: found, microslips } = run.arrays, { left, top, width, height } = plot.bbox;
+  const palette = lab.colours(), inks = [null, palette.microstick, palette.stick, palette.flight], pen = plot.ctx;
+  pen.save();
+  pen.beginPath();
+  pen.rect(left, top, width, height);
+  pen.clip();
+  for (let k = 0; k < begins.length; k++) {
+    if (!inks[found[k]]) continue;
+    const from = plot.valToPos(begins[k], "x", true), to = plot.valToPos(ends[k], "x", true);
+    if (to < left || from > left + width) continue;
+    pen.fillStyle = inks[found[k]];
+    pen.fillRect(from, top, Math.max(1, to - from), height);
+  }
+  if (group === "friction") {
+    pen.fillStyle = palette.purple;
+    let before = -9;
+    const size = 4 * (devicePixelRatio || 1);
+    for (const time of microslips) {
+      const x = plot.valToPos(time, "x", true);
+      if (x - before < size) continue;
+      before = x;
+      pen.beginPath(); pen.moveTo(x - size, top); pen.lineTo(x + size, top); pen.lineTo(x, top + 1.6 * size); pen.fill();
+    }
+  }
+  pen.restore();
+}
+
+/* ---------- loops, portrait, spectrum, wavelet map ---------- */
+const unitOf = (group) => run.series.find((each) => each.group === group)?.unit ?? "";
+const one = (name) => (run.arrays[name] ? name : `${name}1`);
+
+function drawViews() {
+  const palette = lab.colours(), friction = one("friction");
+  plans.loopX = portrait("loop-x", ["way", "m", "displacement"], [friction, "N", "friction"], palette);
+  plans.loopV = portrait("loop-v", ["slip", unitOf("slip"), "sliding velocity"], [friction, "N", "friction"], palette);
+  plans.phase = portrait("phase", [one("x"), unitOf("x"), "displacement"], [one("v"), unitOf("v"), "velocity"], palette);
+  spectrum(palette);
+}
+
+function portrait(id, [x, xUnit, xWords], [y, yUnit, yWords], palette) {
+  const { time } = run.arrays, xs = run.arrays[x], ys = run.arrays[y];
+  const [xLow, xHigh] = range(xs), [yLow, yHigh] = range(ys);
+  const plan = axes($(id), { low: xLow, high: xHigh, label: xWords, unit: xUnit }, { low: yLow, high: yHigh, label: yWords, unit: yUnit }, palette);
+  const split = run.status === "at rest" ? 0 : Math.max(0, time.findIndex((each) => each >= run.last - run.cycle * (1 + 1e-9)));
+  if (split) line(plan, xs, ys, { to: split + 1, colour: palette.faint, width: 0.7 });
+  const inks = [palette.orange, palette.sky, palette.blue, palette.purple];
+  for (let from = split; from < xs.length - 1;) {
+    let to = from + 1;
+    while (to < xs.length && run.kinds[to] === run.kinds[from]) to++;
+    line(plan, xs, ys, { from, to: Math.min(to + 1, xs.length), colour: inks[run.kinds[from]], width: run.kinds[from] ? 2.6 : 1.8 });
+    from = to;
+  }
+  return { ...plan, xs, ys, canvas: $(id), dot: dotOf($(id)) };
+}
+function dotOf(canvas) {
+  let dot = canvas.parentElement.querySelector(".dot");
+  if (!dot) { dot = canvas.parentElement.appendChild(document.createElement("div")); dot.className = "dot"; }
+  return dot;
+}
+
+function spectrum(palette) {
+  const { frequency, amplitude } = run.arrays, most = amplitude.reduce((high, value) => Math.max(high, value), 1e-300);
+  let end = Math.min(frequency.length, frequency.findIndex((each) => each > 60 / run.cycle) >>> 0);
+  end = Math.max(end, Math.min(frequency.length, 60));
+  const low = most * 1e-4;
+  const plan = axes($("spectrum"), { low: 0, high: frequency[end - 1], label: "frequency", unit: "Hz" }, { low, high: most * 1.6, label: "amplitude [m/s²]", factor: 1, unit: "", log: true }, palette);
+  line(plan, frequency, amplitude.map((value) => Math.max(value, low)), { to: end, colour: palette.purple });
+}
+
+function drawWavelet() {
+  const map = plans.map;
+  if (!map) return;
+  const { levels, frequency, time } = map.arrays, columns = time.length, image = new ImageData(columns, map.rows);
+  const up = frequency[0] > frequency[1];
+  for (let row = 0; row < map.rows; row++) {
+    const from = (up ? row : map.rows - 1 - row) * columns;
+    for (let k = 0; k < columns; k++) {
+      const [red, green, blue] = cividis(levels[from + k] / 255);
+      image.data.set([red, green, blue, 255], 4 * (row * columns + k));
+    }
+  }
+  const picture = new OffscreenCanvas(columns, map.rows);
+  picture.getContext("2d").putImageData(image, 0, 0);
+  const low = Math.min(frequency[0], frequency.at(-1)), high = Math.max(frequency[0], frequency.at(-1));
+  const plan = axes($("wavelet"), { low: time[0], high: time.at(-1), label: "time", unit: "s" }, { low, high, label: "frequency [Hz]", factor: 1, unit: "", log: true }, lab.colours());
+  const { left, right, top, bottom } = plan.box;
+  plan.pen.drawImage(picture, left, top, right - left, bottom - top);
+}
+
+function told({ sentences, rows }) {
+  const body = $("rows");
+  $("sentences").replaceChildren(...sentences.map((each) => Object.assign(document.createElement("p"), { textContent: each })));
+  body.replaceChildren(...rows.map(([name, value]) => {
+    const row = document.createElement("tr");
+    row.append(...[name, value].map((each) => Object.assign(document.createElement("td"), { textContent: each })));
+    return row;
+  }));
+}
+
+/* ---------- motion ---------- */
+function moved(time, index) {
+  for (const chart of charts) {
+    const { min, max } = chart.scales.x;
+    chart.now.hidden = !(time >= min && time <= max);
+    chart.now.style.transform = `translateX(${chart.valToPos(time, "x")}px)`;
+  }
+  for (const plan of [plans.loopX, plans.loopV, plans.phase]) {
+    if (!plan || index >= plan.xs.length) continue;
+    plan.dot.style.transform = `translate(${plan.canvas.offsetLeft + plan.x(plan.xs[index])}px, ${plan.canvas.offsetTop + plan.y(plan.ys[index])}px)`;
+  }
+}
+function pace() {
+  const chosen = $("pace").value;
+  stage.pace = chosen ? Number(chosen) : run.cycle / 2;
+  const slower = 1 / stage.pace;
+  $("stage-note").textContent = Math.abs(slower - 1) < 0.01 ? "in true time" : slower > 1 ? `${shortly(+slower.toPrecision(2))} times slower than it is` : `${shortly(+(1 / slower).toPrecision(2))} times faster than it is`;
+}
+
+/* ---------- buttons ---------- */
+function buttons() {
+  const still = () => { $("pause").textContent = stage.playing ? "Pause" : "Run"; $("pause").setAttribute("aria-pressed", !stage.playing); };
+  still();
+  $("pause").addEventListener("click", () => { stage.playing = !stage.playing; still(); });
+  $("pace").addEventListener("change", pace);
+  $("hear").addEventListener("click", () => {
+    if (player) { silence(); return; }
+    conversation.send({ id: ++number, want: "sound", state });
+  });
+  $("share").addEventListener("click", async () => {
+    history.replaceState(null, "", link());
+    await copied(location.origin + location.pathname + link(), "The link is copied: it opens this very system in any lab at this address.");
+  });
+  $("python").addEventListener("click", () => texts("python", "The Python that does this", "lab.py"));
+  $("toml").addEventListener("click", () => texts("toml", "The system's file", "system.toml"));
+  $("text-close").addEventListener("click", () => $("text").close());
+  $("text-copy").addEventListener("click", () => copied($("text-body").textContent, "Copied."));
+  $("text-save").addEventListener("click", () => saved($("text-body").textContent, $("text").dataset.file));
+  $("file").addEventListener("change", async () => {
+    const [file] = $("file").files;
+    $("file").value = "";
+    if (!file) return;
+    try { use((await lab.ask("/open", { method: "POST", body: await file.text(), headers: { "content-type": "text/plain" } })).state); $("preset").value = ""; lab.say(`${file.name} is open.`); } catch (error) { lab.say(error.message, true); }
+  });
+  addEventListener("hashchange", () => { const shared = fromLink(); if (shared) { $("preset").value = ""; use(shared); } });
+  new ResizeObserver(() => {
+    for (const chart of charts) chart.setSize({ width: $("traces").clientWidth - 26, height: chart.height });
+    if (run) { drawViews(); drawWavelet(); stage.draw(); }
+  }).observe($("shown"));
+}
+
+async function texts(form, title, file) {
+  try {
+    const held = await lab.ask("/export", { method: "POST", body: JSON.stringify(state), headers: { "content-type": "application/json" } });
+    $("text-title").textContent = title;
+    $("text-body").textContent = held[form];
+    $("text").dataset.file = file;
+    $("text").showModal();
+  } catch (error) { lab.say(error.message, true); }
+}
+function saved(text, name) {
+  const anchor = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob([text], { type: "text/plain" })), download: name });
+  anchor.click();
+  setTimeout(() => URL.revokeObjectURL(anchor.href), 1000);
+}
+async function copied(text, words) {
+  try { await navigator.clipboard.writeText(text); lab.say(words); } catch { lab.say("The browser does not let the page copy; the address bar holds the link.", true); }
+}
+
+const link = () => `#${btoa(String.fromCharCode(...new TextEncoder().encode(JSON.stringify(state)))).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "")}`;
+function fromLink() {
+  if (location.hash.length < 2) return null;
+  try {
+    const text = atob(location.hash.slice(1).replaceAll("-", "+").replaceAll("_", "/"));
+    return JSON.parse(new TextDecoder().decode(Uint8Array.from(text, (sign) => sign.charCodeAt(0))));
+  } catch {
+    lab.say("The link holds no system; the page begins with its first one.", true);
+    return null;
+  }
+}
+
+/* ---------- sound ---------- */
+function sounded({ fs, words, arrays }) {
+  silence();
+  const context = new AudioContext(), buffer = context.createBuffer(1, arrays.sound.length, fs);
+  const fade = Math.min(400, arrays.sound.length >> 2), values = Float32Array.from(arrays.sound);
+  for (let k = 0; k < fade; k++) { values[k] *= k / fade; values[values.length - 1 - k] *= k / fade; }
+  buffer.copyToChannel(values, 0);
+  const source = new AudioBufferSourceNode(context, { buffer, loop: true }), quieter = new GainNode(context, { gain: 0.5 });
+  source.connect(quieter).connect(context.destination);
+  source.start();
+  player = { context, source };
+  $("hear").textContent = "Silence";
+  $("hear").setAttribute("aria-pressed", true);
+  lab.say(`You hear ${words}.`);
+}
+function silence() {
+  player?.source.stop();
+  player?.context.close();
+  player = null;
+  $("hear").textContent = "Hear it";
+  $("hear").setAttribute("aria-pressed", false);
+}
+
+export const current = () => structuredClone(state);

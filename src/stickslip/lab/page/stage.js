@@ -1,0 +1,135 @@
+// The mass on its spring, as it was computed: true motion, slowed down as one likes, drawn larger.
+import { prefixed, shortly } from "./canvas.js";
+
+const COILS = 9;
+const SCALES = [1, 2, 5];
+
+export class Stage {
+  constructor(canvas, moved) {
+    Object.assign(this, { canvas, moved, time: 0, pace: 1, playing: !matchMedia("(prefers-reduced-motion: reduce)").matches });
+    const step = (now) => {
+      const past = Math.min(0.1, (now - (this.before ?? now)) / 1000);
+      this.before = now;
+      if (this.run && this.playing && canvas.offsetParent) this.to(this.time + past * this.pace);
+      requestAnimationFrame(step);
+    };
+    requestAnimationFrame(step);
+  }
+  show(run, palette) {
+    this.run = run;
+    this.palette = palette;
+    const { time, ...lines } = run.arrays;
+    this.bodies = run.series.filter((line) => line.group === "x" && line.name !== "z");
+    let size = 0;
+    for (const { name } of [...this.bodies, ...(lines.z ? [{ name: "z" }] : [])]) for (const value of lines[name]) size = Math.max(size, Math.abs(value));
+    this.size = size || 1;
+    this.most = Math.max(1e-300, ...["friction", "friction1"].filter((name) => lines[name]).map((name) => lines[name].reduce((most, value) => Math.max(most, Math.abs(value)), 0)));
+    this.push = lines.force ? lines.force.reduce((most, value) => Math.max(most, Math.abs(value)), 1e-300) : 0;
+    if (!(this.time >= run.first && this.time <= run.last)) this.time = run.first;
+    this.to(this.time);
+  }
+  to(time) {
+    const { first, last } = this.run;
+    this.time = time > last ? first : time;
+    this.draw();
+    this.moved(this.time, this.index);
+  }
+  // The value of a line now, straight between two instants.
+  now(name) {
+    const { time } = this.run.arrays, line = this.run.arrays[name], j = this.index;
+    const step = time[j + 1] - time[j];
+    return step > 0 ? line[j] + ((line[j + 1] - line[j]) * Math.min(1, Math.max(0, (this.time - time[j]) / step))) : line[j];
+  }
+  find() {
+    const { time } = this.run.arrays;
+    let low = 0, high = time.length - 2;
+    while (low < high) { const middle = (low + high + 1) >> 1; if (time[middle] <= this.time) low = middle; else high = middle - 1; }
+    this.index = low;
+  }
+  draw() {
+    this.find();
+    const { canvas, palette, run } = this, ratio = devicePixelRatio || 1;
+    const width = canvas.clientWidth, height = canvas.clientHeight;
+    if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
+    if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
+    const pen = canvas.getContext("2d");
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    const floor = height - 24, count = this.bodies.length, room = (width - 120) / count;
+    const scale = (0.22 * Math.min(room, 520)) / this.size, ink = [palette.orange, palette.sky, palette.blue, palette.purple][run.kinds[this.index]];
+    this.ground(pen, floor, width, scale, height);
+    this.bodies.forEach(({ name, unit }, j) => {
+      const middle = 100 + room * (j + 0.5), box = Math.min(64, floor - 30, room * 0.4);
+      const x = middle + this.now(name) * scale, top = floor - box;
+      const from = j ? middle - room / 2 - 20 : 26 + (run.arrays.z ? this.now("z") * scale : 0) + 0.22 * Math.min(room, 520) * (run.arrays.z ? 1 : 0);
+      if (count === 1) this.spring(pen, from, x - box / 2, top + box / 2);
+      pen.fillStyle = count === 1 || j === 0 ? ink : palette.faint;
+      pen.fillRect(x - box / 2, top, box, box);
+      pen.fillStyle = palette.card;
+      pen.textAlign = "center";
+      pen.textBaseline = "middle";
+      pen.font = "600 14px system-ui, sans-serif";
+      pen.fillText(count === 1 ? "m" : `${name}${unit.startsWith("rad") ? " ∠" : ""}`, x, top + box / 2);
+      pen.strokeStyle = palette.faint;
+      pen.setLineDash([3, 4]);
+      pen.beginPath(); pen.moveTo(middle, top - 14); pen.lineTo(middle, floor); pen.stroke();
+      pen.setLineDash([]);
+      if (j === 0) this.arrow(pen, x, floor + 13, (-this.now(run.arrays.friction ? "friction" : "friction1") / this.most) * 60, palette.ink, "friction");
+      if (count === 1 && this.push) this.arrow(pen, x, top - 8, (this.now("force") / this.push) * 70, palette.green, "force");
+    });
+    this.ruler(pen, width, scale, palette);
+    if (run.arrays.z && count === 1) {
+      const end = 26 + this.now("z") * scale + 0.22 * Math.min(room, 520);
+      pen.fillStyle = palette.soft;
+      pen.fillRect(end - 7, floor - 60, 7, 60);
+      pen.fillRect(end - 22, floor - 4, 22, 4);
+    } else if (count === 1) { pen.fillStyle = palette.soft; pen.fillRect(20, floor - 66, 6, 66); }
+  }
+  ground(pen, floor, width, scale, height) {
+    const { palette, run } = this;
+    pen.strokeStyle = palette.soft;
+    pen.lineWidth = 1.5;
+    pen.beginPath(); pen.moveTo(0, floor + 0.5); pen.lineTo(width, floor + 0.5); pen.stroke();
+    pen.lineWidth = 1;
+    pen.strokeStyle = palette.faint;
+    const gap = 14, shift = (((run.belt * this.time * scale) % gap) + gap) % gap;
+    pen.beginPath();
+    for (let x = shift - gap; x < width + gap; x += gap) { pen.moveTo(x, floor + 1); pen.lineTo(x - 8, Math.min(height, floor + 10)); }
+    pen.stroke();
+  }
+  spring(pen, from, to, y) {
+    pen.strokeStyle = this.palette.ink;
+    pen.lineWidth = 1.6;
+    pen.beginPath();
+    pen.moveTo(from, y);
+    const step = (to - from) / (COILS * 2 + 2);
+    for (let k = 1; k <= COILS * 2; k++) pen.lineTo(from + step * (k + 0.5), y + (k % 2 ? -8 : 8));
+    pen.lineTo(to, y);
+    pen.stroke();
+  }
+  arrow(pen, x, y, length, colour, words) {
+    if (Math.abs(length) < 2) return;
+    pen.strokeStyle = pen.fillStyle = colour;
+    pen.lineWidth = 2.4;
+    const side = Math.sign(length);
+    pen.beginPath(); pen.moveTo(x, y); pen.lineTo(x + length - side * 6, y); pen.stroke();
+    pen.beginPath(); pen.moveTo(x + length, y); pen.lineTo(x + length - side * 8, y - 4); pen.lineTo(x + length - side * 8, y + 4); pen.fill();
+    pen.font = "11px system-ui, sans-serif";
+    pen.textAlign = side > 0 ? "left" : "right";
+    pen.fillText(words, x + length + side * 5, y - 1);
+  }
+  // How long a stretch of the picture is, and the time.
+  ruler(pen, width, scale, palette) {
+    const most = 120 / scale, decade = 10 ** Math.floor(Math.log10(most));
+    const length = SCALES.map((each) => each * decade).filter((each) => each <= most).at(-1);
+    const [factor, unit] = prefixed(length, this.bodies[0].unit);
+    pen.strokeStyle = pen.fillStyle = palette.soft;
+    pen.lineWidth = 1.5;
+    pen.beginPath(); pen.moveTo(width - 14 - length * scale, 14); pen.lineTo(width - 14, 14); pen.stroke();
+    pen.font = "12px system-ui, sans-serif";
+    pen.textAlign = "right";
+    pen.textBaseline = "top";
+    pen.fillText(`${shortly(length * factor)} ${unit}`, width - 14, 18);
+    pen.fillText(`t = ${this.time.toFixed(this.run.cycle < 0.05 ? 4 : 2)} s`, width - 14, 34);
+  }
+}
