@@ -16,7 +16,7 @@ from stickslip import datasets
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text("utf-8")
-PAGES = sorted((ROOT / "docs").glob("*.md"))
+PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "extending").glob("*.md")])
 
 
 def blocks(text: str, language: str) -> list[str]:

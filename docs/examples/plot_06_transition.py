@@ -1,0 +1,19 @@
+"""
+The speed at which sliding begins
+=================================
+
+Where a sliding mass turns, a compliant contact first gives way elastically; the friction goes over from one level to
+the other while the mass gathers speed. The speed at the end of that is the transition speed.
+"""
+
+import stickslip as ss
+
+contact = ss.CompliantContact(1.1, stiffness=192_000, damping=23.9)
+slider = ss.Oscillator(mass=2.42, stiffness=2310, law=contact, drive=ss.HarmonicBase(1.1e-3, frequency=8.7))
+rig = ss.Rig.air_track()
+record = rig.stated(rig.measure(ss.simulate(slider, duration=6.0), fs=4000, rng=1, start=4.0))
+fused = ss.friction_force(record, mass=2.42, stiffness=2310, method="fusion")
+
+found = ss.transition_speed(fused)
+print(found)
+axes = ss.plot_transition_speed(found)
