@@ -120,12 +120,8 @@ def misfit(name: str, count: int, size: float) -> Misfit:
     return Misfit(name, count, {("x", 0): size * 1e-10, ("load", 0): size * 1e-4})
 
 
-def excess(low: float, high: float) -> ss.Estimate:
-    return ss.Estimate("excess", (low + high) / 2, (low, high), (high - low) / 4, "1", "")
-
-
-def kept(*misfits: Misfit, share: ss.Estimate | None = None) -> tuple[set[str], float]:
-    told, confidence = standings(misfits, EVIDENCE, excess=share, calibration=0.01)
+def kept(*misfits: Misfit, likely: dict[str, float] | None = None) -> tuple[set[str], float]:
+    told, confidence = standings(misfits, EVIDENCE, likely=likely)
     return {each.name for each in told if each.kept}, confidence
 
 
@@ -153,19 +149,20 @@ def test_confidence_grows_with_the_misfit_of_the_others() -> None:
 def test_a_misfit_within_the_noise_decides_nothing() -> None:
     quiet = Evidence({("x", 0): 30.0}, {("x", 0): 1e-6})
     told, _ = standings(
-        [Misfit("Coulomb", 1, {("x", 0): 1e-14}), Misfit("compliant", 3, {("x", 0): 1e-15})], quiet, excess=None,
-        calibration=0.01,
+        [Misfit("Coulomb", 1, {("x", 0): 1e-14}), Misfit("compliant", 3, {("x", 0): 1e-15})], quiet
     )  # fmt: skip
     assert all(each.kept for each in told)
     assert told[0].name == "Coulomb"
 
 
-def test_a_richer_rigid_law_has_to_earn_its_parameter() -> None:
-    plain, rich = misfit("Coulomb", 1, 1.0), misfit("static", 2, 0.5)
-    assert kept(plain, rich, share=excess(0.15, 0.25))[0] == {"static"}
-    assert kept(plain, rich, share=excess(0.005, 0.035))[0] == {"Coulomb", "static"}  # three calibrations hide it
-    assert kept(plain, misfit("static", 2, 1.0), share=excess(0.0, 0.02))[0] == {"Coulomb"}
-    assert kept(plain, misfit("static", 2, 0.99), share=excess(0.0, 0.2)) == ({"Coulomb", "static"}, 0.5)
+def test_rigid_laws_are_told_apart_by_the_friction_around_rest() -> None:
+    """And by their misfit: a motion that one of them explains far better rejects the others."""
+    plain, rich = misfit("Coulomb", 1, 1.0), misfit("static", 2, 0.95)
+    assert kept(plain, rich, likely={"Coulomb": 0.001, "static": 0.999})[0] == {"static"}
+    assert kept(plain, rich, likely={"Coulomb": 0.99, "static": 0.01})[0] == {"Coulomb"}
+    assert kept(plain, rich, likely={"Coulomb": 0.6, "static": 0.4})[0] == {"Coulomb", "static"}
+    assert kept(plain, rich)[0] == {"Coulomb", "static"}
+    assert kept(plain, misfit("static", 2, 0.4))[0] == {"static"}
 
 
 def stiff(name: str, count: int, size: float) -> Misfit:
@@ -174,8 +171,7 @@ def stiff(name: str, count: int, size: float) -> Misfit:
 
 def test_a_contact_next_to_rigid_is_no_other_family() -> None:
     told, confidence = standings(
-        [misfit("Coulomb", 1, 1.0), stiff("compliant", 3, 0.9), misfit("LuGre", 5, 50.0)], EVIDENCE, excess=None,
-        calibration=0.01,
+        [misfit("Coulomb", 1, 1.0), stiff("compliant", 3, 0.9), misfit("LuGre", 5, 50.0)], EVIDENCE
     )  # fmt: skip
     assert [each.name for each in told if each.kept] == ["Coulomb"]
     assert next(each for each in told if each.name == "compliant").limit
@@ -183,18 +179,9 @@ def test_a_contact_next_to_rigid_is_no_other_family() -> None:
 
 
 def test_a_stiff_contact_that_leaves_far_less_stands_for_itself() -> None:
-    told, _ = standings(
-        [misfit("Coulomb", 1, 3.0), stiff("compliant", 3, 1.0)], EVIDENCE, excess=None, calibration=0.01
-    )
+    told, _ = standings([misfit("Coulomb", 1, 3.0), stiff("compliant", 3, 1.0)], EVIDENCE)
     assert [each.name for each in told if each.kept] == ["compliant"]
     assert not any(each.limit for each in told)
-
-
-def test_a_stribeck_curve_stands_by_its_own_excess() -> None:
-    plain, curve = misfit("Coulomb", 1, 1.0), misfit("Stribeck", 3, 0.3)
-    above = Misfit("Stribeck", 3, curve.squares, excess=0.2)
-    assert kept(plain, misfit("static", 2, 0.9), above, share=excess(0.3, 0.7))[0] == {"Stribeck"}
-    assert "Stribeck" not in kept(plain, curve, share=excess(0.0, 0.02))[0]
 
 
 # ---- records that tell nothing

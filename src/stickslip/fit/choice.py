@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.estimate import Estimate
 from stickslip.statistics import correlation_time
 
 Array = NDArray[np.float64]
@@ -25,6 +24,7 @@ SEPARATED = 2.0  # times the misfit of the best law, from which on another famil
 CALIBRATIONS = 3.0  # times the calibration's error, below which an effect is not to be told from it
 CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
 SHARPNESS = 4.0  # power of the ratio of misfits that the odds between two families follow
+UNLIKELY = 0.05  # a law less probable than this within its family is rejected
 FAMILIES = {"Coulomb": "rigid", "static": "rigid", "Stribeck": "rigid"}
 
 
@@ -42,8 +42,6 @@ class Misfit:
         Mean square of what is left of each channel of each record [unit of the channel, squared].
     predicted : mapping of (str, int) to float, or None
         The same where each record is predicted by a fit to the others.
-    excess : float
-        By what part its static friction exceeds its kinetic.
     stiff : bool
         Whether its contact gives way so little that it is a rigid one's limit.
     """
@@ -52,7 +50,6 @@ class Misfit:
     count: int
     squares: Mapping[Key, float]
     predicted: Mapping[Key, float] | None = None
-    excess: float = 0.0
     stiff: bool = False
 
     @property
@@ -117,16 +114,20 @@ def independent(residual: Array) -> float:
 
 
 def standings(
-    misfits: Sequence[Misfit], evidence: Evidence, *, excess: Estimate | None, calibration: float
+    misfits: Sequence[Misfit], evidence: Evidence, *, likely: Mapping[str, float] | None = None
 ) -> tuple[list[Standing], float]:
-    """The laws, the best one first, those kept that the records leave possible; and the confidence in that."""
+    """The laws, the best one first, those kept that the records leave possible; and the confidence in that.
+
+    `likely` is how probable each rigid law is by the friction around rest.
+    """
     order = sorted(misfits, key=lambda each: evidence.criterion(each.squares, each.count))
     limits = _limits(order, evidence)
     order.sort(key=lambda each: each.name in limits)
-    best = order[0]
+    inner, sure = _within([each for each in order if each.family == order[0].family], evidence, likely)
+    best = next(each for each in order if each.name == next(iter(inner)))
+    order.sort(key=lambda each: each is not best)
     ratios = {each.name: evidence.over(each.squares, best.squares) for each in order}
     forecasts = _forecasts(order, evidence)
-    inner, sure = _within([each for each in order if each.family == best.family], evidence, excess, calibration)
     others = {each.name for each in order if each.family != best.family} - limits
     near = {name for name in others if ratios[name] <= SEPARATED or forecasts[name] < 1}
     level = evidence.criterion(best.squares, best.count)
@@ -179,33 +180,22 @@ def _nearest(order: Sequence[Misfit], ratios: Mapping[str, float], best: str) ->
 
 
 def _within(
-    family: Sequence[Misfit], evidence: Evidence, excess: Estimate | None, calibration: float
+    family: Sequence[Misfit], evidence: Evidence, likely: Mapping[str, float] | None
 ) -> tuple[dict[str, str], float]:
-    """The laws of one family that are not rejected, with words; from the simplest on, a richer one has to earn it."""
-    steps = sorted(family, key=lambda each: each.count)
-    high = excess.interval[1] if excess is not None else math.inf
-    least = CALIBRATIONS * calibration
-    chosen, doubted, sure = steps[0], list[Misfit](), 1.0
-    for richer in steps[1:]:
-        gain = evidence.criterion(chosen.squares, chosen.count) - evidence.criterion(richer.squares, richer.count)
-        odds = math.exp(max(-50.0, min(50.0, gain / 2)))
-        better = odds / (1 + odds)
-        if gain > 0 and _shown(richer, excess, least):
-            chosen, doubted, sure = richer, [], sure * better
-        elif (gain > 0 or chosen is steps[0]) and high > least:
-            doubted.append(richer)
-            sure = min(sure, 0.5)
-        else:
-            sure *= 1 - better
-    words = {chosen.name: "not rejected" if doubted else "best"}
-    return words | {each.name: "not rejected" for each in doubted}, sure
+    """The laws of one family that are not rejected, the likeliest first, with words; and how likely they are together.
 
-
-def _shown(richer: Misfit, excess: Estimate | None, least: float) -> bool:
-    """Whether static friction is seen to exceed the kinetic by more than the calibration hides."""
-    if richer.name == "Stribeck":
-        return richer.excess > least
-    return excess is not None and excess.interval[0] > 0 and excess.value > least
+    How likely each is by what else was seen, and by its misfit over the least one's.
+    """
+    least = min(family, key=lambda each: evidence.criterion(each.squares, each.count))
+    worth = {
+        each.name: (likely or {}).get(each.name, 1.0) * evidence.over(each.squares, least.squares) ** -SHARPNESS
+        for each in family
+    }
+    total = math.fsum(worth.values()) or 1.0
+    order = sorted(worth, key=lambda name: -worth[name])
+    kept = [name for name in order if worth[name] > UNLIKELY * total] or order[:1]
+    words = "best" if len(kept) == 1 else "not rejected"
+    return dict.fromkeys(kept, words), math.fsum(worth[name] for name in kept) / total
 
 
 def undescribed(told: Sequence[Standing]) -> list[Standing]:

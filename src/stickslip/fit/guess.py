@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stickslip.drives import Release
 from stickslip.errors import EstimateError
 from stickslip.fit.drive import as_driven, face_of
+from stickslip.fit.releases import Rests
 from stickslip.identify.force import friction_force
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
@@ -48,6 +49,8 @@ class Seen:
         Friction of fast sliding [N].
     frequency : float
         Angular frequency [rad/s] of the motion: speed over displacement.
+    rests : Rests
+        Friction around rest.
     """
 
     slip: Array
@@ -56,11 +59,12 @@ class Seen:
     step: Array
     level: float
     frequency: float
+    rests: Rests
 
     @classmethod
     def of(cls, records: Sequence[Record], oscillator: Oscillator) -> Seen:
         """What the sensors of the records say together of sliding and friction."""
-        slips, speeds, frictions, steps, ways = [], [], [], [], []
+        slips, speeds, frictions, steps, ways, rests = [], [], [], [], [], []
         for record in records:
             told = _told(as_driven(record, oscillator.drive), oscillator)
             inner = slice(EDGE, -EDGE)
@@ -71,6 +75,7 @@ class Seen:
             frictions.append(told["friction"][inner])
             steps.append(np.full(len(slips[-1]), 1 / told.fs))
             ways.append(x[inner] - x[inner].mean())
+            rests.append(_rests(told, speeds[-1], frictions[-1], ways[-1]))
         speed, friction = np.concatenate(speeds), np.concatenate(frictions)
         fast = np.abs(speed) > FAST * np.abs(speed).max()
         level = float(np.median((friction * np.sign(speed))[fast]))
@@ -83,7 +88,8 @@ class Seen:
                 else "correct the signs of the channels, or mass= and stiffness=",
             )  # fmt: skip
         way = float(np.std(np.concatenate(ways)))
-        return cls(np.concatenate(slips), speed, friction, np.concatenate(steps), level, float(np.std(speed)) / way)
+        return cls(np.concatenate(slips), speed, friction, np.concatenate(steps), level, float(np.std(speed)) / way,
+                   Rests.together(rests))  # fmt: skip
 
     @property
     def fastest(self) -> float:
@@ -93,6 +99,12 @@ class Seen:
     def left(self, told: Array) -> float:
         """Mean square of what a told friction leaves."""
         return float(np.mean((self.friction - told) ** 2))
+
+
+def _rests(told: Record, speed: Array, friction: Array, way: Array) -> Rests:
+    unsure = float(np.median(told["v_sd"])) if "v_sd" in told else 0.0
+    frequency = float(np.std(speed)) / max(float(np.std(way)), 1e-300)
+    return Rests.of(speed, friction, fs=told.fs, frequency=frequency, unsure=unsure)
 
 
 def _told(record: Record, oscillator: Oscillator) -> Record:
@@ -109,8 +121,10 @@ def coulomb(seen: Seen) -> list[Any]:
 
 
 def static(seen: Seen) -> list[Any]:
-    """What friction reaches at rest, over the level."""
-    return [Coulomb(seen.level, static=seen.level * (1 + _excess(seen)))]
+    """What friction reaches at a release, or at rest, over the level."""
+    fall = seen.rests.fall
+    excess = _excess(seen) if fall is None else max(LEAST_EXCESS, fall.value)
+    return [Coulomb(seen.level, static=seen.level * (1 + excess))]
 
 
 def _excess(seen: Seen) -> float:

@@ -37,6 +37,7 @@ class Knob(NamedTuple):
     kind: str  # "log", "linear", "above" (the kinetic level), a sensor's "gain" or "delay", or of the "profile"
     origin: float
     scale: float = 1.0
+    most: float = math.inf  # of a coordinate
 
     def value(self, u: float) -> float:
         """The parameter at a coordinate; of an "above" the excess over the kinetic level, as a share of it."""
@@ -280,6 +281,7 @@ def descend(
     *,
     passes: int = PASSES,
     settled: float = SETTLED,
+    share: float = SHARE,
     tell: Callable[[], None] | None = None,
 ) -> Point:
     """Levenberg and Marquardt's descent, each stretch's start eliminated from the common step."""
@@ -299,7 +301,7 @@ def descend(
                 damping, point = max(1e-9, damping / 10), tried
                 break
             damping *= 10
-        if before - point.chi2 < max(settled, SHARE * before):
+        if before - point.chi2 < max(settled, share * before):
             return point
     return point
 
@@ -307,7 +309,7 @@ def descend(
 def _inside(knobs: Sequence[Knob], u: Array, step: Array) -> Array:
     """Where a step leads, no further than is sensible, and no further than a parameter's own limit."""
     least = np.array([-FURTHEST if k.kind == "log" else k.least for k in knobs])
-    most = np.array([FURTHEST if k.kind == "log" else np.inf for k in knobs])
+    most = np.array([min(k.most, FURTHEST) if k.kind == "log" else k.most for k in knobs])
     bold = np.array([{"log": BOLDEST, "above": BOLDER}.get(k.kind, np.inf) for k in knobs])
     return np.asarray(np.clip(u + np.clip(step, -bold, bold), least, most))
 

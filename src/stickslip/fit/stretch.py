@@ -146,10 +146,14 @@ class Stretch:
 
     def told(self, run: Trajectory, delays: Mapping[str, float]) -> list[tuple[Array, NDArray[np.int64] | None]]:
         """What each sensor would read of a run, as :meth:`Sensor.predicted`; `delays` [s] by channel."""
+        motion = self.motion(run)
+        return [sensor.predicted(motion, delays.get(sensor.channel.name, 0.0)) for sensor in self.sensors]
+
+    def motion(self, run: Trajectory) -> Motion:
+        """What the sensors feel of a run."""
         outputs = {SENSED[sensor.channel.name] for sensor in self.sensors}
         outputs |= {"a"} if any(sensor.channel.inertia for sensor in self.sensors) else set()
-        motion = Motion(run, tuple(sorted(outputs)))
-        return [sensor.predicted(motion, delays.get(sensor.channel.name, 0.0)) for sensor in self.sensors]
+        return Motion(run, tuple(sorted(outputs)))
 
     def face_speed(self, oscillator: Oscillator) -> float:
         """Velocity [m/s] of the counter-face at the first instant."""

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.fit.choice import Evidence, Key, independent
 from stickslip.fit.search import Knob, Point, Problem, descend, rows_of
 from stickslip.fit.start import Shown, free_names, knob, thinned
-from stickslip.fit.stretch import Stretch
+from stickslip.fit.stretch import Motion, Stretch, attempted
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.lugre import LuGre
@@ -26,18 +25,17 @@ Left = dict[Key, Array]
 Tell = Callable[[], None]
 
 FINALISTS = 2  # starts that are followed
+ENOUGH = 1e-3  # of the misfit: what a step lowers it less by tells no law from another
 CONTENDING = 10.0  # times the least misfit of the others: a law beyond is not followed to its end
 PASSES, FEW = 12, 3  # of a descent: of a law, and of one that stands near its end
-EXCESSES = (0.0, 0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.32, 0.5)
+LITTLE = 0.01  # of the kinetic friction, by which the static one exceeds it at a start
 RIGID = 1e-2  # of the smallest stroke, by which a contact gives way that counts as rigid where a rigid law does as well
-STIFFEST = 1e-5  # of the stroke: what a contact that is next to rigid gives way
+STIFFEST = 1e-4  # of the stroke: what a contact that is next to rigid gives way
 FALLS = (0.01, 0.05)  # of the largest speed, within which a Stribeck curve falls
 TURNS = 24  # of the motion, after which a record tells laws apart no better
-DETUNED = tuple(1 + 0.0025 * step for step in range(-10, 11))  # a mount, against what is stated
+DETUNED = (0.01, 0.0025)  # steps in which a mount is tried, against what is stated
 SILENT = 0.2  # of a channel's size, left by the best law: nothing is known of such a sensor
-HALVINGS = 2  # of the way to the neighbours of the best excess
 STILL = 1e-12  # scale of a knob that is not turned
-RISE = 3.84  # of minus twice the logarithm of the likelihood, at the ends of a 95 % interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +55,6 @@ class Trial:
     def count(self) -> int:
         """Parameters of the law."""
         return len(free_names(self.problem.oscillator, None))
-
-    @property
-    def excess(self) -> float:
-        """By what part its static friction exceeds its kinetic."""
-        law: Any = self.system.law
-        static = getattr(law, "static", None)
-        return 0.0 if static is None else float(static / law.kinetic - 1)
 
     @property
     def stiff(self) -> bool:
@@ -128,19 +119,35 @@ def searched(
     for number, law in enumerate(starts):
         system = replace(oscillator, law=law)
         problem = Problem.of(system, stretches, ())
-        looks.append((descend(problem, problem.begin(np.zeros(0)), passes=2, tell=tell), number, problem))
+        looks.append((descend(problem, problem.begin(np.zeros(0)), passes=2, share=ENOUGH, tell=tell), number, problem))
     looks = sorted((each for each in looks if math.isfinite(each[0].chi2)), key=lambda each: (each[0].chi2, each[1]))
     ends = []
     for begun, _, still in looks[:FINALISTS]:
         names = (*free_names(still.oscillator, None), *known)
-        problem = replace(still, knobs=tuple(knob(still.oscillator, each) for each in names))
-        point = descend(problem, problem.at(np.zeros(len(names)), begun.starts), passes=FEW, tell=tell)
+        problem = replace(still, knobs=tuple(_turned(still, each) for each in names))
+        point = descend(problem, problem.at(np.zeros(len(names)), begun.starts), passes=FEW, share=ENOUGH, tell=tell)
         if point.chi2 < CONTENDING * least:
-            point = descend(problem, point, passes=passes, tell=tell)
+            point = descend(problem, point, passes=passes, share=ENOUGH, tell=tell)
         if math.isfinite(point.chi2):
             ends.append((problem, point))
             least = min(least, point.chi2)
     return Trial(name, *min(ends, key=lambda each: each[1].chi2)) if ends else None
+
+
+def _turned(problem: Problem, name: str) -> Knob:
+    """The knob of a parameter; a contact gets no stiffer than next to rigid, where it would cost and tell nothing."""
+    turned = knob(problem.oscillator, name)
+    stiffest = _stiffest(problem)
+    most = {"law.stiffness": stiffest, "law.damping": 2 * math.sqrt(stiffest * problem.oscillator.mass)}
+    if name not in most or turned.kind != "log":
+        return turned
+    return turned._replace(most=max(0.0, math.log(most[name] / turned.origin)))
+
+
+def _stiffest(problem: Problem) -> float:
+    """The contact that gives way a smallest part of the stroke under the friction."""
+    law: Any = problem.oscillator.law
+    return float(law.kinetic) / (STIFFEST * max(float(each.scales[0]) for each in problem.stretches))
 
 
 def resumed(trial: Trial, stretches: Sequence[Stretch], least: float, passes: int, tell: Tell) -> Trial | None:
@@ -148,8 +155,21 @@ def resumed(trial: Trial, stretches: Sequence[Stretch], least: float, passes: in
     problem = replace(trial.problem, stretches=tuple(stretches))
     point = problem.at(trial.point.u, trial.point.starts)
     if point.chi2 < CONTENDING * least:
-        point = descend(problem, point, passes=passes, tell=tell)
+        point = descend(problem, point, passes=passes, share=ENOUGH, tell=tell)
     return replace(trial, problem=problem, point=point) if math.isfinite(point.chi2) else None
+
+
+def with_static(trial: Trial, excess: float) -> Trial:
+    """The law whose static friction exceeds the kinetic by what the releases tell, turned no more.
+
+    The misfit jumps with it, and a rough surface moves its valley.
+    """
+    system = trial.system
+    static = system.law.kinetic * (1 + excess)  # type: ignore[union-attr]
+    left = [j for j, each in enumerate(trial.problem.knobs) if each.name != "static"]
+    knobs = tuple(trial.problem.knobs[j]._replace(origin=trial.problem.knobs[j].value(trial.point.u[j])) for j in left)
+    problem = replace(trial.problem, oscillator=system.having(static=static), knobs=knobs)
+    return replace(trial, problem=problem, point=problem.at(np.zeros(len(knobs)), trial.point.starts))
 
 
 def from_simpler(name: str, trials: Mapping[str, Trial]) -> list[Any]:
@@ -157,7 +177,7 @@ def from_simpler(name: str, trials: Mapping[str, Trial]) -> list[Any]:
     laws = {each: trial.system.law for each, trial in trials.items()}
     if name == "static" and "Coulomb" in laws:
         level = laws["Coulomb"].kinetic  # type: ignore[union-attr]
-        return [Coulomb(level, static=(1 + EXCESSES[1]) * level)]
+        return [Coulomb(level, static=(1 + LITTLE) * level)]
     if name == "Stribeck" and "static" in laws:
         law: Any = laws["static"]
         fastest = max(float(each.scales[1]) for each in trials["static"].problem.stretches)
@@ -165,14 +185,13 @@ def from_simpler(name: str, trials: Mapping[str, Trial]) -> list[Any]:
         return [Stribeck(law.kinetic, static, speed=share * fastest) for share in FALLS]
     if name == "compliant" and "Coulomb" in laws:
         rigid: Any = trials["Coulomb"].system
-        stroke = max(float(each.scales[0]) for each in trials["Coulomb"].problem.stretches)
-        stiffness = rigid.law.kinetic / (STIFFEST * stroke)
+        stiffness = _stiffest(trials["Coulomb"].problem)
         damping = 0.2 * math.sqrt(stiffness * rigid.mass)
         return [CompliantContact(rigid.law.kinetic, stiffness=stiffness, damping=damping)]
-    if name == "LuGre" and "compliant" in laws:
+    if name == "LuGre" and "compliant" in laws and not trials["compliant"].stiff:
         held: Any = laws["compliant"]
         fastest = max(float(each.scales[1]) for each in trials["compliant"].problem.stretches)
-        static = (1 + EXCESSES[1]) * held.kinetic
+        static = (1 + LITTLE) * held.kinetic
         return [LuGre(held.kinetic, static, speed=FALLS[-1] * fastest, stiffness=held.stiffness, damping=held.damping)]
     return []
 
@@ -182,12 +201,12 @@ def predicted(trial: Trial, tell: Tell) -> Left:
     found: Left = {}
     for number in range(len(trial.problem.stretches)):
         others = [j for j in range(len(trial.problem.stretches)) if j != number]
-        fitted = descend(*_part(trial.problem, trial.point, others), passes=FEW, tell=tell)
+        fitted = descend(*_part(trial.problem, trial.point, others), passes=FEW, share=ENOUGH, tell=tell)
         held, begun = _part(trial.problem, replace(trial.point, u=fitted.u), [number])
         sensors = [(k, u) for k, u in zip(held.knobs, fitted.u, strict=True) if k.kind in ("gain", "delay")]
         knobs = tuple(stopped(k, u) for k, u in sensors)
         still = replace(held, oscillator=held.system(fitted.u), knobs=knobs)
-        point = descend(still, still.at(np.zeros(len(still.knobs)), begun.starts), passes=FEW, tell=tell)
+        point = descend(still, still.at(np.zeros(len(still.knobs)), begun.starts), passes=FEW, share=ENOUGH, tell=tell)
         if not math.isfinite(point.chi2):
             point = replace(begun, residuals=tuple(np.full_like(r, np.inf) for r in begun.residuals))
         found |= left_of(still, point)
@@ -206,59 +225,6 @@ def _part(problem: Problem, point: Point, rows: Sequence[int]) -> tuple[Problem,
         scales=tuple(problem.scales[j] for j in rows),
     )  # fmt: skip
     return part, part.at(point.u, tuple(point.starts[j] for j in rows))
-
-
-def static_of(coulomb: Trial, evidence: Evidence, tell: Tell) -> tuple[Trial, Estimate]:
-    """The static friction, searched and not descended to, for the misfit jumps with it; and by what part it exceeds.
-
-    At each excess over the kinetic friction all else is fitted anew; where the misfit leaves the 95 % of its likelihood
-    the excess has its ends.
-    """
-    tried = {share: _held(coulomb, share, tell) for share in EXCESSES}
-    for _ in range(HALVINGS):
-        places = sorted(tried)
-        at = min(range(len(places)), key=lambda i: _worth(tried[places[i]], evidence))
-        for near in (at - 1, at + 1):
-            if 0 <= near < len(places):
-                share = (places[at] + places[near]) / 2
-                tried[share] = _held(coulomb, share, tell)
-    worth = {share: _worth(trial, evidence) for share, trial in tried.items()}
-    low, high = _ends(worth)
-    best = min(worth, key=lambda share: worth[share])
-    sd = (high - low) / (2 * NORMAL_95) if math.isfinite(high) else math.nan
-    words = "profile of the misfit, the sensors' gains free"
-    return tried[best], Estimate("excess of static friction", best, (low, high), sd, "1", words)
-
-
-def _held(coulomb: Trial, share: float, tell: Tell) -> Trial:
-    """The law whose static friction exceeds the kinetic by a share, all else fitted anew."""
-    system = coulomb.system
-    level = system.law.kinetic  # type: ignore[union-attr]
-    system = replace(system, law=Coulomb(level, static=level * (1 + share)))
-    knobs = [k._replace(origin=k.value(u)) for k, u in zip(coulomb.problem.knobs, coulomb.point.u, strict=True)]
-    held = replace(coulomb.problem, oscillator=system, knobs=(*knobs, Knob("static", "above", share, STILL)))
-    start = held.at(np.zeros(len(held.knobs)), coulomb.point.starts)
-    return Trial("static", held, descend(held, start, passes=FEW, tell=tell) if math.isfinite(start.chi2) else start)
-
-
-def _worth(trial: Trial, evidence: Evidence) -> float:
-    return evidence.criterion(squares(trial.left), 0) if math.isfinite(trial.point.chi2) else math.inf
-
-
-def _ends(tried: Mapping[float, float]) -> tuple[float, float]:
-    """Where the likelihood, straight between the values tried, leaves the interval; infinite where it does not."""
-    values = np.array(sorted(tried))
-    rises = np.array([tried[each] for each in values])
-    rises = rises - rises.min()
-    inside = np.flatnonzero(rises <= RISE)
-
-    def crossing(a: int, b: int) -> float:
-        share = (RISE - rises[a]) / (rises[b] - rises[a])
-        return float(values[a] + share * (values[b] - values[a]))
-
-    low = float(values[0]) if inside[0] == 0 else crossing(int(inside[0]), int(inside[0]) - 1)
-    high = math.inf if inside[-1] == len(values) - 1 else crossing(int(inside[-1]), int(inside[-1]) + 1)
-    return low, high
 
 
 def evidence_of(trial: Trial, shown: Sequence[Shown]) -> Evidence:
@@ -294,18 +260,41 @@ def tuned(shown: Sequence[Shown], trial: Trial, stretch: Callable[[Shown, int], 
         name: each.record.channels[name].mount for each in shown for name in each.channels
         if each.record.channels[name].mount
     }  # fmt: skip
-    best = list(shown)
+    best, motions = list(shown), _motions(trial)
     for name, mount in mounts.items():
         assert mount is not None
-        tries = []
-        for share in DETUNED:
-            tell()
-            moved = [_remounted(each, name, (share * mount[0], mount[1])) for each in best]
-            problem = replace(trial.problem, stretches=tuple(stretch(each, j) for j, each in enumerate(moved)))
-            left = squares(left_of(problem, problem.at(trial.point.u, trial.point.starts)))
-            tries.append((math.fsum(square for key, square in left.items() if key[0] == name), share, moved))
-        best = min(tries, key=lambda each: each[:2])[2]
+        tried: dict[float, tuple[float, list[Shown]]] = {}
+        for step in DETUNED:
+            middle = min(tried, key=lambda share: tried[share][0]) if tried else 1.0
+            for share in {middle + turns * step for turns in (-2, -1, 0, 1, 2)} - set(tried):
+                tell()
+                moved = [_remounted(each, name, (share * mount[0], mount[1])) for each in best]
+                left = [_unread(trial, motions, stretch(each, j), j, name) for j, each in enumerate(moved)]
+                tried[share] = math.fsum(left), moved
+        best = min(tried.items(), key=lambda each: (each[1][0], each[0]))[1][1]
     return best
+
+
+def _motions(trial: Trial) -> list[Motion | None]:
+    """What happens in each stretch at the end of a search."""
+    found = []
+    for j, stretch in enumerate(trial.problem.stretches):
+        start = trial.point.starts[j]
+        off = start[len(trial.problem.scales[j]) :]
+        run = attempted(stretch, trial.system, trial.problem.start(j, start), off)
+        found.append(None if run is None else stretch.motion(run))
+    return found
+
+
+def _unread(trial: Trial, motions: Sequence[Motion | None], stretch: Stretch, j: int, name: str) -> float:
+    """Mean square of what a motion leaves of a sensor's readings, in units of its noise."""
+    motion, u = motions[j], trial.point.u
+    sensors = [sensor for sensor in stretch.sensors if sensor.channel.name == name]
+    if motion is None or not sensors:
+        return 0.0
+    late = trial.problem.sensor_knobs(u, "delay").get(name, 0.0)
+    told = trial.problem.sensor_knobs(u, "gain").get(name, 1.0) * sensors[0].predicted(motion, late)[0]
+    return float(np.mean((sensors[0].noise * sensors[0].freed(sensors[0].readings - told)) ** 2))
 
 
 def _remounted(shown: Shown, name: str, mount: tuple[float, float]) -> Shown:

@@ -29,10 +29,10 @@ from stickslip.fit.trials import (
     resumed,
     searched,
     squares,
-    static_of,
     tuned,
     unexplained,
     weighed,
+    with_static,
 )
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
@@ -274,17 +274,16 @@ def compare_laws(
             "check mass= and stiffness=, or give laws with their values",
         )  # fmt: skip
     first = min(trials.values(), key=lambda each: each.point.chi2)
-    evidence = evidence_of(first, shown)
-    rigid = None
-    if "static" in trials and "Coulomb" in trials and first.name in FAMILIES:
-        trials["static"], rigid = static_of(trials["Coulomb"], evidence, tell)
+    rigid, likely = seen.rests.fall, seen.rests.probabilities(calibration, CALIBRATIONS * calibration)
     misfits = []
     for trial in trials.values():
         left, near = squares(trial.left), trial.point.chi2 < CONTENDING * first.point.chi2
         ahead = squares(predicted(trial, tell)) if leave_out and len(records) > 1 and near else None
-        misfits.append(Misfit(trial.name, trial.count, left, ahead, trial.excess, trial.stiff))
-    told, confidence = standings(misfits, evidence, excess=rigid, calibration=calibration)
+        misfits.append(Misfit(trial.name, trial.count, left, ahead, trial.stiff))
+    told, confidence = standings(misfits, evidence_of(first, shown), likely=likely)
     best = trials[told[0].name]
+    if best.name == "static" and rigid is not None:
+        best = with_static(best, rigid.value)
     for _ in range(RETUNED if rough else 0):  # the mounts by the law that was found, not by the first look
         before, shown = shown, tuned(stated, best, stretch, tell)
         if [each.record.channels for each in before] == [each.record.channels for each in shown]:
@@ -293,6 +292,8 @@ def compare_laws(
         best = again or best
     whole = [weighed(each, number, calibration, whole=True) for number, each in enumerate(shown)]
     fit = _fit(best, shown, whole, tell)
+    if best.name == "static" and rigid is not None:
+        fit = _with_static(fit, rigid)
     doubt = _doubt(fit, calibration)
     if doubt:
         told, confidence = undescribed(told), 0.0
@@ -315,6 +316,19 @@ def _excess(fit: LawFit) -> Estimate:
         static, name="excess of static friction", value=static.value / level - 1, interval=(max(0.0, low), high),
         sd=static.sd / level, unit="1",
     )  # fmt: skip
+
+
+def _with_static(fit: LawFit, excess: Estimate) -> LawFit:
+    """The fit with the static friction that the releases tell."""
+    level = fit.parameters["kinetic"].value
+    low, high = (level * (1 + end) for end in excess.interval)
+    static = replace(
+        excess, name="static friction", value=level * (1 + excess.value), interval=(low, high), sd=level * excess.sd,
+        unit="N",
+    )  # fmt: skip
+    correlations = np.eye(len(fit.correlations) + 1)
+    correlations[1:, 1:] = fit.correlations
+    return replace(fit, parameters={"static": static, **fit.parameters}, correlations=correlations)
 
 
 def _left(trial: Trial) -> dict[str, float]:
