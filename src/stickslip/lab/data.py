@@ -1,0 +1,326 @@
+"""What the page asks of records: files sent, questions asked in processes of their own, answers fetched."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import tempfile
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
+from starlette.routing import BaseRoute, Route
+
+import stickslip as ss
+from stickslip.lab.jobs import Job, Jobs, Limits
+from stickslip.lab.uploads import UNUSED, Uploads
+
+LONGEST_ASK = 1 << 18  # bytes
+SWEPT_EVERY = 60.0  # seconds
+# A report is a page of its own: it runs nothing and asks nothing of anyone.
+REPORT_POLICY = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:; font-src data:"
+
+Key = Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]
+Text = Annotated[str, Field(max_length=400)]
+Value = Text | Annotated[float, Field(allow_inf_nan=False)] | None
+
+
+class Reading(BaseModel):
+    """How files are read; the fields are those of :class:`~stickslip.RigSettings`."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    channels: Annotated[dict[Text, Text], Field(max_length=64)] = {}
+    units: Annotated[dict[Text, Text], Field(max_length=64)] = {}
+    fs: Value = None
+    time: Text | None = None
+    delimiter: Text | None = None
+    decimal: Literal[".", ","] | None = None
+    rows: Text | None = None
+    repair: Annotated[list[Text], Field(max_length=16)] = []
+
+
+class Options(BaseModel):
+    """What a question is told."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class Constants(Options):
+    """What is known of the rig."""
+
+    mass: Value = None
+    stiffness: Value = None
+
+
+class AnalyzeOptions(Constants):
+    """Of all questions about friction; a normal load for each record."""
+
+    damping: Value = None
+    damper: Literal["ground", "base"] | None = None
+    contact: Literal["ground", "base"] | None = None
+    normal: Annotated[list[Value], Field(max_length=16)] = []
+    method: Text | None = None
+
+
+class DecayOptions(Constants):
+    """Of a free decay."""
+
+    method: Literal["all", "waveform", "thesis"] | None = None
+    channel: Text | None = None
+    restoring: Literal["linear", "pendulum"] | None = None
+
+
+class WaveletOptions(Constants):
+    """Of a map over time and frequency."""
+
+    channel: Text | None = None
+    frequencies: Text | None = None
+    wavelet_frequency: Annotated[float, Field(gt=0, le=1000)] | None = None
+    normalisation: Literal["energy", "amplitude"] | None = None
+
+
+class SqueakOptions(Options):
+    """Of squeaks."""
+
+    channel: Text | None = None
+    frequencies: Text | None = None
+    contact: Literal["ground", "base"] | None = None
+    normal: Annotated[list[Value], Field(max_length=16)] = []
+    lever: Value = None
+
+
+class FitOptions(Constants):
+    """Of a friction law, or a curve."""
+
+    damping: Value = None
+    damper: Literal["ground", "base"] | None = None
+    contact: Literal["ground", "base"] | None = None
+    laws: Text | None = None
+    calibration: Annotated[float, Field(gt=0, lt=1)] | None = None
+    curve: Text | None = None
+
+
+OPTIONS: dict[str, type[Options]] = {
+    "describe": Options, "analyze": AnalyzeOptions, "decay": DecayOptions, "wavelet": WaveletOptions,
+    "squeak": SqueakOptions, "fit": FitOptions,
+}  # fmt: skip
+
+
+class Ask(BaseModel):
+    """A question: of which records, each some files; how they are read; what else is told."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    question: Literal["describe", "analyze", "decay", "wavelet", "squeak", "fit"]
+    records: Annotated[
+        list[Annotated[list[Key], Field(min_length=1, max_length=8)]], Field(min_length=1, max_length=16)
+    ]
+    reading: Reading = Reading()
+    options: dict[str, Any] = {}
+
+
+@dataclass(frozen=True)
+class Data:
+    """The files and the analyses of this run of the lab."""
+
+    uploads: Uploads
+    jobs: Jobs
+
+
+@asynccontextmanager
+async def open_data(limits: Limits | None = None, **sizes: int) -> AsyncIterator[Data]:
+    """The files and analyses of one run; all of it is stopped and removed at the end."""
+    with tempfile.TemporaryDirectory(prefix=f"stickslip-lab-{os.getpid()}-", ignore_cleanup_errors=True) as place:
+        folders = Path(place, "files"), Path(place, "analyses")
+        for folder in folders:
+            folder.mkdir(mode=0o700)
+        data = Data(Uploads(folders[0], **sizes), Jobs(folders[1], limits))
+        sweeping = asyncio.create_task(_sweep(data))
+        try:
+            yield data
+        finally:
+            sweeping.cancel()
+            await asyncio.gather(sweeping, return_exceptions=True)
+            await data.jobs.close()
+
+
+@asynccontextmanager
+async def lifespan(app: Starlette) -> AsyncIterator[None]:
+    """The files and analyses of an app, from its start to its end."""
+    async with open_data() as data:
+        app.state.data = data
+        yield
+
+
+async def _sweep(data: Data) -> None:
+    """Remove what nobody has asked about for long."""
+    while True:
+        await asyncio.sleep(SWEPT_EVERY)
+        before = time.monotonic() - UNUSED
+        data.uploads.remove_unused(before=before)
+        await data.jobs.remove_ended(before=before)
+
+
+def _of(request: Request) -> Data:
+    data: Data = request.app.state.data
+    return data
+
+
+async def send_file(request: Request) -> Response:
+    """Keep a file; its own name is a label."""
+    stated = request.headers.get("content-length", "")
+    with suppress(ClientDisconnect):
+        upload = await _of(request).uploads.receive(
+            request.stream(), label=request.query_params.get("name", ""),
+            stated=int(stated) if stated.isascii() and stated.isdigit() else 0,
+        )  # fmt: skip
+        return JSONResponse({"id": upload.key, "name": upload.label, "size": upload.size}, status_code=201)
+    return Response(status_code=400)
+
+
+async def example(request: Request) -> Response:
+    """Keep the bundled record, as if it had been sent."""
+    upload = await _of(request).uploads.write(_example, label="example.csv")
+    return JSONResponse({"id": upload.key, "name": upload.label, "size": upload.size}, status_code=201)
+
+
+def _example(path: Path) -> None:
+    ss.write_record(ss.datasets.demo(), path)
+
+
+async def remove_file(request: Request) -> Response:
+    """Remove a file."""
+    _of(request).uploads.remove(request.path_params["key"])
+    return Response(status_code=204)
+
+
+async def limits(request: Request) -> Response:
+    """How large a file may be."""
+    return JSONResponse({"largest": _of(request).uploads.largest})
+
+
+async def ask(request: Request) -> Response:
+    """Start an analysis."""
+    asked = _asked(await _body(request))
+    data = _of(request)
+    files = [[data.uploads.get(key) for key in record] for record in asked.records]
+    names = {upload.path.name: upload.label for record in files for upload in record}
+    told = {
+        "question": asked.question, "reading": asked.reading.model_dump(exclude_defaults=True),
+        "options": asked.options,
+        "records": [[str(upload.path) for upload in record] for record in files],
+    }  # fmt: skip
+    return JSONResponse({"id": data.jobs.start(told, names=names).key}, status_code=202)
+
+
+async def _body(request: Request) -> bytes:
+    body = bytearray()
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > LONGEST_ASK:
+            raise HTTPException(413, f"The question is longer than {LONGEST_ASK} bytes; state fewer channels.")
+    return bytes(body)
+
+
+def _asked(body: bytes) -> Ask:
+    try:
+        asked = Ask.model_validate_json(body)
+        options = OPTIONS[asked.question].model_validate(asked.options).model_dump(exclude_defaults=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+        place = ".".join(str(part) for part in first["loc"]) or "the question"
+        raise HTTPException(422, f"{place} can not be understood ({first['msg']}); correct it.") from error
+    return asked.model_copy(update={"options": options})
+
+
+async def status(request: Request) -> Response:
+    """Where an analysis stands, with its answer when it is done."""
+    job = _job(request)
+    return JSONResponse({**job.told(), "answer": job.answer})
+
+
+async def events(request: Request) -> Response:
+    """Where an analysis stands, told at each change (server-sent events)."""
+    job, jobs = _job(request), _of(request).jobs
+
+    async def lines() -> AsyncIterator[str]:
+        async for told in jobs.watch(job):
+            yield ": still here\n\n" if told is None else f"data: {json.dumps(told)}\n\n"
+
+    return StreamingResponse(lines(), media_type="text/event-stream", headers={"Cache-Control": "no-store"})
+
+
+async def cancel(request: Request) -> Response:
+    """Stop an analysis."""
+    job = _job(request)
+    await _of(request).jobs.cancel(job)
+    return JSONResponse(job.told())
+
+
+async def report(request: Request) -> Response:
+    """The report of an analysis: to look at, or with ?keep=1 to keep."""
+    return FileResponse(
+        _kept(_job(request), Path("results", "report.html")), media_type="text/html", filename="report.html",
+        headers={"Content-Security-Policy": REPORT_POLICY},
+        content_disposition_type="attachment" if request.query_params.get("keep") else "inline",
+    )  # fmt: skip
+
+
+async def results(request: Request) -> Response:
+    """The numbers of an analysis, to keep."""
+    path = _kept(_job(request), Path("results", "results.json"))
+    return FileResponse(path, media_type="application/json", filename="results.json")
+
+
+async def folder(request: Request) -> Response:
+    """All that an analysis wrote, as one ZIP file."""
+    return FileResponse(_kept(_job(request), Path("results.zip")), media_type="application/zip", filename="results.zip")
+
+
+async def figure(request: Request) -> Response:
+    """One figure of an analysis, by its number in the answer's list."""
+    job, number = _job(request), request.path_params["number"]
+    names = (job.answer or {}).get("figures", [])
+    if number >= len(names):
+        raise HTTPException(404, "The analysis has no such figure; see its list.")
+    path = _kept(job, Path("results", "figures", Path(names[number]).name))
+    return FileResponse(path, media_type="image/svg+xml", headers={"Content-Security-Policy": REPORT_POLICY})
+
+
+def _job(request: Request) -> Job:
+    return _of(request).jobs.get(request.path_params["key"])
+
+
+def _kept(job: Job, path: Path) -> Path:
+    """A file that a finished analysis left, if it is one of its own."""
+    found = job.folder / path
+    whole = job.state == "done" and found.is_file() and found.resolve() == job.folder.resolve() / path
+    if not whole:
+        raise HTTPException(404, "The analysis left nothing of that kind; see whether it is done.")
+    return found
+
+
+routes: list[BaseRoute] = [
+    Route("/files", send_file, methods=["POST"]),
+    Route("/files", limits, methods=["GET"]),
+    Route("/files/example", example, methods=["POST"]),
+    Route("/files/{key}", remove_file, methods=["DELETE"]),
+    Route("/jobs", ask, methods=["POST"]),
+    Route("/jobs/{key}", status, methods=["GET"]),
+    Route("/jobs/{key}", cancel, methods=["DELETE"]),
+    Route("/jobs/{key}/events", events, methods=["GET"]),
+    Route("/jobs/{key}/results.zip", folder, methods=["GET"]),
+    Route("/jobs/{key}/figures/{number:int}", figure, methods=["GET"]),
+    Route("/jobs/{key}/results.json", results, methods=["GET"]),
+    Route("/jobs/{key}/report", report, methods=["GET"]),
+]

@@ -1,0 +1,468 @@
+// The records: files dropped, channels looked at, a question asked, its answer shown.
+
+const ROLES = {
+  x: "displacement", v: "velocity", a: "acceleration", z: "base displacement", friction: "friction force",
+  load: "load cell", force: "applied force", normal: "normal force", coefficient: "coefficient of friction",
+  theta: "angle", sound: "sound pressure", y: "normal displacement", normal_acceleration: "normal acceleration",
+  torsion_velocity: "torsion velocity",
+};
+const QUESTIONS = {
+  analyze: "How much friction is there, and does it stick?",
+  decay: "What makes a free decay die away?",
+  wavelet: "What rings, and when?",
+  squeak: "Does it squeak?",
+  fit: "Which friction law is it?",
+};
+const FIELDS = {
+  mass: ["Mass", "kg", "2.42, or 250 g"], stiffness: ["Spring", "N/m", "2310, or 1.2 N/mm"],
+  damping: ["Damping", "N s/m", "0.12"], frequencies: ["Range", "Hz", "500:8000"],
+  laws: ["Laws", "all unless given", "Coulomb, compliant"],
+  damper: ["Damper ends on", "", ["ground", "base"]], contact: ["Mass slides on", "", ["ground", "base"]],
+  curve: ["Or a curve of friction", "", ["coulomb", "viscous", "stribeck", "asymmetric", "tabulated", "dahl", "jenkins",
+    "iwan", "maxwell", "aging", "slip"]],
+};
+
+let lab;
+let root;
+let files = [];
+let described = null;
+let job = null;
+let plots = [];
+const parts = {};
+
+export function start(section, given) {
+  lab = given;
+  root = section;
+  root.replaceChildren(
+    make("h2", {}, "Your records"),
+    make("p", { class: "data-lead" }, "Drop what your rig recorded: the friction in it, how sure that is, and why. " +
+      "Nothing leaves this computer."),
+    dropZone(),
+    (parts.files = make("div", { class: "data-files" })),
+    (parts.records = make("div", { class: "data-records" })),
+    (parts.asking = make("div", { class: "data-asking" })),
+    (parts.progress = make("div", { class: "data-running" })),
+    (parts.answer = make("div", { class: "data-answer", tabindex: "-1" })),
+  );
+  addEventListener("pagehide", leave);
+}
+
+// ---- files
+
+function dropZone() {
+  const input = make("input", { type: "file", multiple: "", id: "data-input", class: "data-input" });
+  input.addEventListener("change", () => { add([...input.files]); input.value = ""; });
+  const example = make("button", { type: "button", id: "data-example" }, "Try the example record");
+  example.addEventListener("click", () => guarded(useExample));
+  const zone = make("div", { class: "data-drop" },
+    make("label", { for: "data-input", class: "data-choose" }, "Choose files"), input,
+    make("span", {}, " or drop them here: TDMS, UFF, MAT, CSV, WAV, HDF5, Parquet, LVM, JSON "), example);
+  for (const kind of ["dragenter", "dragover"]) {
+    zone.addEventListener(kind, (event) => { event.preventDefault(); zone.classList.add("data-over"); });
+  }
+  for (const kind of ["dragleave", "drop"]) zone.addEventListener(kind, () => zone.classList.remove("data-over"));
+  zone.addEventListener("drop", (event) => { event.preventDefault(); add([...event.dataTransfer.files]); });
+  return zone;
+}
+
+async function add(chosen) {
+  const { largest } = await lab.ask("/files");
+  for (const file of chosen) {
+    const entry = { name: file.name, size: file.size, sent: 0, id: null, error: "" };
+    files.push(entry);
+    if (file.size > largest) entry.error = `larger than ${size(largest)}, which is the limit here`;
+  }
+  showFiles();
+  for (const [entry, file] of files.slice(-chosen.length).map((each, number) => [each, chosen[number]])) {
+    if (entry.error) continue;
+    try {
+      entry.id = (await send(file, entry)).id;
+      entry.sent = entry.size;
+    } catch (error) {
+      entry.error = error.message;
+    }
+    showFiles();
+  }
+  const failed = files.filter((entry) => entry.error);
+  if (failed.length) lab.say(`${failed[0].name}: ${failed[0].error}`);
+  await guarded(describe);
+}
+
+function send(file, entry) {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    request.open("POST", `/files?name=${encodeURIComponent(file.name)}`);
+    request.setRequestHeader("Content-Type", "application/octet-stream");
+    request.upload.onprogress = (event) => { entry.sent = event.loaded; entry.bar?.setAttribute("value", event.loaded); };
+    request.onload = () => {
+      const told = JSON.parse(request.responseText || "{}");
+      if (request.status === 201) resolve(told);
+      else reject(new Error(told.error || `the lab answered ${request.status}`));
+    };
+    request.onerror = () => reject(new Error("the lab does not answer; is it still running?"));
+    request.send(file);
+  });
+}
+
+async function useExample() {
+  const told = await lab.ask("/files/example", { method: "POST" });
+  files.push({ ...told, sent: told.size, error: "" });
+  showFiles();
+  await describe();
+}
+
+function showFiles() {
+  const rows = files.map((entry) => {
+    const remove = make("button", { type: "button", "aria-label": `Remove ${entry.name}` }, "Remove");
+    remove.addEventListener("click", () => guarded(() => forget(entry)));
+    entry.bar = make("progress", { max: entry.size || 1, value: entry.sent, "aria-label": `${entry.name} sent` });
+    const state = entry.error ? make("span", { class: "data-error" }, entry.error) : entry.id ? "" : entry.bar;
+    return make("li", {}, make("strong", {}, entry.name), ` ${size(entry.size)} `, state, " ", remove);
+  });
+  const pieces = [make("ul", { class: "data-list" }, ...rows)];
+  if (ready().length > 1) {
+    pieces.push(choice("data-together", "These files are", { apart: "one record each", together: "parts of one record" },
+      parts.together || "apart", (value) => { parts.together = value; guarded(describe); }));
+  }
+  parts.files.replaceChildren(...(files.length ? pieces : []));
+}
+
+async function forget(entry) {
+  files = files.filter((each) => each !== entry);
+  if (entry.id) await lab.ask(`/files/${entry.id}`, { method: "DELETE" });
+  showFiles();
+  await describe();
+}
+
+function leave() {
+  if (job) fetch(`/jobs/${job}`, { method: "DELETE", keepalive: true });
+  for (const { id } of ready()) fetch(`/files/${id}`, { method: "DELETE", keepalive: true });
+}
+
+function ready() {
+  return files.filter((entry) => entry.id);
+}
+
+function records() {
+  const keys = ready().map((entry) => entry.id);
+  return parts.together === "together" ? [keys] : keys.map((key) => [key]);
+}
+
+// ---- channels
+
+const told = { columns: null, fs: "", repair: [] };
+
+async function describe() {
+  clear();
+  described = null;
+  parts.records.replaceChildren();
+  parts.asking.replaceChildren();
+  if (!ready().length) return;
+  const answer = await run("describe", {});
+  if (!answer) return;
+  described = answer;
+  parts.records.replaceChildren(...answer.records.map(showRecord));
+  showQuestions();
+  lab.say(`${answer.records.map((record) => record.name).join(", ")} read`);
+}
+
+function reading() {
+  const said = { repair: told.repair };
+  if (told.fs) said.fs = told.fs;
+  if (told.columns) {
+    said.channels = Object.fromEntries(told.columns.map(({ name, column, unit }) =>
+      [name, `\`${column}\`${unit ? ` [${unit}]` : ""}`]));
+  }
+  return said;
+}
+
+function showRecord(record, number) {
+  const length = record.duration === null ? "" : `, ${digits(record.duration)} s at ${digits(record.fs)} Hz`;
+  const box = make("article", { class: "data-record" },
+    make("h3", {}, record.name), make("p", {}, `${record.rows.toLocaleString("en")} rows${length}`));
+  if (record.fs === null) box.append(rateField(record.asks));
+  box.append(channelTable(record, number), previews(record));
+  if (record.faults.length) box.append(make("h4", {}, "What the check-up found"), faults(record));
+  if (record.notes.length) {
+    box.append(make("details", {}, make("summary", {}, "How it was read"),
+      make("ul", {}, ...record.notes.map((note) => make("li", {}, note)))));
+  }
+  return box;
+}
+
+function rateField(asks) {
+  const [box, input] = field("data-fs", "Sampling rate", "Hz", "1000", told.fs);
+  input.required = true;
+  input.addEventListener("change", () => { told.fs = input.value.trim(); guarded(describe); });
+  return make("div", { class: "data-needed" }, make("p", {}, asks), box);
+}
+
+function channelTable(record, number) {
+  const head = make("tr", {}, ...["Column", "Is", "Unit", "From", "To"].map((text) => make("th", { scope: "col" }, text)));
+  const rows = record.channels.map((channel, row) => {
+    const column = told.columns?.[row]?.column || channel.column;
+    const words = { ...ROLES };
+    if (!(channel.name in words)) words[channel.name] = `${channel.name} (not used)`;
+    const role = select(`data-role-${number}-${channel.name}`, words, channel.name);
+    role.setAttribute("aria-label", `What ${column} is`);
+    const unit = make("input", { type: "text", size: "7", value: record.unknown.includes(channel.name) ? "" : channel.unit });
+    unit.setAttribute("aria-label", `Unit of ${column}`);
+    if (record.unknown.includes(channel.name)) unit.placeholder = "unit?";
+    const change = () => retell(record, row, role.value, unit.value.trim());
+    role.addEventListener("change", change);
+    unit.addEventListener("change", change);
+    return make("tr", {}, make("th", { scope: "row" }, column), make("td", {}, role), make("td", {}, unit),
+      make("td", {}, amount(channel.low)), make("td", {}, amount(channel.high)));
+  });
+  return make("div", { class: "data-scroll", tabindex: "0", role: "region", "aria-label": `Channels of ${record.name}` },
+    make("table", {}, make("thead", {}, head), make("tbody", {}, ...rows)));
+}
+
+// All columns, with what was said of one: the library reads the file again by this map.
+function retell(record, number, name, unit) {
+  told.columns ??= record.channels.map((channel) => ({ column: channel.column, name: channel.name, unit: "" }));
+  const other = told.columns.find((each) => each.name === name);
+  if (other) other.name = told.columns[number].name;
+  told.columns[number].name = name;
+  if (unit !== record.channels[number].unit) told.columns[number].unit = unit;
+  guarded(describe);
+}
+
+function previews(record) {
+  const box = make("div", { class: "data-previews" });
+  queueMicrotask(() => {
+    for (const channel of record.channels) {
+      const place = make("div", { class: "data-preview" });
+      box.append(place);
+      plots.push(lab.plot(place, {
+        title: `${ROLES[channel.name] || channel.name}`, unit: channel.unit, time: record.preview.time,
+        series: [{ label: channel.name, values: record.preview.channels[channel.name] }],
+      }));
+    }
+  });
+  return box;
+}
+
+function faults(record) {
+  return make("ul", { class: "data-faults" }, ...record.faults.map((fault, number) => {
+    const line = make("li", {}, fault.message);
+    if (fault.repair) {
+      const box = make("input", { type: "checkbox", id: `data-repair-${record.name}-${number}` });
+      box.checked = told.repair.includes(fault.repair);
+      box.addEventListener("change", () => {
+        told.repair = told.repair.filter((each) => each !== fault.repair).concat(box.checked ? [fault.repair] : []);
+        guarded(describe);
+      });
+      line.append(" ", make("label", {}, box, " mend it"));
+    }
+    return line;
+  }));
+}
+
+// ---- questions
+
+function showQuestions() {
+  const able = Object.keys(QUESTIONS).filter((name) => described.questions[name].able);
+  if (!able.includes(parts.question)) parts.question = able[0];
+  const options = Object.entries(QUESTIONS).map(([name, words]) => {
+    const asked = described.questions[name];
+    const input = make("input", { type: "radio", name: "data-question", id: `data-ask-${name}`, value: name });
+    input.checked = name === parts.question;
+    input.disabled = !asked.able;
+    input.addEventListener("change", () => { parts.question = name; showFields(); });
+    const why = asked.able ? "" : make("small", {}, ` (${asked.why})`);
+    return make("div", {}, input, make("label", { for: `data-ask-${name}` }, ` ${words}`, why));
+  });
+  parts.form = make("form", { class: "data-form" });
+  parts.form.addEventListener("submit", (event) => { event.preventDefault(); guarded(askIt); });
+  parts.asking.replaceChildren(make("fieldset", {}, make("legend", {}, "Ask"), ...options), parts.form);
+  showFields();
+}
+
+function showFields() {
+  const asked = described.questions[parts.question];
+  const stated = described.records[0].stated || {};
+  const one = (name, needed) => {
+    const [label, unit, hint] = FIELDS[name];
+    const id = `data-option-${name}`;
+    if (Array.isArray(hint)) {
+      const words = Object.fromEntries([["", "unless given"], ...hint.map((each) => [each, each])]);
+      const input = select(id, words, "");
+      input.dataset.option = name;
+      return make("div", { class: "data-field" }, make("label", { for: id }, label), input);
+    }
+    const [box, input] = field(id, label, unit, hint, stated[name] ?? "");
+    input.required = needed;
+    input.dataset.option = name;
+    return box;
+  };
+  const loads = asked.may.includes("normal") ? described.records.map((record, number) => {
+    const name = described.records.length > 1 ? `Normal load, ${record.name}` : "Normal load";
+    const [box, input] = field(`data-normal-${number}`, name, "N", "2.45", "");
+    input.dataset.normal = number;
+    return box;
+  }) : [];
+  const may = asked.may.filter((name) => name in FIELDS).map((name) => one(name, false));
+  const more = make("details", {}, make("summary", {}, "What else you know of the rig"), ...may, ...loads);
+  more.open = Object.keys(stated).length > 0 && asked.needs.length === 0;
+  const needs = asked.needs.map((name) => one(name, true));
+  const button = make("button", { type: "submit", class: "data-run", id: "data-run" }, "Ask the record");
+  if (described.needs.length) button.disabled = true;
+  parts.form.replaceChildren(
+    ...(needs.length ? [make("p", {}, "The record can not tell this:"), ...needs] : []),
+    ...(may.length + loads.length ? [more] : []), button);
+}
+
+function options() {
+  const said = {};
+  for (const input of parts.form.querySelectorAll("[data-option]")) {
+    if (input.value.trim()) said[input.dataset.option] = input.value.trim();
+  }
+  if (said.curve) delete said.laws;
+  const loads = [...parts.form.querySelectorAll("[data-normal]")].map((input) => input.value.trim() || null);
+  if (loads.some(Boolean)) said.normal = loads;
+  return said;
+}
+
+async function askIt() {
+  const answer = await run(parts.question, options());
+  if (answer) showAnswer(answer);
+}
+
+// ---- running
+
+async function run(question, said) {
+  parts.answer.replaceChildren();
+  const body = JSON.stringify({ question, records: records(), reading: reading(), options: said });
+  const { id } = await lab.ask("/jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body });
+  job = id;
+  const bar = make("progress", { max: 1, "aria-label": "How far it is" });
+  const words = make("span", { class: "data-words" }, "starting");
+  const stop = make("button", { type: "button", id: "data-cancel" }, "Cancel");
+  stop.addEventListener("click", () => guarded(() => lab.ask(`/jobs/${id}`, { method: "DELETE" })));
+  parts.progress.replaceChildren(bar, " ", words, " ", stop);
+  await ended(id, (told) => {
+    words.textContent = told.words;
+    if (told.state === "running") bar.value = told.share;
+  });
+  const { state, message, answer } = await lab.ask(`/jobs/${id}`);
+  job = null;
+  parts.progress.replaceChildren();
+  if (state === "done") {
+    parts.job = id;
+    return answer;
+  }
+  fail(message);
+  return null;
+}
+
+function ended(id, watch) {
+  return new Promise((resolve) => {
+    const source = new EventSource(`/jobs/${id}/events`);
+    source.onmessage = (event) => {
+      const told = JSON.parse(event.data);
+      watch(told);
+      if (!["waiting", "running"].includes(told.state)) { source.close(); resolve(); }
+    };
+    source.onerror = () => {
+      if (source.readyState === EventSource.CLOSED) resolve();
+    };
+  });
+}
+
+function fail(message) {
+  lab.say(message);
+  parts.answer.replaceChildren(make("p", { class: "data-error", role: "alert" }, message));
+}
+
+async function guarded(work) {
+  try {
+    await work();
+  } catch (error) {
+    parts.progress.replaceChildren();
+    fail(error.message);
+  }
+}
+
+// ---- the answer
+
+function showAnswer(answer) {
+  clear(true);
+  const link = (path, text) => make("a", { href: `/jobs/${parts.job}/${path}`, download: "" }, text);
+  const rows = answer.lines.map((line) => make("tr", {}, make("th", { scope: "row" }, line[0]),
+    ...line.slice(1).map((cell) => make("td", {}, cell))));
+  const head = ["Quantity", "Value", "95 % interval", "How sure"].map((text) => make("th", { scope: "col" }, text));
+  const table = make("div", { class: "data-scroll", tabindex: "0", role: "region", "aria-label": "Results" },
+    make("table", { id: "data-results" }, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows)));
+  const overlay = make("div", { class: "data-overlay" });
+  const page = make("iframe", { src: `/jobs/${parts.job}/report`, title: `Report of ${answer.title}`, sandbox: "",
+    class: "data-report", loading: "lazy" });
+  parts.answer.replaceChildren(
+    make("h3", {}, answer.title),
+    ...answer.headline.map((text) => make("p", { class: "data-headline" }, text)),
+    ...answer.cautions.map((text) => make("p", { class: "data-caution" }, text)),
+    ...(rows.length ? [table] : []), overlay,
+    make("p", { class: "data-downloads" }, link("report?keep=1", "Report (HTML)"), " ", link("results.json", "Numbers (JSON)"),
+      " ", link("results.zip", "All with figures (ZIP)"), " ",
+      make("a", { href: `/jobs/${parts.job}/report`, target: "_blank", rel: "noopener" }, "Open the report in a tab")),
+    ...(answer.notes.length ? [make("details", {}, make("summary", {}, "Notes"),
+      make("ul", {}, ...answer.notes.map((note) => make("li", {}, note))))] : []),
+    page);
+  for (const each of answer.overlay) {
+    const place = make("div", { class: "data-preview" });
+    overlay.append(place);
+    plots.push(lab.plot(place, {
+      title: `${each.record}: ${ROLES[each.channel] || each.channel}, measured and fitted`, unit: each.unit, time: each.time,
+      series: [{ label: "measured", values: each.measured }, { label: "fitted", values: each.fitted, dash: true }],
+    }));
+  }
+  parts.answer.focus();
+  lab.say(answer.headline[0] || "done");
+}
+
+function clear(answersOnly = false) {
+  if (!answersOnly) {
+    for (const plot of plots) plot?.destroy?.();
+    plots = [];
+    parts.answer.replaceChildren();
+  }
+}
+
+// ---- pieces
+
+function make(tag, attributes, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
+}
+
+function field(id, label, unit, hint, value) {
+  const input = make("input", { type: "text", id, placeholder: hint, value, autocomplete: "off" });
+  return [make("div", { class: "data-field" }, make("label", { for: id }, unit ? `${label} [${unit}]` : label), input), input];
+}
+
+function select(id, words, value) {
+  const element = make("select", { id });
+  for (const [key, text] of Object.entries(words)) element.append(make("option", { value: key }, text));
+  element.value = value;
+  return element;
+}
+
+function choice(id, label, words, value, change) {
+  const element = select(id, words, value);
+  element.addEventListener("change", () => change(element.value));
+  return make("div", { class: "data-field" }, make("label", { for: id }, label), element);
+}
+
+function size(bytes) {
+  return bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+}
+
+function digits(value) {
+  return String(Number(value.toPrecision(6)));
+}
+
+function amount(value) {
+  return value === null ? "" : String(Number(value.toPrecision(4)));
+}

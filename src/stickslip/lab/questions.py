@@ -1,0 +1,187 @@
+"""The questions that the page can ask, each answered by one public function and published as a folder."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import stickslip as ss
+from stickslip.lab.asked import Asked, on_the_page
+from stickslip.lab.describe import curve, describe
+
+if TYPE_CHECKING:
+    from stickslip import Record, RigSettings
+
+FOLDER = "results"
+
+
+def each(asked: Asked, answer: Callable[[int], Any]) -> tuple[list[Any], list[str]]:
+    """What each record answers, and why those that are left out do not; the reason where none does."""
+    found, left_out = [], []
+    for number in range(len(asked.records)):
+        asked.say(f"analysing {asked.name(number)}", number / (len(asked.records) + 1))
+        try:
+            found.append(answer(number))
+        except ss.ModelError:
+            raise
+        except ss.StickslipError as error:
+            left_out.append(error)
+    if not found:
+        raise left_out[0]
+    return found, [f"Left out: {on_the_page(str(error))}" for error in left_out]
+
+
+def published(
+    asked: Asked, found: Sequence[Any], left_out: Sequence[str], compare: Callable[..., Any]
+) -> dict[str, Any]:
+    """The page, numbers and figures of one record, or of several compared; and what the lab shows of them."""
+    results = compare(found) if len(found) > 1 else found[0]
+    results = dataclasses.replace(results, notes=(*results.notes, *left_out))
+    asked.say("drawing and writing", len(asked.records) / (len(asked.records) + 1))
+    ss.publish(results, folder=FOLDER)
+    return _told(ss.summary(results))
+
+
+def _told(summary: Any) -> dict[str, Any]:
+    """What the lab shows: the same words as the report and the command line. Also packs the folder."""
+    shutil.make_archive(FOLDER, "zip", FOLDER)
+    figures = sorted(path.name for path in Path(FOLDER, "figures").glob("*.svg"))
+    return {
+        "title": summary.title,
+        "headline": [on_the_page(each) for each in summary.headline],
+        "cautions": [on_the_page(each) for each in summary.cautions],
+        "lines": [[line.name, line.value, line.interval, line.status] for line in summary.lines],
+        "notes": [on_the_page(each) for each in summary.notes],
+        "figures": figures,
+        "overlay": [],
+    }
+
+
+def analyze(asked: Asked) -> dict[str, Any]:
+    """All questions about friction."""
+    method = asked.options.get("method") or "auto"
+
+    def one(number: int) -> Any:
+        rig = asked.rig(number)
+        if not asked.is_long(number):
+            return ss.analyze(asked.record(number), rig=rig, method=method)
+
+        def tell(words: str) -> None:
+            asked.say(f"analysing {asked.name(number)}, {words}", number / (len(asked.records) + 1))
+
+        return ss.analyze_blocks(asked.parts(number), rig=rig, method=method, progress=tell)
+
+    return published(asked, *each(asked, one), ss.compare)
+
+
+def decay(asked: Asked) -> dict[str, Any]:
+    """How a released mass dies away."""
+    told = {name: value for name, value in asked.options.items() if value is not None}
+    found, left_out = each(asked, lambda number: ss.analyze_decay(asked.record(number), **told))
+    answer = published(asked, found, left_out, ss.compare_decays)
+    return {**answer, "overlay": [curve for each in found for curve in _decay_curves(each)]}
+
+
+def _decay_curves(found: Any) -> Iterator[dict[str, Any]]:
+    fit = found.waveform
+    if fit is None:
+        return
+    unit = found.record.channels[fit.channel].unit
+    for time, measured, fitted in zip(fit.time, fit.measured, fit.fitted, strict=True):
+        yield curve(found.name, fit.channel, unit, time, measured, fitted)
+
+
+def squeak(asked: Asked) -> dict[str, Any]:
+    """When, how loud and at which frequency it squeaks."""
+    band = frequency_range(asked.options.get("frequencies"))
+    told = {name: asked.options.get(name) for name in ("channel", "lever")}
+
+    def one(number: int) -> Any:
+        rig = asked.rig(number)
+        found = ss.analyze_squeaks(asked.record(number), frequencies=band, contact=rig.contact, **told)
+        load = rig.normal_load(found.name)
+        return found if load is None else dataclasses.replace(found, normal=load)
+
+    return published(asked, *each(asked, one), ss.compare_squeaks)
+
+
+def wavelet(asked: Asked) -> dict[str, Any]:
+    """A channel over time and frequency."""
+    options = {name: value for name, value in asked.options.items() if value is not None}
+    band = frequency_range(options.pop("frequencies", None))
+    asked.say(f"mapping {asked.name(0)}", 0.1)
+    found = ss.time_frequency(asked.parts(), frequencies=band, **options)
+    return published(asked, [found], [], list)
+
+
+def fit(asked: Asked) -> dict[str, Any]:
+    """Which friction law it is, or a curve of friction."""
+    rig, curve_name = asked.rig(), asked.options.get("curve")
+    asked.say("reading", 0.0)
+    records = [asked.record(number) for number in range(len(asked.records))]
+    if curve_name:
+        friction = with_friction(records[0], rig)
+        found: Any = ss.fit_curve(friction, curve=curve_name, contact=rig.contact)
+        records, curves = [friction], []
+    else:
+        found = ss.compare_laws(
+            records, slider(rig), laws=_listed(asked.options.get("laws")),
+            calibration=asked.options.get("calibration") or 0.01,
+            progress=lambda share: asked.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
+        )  # fmt: skip
+        curves = [
+            curve(asked.name(number), name, records[number].channels[name].unit, traces.time[name], values,
+                  traces.fitted[name])
+            for number, traces in enumerate(found.fit.traces)
+            for name, values in traces.measured.items()
+        ]  # fmt: skip
+    name = asked.name(0) if len(records) == 1 else f"{len(records)} records"
+    ss.publish_fit(found, folder=FOLDER, records=records, name=name)
+    return {**_told(ss.fit_summary(found, records=records, name=name)), "overlay": curves}
+
+
+def _listed(words: str | None) -> list[str] | None:
+    return [word.strip() for word in words.split(",") if word.strip()] if words else None
+
+
+def with_friction(record: Record, rig: RigSettings) -> Record:
+    """The record with friction: measured, or what the motion leaves of the forces where the mass is known."""
+    if {"friction", "coefficient"} & set(record):
+        return record
+    return ss.friction_force(
+        record, mass=rig.mass, stiffness=rig.stiffness, damping=rig.damping or 0.0, damper=rig.damper,
+        contact=rig.contact,
+    )  # fmt: skip
+
+
+def slider(rig: RigSettings) -> Any:
+    """The oscillator that the options state; where its base moved is in the record."""
+    constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
+    if missing := [name for name, value in constants.items() if value is None]:
+        raise ss.ModelError(
+            f"no {' and no '.join(missing)}", "a law is fitted by simulating the oscillator",
+            f"give the {' and the '.join(missing)}",
+        )  # fmt: skip
+    drive = ss.HarmonicBase(0.0, frequency=1.0, contact="base") if rig.contact == "base" else ss.Release()
+    return ss.Oscillator(**constants, damping=rig.damping or 0.0, damper=rig.damper, law=ss.Coulomb(1.0), drive=drive)
+
+
+def frequency_range(text: str | None) -> tuple[float, float] | None:
+    """LOW:HIGH in Hz as two numbers."""
+    if not text:
+        return None
+    try:
+        low, high = (float(end) for end in str(text).split(":"))
+    except ValueError as error:
+        raise ss.ModelError(
+            f"frequencies {text}", "a range is written LOW:HIGH in Hz", "write it as in 500:8000"
+        ) from error
+    return low, high
+
+
+QUESTIONS: dict[str, Callable[[Asked], dict[str, Any]]] = {
+    "describe": describe, "analyze": analyze, "decay": decay, "squeak": squeak, "wavelet": wavelet, "fit": fit,
+}  # fmt: skip

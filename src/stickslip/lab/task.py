@@ -1,0 +1,79 @@
+"""One analysis in a process of its own: reads what was asked from a file, tells how far it is, leaves its answer."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+ASK, ANSWER = "ask.json", "answer.json"
+# What a page's analysis has no use for, and a file that takes over its reader would.
+FORBIDDEN = (
+    "socket.connect", "socket.bind", "socket.sendto", "socket.getaddrinfo", "subprocess.Popen", "os.system", "os.exec",
+    "os.posix_spawn", "os.fork", "os.forkpty", "os.startfile",
+)  # fmt: skip
+
+
+def main() -> int:
+    """Answer what ask.json of a folder asks, into its answer.json."""
+    os.chdir(sys.argv[1])
+    from stickslip import StickslipError
+
+    ask = json.loads(Path(ASK).read_text(encoding="utf-8"))
+    limit(**ask.pop("limits"))
+    from stickslip.lab.asked import Asked, on_the_page
+    from stickslip.lab.questions import QUESTIONS
+
+    say = _line_by_line()
+    try:
+        answer = QUESTIONS[ask["question"]](Asked.of(ask, say))
+    except StickslipError as error:
+        return _leave({"refused": on_the_page(str(error))}, 1)
+    except MemoryError:
+        return _leave({"refused": "The record and what is made of it do not fit in memory; cut it to fewer rows."}, 1)
+    return _leave({"answer": answer}, 0)
+
+
+def limit(*, memory: int, processor: float, written: int) -> None:
+    """Bound what this process may take, and what it may do: no network, no other program."""
+    sys.addaudithook(_forbid)
+    try:
+        import resource
+    except ImportError:  # where there is none, the clock alone bounds the analysis
+        return
+    for what, most in (
+        (resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, int(processor)), (resource.RLIMIT_FSIZE, written),
+        (resource.RLIMIT_CORE, 0),
+    ):  # fmt: skip
+        hard = resource.getrlimit(what)[1]
+        resource.setrlimit(what, (most if hard < 0 else min(most, hard), hard))
+
+
+def _forbid(event: str, arguments: tuple[Any, ...]) -> None:
+    if event in FORBIDDEN:
+        raise PermissionError(f"{event} is not for an analysis")
+
+
+def _line_by_line() -> Callable[[str, float], None]:
+    """How far it is, on the line to the lab; whatever else is printed goes to the error stream."""
+    line = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+
+    def say(words: str, share: float) -> None:
+        line.write(json.dumps({"words": words, "share": min(max(share, 0.0), 1.0)}) + "\n")
+        line.flush()
+
+    return say
+
+
+def _leave(answer: Mapping[str, Any], code: int) -> int:
+    text = json.dumps(answer, ensure_ascii=False, allow_nan=False)
+    Path(ANSWER).write_text(text, encoding="utf-8")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

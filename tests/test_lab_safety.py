@@ -1,0 +1,317 @@
+"""Nobody but this machine's own page is answered, and nothing that is sent brings the lab down."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import struct
+import time
+import zlib
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import httpx2 as httpx
+import numpy as np
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from labs import Lab, running_lab
+from starlette.applications import Starlette
+from starlette.routing import Route, WebSocketRoute
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+import stickslip as ss
+from stickslip.lab.server import lab_app
+
+ENDED = ("done", "refused", "broken", "cancelled")
+
+
+@pytest.fixture(scope="module")
+def lab() -> Iterator[Lab]:
+    with running_lab() as lab:
+        yield lab
+
+
+@pytest.fixture(scope="module")
+def client(lab: Lab) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=lab.base, headers=lab.headers, timeout=60) as client:
+        yield client
+
+
+def send(client: httpx.Client, name: str, contents: bytes) -> str:
+    answer = client.post("/files", params={"name": name}, content=contents)
+    assert answer.status_code == 201, answer.text
+    return answer.json()["id"]
+
+
+def asked(client: httpx.Client, key: str, question: str = "describe", **more: Any) -> dict[str, Any]:
+    job = client.post("/jobs", json={"question": question, "records": [[key]], **more}).json()["id"]
+    until = time.monotonic() + 120
+    while time.monotonic() < until:
+        told = client.get(f"/jobs/{job}").json()
+        if told["state"] in ENDED:
+            return told
+        time.sleep(0.05)
+    raise AssertionError("it never ended")
+
+
+def paths(app: Starlette) -> list[tuple[str, str]]:
+    found = [("GET", "/"), ("GET", "/lab.js"), ("GET", "/openapi.json")]
+    for route in app.routes:
+        if isinstance(route, Route):
+            place = route.path.replace("{number:int}", "0").replace("{key}", "0" * 32).replace("{name}", "x")
+            found += [(method, place) for method in sorted(route.methods or ())]
+    return found
+
+
+ROUTES = paths(lab_app(token="t", port=1))
+
+
+@pytest.mark.parametrize(("method", "path"), ROUTES)
+def test_every_door_wants_our_host_our_page_and_the_token(lab: Lab, method: str, path: str) -> None:
+    known = lab.headers
+    ours = f"127.0.0.1:{lab.port}"
+    with httpx.Client(base_url=lab.base) as anyone:
+        assert anyone.request(method, path).status_code == 401
+        assert anyone.request(method, path, headers={"Authorization": "Bearer wrong"}).status_code == 401
+        for host in ("evil.example", f"evil.example:{lab.port}", "127.0.0.1", f"127.0.0.1.evil.example:{lab.port}"):
+            assert anyone.request(method, path, headers={**known, "Host": host}).status_code == 400
+        for origin in ("http://evil.example", "null", "http://127.0.0.1:1", f"https://{ours}"):
+            assert anyone.request(method, path, headers={**known, "Origin": origin}).status_code == 403
+        answer = anyone.request(method, path, headers={**known, "Origin": f"http://{ours}"})
+        assert answer.status_code not in (400, 401, 403) or method not in ("GET", "HEAD")
+        assert answer.status_code < 500
+        assert "content-security-policy" in answer.headers
+
+
+def test_the_lab_listens_on_this_machine_alone(lab: Lab) -> None:
+    """No socket of it is bound to another address than 127.0.0.1."""
+    inodes = set()
+    for link in Path(f"/proc/{lab.process.pid}/fd").iterdir():
+        target = os.readlink(link) if link.is_symlink() else ""
+        if target.startswith("socket:["):
+            inodes.add(target[8:-1])
+    bound = [
+        fields[1]
+        for table in ("tcp", "tcp6")
+        for fields in (line.split() for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:])
+        if fields[9] in inodes and fields[3] == "0A"
+    ]
+    assert bound == [f"0100007F:{lab.port:04X}"]
+
+
+def test_the_page_may_run_its_own_scripts_and_nothing_else(client: httpx.Client) -> None:
+    policy = client.get("/").headers["content-security-policy"]
+    rules = {words.split()[0]: words.split()[1:] for words in policy.split(";") if words.strip()}
+    assert rules["default-src"] == ["'none'"]
+    assert rules["script-src"] == ["'self'"]
+    assert not {"'unsafe-inline'", "'unsafe-eval'", "*", "https:"} & {each for rule in rules.values() for each in rule}
+    assert rules["frame-ancestors"] == ["'none'"]
+
+
+def test_a_report_runs_nothing_whatever_it_is_called(client: httpx.Client, tmp_path: Path) -> None:
+    time = np.arange(2000) / 500
+    friction = 1.5 * np.sign(np.cos(2 * np.pi * time)) + np.random.default_rng(1).normal(0, 0.01, time.size)
+    record = ss.Record.of({"x": np.sin(2 * np.pi * time) / 6.28, "friction": friction}, fs=500)
+    name = "<img src=x onerror=alert(1)>.csv"
+    key = send(client, name, ss.write_record(record, tmp_path / "a.csv").read_bytes())
+    job = client.post("/jobs", json={"question": "analyze", "records": [[key]]}).json()["id"]
+    while client.get(f"/jobs/{job}").json()["state"] not in ENDED:
+        pass
+    page = client.get(f"/jobs/{job}/report")
+    assert page.status_code == 200
+    assert "<img src=x" not in page.text
+    assert "&lt;img src=x" in page.text
+    policy = page.headers["content-security-policy"]
+    assert policy.startswith("sandbox; default-src 'none'")
+    assert "script-src" not in policy
+    assert "'self'" not in policy.replace("frame-ancestors 'self'", "")
+
+
+@pytest.mark.parametrize("path", ["/../pyproject.toml", "/%2e%2e/%2e%2e/server.py", "/..%2fserver.py", "//etc/passwd",
+                                  "/jobs/../../etc/passwd", "/jobs/%2e%2e%2f%2e%2e/report", "/vendor/../../server.py"])  # fmt: skip
+def test_no_path_leads_out_of_the_page(lab: Lab, path: str) -> None:
+    import http.client
+
+    door = http.client.HTTPConnection("127.0.0.1", lab.port)
+    door.request("GET", path, headers=lab.headers)
+    answer = door.getresponse()
+    assert answer.status in (400, 404, 405)
+    assert b"import" not in answer.read()
+
+
+class Bomb:
+    """Unpickled anywhere, it leaves a file behind."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> Any:
+        return os.system, (f"touch {self.path}",)
+
+
+@pytest.mark.parametrize("name", ["a.pkl", "a.mat", "a.csv", "a.h5", "a.lvm", "a.npy", "a.parquet", "a.json"])
+def test_a_pickle_is_never_opened(client: httpx.Client, tmp_path: Path, name: str) -> None:
+    mark = tmp_path / "gone-off"
+    array = np.array([Bomb(mark)], dtype=object)
+    np.save(tmp_path / "a.npy", array, allow_pickle=True)
+    contents = (tmp_path / "a.npy").read_bytes() if name == "a.npy" else pickle.dumps(Bomb(mark))
+    told = asked(client, send(client, name, contents))
+    assert told["state"] == "refused"
+    assert name in told["message"]
+    assert not mark.exists()
+
+
+def zip_bomb(size: int) -> bytes:
+    """A MATLAB file of a few hundred kB that unpacks to `size` bytes of zeros."""
+    head = b"MATLAB 5.0 MAT-file".ljust(116) + b"\0" * 8 + struct.pack("<H2s", 0x0100, b"IM")
+    inner = struct.pack("<IIII", 14, size, 6, 8) + struct.pack("<II", 6, 0) + struct.pack("<IIii", 5, 8, size // 8 - 9, 1)
+    inner += struct.pack("<IHH4s", 1 | (1 << 16), 0, 0, b"x\0\0\0")[:8] + struct.pack("<II", 9, size - 72)
+    packing = zlib.compressobj(1)
+    packed = packing.compress(inner)
+    for _ in range(size >> 20):
+        packed += packing.compress(b"\0" * (1 << 20))
+    packed += packing.flush()
+    return head + struct.pack("<II", 15, len(packed)) + packed
+
+
+def test_what_unpacks_to_more_than_there_is_ends_as_one_sentence(client: httpx.Client) -> None:
+    begun = time.monotonic()
+    told = asked(client, send(client, "bomb.mat", zip_bomb(256 << 20)), reading={"fs": 100})
+    assert told["state"] in ENDED
+    assert time.monotonic() - begun < 60
+    assert client.get("/alive").status_code == 200
+
+
+def test_a_request_that_is_too_large_is_refused(client: httpx.Client) -> None:
+    for path in ("/jobs", "/export", "/open"):
+        assert client.post(path, content=b"x" * (3 << 20)).status_code == 413
+
+
+def test_what_the_lab_says_it_understands_it_bears(lab: Lab, client: httpx.Client) -> None:
+    """Every operation of the lab's own OpenAPI document, with requests that fit it and requests that do not."""
+    document = client.get("/openapi.json").json()
+    schema = schemathesis.openapi.from_dict(document)
+    schema.config.update(base_url=lab.base)
+    operations = [result.ok() for result in schema.get_all_operations()]
+    assert {operation.path for operation in operations} >= {"/files", "/jobs", "/jobs/{key}"}
+    for operation in operations:
+        bears(operation, lab)
+    assert client.get("/alive").status_code == 200
+
+
+def bears(operation: Any, lab: Lab) -> None:
+    wild = {"derandomize": True, "deadline": None, "phases": [Phase.generate], "database": None,
+            "suppress_health_check": list(HealthCheck)}  # fmt: skip
+    modes = schemathesis.GenerationMode
+
+    @settings(max_examples=8, **wild)
+    @given(case=st.one_of(*(operation.as_strategy(generation_mode=mode) for mode in modes)))
+    def check(case: Any) -> None:
+        answer = case.call(headers=lab.headers, timeout=30)
+        assert answer.status_code < 500 or answer.status_code in (503, 507), case.as_curl_command()
+        if answer.status_code >= 400 and case.method != "HEAD":
+            assert set(answer.json()) == {"error"}, case.as_curl_command()
+
+    check()
+
+
+def sockets(app: Starlette) -> list[str]:
+    return [route.path for route in app.routes if isinstance(route, WebSocketRoute)]
+
+
+SOCKETS = sockets(lab_app(token="t", port=1))
+
+
+@pytest.mark.parametrize("path", SOCKETS)
+def test_a_socket_wants_our_page_and_the_token(lab: Lab, path: str) -> None:
+    place = f"ws://127.0.0.1:{lab.port}{path}"
+    for headers in ({}, {"Authorization": "Bearer wrong"}, {**lab.headers, "Origin": "http://evil.example"}):
+        with pytest.raises(InvalidStatus) as refused:
+            connect(place, additional_headers=headers)
+        assert refused.value.response.status_code == 403
+
+
+@pytest.mark.parametrize("path", SOCKETS)
+def test_a_socket_bears_whatever_comes(lab: Lab, client: httpx.Client, path: str) -> None:
+    noise = np.random.default_rng(11)
+    words = [b'{"id": 1, "want": "run", "state": {"system": {"mass": 1e308}}}', b"[" * 5000, b'{"id": NaN}', b"null",
+             b'{"id": 1, "want": "run"}', b'{"id": {}, "want": []}', b'"' + b"x" * 100_000 + b'"']  # fmt: skip
+    for number in range(40):
+        with connect(f"ws://127.0.0.1:{lab.port}{path}", additional_headers=lab.headers) as socket:
+            try:
+                for _ in range(5):
+                    some = noise.bytes(int(noise.integers(0, 400)))
+                    socket.send(some)
+                    socket.send(some.decode("latin-1"))
+                socket.send(words[number % len(words)].decode())
+                socket.send(words[number % len(words)])
+            except ConnectionClosed:
+                pass
+    assert client.get("/alive").status_code == 200
+
+
+def raw(lab: Lab, contents: bytes) -> None:
+    import socket
+
+    with socket.create_connection(("127.0.0.1", lab.port), timeout=5) as door:
+        door.sendall(contents)
+        door.settimeout(0.2)
+        try:
+            door.recv(4096)
+        except (TimeoutError, ConnectionError):
+            pass
+
+
+def test_bytes_that_are_no_request_harm_nobody(lab: Lab, client: httpx.Client) -> None:
+    noise = np.random.default_rng(5)
+    for number in range(10):
+        raw(lab, noise.bytes(500))
+        raw(lab, b"GET / HTTP/1.1\r\nHost: " + noise.bytes(50).replace(b"\n", b"") + b"\r\n\r\n")
+        raw(lab, b"POST /files HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nContent-Length: %d\r\n\r\nabc" % (lab.port, 10**number))
+    assert client.get("/alive").status_code == 200
+
+
+def test_an_upload_that_breaks_off_leaves_nothing(lab: Lab, client: httpx.Client) -> None:
+    (place,) = Path(os.environ.get("TMPDIR", "/tmp")).glob(f"stickslip-lab-{lab.process.pid}-*/files")
+    before = set(place.iterdir())
+    head = f"POST /files?name=a.csv HTTP/1.1\r\nHost: 127.0.0.1:{lab.port}\r\nAuthorization: Bearer {lab.token}\r\n"
+    raw(lab, (head + "Content-Length: 5000000\r\n\r\n").encode() + b"x" * 2_000_000)
+    until = time.monotonic() + 10
+    while set(place.iterdir()) != before and time.monotonic() < until:
+        time.sleep(0.05)
+    assert set(place.iterdir()) == before
+
+
+def test_twenty_at_once_are_all_answered(lab: Lab, client: httpx.Client) -> None:
+    contents = [b"time [s],x [m]\n" + b"".join(b"%g,%g\n" % (n / 100, n % (u + 5)) for n in range(300)) for u in range(20)]
+
+    def user(number: int) -> tuple[int, float]:
+        with httpx.Client(base_url=lab.base, headers=lab.headers, timeout=120) as mine:
+            told = asked(mine, send(mine, f"user{number}.csv", contents[number]))
+            (channel,) = told["answer"]["records"][0]["channels"]
+            return told["answer"]["records"][0]["rows"], channel["high"]
+
+    with ThreadPoolExecutor(20) as users:
+        waiting = users.map(user, range(20))
+        slowest = 0.0
+        for _ in range(10):
+            begun = time.monotonic()
+            assert client.get("/alive").status_code == 200
+            slowest = max(slowest, time.monotonic() - begun)
+            time.sleep(0.1)
+        assert list(waiting) == [(300, number + 4.0) for number in range(20)]
+    assert slowest < 2.0
+
+
+def test_all_is_removed_at_the_end(tmp_path: Path) -> None:
+    with running_lab() as lab:
+        (place,) = Path(os.environ.get("TMPDIR", "/tmp")).glob(f"stickslip-lab-{lab.process.pid}-*")
+        with httpx.Client(base_url=lab.base, headers=lab.headers) as client:
+            send(client, "a.csv", b"a,b\n1,2\n")
+        assert len(list((place / "files").iterdir())) == 1
+    assert not place.exists()
