@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 POINTS = 2000  # pairs of least and greatest value of a channel that are drawn
 MOTION, FORCES = {"x", "v"}, {"friction", "load", "force"}
 CONSTANTS = ("mass", "stiffness", "damping")
-HEARD = {"sound", "normal_acceleration", "a", "friction", "v", "x"}
+UNTOLD = " (no unit stated, "  # how a channel's source tells it
 _REPAIRS = {
     "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
     "restore_clipped": "clipping", "remove_drift": "drift",
@@ -53,15 +53,14 @@ def questions(channels: set[str], records: int) -> dict[str, dict[str, Any]]:
         "decay": _question(bool(channels & {"x", "theta", "v", "a"}), "name x, theta, v or a among the channels",
                            may=rig),
         "wavelet": _question(records == 1, "one record is mapped at a time", may=["frequencies", *rig]),
-        "squeak": _question(bool(channels & HEARD), "name a sound or an acceleration a among the channels",
-                            may=["frequencies", "normal"]),
+        "squeak": _question(True, may=["frequencies", "normal"]),
         "fit": _question(moves or "friction" in channels, motion,
                          needs=[] if "friction" in channels and not moves else rig,
                          may=["damping", "damper", "contact", "laws", "curve"]),
     }  # fmt: skip
 
 
-def _question(able: bool, why: str, *, needs: Sequence[str] = (), may: Sequence[str] = ()) -> dict[str, Any]:
+def _question(able: bool, why: str = "", *, needs: Sequence[str] = (), may: Sequence[str] = ()) -> dict[str, Any]:
     return {
         "able": able, "why": "" if able else why, "needs": list(needs),
         "may": [name for name in may if name not in needs],
@@ -101,7 +100,7 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
         "channels": [
             {
                 "name": channel.name, "unit": channel.unit, "words": channel.quantity,
-                "column": channel.name if restored else channel.source or channel.name,
+                "column": channel.name if restored else channel.source.partition(UNTOLD)[0] or channel.name,
                 "low": plain(np.fmin.reduce(curves[channel.name])),
                 "high": plain(np.fmax.reduce(curves[channel.name])),
             }
@@ -117,8 +116,8 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
 
 
 def _untold(channel: ss.Channel) -> bool:
-    """Whether nobody stated a unit: what it is in is then not known, unless it is a sound or a coefficient."""
-    return channel.unit == "1" and channel.name not in ("sound", "coefficient")
+    """Whether nobody stated a unit: what it is in is then not known, unless it may well have none."""
+    return UNTOLD in channel.source or (channel.unit == "1" and channel.name not in ("sound", "coefficient"))
 
 
 def _fault(fault: Fault) -> dict[str, Any]:

@@ -181,6 +181,10 @@ function showRecord(record, number) {
   const box = make("article", { class: "data-record" },
     make("h3", {}, record.name), make("p", {}, `${record.rows.toLocaleString("en")} rows${length}`));
   if (record.fs === null) box.append(rateField(record.asks));
+  if (record.unknown.length) {
+    box.append(make("p", { class: "data-needed" }, `The file states no unit for ${record.unknown.join(", ")}: ` +
+      "write it below (what has a known meaning is taken in SI units otherwise)."));
+  }
   box.append(channelTable(record, number), previews(record));
   if (record.faults.length) box.append(make("h4", {}, "What the check-up found"), faults(record));
   if (record.notes.length) {
@@ -207,7 +211,10 @@ function channelTable(record, number) {
     role.setAttribute("aria-label", `What ${column} is`);
     const unit = make("input", { type: "text", size: "7", value: record.unknown.includes(channel.name) ? "" : channel.unit });
     unit.setAttribute("aria-label", `Unit of ${column}`);
-    if (record.unknown.includes(channel.name)) unit.placeholder = "unit?";
+    if (record.unknown.includes(channel.name)) {
+      unit.placeholder = channel.unit === "1" ? "unit?" : `${channel.unit}?`;
+      unit.classList.add("data-needed");
+    }
     const change = () => retell(record, row, role.value, unit.value.trim());
     role.addEventListener("change", change);
     unit.addEventListener("change", change);
