@@ -125,7 +125,8 @@ LVM_HEAD = (
 def uff_set(node: int, name: str, values: np.ndarray, unit: str) -> dict[str, Any]:
     return pyuff.prepare_58(
         binary=0, func_type=1, rsp_node=node, rsp_dir=3, ref_dir=0, ref_node=0, data=values,
-        x=np.arange(len(values)) / FS, id1=name, rsp_ent_name=name, ref_ent_name="NONE", abscissa_spacing=1, abscissa_spec_data_type=17,
+        x=np.arange(len(values)) / FS, id1=name, rsp_ent_name=name, ref_ent_name="NONE",
+        abscissa_spacing=1, abscissa_spec_data_type=17,
         abscissa_axis_units_lab="s", ordinate_spec_data_type=12, ordinate_axis_units_lab=unit,
         orddenom_spec_data_type=0, z_axis_spec_data_type=0,
     )  # fmt: skip

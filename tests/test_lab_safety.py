@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import http.client
 import os
 import pickle
+import socket
 import struct
 import time
 import zlib
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +21,13 @@ import pytest
 import schemathesis
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from labs import Lab, running_lab
 from starlette.applications import Starlette
 from starlette.routing import Route, WebSocketRoute
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 import stickslip as ss
+from labs import Lab, running_lab
 from stickslip.lab.server import lab_app
 
 ENDED = ("done", "refused", "broken", "cancelled")
@@ -132,11 +135,12 @@ def test_a_report_runs_nothing_whatever_it_is_called(client: httpx.Client, tmp_p
     assert "'self'" not in policy.replace("frame-ancestors 'self'", "")
 
 
-@pytest.mark.parametrize("path", ["/../pyproject.toml", "/%2e%2e/%2e%2e/server.py", "/..%2fserver.py", "//etc/passwd",
-                                  "/jobs/../../etc/passwd", "/jobs/%2e%2e%2f%2e%2e/report", "/vendor/../../server.py"])  # fmt: skip
+@pytest.mark.parametrize(
+    "path",
+    ["/../pyproject.toml", "/%2e%2e/%2e%2e/server.py", "/..%2fserver.py", "//etc/passwd", "/jobs/../../etc/passwd",
+     "/jobs/%2e%2e%2f%2e%2e/report", "/vendor/../../server.py"],
+)  # fmt: skip
 def test_no_path_leads_out_of_the_page(lab: Lab, path: str) -> None:
-    import http.client
-
     door = http.client.HTTPConnection("127.0.0.1", lab.port)
     door.request("GET", path, headers=lab.headers)
     answer = door.getresponse()
@@ -169,7 +173,9 @@ def test_a_pickle_is_never_opened(client: httpx.Client, tmp_path: Path, name: st
 def zip_bomb(size: int) -> bytes:
     """A MATLAB file of a few hundred kB that unpacks to `size` bytes of zeros."""
     head = b"MATLAB 5.0 MAT-file".ljust(116) + b"\0" * 8 + struct.pack("<H2s", 0x0100, b"IM")
-    inner = struct.pack("<IIII", 14, size, 6, 8) + struct.pack("<II", 6, 0) + struct.pack("<IIii", 5, 8, size // 8 - 9, 1)
+    inner = (
+        struct.pack("<IIII", 14, size, 6, 8) + struct.pack("<II", 6, 0) + struct.pack("<IIii", 5, 8, size // 8 - 9, 1)
+    )
     inner += struct.pack("<IHH4s", 1 | (1 << 16), 0, 0, b"x\0\0\0")[:8] + struct.pack("<II", 9, size - 72)
     packing = zlib.compressobj(1)
     packed = packing.compress(inner)
@@ -243,28 +249,22 @@ def test_a_socket_bears_whatever_comes(lab: Lab, client: httpx.Client, path: str
              b'{"id": 1, "want": "run"}', b'{"id": {}, "want": []}', b'"' + b"x" * 100_000 + b'"']  # fmt: skip
     for number in range(40):
         with connect(f"ws://127.0.0.1:{lab.port}{path}", additional_headers=lab.headers) as socket:
-            try:
+            with suppress(ConnectionClosed):
                 for _ in range(5):
                     some = noise.bytes(int(noise.integers(0, 400)))
                     socket.send(some)
                     socket.send(some.decode("latin-1"))
                 socket.send(words[number % len(words)].decode())
                 socket.send(words[number % len(words)])
-            except ConnectionClosed:
-                pass
     assert client.get("/alive").status_code == 200
 
 
 def raw(lab: Lab, contents: bytes) -> None:
-    import socket
-
     with socket.create_connection(("127.0.0.1", lab.port), timeout=5) as door:
         door.sendall(contents)
         door.settimeout(0.2)
-        try:
+        with suppress(TimeoutError, ConnectionError):
             door.recv(4096)
-        except (TimeoutError, ConnectionError):
-            pass
 
 
 def test_bytes_that_are_no_request_harm_nobody(lab: Lab, client: httpx.Client) -> None:
@@ -272,7 +272,9 @@ def test_bytes_that_are_no_request_harm_nobody(lab: Lab, client: httpx.Client) -
     for number in range(10):
         raw(lab, noise.bytes(500))
         raw(lab, b"GET / HTTP/1.1\r\nHost: " + noise.bytes(50).replace(b"\n", b"") + b"\r\n\r\n")
-        raw(lab, b"POST /files HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nContent-Length: %d\r\n\r\nabc" % (lab.port, 10**number))
+        raw(
+            lab, b"POST /files HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nContent-Length: %d\r\n\r\nabc" % (lab.port, 10**number)
+        )
     assert client.get("/alive").status_code == 200
 
 
@@ -288,7 +290,9 @@ def test_an_upload_that_breaks_off_leaves_nothing(lab: Lab, client: httpx.Client
 
 
 def test_twenty_at_once_are_all_answered(lab: Lab, client: httpx.Client) -> None:
-    contents = [b"time [s],x [m]\n" + b"".join(b"%g,%g\n" % (n / 100, n % (u + 5)) for n in range(300)) for u in range(20)]
+    contents = [
+        b"time [s],x [m]\n" + b"".join(b"%g,%g\n" % (n / 100, n % (u + 5)) for n in range(300)) for u in range(20)
+    ]
 
     def user(number: int) -> tuple[int, float]:
         with httpx.Client(base_url=lab.base, headers=lab.headers, timeout=120) as mine:

@@ -22,12 +22,17 @@ from starlette.routing import BaseRoute, Route
 
 import stickslip as ss
 from stickslip.lab.jobs import Job, Jobs, Limits
+from stickslip.lab.openapi import described
 from stickslip.lab.uploads import UNUSED, Uploads
 
 LONGEST_ASK = 1 << 18  # bytes
 SWEPT_EVERY = 60.0  # seconds
 # A report is a page of its own: it runs nothing and asks nothing of anyone.
-REPORT_POLICY = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:; font-src data:"
+REPORT_HEADERS = {
+    "Content-Security-Policy": "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; "
+    "media-src data:; font-src data:; frame-ancestors 'self'",
+    "X-Frame-Options": "SAMEORIGIN",
+}
 
 Key = Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]
 Text = Annotated[str, Field(max_length=400)]
@@ -129,6 +134,36 @@ class Ask(BaseModel):
     options: dict[str, Any] = {}
 
 
+def schema_of(model: type[BaseModel]) -> dict[str, Any]:
+    """The JSON schema of a model, whole: what it refers to is written out."""
+    schema = model.model_json_schema()
+    parts = schema.pop("$defs", {})
+
+    def whole(node: Any) -> Any:
+        if isinstance(node, dict):
+            return (
+                whole(parts[node["$ref"].rpartition("/")[2]])
+                if "$ref" in node
+                else {k: whole(v) for k, v in node.items()}
+            )
+        return [whole(item) for item in node] if isinstance(node, list) else node
+
+    written: dict[str, Any] = whole(schema)
+    return written
+
+
+def object_of(**properties: str) -> dict[str, Any]:
+    """The JSON schema of an object that has all of these."""
+    return {
+        "type": "object", "required": list(properties),
+        "properties": {name: {"type": kind} for name, kind in properties.items()},
+    }  # fmt: skip
+
+
+FILE = object_of(id="string", name="string", size="integer")
+STATUS = object_of(state="string", words="string", share="number", message="string")
+
+
 @dataclass(frozen=True)
 class Data:
     """The files and the analyses of this run of the lab."""
@@ -176,6 +211,8 @@ def _of(request: Request) -> Data:
     return data
 
 
+@described("Keep a file", body={"type": "string", "format": "binary"}, media="application/octet-stream",
+           answer=FILE, status=201)  # fmt: skip
 async def send_file(request: Request) -> Response:
     """Keep a file; its own name is a label."""
     stated = request.headers.get("content-length", "")
@@ -188,6 +225,7 @@ async def send_file(request: Request) -> Response:
     return Response(status_code=400)
 
 
+@described("Keep the bundled record as if it had been sent", answer=FILE, status=201)
 async def example(request: Request) -> Response:
     """Keep the bundled record, as if it had been sent."""
     upload = await _of(request).uploads.write(_example, label="example.csv")
@@ -198,17 +236,20 @@ def _example(path: Path) -> None:
     ss.write_record(ss.datasets.demo(), path)
 
 
+@described("Remove a file", status=204)
 async def remove_file(request: Request) -> Response:
     """Remove a file."""
     _of(request).uploads.remove(request.path_params["key"])
     return Response(status_code=204)
 
 
+@described("How large a file may be", answer=object_of(largest="integer"))
 async def limits(request: Request) -> Response:
     """How large a file may be."""
     return JSONResponse({"largest": _of(request).uploads.largest})
 
 
+@described("Start an analysis", body=schema_of(Ask), answer=object_of(id="string"), status=202)
 async def ask(request: Request) -> Response:
     """Start an analysis."""
     asked = _asked(await _body(request))
@@ -243,12 +284,14 @@ def _asked(body: bytes) -> Ask:
     return asked.model_copy(update={"options": options})
 
 
+@described("Where an analysis stands, with its answer when it is done", answer=STATUS)
 async def status(request: Request) -> Response:
     """Where an analysis stands, with its answer when it is done."""
     job = _job(request)
     return JSONResponse({**job.told(), "answer": job.answer})
 
 
+@described("Where an analysis stands, at each change", gives="text/event-stream")
 async def events(request: Request) -> Response:
     """Where an analysis stands, told at each change (server-sent events)."""
     job, jobs = _job(request), _of(request).jobs
@@ -260,6 +303,7 @@ async def events(request: Request) -> Response:
     return StreamingResponse(lines(), media_type="text/event-stream", headers={"Cache-Control": "no-store"})
 
 
+@described("Stop an analysis", answer=STATUS)
 async def cancel(request: Request) -> Response:
     """Stop an analysis."""
     job = _job(request)
@@ -267,26 +311,30 @@ async def cancel(request: Request) -> Response:
     return JSONResponse(job.told())
 
 
+@described("The report of an analysis", gives="text/html")
 async def report(request: Request) -> Response:
     """The report of an analysis: to look at, or with ?keep=1 to keep."""
     return FileResponse(
         _kept(_job(request), Path("results", "report.html")), media_type="text/html", filename="report.html",
-        headers={"Content-Security-Policy": REPORT_POLICY},
+        headers=REPORT_HEADERS,
         content_disposition_type="attachment" if request.query_params.get("keep") else "inline",
     )  # fmt: skip
 
 
+@described("The numbers of an analysis", answer={"type": "object"})
 async def results(request: Request) -> Response:
     """The numbers of an analysis, to keep."""
     path = _kept(_job(request), Path("results", "results.json"))
     return FileResponse(path, media_type="application/json", filename="results.json")
 
 
+@described("All that an analysis wrote", gives="application/zip")
 async def folder(request: Request) -> Response:
     """All that an analysis wrote, as one ZIP file."""
     return FileResponse(_kept(_job(request), Path("results.zip")), media_type="application/zip", filename="results.zip")
 
 
+@described("A figure of an analysis, by its number in the answer's list", gives="image/svg+xml")
 async def figure(request: Request) -> Response:
     """One figure of an analysis, by its number in the answer's list."""
     job, number = _job(request), request.path_params["number"]
@@ -294,7 +342,7 @@ async def figure(request: Request) -> Response:
     if number >= len(names):
         raise HTTPException(404, "The analysis has no such figure; see its list.")
     path = _kept(job, Path("results", "figures", Path(names[number]).name))
-    return FileResponse(path, media_type="image/svg+xml", headers={"Content-Security-Policy": REPORT_POLICY})
+    return FileResponse(path, media_type="image/svg+xml", headers=REPORT_HEADERS)
 
 
 def _job(request: Request) -> Job:
