@@ -58,3 +58,5 @@ def running_lab() -> Iterator[Lab]:
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             raise
+        finally:
+            process.stdout.close()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 import time
+import zlib
 from collections.abc import Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -375,6 +377,28 @@ def test_limits_hold_an_analysis_that_asks_for_too_much(tmp_path: Path) -> None:
         assert told["state"] in ("refused", "broken")
         assert told["message"]
         assert client.get("/files").status_code == 200
+
+
+def zip_bomb(size: int) -> bytes:
+    """A MATLAB file of a few hundred kB that unpacks to `size` bytes of zeros."""
+    head = b"MATLAB 5.0 MAT-file".ljust(116) + b"\0" * 8 + struct.pack("<H2s", 0x0100, b"IM")
+    inner = struct.pack("<II", 14, size + 48) + struct.pack("<IIII", 6, 8, 6, 0)  # a matrix of doubles
+    inner += struct.pack("<IIii", 5, 8, size // 8, 1)  # of so many rows
+    inner += struct.pack("<HH4s", 1, 1, b"x") + struct.pack("<II", 9, size)  # called x, and its numbers
+    packing = zlib.compressobj(1)
+    packed = packing.compress(inner)
+    for _ in range(size >> 20):
+        packed += packing.compress(b"\0" * (1 << 20))
+    packed += packing.flush()
+    return head + struct.pack("<II", 15, len(packed)) + packed
+
+
+def test_what_unpacks_to_more_than_there_is_ends_as_one_sentence() -> None:
+    with TestClient(app_with(limits=Limits(memory=700 << 20))) as client:
+        key = client.post("/files", params={"name": "bomb.mat"}, content=zip_bomb(1 << 30)).json()["id"]
+        told = ended(client, ask(client, "describe", key, reading={"fs": 100}))
+        assert told["state"] == "refused"
+        assert "memory" in told["message"]
 
 
 def test_what_waits_is_bounded(tmp_path: Path) -> None:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import http.client
+import io
 import os
 import pickle
 import socket
-import struct
 import time
-import zlib
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ import httpx2 as httpx
 import numpy as np
 import pytest
 import schemathesis
+import soundfile
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from starlette.applications import Starlette
@@ -141,11 +141,11 @@ def test_a_report_runs_nothing_whatever_it_is_called(client: httpx.Client, tmp_p
      "/jobs/%2e%2e%2f%2e%2e/report", "/vendor/../../server.py"],
 )  # fmt: skip
 def test_no_path_leads_out_of_the_page(lab: Lab, path: str) -> None:
-    door = http.client.HTTPConnection("127.0.0.1", lab.port)
-    door.request("GET", path, headers=lab.headers)
-    answer = door.getresponse()
-    assert answer.status in (400, 404, 405)
-    assert b"import" not in answer.read()
+    with closing(http.client.HTTPConnection("127.0.0.1", lab.port)) as door:
+        door.request("GET", path, headers=lab.headers)
+        answer = door.getresponse()
+        assert answer.status in (400, 404, 405)
+        assert b"import" not in answer.read()
 
 
 class Bomb:
@@ -168,29 +168,6 @@ def test_a_pickle_is_never_opened(client: httpx.Client, tmp_path: Path, name: st
     assert told["state"] == "refused"
     assert name in told["message"]
     assert not mark.exists()
-
-
-def zip_bomb(size: int) -> bytes:
-    """A MATLAB file of a few hundred kB that unpacks to `size` bytes of zeros."""
-    head = b"MATLAB 5.0 MAT-file".ljust(116) + b"\0" * 8 + struct.pack("<H2s", 0x0100, b"IM")
-    inner = (
-        struct.pack("<IIII", 14, size, 6, 8) + struct.pack("<II", 6, 0) + struct.pack("<IIii", 5, 8, size // 8 - 9, 1)
-    )
-    inner += struct.pack("<IHH4s", 1 | (1 << 16), 0, 0, b"x\0\0\0")[:8] + struct.pack("<II", 9, size - 72)
-    packing = zlib.compressobj(1)
-    packed = packing.compress(inner)
-    for _ in range(size >> 20):
-        packed += packing.compress(b"\0" * (1 << 20))
-    packed += packing.flush()
-    return head + struct.pack("<II", 15, len(packed)) + packed
-
-
-def test_what_unpacks_to_more_than_there_is_ends_as_one_sentence(client: httpx.Client) -> None:
-    begun = time.monotonic()
-    told = asked(client, send(client, "bomb.mat", zip_bomb(256 << 20)), reading={"fs": 100})
-    assert told["state"] in ENDED
-    assert time.monotonic() - begun < 60
-    assert client.get("/alive").status_code == 200
 
 
 def test_a_request_that_is_too_large_is_refused(client: httpx.Client) -> None:
@@ -248,14 +225,14 @@ def test_a_socket_bears_whatever_comes(lab: Lab, client: httpx.Client, path: str
     words = [b'{"id": 1, "want": "run", "state": {"system": {"mass": 1e308}}}', b"[" * 5000, b'{"id": NaN}', b"null",
              b'{"id": 1, "want": "run"}', b'{"id": {}, "want": []}', b'"' + b"x" * 100_000 + b'"']  # fmt: skip
     for number in range(40):
-        with connect(f"ws://127.0.0.1:{lab.port}{path}", additional_headers=lab.headers) as socket:
-            with suppress(ConnectionClosed):
-                for _ in range(5):
-                    some = noise.bytes(int(noise.integers(0, 400)))
-                    socket.send(some)
-                    socket.send(some.decode("latin-1"))
-                socket.send(words[number % len(words)].decode())
-                socket.send(words[number % len(words)])
+        place = f"ws://127.0.0.1:{lab.port}{path}"
+        with connect(place, additional_headers=lab.headers) as talk, suppress(ConnectionClosed):
+            for _ in range(5):
+                some = noise.bytes(int(noise.integers(0, 400)))
+                talk.send(some)
+                talk.send(some.decode("latin-1"))
+            talk.send(words[number % len(words)].decode())
+            talk.send(words[number % len(words)])
     assert client.get("/alive").status_code == 200
 
 
@@ -290,15 +267,13 @@ def test_an_upload_that_breaks_off_leaves_nothing(lab: Lab, client: httpx.Client
 
 
 def test_twenty_at_once_are_all_answered(lab: Lab, client: httpx.Client) -> None:
-    contents = [
-        b"time [s],x [m]\n" + b"".join(b"%g,%g\n" % (n / 100, n % (u + 5)) for n in range(300)) for u in range(20)
-    ]
-
     def user(number: int) -> tuple[int, float]:
+        sound = io.BytesIO()
+        soundfile.write(sound, np.linspace(0, (number + 1) / 32, 300), 8000, format="WAV", subtype="DOUBLE")
         with httpx.Client(base_url=lab.base, headers=lab.headers, timeout=120) as mine:
-            told = asked(mine, send(mine, f"user{number}.csv", contents[number]))
-            (channel,) = told["answer"]["records"][0]["channels"]
-            return told["answer"]["records"][0]["rows"], channel["high"]
+            told = asked(mine, send(mine, f"user{number}.wav", sound.getvalue()))
+        (record,) = told["answer"]["records"]
+        return record["rows"], record["channels"][0]["high"]
 
     with ThreadPoolExecutor(20) as users:
         waiting = users.map(user, range(20))
@@ -308,7 +283,7 @@ def test_twenty_at_once_are_all_answered(lab: Lab, client: httpx.Client) -> None
             assert client.get("/alive").status_code == 200
             slowest = max(slowest, time.monotonic() - begun)
             time.sleep(0.1)
-        assert list(waiting) == [(300, number + 4.0) for number in range(20)]
+        assert list(waiting) == [(300, (number + 1) / 32) for number in range(20)]
     assert slowest < 2.0
 
 

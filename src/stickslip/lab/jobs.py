@@ -49,7 +49,7 @@ class Limits:
     processor: float = 1800.0
     wall: float = 3600.0
     written: int = 1 << 30
-    at_once: int = max(1, (os.cpu_count() or 2) - 1)
+    at_once: int = os.cpu_count() or 2
     waiting: int = 64
 
 
