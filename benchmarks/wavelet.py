@@ -27,6 +27,10 @@ CENTRE, FS = 4.5, 4000.0
 LOWEST, HIGHEST = 1.0, 800.0
 ROWS = 10  # whose error is told
 EDGE = 20_000  # samples at either end that are left out of the errors
+# PyWavelets differences a table of the wavelet's integral, read without interpolation. Of the 2^12 points that it has
+# by default, a wavelet of 1 Hz at 4 kHz repeats each eleven times, and hears tones of 364 Hz, ten times as loud as
+# what it should hear. 2^18 cost as little and leave 0.3 in the lowest row, less in all others; more points cost time.
+INTEGRAL_POINTS = 18  # as a power of two
 
 
 def signal(count: int) -> np.ndarray:
@@ -55,7 +59,9 @@ def candidates(values: np.ndarray, scales: np.ndarray) -> dict[str, Callable[[],
         import pywt
 
         name = f"cmor2.0-{CENTRE / (2 * np.pi)}"
-        found["PyWavelets"] = lambda: pywt.cwt(values, scales * FS, name, 1 / FS, method="fft")[0]
+        found["PyWavelets"] = lambda: pywt.cwt(
+            values, scales * FS, name, 1 / FS, method="fft", precision=INTEGRAL_POINTS
+        )[0]
     if importlib.util.find_spec("ssqueezepy"):
         import ssqueezepy
 

@@ -34,7 +34,7 @@ BLOCKS = (1 << 11, 1 << 14)  # samples of one transform of many
 MARGIN = 16  # of them at either end, one in so many, a wavelet of the neighbours may reach
 MOST_IN_BLOCKS = 32  # values made of one sample there
 FEWEST_BLOCKS = 4
-AT_ONCE = 1 << 18  # bytes of the blocks gone through together, which the processor's cache holds
+AT_ONCE = 1 << 19  # bytes of the blocks gone through together, which the processor's cache holds
 
 
 def normalised_gain(scale: float, normalisation: str) -> float:

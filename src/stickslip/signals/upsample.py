@@ -18,7 +18,7 @@ MOST_PHASES = 64  # values made of one sample
 SHIFT = math.pi / TILE  # [rad a sample] a band's middle may lie from zero
 WIDEST = 2.4  # [rad a sample] half of a band, which is pi where nothing is to spare
 WIDEST_OF_MANY = 2.0  # the same where the values are `MANY`
-MANY = 8  # phases from which on they are gone through sample by sample
+MANY = 16  # phases from which on they are gone through sample by sample
 BYTES = 256  # half of the values made at once there take so many
 STEPS = 8  # widths an octave that there are weights for
 MOST_TAPS = 40
@@ -63,7 +63,8 @@ def upsampled(
         around = samples[LEAD + 1 - weights.shape[1] // 2 :]
         places = turns * (np.arange(TILE) * phases + np.arange(phases)[:, None]) % (TILE * phases)
         turn = np.exp(2j * np.pi / (TILE * phases) * places).astype(out.dtype)
-        _few(around.view(kind), weights.astype(kind), turn.view(kind), np.empty(2 * TILE, dtype=kind), out.view(kind))
+        room = np.empty((phases, 2 * TILE), dtype=kind)
+        _FEW[phases](around.view(kind), weights.astype(kind), turn.view(kind), room, out.view(kind))
         return
     values = 2 * BYTES // kind.itemsize  # made at once
     halves, first = _halves(weights, values)
@@ -98,18 +99,16 @@ def _weights(step: int, reach: float, accuracy: float) -> Array:
     return np.ascontiguousarray(weights.T)
 
 
-@compiled(**FAST)
-def _few(around, weights, turn, sums, out):
-    """Phase by phase over a tile. Real and imaginary parts stand side by side; the taps are a multiple of four."""
-    phases, taps = weights.shape
-    tile = sums.size
-    for first in range(0, out.size // phases + 1, tile):
-        for phase in range(phases):
-            if phase == 0:  # the samples themselves
-                window = around[first + taps - 2 : first + taps - 2 + tile]
-                for i in range(tile):
-                    sums[i] = window[i]
-            else:
+def _few_of(phases: int) -> Any:
+    """The kernel for so many phases: a constant of it, so that what it writes lies side by side."""
+
+    @compiled(**FAST)
+    def few(around, weights, turn, room, out):
+        """Phase by phase over a tile. Real and imaginary parts stand side by side; the taps are a multiple of four."""
+        taps, tile = weights.shape[1], room.shape[1]
+        for first in range(0, out.size // phases + 1, tile):
+            for phase in range(1, phases):
+                sums = room[phase]
                 for j in range(0, taps, 4):
                     a, b, c, d = weights[phase, j], weights[phase, j + 1], weights[phase, j + 2], weights[phase, j + 3]
                     window = around[first + 2 * j : first + 2 * j + tile + 6]
@@ -119,11 +118,26 @@ def _few(around, weights, turn, sums, out):
                     else:
                         for i in range(tile):
                             sums[i] += a * window[i] + b * window[i + 2] + c * window[i + 4] + d * window[i + 6]
-            kept = min(tile // 2, (out.size // 2 - phase - 1) // phases + 1 - first // 2)
-            for k in range(kept):
-                place = 2 * ((first // 2 + k) * phases + phase)
-                out[place] = turn[phase, 2 * k] * sums[2 * k] - turn[phase, 2 * k + 1] * sums[2 * k + 1]
-                out[place + 1] = turn[phase, 2 * k] * sums[2 * k + 1] + turn[phase, 2 * k + 1] * sums[2 * k]
+            window = around[first + taps - 2 : first + taps - 2 + tile]
+            for i in range(tile):  # the samples themselves
+                room[0, i] = window[i]
+            row = out[first * phases : (first + tile) * phases]
+            if row.size == tile * phases:
+                for k in range(tile // 2):
+                    for phase in range(phases):
+                        c, s = turn[phase, 2 * k], turn[phase, 2 * k + 1]
+                        x, y = room[phase, 2 * k], room[phase, 2 * k + 1]
+                        row[2 * (k * phases + phase)] = c * x - s * y
+                        row[2 * (k * phases + phase) + 1] = c * y + s * x
+            else:
+                for place in range(row.size // 2):
+                    k, phase = place // phases, place % phases
+                    c, s = turn[phase, 2 * k], turn[phase, 2 * k + 1]
+                    x, y = room[phase, 2 * k], room[phase, 2 * k + 1]
+                    row[2 * place] = c * x - s * y
+                    row[2 * place + 1] = c * y + s * x
+
+    return few
 
 
 def _halves(weights: Array, values: int) -> tuple[Array, int]:
@@ -198,4 +212,5 @@ def _many_of(lanes: int) -> Any:
     return many
 
 
+_FEW = {phases: _few_of(phases) for phases in (2, 4, 8)}
 _MANY = {size: _many_of(BYTES // size) for size in (4, 8)}
