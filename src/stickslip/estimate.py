@@ -6,7 +6,12 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from stickslip.units import prefixed
+
 NORMAL_95 = 1.959963984540054  # two-sided 95 % quantile of the normal distribution
+MOST_DECIMALS = 6  # printed in the plain unit
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,10 @@ class Estimate:
     --------
     >>> print(Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="median of 18 half cycles"))
     sliding friction 1.318 N (95 %: 1.310 to 1.326)
+    >>> print(Estimate.normal("energy in a cycle", 1.2e-7, sd=2e-8, unit="J", method="mean of cycles"))
+    energy in a cycle 120 nJ (95 %: 81 to 159)
+    >>> print(Estimate.normal("memory", 1.2e-7, sd=2e-8, unit="m s/N", method="slope"))
+    memory 1.2e-07 m s/N (95 %: 8.1e-08 to 1.6e-07)
     """
 
     name: str
@@ -82,11 +91,18 @@ class Estimate:
         }  # fmt: skip
 
     def __str__(self) -> str:
-        low, high = self.interval
-        digits = decimals(self.sd if self.sd > 0 else high - low, self.value)
+        spread = self.sd if self.sd > 0 else self.interval[1] - self.interval[0]
+        numbers, unit, digits = np.array([self.value, *self.interval]), self.unit, decimals(spread, self.value)
+        form = f".{digits}f"
+        if digits > MOST_DECIMALS:  # zeros to be counted: a prefix, or an exponent where the unit has none
+            factor, unit = prefixed(numbers, unit)
+            numbers, digits = factor * numbers, decimals(factor * spread, factor * self.value)
+            largest = np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0)
+            exponent = digits > MOST_DECIMALS and largest > 0
+            form = f".{max(0, digits + math.floor(math.log10(largest)))}e" if exponent else f".{digits}f"
+        value, low, high = (f"{number:{form}}" for number in numbers)
         flag = "" if self.status == "ok" else f" [{self.status}]"
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{self.name} {self.value:.{digits}f}{unit} (95 %: {low:.{digits}f} to {high:.{digits}f}){flag}"
+        return f"{self.name} {value}{'' if unit == '1' else f' {unit}'} (95 %: {low} to {high}){flag}"
 
 
 class Result:
