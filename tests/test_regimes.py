@@ -220,3 +220,14 @@ def test_the_figures_show_what_was_found() -> None:
         assert words in plate.svg()
     line = next(line for line in ss.plot_boundary(curve).get_lines() if "Hartog" in str(line.get_label()))
     assert np.interp(curve.places, *line.get_data()) == pytest.approx(curve.values, rel=2e-4)
+
+
+def test_the_figures_tell_an_angle_in_radians() -> None:
+    lever = ss.Structure(
+        [[1.0]], [[0.1]], [[1.0]], contacts=[ss.Contact(ss.Coulomb(0.8), [1.0])], acts_on=[1.0], rotations=[1],
+        drive=ss.HarmonicForce(1.0, frequency=0.08),
+    )  # fmt: skip
+    map_ = ss.plot_basins(ss.basins(lever, grid={"x": [-1.0, 1.0], "v": [-1.0, 1.0]}))
+    assert (map_.get_xlabel(), map_.get_ylabel()) == ("x [rad]", "v [rad/s]")
+    diagram = ss.plot_bifurcation(ss.bifurcation(lever, "drive.amplitude", values=[1.0, 1.2]))
+    assert diagram.axes[0].get_ylabel() == "displacement at phase zero [rad]"

@@ -12,7 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, RecordError
-from stickslip.plot.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SKY, Array, axis_label, prefixed, styled
+from stickslip.plot.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    SKY,
+    Array,
+    axis_label,
+    legend_above,
+    prefixed,
+    styled,
+)
 from stickslip.plot.trajectory import MASSES, contacts_of, curve, kinds_of, last_cycles, numbered_words, sampled
 from stickslip.structure import Structure
 
@@ -226,7 +239,7 @@ def _background(ax: Axes, run: Trajectory, across: str, times: Array) -> list[tu
         x, y = sampled(run, (("x", j), (up, j)), times)
         dots.append((dot, x_factor * (times if across == "time" else x), y_factor * y, colour if count > 1 else None))
     if count > 1 and across == "time":
-        ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(0, 1.0))
+        legend_above(ax, columns=4)
     names = [numbered_words(run, words, name, 0) for words, name in (("displacement", "x"), ("velocity", "v"))]
     ax.set(
         xlabel=axis_label("time" if across == "time" else names[0], x_unit),

@@ -20,9 +20,10 @@ from stickslip.plot.style import (
     PURPLE,
     SHADE,
     SKY,
-    WIDTH,
     axes_of,
     axis_label,
+    empty_figure,
+    legend_above,
     new_figure,
     prefixed,
     spelled,
@@ -34,6 +35,7 @@ from stickslip.regimes.bifurcation import Bifurcation
 from stickslip.regimes.boundary import Boundary
 from stickslip.regimes.dither import Dither, dithered_friction
 from stickslip.solve.automaton import Array, System
+from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +43,6 @@ if TYPE_CHECKING:
 
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK, FAINT, SHADE)
 MOST_NAMED = 8  # attractors in a legend
-_UNITS = {"x": "m", "v": "m/s"}
 
 
 def unit_of(system: System, parameter: str) -> str:
@@ -73,7 +74,10 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
     2
     """
     figure, (top, bottom) = new_figure(2, height=4.6, heights=(3, 1))
-    factor, unit = prefixed(np.concatenate([each.points[:, 0] for each in (*found.up, *found.down)]), "m")
+    motion = found.up[0].orbit.orbit
+    factor, unit = prefixed(
+        np.concatenate([each.points[:, 0] for each in (*found.up, *found.down)]), motion.units("x")[0]
+    )
     looks = (("down", ORANGE, "o", 5.0, "none"), ("up", BLUE, ".", 4.0, BLUE))
     crowded = max(len(each.points) for each in (*found.up, *found.down)) > 20
     for name, colour, marker, size, face in looks:
@@ -101,8 +105,8 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
     bottom.set_ylim(0, 1.15)
     bottom.set_ylabel("largest\nmultiplier")
     top.set_ylabel(axis_label("displacement at phase zero", unit))
-    bottom.set_xlabel(_named(found.up[0].orbit.orbit.system, found.parameter))
-    top.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=4, borderaxespad=0.2, markerscale=3 if crowded else 1)
+    bottom.set_xlabel(_named(motion.system, found.parameter))
+    legend_above(top, columns=4, markerscale=3 if crowded else 1)
     return figure
 
 
@@ -165,8 +169,9 @@ def plot_basins(found: Basins, *, ax: Axes | None = None) -> Axes:
 
     ax = axes_of(ax, height=4.2)
     (down, across), (rows, columns) = found.names, found.axes
-    across_factor, across_unit = prefixed(rows, _UNITS.get(down[0], "1"))
-    down_factor, down_unit = prefixed(columns, _UNITS.get(across[0], "1"))
+    units = _state_units(found.attractors[0].orbit.orbit)
+    across_factor, across_unit = prefixed(rows, units.get(down, "1"))
+    down_factor, down_unit = prefixed(columns, units.get(across, "1"))
     count = len(found.attractors)
     colours = [COLOURS[j % len(COLOURS)] for j in range(count)]
     known = np.ma.masked_less(found.which.T, 0)
@@ -187,10 +192,15 @@ def plot_basins(found: Basins, *, ax: Axes | None = None) -> Axes:
         low, high = share.interval
         words = f"{each.regime}: {100 * share.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
         handles.append(Patch(color=colours[j], alpha=0.55, label=words))
-    ax.legend(handles=handles[:MOST_NAMED], loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2, borderaxespad=0.2)
+    legend_above(ax, handles=handles[:MOST_NAMED], columns=2)
     ax.set_xlabel(axis_label(down, across_unit))
     ax.set_ylabel(axis_label(across, down_unit))
     return ax
+
+
+def _state_units(motion: Trajectory) -> dict[str, str]:
+    """Of the coordinates of the state: rad and rad/s where a structure turns."""
+    return dict(zip(motion.table.names, (*motion.units("x"), *motion.units("v")), strict=False))
 
 
 def _ends(found: Basins, end: int, *factors: float) -> Array:
@@ -247,7 +257,7 @@ def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
         ax.text(0.98, place, str(kind), transform=ax.transAxes, ha="right", va="top" if place > 0.5 else "bottom")
     ax.set_xlabel(_named(system, found.along) if found.along else "place")
     ax.set_ylabel(_named(system, found.parameter))
-    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2, borderaxespad=0.2)
+    legend_above(ax, columns=2)
     return ax
 
 
@@ -292,10 +302,9 @@ def plot_dither(found: Dither) -> Figure:
     >>> len(plot_dither(ss.dither(slider, frequency=5.0)).axes)
     2
     """
-    from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
 
-    figure = Figure(figsize=(WIDTH, 4.8), layout="constrained")
+    figure = empty_figure(4.8)
     top, bottom = figure.subplots(2, 1)
     factor, unit = prefixed(found.scan[:, 0], found.amplitude.unit)
     sticks = found.scan[:, 1] * found.frequency
@@ -318,7 +327,7 @@ def plot_dither(found: Dither) -> Figure:
         top.text(0.99, 0.04, "lowest row: no stick at all", transform=top.transAxes, ha="right", fontsize=7)
     top.set_xlabel(axis_label(f"dither of {found.frequency:.4g} Hz on the {found.on}", unit))
     top.set_ylabel("longest stick\n[periods of the dither]")
-    top.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2, borderaxespad=0.2)
+    legend_above(top, columns=2)
     shares = np.linspace(0, 1, 200)
     bottom.plot(shares, dithered_friction(shares, speed=1.0), color=ORANGE, label="(2/pi) asin(v/aw)")
     for column, colour, words in ((2, BLUE, "exact runs with this dither"), (3, GREEN, "with ten times as much")):
@@ -326,7 +335,7 @@ def plot_dither(found: Dither) -> Figure:
     bottom.axhline(1.0, color=FAINT, linewidth=0.8)
     bottom.set_xlabel("sliding speed over that of the dither, v/aw")
     bottom.set_ylabel("mean friction\nover sliding friction")
-    bottom.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=3, borderaxespad=0.2)
+    legend_above(bottom, columns=3)
     figure.align_ylabels([top, bottom])
     return figure
 

@@ -16,6 +16,7 @@ from stickslip.plot.style import (
     Array,
     axes_of,
     axis_label,
+    legend_above,
     new_figure,
     prefixed,
     styled,
@@ -116,7 +117,7 @@ def plot_sticks(findings: Findings) -> Figure:
             left.plot(times[some], durations[some], marker, color=colour, markersize=4, linestyle="none", label=kind)
             right.hist(durations, bins=bins, color=colour, alpha=0.75, orientation="horizontal")
     left.set(xlabel="time [s]", ylabel=axis_label("duration", unit), ylim=(0, None))
-    left.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(left, columns=2)
     right.set(xlabel="how many")
     return figure
 
@@ -192,7 +193,7 @@ def _loop(findings: Findings | SqueakFindings, abscissa: str, ax: Axes) -> Axes:
 
 
 def _legend_above(ax: Axes) -> None:
-    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(ax, columns=3)
 
 
 def _cycles(findings: Findings | SqueakFindings, abscissa: str) -> list[tuple[Array, Array]]:

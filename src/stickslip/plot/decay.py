@@ -21,6 +21,7 @@ from stickslip.plot.style import (
     axes_of,
     axis_label,
     envelope,
+    legend_above,
     new_figure,
     prefixed,
     styled,
@@ -74,7 +75,7 @@ def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = N
     ax.axhline(factor * rest, color=FAINT, linewidth=0.8)
     _shade_rest(ax, ring, rows)
     ax.set(xlabel="time [s]", ylabel=axis_label(WORDS[ring.channel], unit))
-    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(ax, columns=3)
     return ax
 
 
@@ -100,7 +101,7 @@ def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
     above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="measured")
     above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=words)
     above.set_ylabel(axis_label(WORDS[ring.channel], unit))
-    above.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(above, columns=2)
     left = measured - fitted
     small, small_unit = prefixed(left, ring.unit)
     below.plot(*envelope(time, small * left), color=PURPLE, linewidth=0.8)
@@ -143,7 +144,7 @@ def plot_differences(found: Decrement, *, ax: Axes | None = None) -> Axes:
     )  # fmt: skip
     ax.axhline(0, color=FAINT, linewidth=0.8)
     ax.set(xlabel="number i of the extreme", ylabel=axis_label("X(i+1) - X(i-1)", unit))
-    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(ax, columns=2)
     return ax
 
 
@@ -180,7 +181,7 @@ def plot_bounds(found: Decrement) -> Figure:
         reach = 3 * float(np.nanmedian(np.where(np.isfinite(worst), worst, np.nan))) + float(np.ptp(value))
         ax.set_ylim(middle - reach, middle + reach)
         ax.set_ylabel(label)
-    axes[0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(axes[0], columns=3)
     axes[1].set_xlabel("half cycles m between the two differences")
     figure.align_ylabels(list(axes))
     return figure
@@ -221,7 +222,7 @@ def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio"
     ax.set_yticks(places, names)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.set_xlabel(axis_label(each[0].name, unit))
-    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(ax, columns=2)
     return ax
 
 

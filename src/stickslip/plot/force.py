@@ -6,7 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.plot.style import BLUE, FAINT, GREEN, INK, ORANGE, SHADE, WIDTH, Array, axis_label, prefixed, styled
+from stickslip.plot.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    SHADE,
+    Array,
+    axis_label,
+    empty_figure,
+    legend_above,
+    prefixed,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,9 +57,8 @@ def plot_force_comparison(comparison: ForceComparison) -> Figure:
     >>> len(plot_force_comparison(ss.compare_force(record, mass=2.42, stiffness=2310)).axes)
     3
     """
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, 6.6), layout="constrained")
+    figure = empty_figure(6.6)
     above, middle, below = figure.subplots(3, 1)
     _over_time(comparison, above)
     _sizes(comparison, middle)
@@ -68,7 +80,7 @@ def _over_time(comparison: ForceComparison, ax: Axes) -> None:
     ):
         ax.plot(comparison.time[shown], factor * values[shown], color=colour, linewidth=1.0, label=label)
     ax.set(xlabel="time [s]", ylabel=axis_label("friction", unit))
-    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(ax, columns=2)
 
 
 def _middle(comparison: ForceComparison) -> Array:
@@ -82,7 +94,7 @@ def _sizes(comparison: ForceComparison, ax: Axes) -> None:
     ax.set(ylabel="rms in the band [N]")
     ax.xaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_major_formatter("{x:g}")
-    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(ax, columns=3)
 
 
 def _ratio(comparison: ForceComparison, ax: Axes) -> None:
@@ -111,4 +123,4 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     top = max(2.0, 1.1 * float(gain[heard].max(initial=0.0)))
     ax.set(xscale="log", ylim=(0, min(top, 10.0)), xlabel="frequency [Hz]", ylabel="ratio, coherence")
     ax.xaxis.set_major_formatter("{x:g}")
-    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(ax, columns=3)

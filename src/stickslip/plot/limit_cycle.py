@@ -17,6 +17,7 @@ from stickslip.plot.style import (
     SHADE,
     SKY,
     axis_label,
+    legend_above,
     new_figure,
     prefixed,
     styled,
@@ -85,7 +86,7 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
         top.axvspan(*branches.both, color=SHADE, alpha=0.5, linewidth=0, label="either may last")
     top.set_ylabel(axis_label("amplitude of sliding", unit))
     top.set_ylim(bottom=-0.04 * factor * max(float(sizes.max()), 1e-300))
-    top.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
+    legend_above(top, columns=2)
     middle.set_ylabel("frequency [Hz]")
     below.set(xlabel=label, ylabel="share of the time", ylim=(-0.05, 1.05))
     below.legend(loc="upper right", ncols=2)
@@ -148,5 +149,5 @@ def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = No
     shown = [
         Patch(facecolor=COLOURS[known[k]], alpha=FILLED, edgecolor=FAINT, label=known[k]) for k in np.unique(places)
     ]
-    axes.legend(handles=shown, loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
+    legend_above(axes, handles=shown, columns=2)
     return figure

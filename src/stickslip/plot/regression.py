@@ -6,7 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.plot.style import FAINT, INK, ORANGE, PURPLE, axis_label, envelope, new_figure, prefixed, styled
+from stickslip.plot.style import (
+    FAINT,
+    INK,
+    ORANGE,
+    PURPLE,
+    axis_label,
+    envelope,
+    legend_above,
+    new_figure,
+    prefixed,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +46,7 @@ def plot_regression(findings: Findings) -> Figure:
     above.plot(*envelope(time, factor * regression.measured), color=PURPLE, linewidth=1.0, label="measured")
     above.plot(*envelope(time, factor * regression.explained), color=ORANGE, linewidth=1.0, label="explained")
     above.set_ylabel(axis_label("force", unit))
-    above.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(above, columns=2)
     below.plot(*envelope(time, factor * (regression.measured - regression.explained)), color=INK, linewidth=0.8)
     below.axhline(0, color=FAINT, linewidth=0.8)
     below.set(xlabel="time [s]", ylabel=axis_label("left over", unit))

@@ -19,10 +19,11 @@ from stickslip.plot.style import (
     INK,
     ORANGE,
     PURPLE,
-    WIDTH,
     Array,
     axis_label,
+    empty_figure,
     envelope,
+    legend_above,
     new_figure,
     prefixed,
     spelled,
@@ -83,12 +84,10 @@ def plot_squeaks(found: Squeaks) -> Figure:
     >>> len(figure.axes)  # the sound, the spectrogram, its bar
     3
     """
-    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
     record, name = found.record, found.channel
-    figure = Figure(figsize=(WIDTH, 4.8), layout="constrained")
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2.2))
+    figure, (above, below) = new_figure(2, height=4.8, heights=(1, 2.2))
     _trace(above, record, name)
     drawn = _spectrogram(below, found)
     numbered = len(found.bursts) <= MOST_NUMBERS
@@ -147,7 +146,7 @@ def plot_burst_spectra(spectra: BurstSpectra, *, channel: str, record: Record) -
         ax.yaxis.set_minor_locator(NullLocator())
         power = "1/Hz" if unit == "1" else f"({unit})²/Hz" if "/" in unit else f"{unit}²/Hz"
         ax.set_ylabel(f"{_words(record, name)}\n[{power}]")
-    axes[0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(axes[0], columns=2)
     axes[-1].set(xlabel="frequency [Hz]", xlim=(0, float(spectra.frequency[last - 1])))
     figure.align_ylabels(axes)
     return figure
@@ -183,7 +182,7 @@ def plot_coherence(spectra: BurstSpectra, *, channel: str, record: Record) -> Fi
             ax.axhline(spectra.significant_outside, color=BLUE, linestyle=":", linewidth=0.9)
         other = pair[0] if pair[1] == channel else pair[1]
         ax.set(ylim=(0, 1.02), ylabel=_words(record, other))
-    axes[0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(axes[0], columns=2)
     axes[-1].set(xlabel="frequency [Hz]", xlim=(0, float(shown[-1])))
     figure.align_ylabels(axes)
     return figure
@@ -225,7 +224,7 @@ def plot_forcing_cycle(found: Squeaks) -> Figure:
             for begin, end in _within_one(float(turn[0]), float(turn[-1])):
                 below.plot([begin, end], [number + 1] * 2, color=colour, linewidth=thick * wide, solid_capstyle="butt")
         below.plot(burst.phase, number + 1, "o", color=INK, markersize=2.5)
-    above.legend(loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(above)
     above.set_ylabel(axis_label("velocity", unit))
     below.set(xlabel="phase of the forcing cycle, 0 at the largest displacement", ylabel="burst", xlim=(0, 1))
     below.set_ylim(len(found.bursts) + 0.7, 0.3)
@@ -276,10 +275,9 @@ def plot_conditions(comparison: SqueakComparison) -> Figure:
     -------
     Figure
     """
-    from matplotlib.figure import Figure
 
     conditions = [each for each in comparison.conditions if each.level is not None]
-    figure = Figure(figsize=(WIDTH, 1.5 + 0.34 * len(conditions)), layout="constrained")
+    figure = empty_figure(1.5 + 0.34 * len(conditions))
     left, right = figure.subplots(1, 2, sharey=True)
     over_load = all(each.coefficient is not None for each in conditions)
     drawn = (
@@ -320,10 +318,9 @@ def plot_condition_loops(comparison: SqueakComparison) -> Figure:
     -------
     Figure
     """
-    from matplotlib.figure import Figure
 
     rows = [each for each in comparison.findings if each.loops is not None][:MOST_ROWS]
-    figure = Figure(figsize=(WIDTH, 0.4 + 2.1 * len(rows)), layout="constrained")
+    figure = empty_figure(0.4 + 2.1 * len(rows))
     axes = figure.subplots(len(rows), 2, sharey="row", squeeze=False)
     for (left, right), found in zip(axes, rows, strict=True):
         assert found.loops is not None

@@ -49,17 +49,27 @@ def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
     return drawing
 
 
-def new_figure(rows: int = 1, *, height: float = 3.4, heights: Sequence[float] | None = None) -> tuple[Figure, Any]:
-    """A figure of the report's width, not known to pyplot; and its axes, one under the other on one abscissa."""
+def empty_figure(height: float) -> Figure:
+    """A figure of the report's width, not known to pyplot."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    return Figure(figsize=(WIDTH, height), layout="constrained")
+
+
+def new_figure(rows: int = 1, *, height: float = 3.4, heights: Sequence[float] | None = None) -> tuple[Figure, Any]:
+    """A figure of the report's width, and its axes, one under the other on one abscissa."""
+    figure = empty_figure(height)
     return figure, figure.subplots(rows, 1, sharex=True, height_ratios=heights)
 
 
 def axes_of(ax: Axes | None, *, height: float = 3.8) -> Axes:
     """The axes given, or those of a new figure."""
     return ax if ax is not None else new_figure(height=height)[1]
+
+
+def legend_above(ax: Axes, *, columns: int = 1, **options: Any) -> None:
+    """A legend over the axes, where it hides nothing that is drawn."""
+    ax.legend(ncols=columns, loc="lower left", bbox_to_anchor=(0, 1), **options)
 
 
 def axis_label(words: str, unit: str, between: str = " ") -> str:

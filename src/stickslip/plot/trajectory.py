@@ -23,6 +23,7 @@ from stickslip.plot.style import (
     axes_of,
     axis_label,
     envelope,
+    legend_above,
     new_figure,
     prefixed,
     styled,
@@ -187,7 +188,7 @@ def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = Non
             handle for handle in ax.get_legend_handles_labels()[0] if ax is axes[0] or _shades_alone(run, handle)
         ]
         if handles and (ax is axes[0] or contacts_of(run) > 1):
-            ax.legend(handles=handles, ncols=6, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
+            legend_above(ax, handles=handles, columns=6)
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(first, last)
     figure.align_ylabels(axes)
@@ -389,7 +390,7 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
         ax.axhline(belt, color=INK, linewidth=0.9, linestyle=":", zorder=1, label="belt")
     named = (numbered_words(run, _named(run, quantity), *quantity) for quantity in (across, up))
     ax.set(xlabel=axis_label(next(named), x_unit), ylabel=axis_label(next(named), y_unit))
-    ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(0, 1.0))
+    legend_above(ax, columns=4)
     return ax
 
 

@@ -9,7 +9,19 @@ import numpy as np
 
 from stickslip.errors import RecordError
 from stickslip.plot.plate import Plate, plate
-from stickslip.plot.style import BLUE, INK, ORANGE, SHADE, WIDTH, Array, axis_label, envelope, prefixed, styled
+from stickslip.plot.style import (
+    BLUE,
+    INK,
+    ORANGE,
+    SHADE,
+    Array,
+    axis_label,
+    empty_figure,
+    envelope,
+    legend_above,
+    prefixed,
+    styled,
+)
 from stickslip.signals.pieces import RING
 from stickslip.signals.wavelet import CENTRE, ends, wavelet_map
 
@@ -68,7 +80,6 @@ def plot_wavelet(
     >>> len(figure.axes)  # the signal, the map, the bar
     3
     """
-    from matplotlib.figure import Figure
 
     if style == "lines" and wavelets.ndim == 2 and wavelets.sizes["frequency"] < 2:
         raise RecordError(
@@ -80,7 +91,7 @@ def plot_wavelet(
             "a map spans some decibel in two levels at least, filled or in lines",
             "leave them out",
         )
-    figure = Figure(figsize=(WIDTH, 5.0 if record is not None else 3.6), layout="constrained")
+    figure = empty_figure(5.0 if record is not None else 3.6)
     if record is not None:
         top, axes = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2.4))
         _signal(top, record, str(wavelets.attrs["channel"]), wavelets.time.values)
@@ -135,7 +146,7 @@ def plot_stick(found: TimeFrequency) -> Figure:
             top.axvspan(begin, end, color=ORANGE, alpha=0.18, linewidth=0, label="rings" if number == 1 else None)
         elif 0 < number < len(window.pieces) - 1:
             top.axvspan(begin, end, color=SHADE, alpha=0.8, linewidth=0, label="micro-slip" if number == 2 else None)
-    top.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(top, columns=2)
     return figure
 
 

@@ -44,7 +44,7 @@ class LimitCycle:
     frequency : float
         At which the motion repeats [Hz]; of one that does not, of its strongest line; 0 where nothing vibrates.
     amplitudes : ndarray (n,)
-        Half the swing of each displacement [m or rad].
+        Half the swing of each displacement [m, or rad of an angle].
     amplitude : float
         Half the swing of the contact that slides to and fro most [m].
     stick_share, separation_share : tuple of float

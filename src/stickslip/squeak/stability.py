@@ -77,7 +77,7 @@ class Stability:
     without_coupling, without_slope : float
         The same where friction does not follow the load, and where it does not change with the speed [1/s].
     place : tuple of float
-        Displacements while it slides steadily [m].
+        Displacements while it slides steadily [m, or rad of an angle].
     loads : tuple of float
         Load on each contact there [N].
     status : str
