@@ -27,36 +27,46 @@ let root;
 let files = [];
 let described = null;
 let job = null;
-let plots = [];
+let charts = [];
 const parts = {};
 
 export function start(section, given) {
   lab = given;
   root = section;
-  root.replaceChildren(
-    make("h2", {}, "Your records"),
-    make("p", { class: "data-lead" }, "Drop what your rig recorded: the friction in it, how sure that is, and why. " +
-      "Nothing leaves this computer."),
-    dropZone(),
+  const panel = make("div", { class: "panel" },
+    make("h2", {}, "Your records"), dropZone(),
     (parts.files = make("div", { class: "data-files" })),
-    (parts.records = make("div", { class: "data-records" })),
-    (parts.asking = make("div", { class: "data-asking" })),
     (parts.progress = make("div", { class: "data-running" })),
+    (parts.asking = make("div", { class: "data-asking" })));
+  const shown = make("div", { class: "data-shown" },
     (parts.answer = make("div", { class: "data-answer", tabindex: "-1" })),
-  );
+    (parts.records = make("div", { class: "data-records" }, welcome())));
+  root.replaceChildren(make("div", { class: "beside" }, panel, shown));
+  lab.onTheme(redraw);
   addEventListener("pagehide", leave);
+}
+
+function welcome() {
+  const steps = [
+    "Drop what your rig recorded: displacement, acceleration, forces or sound, in one file or several.",
+    "See the channels as they were understood. You are asked only for what the files do not tell.",
+    "Ask: how much friction, does it stick, what rings, does it squeak, which law. Each answer says how sure it is.",
+  ];
+  return make("div", { class: "card data-welcome" }, make("h2", {}, "From a record to its friction"),
+    make("ol", {}, ...steps.map((text) => make("li", {}, text))),
+    make("p", { class: "note" }, "Nothing leaves this computer; files are removed when you close the page."));
 }
 
 // ---- files
 
 function dropZone() {
-  const input = make("input", { type: "file", multiple: "", id: "data-input", class: "data-input" });
+  const input = make("input", { type: "file", multiple: "", id: "data-input", class: "hidden" });
   input.addEventListener("change", () => { add([...input.files]); input.value = ""; });
   const example = make("button", { type: "button", id: "data-example" }, "Try the example record");
   example.addEventListener("click", () => guarded(useExample));
   const zone = make("div", { class: "data-drop" },
-    make("label", { for: "data-input", class: "data-choose" }, "Choose files"), input,
-    make("span", {}, " or drop them here: TDMS, UFF, MAT, CSV, WAV, HDF5, Parquet, LVM, JSON "), example);
+    make("p", {}, "Drop files here, or"), input, make("label", { for: "data-input", class: "button" }, "Choose files …"),
+    make("p", { class: "note" }, "CSV, TDMS, UFF, MAT, WAV, HDF5, Parquet, LVM, JSON"), example);
   for (const kind of ["dragenter", "dragover"]) {
     zone.addEventListener(kind, (event) => { event.preventDefault(); zone.classList.add("data-over"); });
   }
@@ -153,9 +163,9 @@ function records() {
 const told = { columns: null, fs: "", repair: [] };
 
 async function describe() {
-  clear();
   described = null;
-  parts.records.replaceChildren();
+  parts.answer.replaceChildren();
+  parts.records.replaceChildren(welcome());
   parts.asking.replaceChildren();
   if (!ready().length) return;
   const answer = await run("describe", {});
@@ -178,15 +188,15 @@ function reading() {
 
 function showRecord(record, number) {
   const length = record.duration === null ? "" : `, ${digits(record.duration)} s at ${digits(record.fs)} Hz`;
-  const box = make("article", { class: "data-record" },
-    make("h3", {}, record.name), make("p", {}, `${record.rows.toLocaleString("en")} rows${length}`));
+  const box = make("article", { class: "card data-record" },
+    make("h2", {}, record.name), make("p", {}, `${record.rows.toLocaleString("en")} rows${length}`));
   if (record.fs === null) box.append(rateField(record.asks));
   if (record.unknown.length) {
     box.append(make("p", { class: "data-needed" }, `The file states no unit for ${record.unknown.join(", ")}: ` +
       "write it below (what has a known meaning is taken in SI units otherwise)."));
   }
   box.append(channelTable(record, number), previews(record));
-  if (record.faults.length) box.append(make("h4", {}, "What the check-up found"), faults(record));
+  if (record.faults.length) box.append(make("h3", {}, "What the check-up found"), faults(record));
   if (record.notes.length) {
     box.append(make("details", {}, make("summary", {}, "How it was read"),
       make("ul", {}, ...record.notes.map((note) => make("li", {}, note)))));
@@ -241,10 +251,10 @@ function previews(record) {
     for (const channel of record.channels) {
       const place = make("div", { class: "data-preview" });
       box.append(place);
-      plots.push(lab.plot(place, {
-        title: `${ROLES[channel.name] || channel.name}`, unit: channel.unit, time: record.preview.time,
+      draw(place, {
+        title: ROLES[channel.name] || channel.name, unit: channel.unit, time: record.preview.time,
         series: [{ label: channel.name, values: record.preview.channels[channel.name] }],
-      }));
+      });
     }
   });
   return box;
@@ -293,12 +303,12 @@ function showFields() {
     const [label, unit, hint] = FIELDS[name];
     const id = `data-option-${name}`;
     if (Array.isArray(hint)) {
-      const words = Object.fromEntries([["", "unless given"], ...hint.map((each) => [each, each])]);
+      const words = Object.fromEntries([["", "not stated"], ...hint.map((each) => [each, each])]);
       const input = select(id, words, "");
       input.dataset.option = name;
       return make("div", { class: "data-field" }, make("label", { for: id }, label), input);
     }
-    const [box, input] = field(id, label, unit, hint, stated[name] ?? "");
+    const [box, input] = field(id, label, unit, hint, name in stated ? digits(stated[name]) : "");
     input.required = needed;
     input.dataset.option = name;
     return box;
@@ -313,7 +323,7 @@ function showFields() {
   const more = make("details", {}, make("summary", {}, "What else you know of the rig"), ...may, ...loads);
   more.open = Object.keys(stated).length > 0 && asked.needs.length === 0;
   const needs = asked.needs.map((name) => one(name, true));
-  const button = make("button", { type: "submit", class: "data-run", id: "data-run" }, "Ask the record");
+  const button = make("button", { type: "submit", class: "main", id: "data-run" }, "Ask the record");
   if (described.needs.length) button.disabled = true;
   parts.form.replaceChildren(
     ...(needs.length ? [make("p", {}, "The record can not tell this:"), ...needs] : []),
@@ -379,7 +389,7 @@ function ended(id, watch) {
 
 function fail(message) {
   lab.say(message);
-  parts.answer.replaceChildren(make("p", { class: "data-error", role: "alert" }, message));
+  parts.answer.replaceChildren(make("p", { class: "card data-error", role: "alert" }, message));
 }
 
 async function guarded(work) {
@@ -394,8 +404,7 @@ async function guarded(work) {
 // ---- the answer
 
 function showAnswer(answer) {
-  clear(true);
-  const link = (path, text) => make("a", { href: `/jobs/${parts.job}/${path}`, download: "" }, text);
+  const link = (path, text) => make("a", { href: `/jobs/${parts.job}/${path}`, download: "", class: "button" }, text);
   const rows = answer.lines.map((line) => make("tr", {}, make("th", { scope: "row" }, line[0]),
     ...line.slice(1).map((cell) => make("td", {}, cell))));
   const head = ["Quantity", "Value", "95 % interval", "How sure"].map((text) => make("th", { scope: "col" }, text));
@@ -403,35 +412,41 @@ function showAnswer(answer) {
     make("table", { id: "data-results" }, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows)));
   const overlay = make("div", { class: "data-overlay" });
   const page = make("iframe", { src: `/jobs/${parts.job}/report`, title: `Report of ${answer.title}`, sandbox: "",
-    class: "data-report", loading: "lazy" });
-  parts.answer.replaceChildren(
-    make("h3", {}, answer.title),
+    class: "data-report" });
+  parts.answer.replaceChildren(make("article", { class: "card" },
+    make("h2", {}, answer.title),
     ...answer.headline.map((text) => make("p", { class: "data-headline" }, text)),
     ...answer.cautions.map((text) => make("p", { class: "data-caution" }, text)),
     ...(rows.length ? [table] : []), overlay,
-    make("p", { class: "data-downloads" }, link("report?keep=1", "Report (HTML)"), " ", link("results.json", "Numbers (JSON)"),
-      " ", link("results.zip", "All with figures (ZIP)"), " ",
-      make("a", { href: `/jobs/${parts.job}/report`, target: "_blank", rel: "noopener" }, "Open the report in a tab")),
+    make("p", { class: "data-downloads" }, link("report?keep=1", "Report (HTML)"), link("results.json", "Numbers (JSON)"),
+      link("results.zip", "All with figures (ZIP)"),
+      make("a", { href: `/jobs/${parts.job}/report`, target: "_blank", rel: "noopener", class: "button" }, "Report in a tab")),
     ...(answer.notes.length ? [make("details", {}, make("summary", {}, "Notes"),
       make("ul", {}, ...answer.notes.map((note) => make("li", {}, note))))] : []),
-    page);
+    page));
   for (const each of answer.overlay) {
     const place = make("div", { class: "data-preview" });
     overlay.append(place);
-    plots.push(lab.plot(place, {
+    draw(place, {
       title: `${each.record}: ${ROLES[each.channel] || each.channel}, measured and fitted`, unit: each.unit, time: each.time,
-      series: [{ label: "measured", values: each.measured }, { label: "fitted", values: each.fitted, dash: true }],
-    }));
+      series: [{ label: "measured", values: each.measured }, { label: "fitted", values: each.fitted, dash: [7, 4] }],
+    });
   }
   parts.answer.focus();
   lab.say(answer.headline[0] || "done");
 }
 
-function clear(answersOnly = false) {
-  if (!answersOnly) {
-    for (const plot of plots) plot?.destroy?.();
-    plots = [];
-    parts.answer.replaceChildren();
+// ---- charts, drawn again when the theme changes
+
+function draw(place, told) {
+  charts.push({ place, told, chart: lab.plot(place, told) });
+}
+
+function redraw() {
+  charts = charts.filter(({ place }) => place.isConnected);
+  for (const each of charts) {
+    each.chart.destroy();
+    each.chart = lab.plot(each.place, each.told);
   }
 }
 
