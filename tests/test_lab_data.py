@@ -219,6 +219,8 @@ def test_a_fitted_law_lies_over_the_record(client: Client, tmp_path: Path) -> No
     assert answer["overlay"][0]["channel"] == "x"
     measured, fitted = (np.array(answer["overlay"][0][name]) for name in ("measured", "fitted"))
     assert np.std(measured - fitted) < 2e-5
+    assert answer["state"]["law"]["kinetic"] == pytest.approx(0.5, rel=0.01)
+    assert ss.read_system(answer["state"]).system.mass == 1.0
 
 
 def test_several_records_are_compared_and_one_that_does_not_answer_is_named(client: Client, tmp_path: Path) -> None:

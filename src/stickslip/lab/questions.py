@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -140,7 +141,19 @@ def fit(asked: Asked) -> dict[str, Any]:
         ]  # fmt: skip
     name = asked.name(0) if len(records) == 1 else f"{len(records)} records"
     ss.publish_fit(found, folder=FOLDER, records=records, name=name)
-    return {**_told(ss.fit_summary(found, records=records, name=name)), "overlay": curves}
+    told = _told(ss.fit_summary(found, records=records, name=name))
+    return {**told, "overlay": curves, "state": fitted_system(Path(FOLDER, "law", "law.toml"))}
+
+
+def fitted_system(file: Path) -> dict[str, Any] | None:
+    """The system with the fitted law, to play with; None where it is a law alone, or of a kind that is not played."""
+    if not file.exists():
+        return None
+    try:
+        system: dict[str, Any] = json.loads(ss.export_system(ss.read_system(file), format="json"))
+    except ss.ModelError:
+        return None
+    return system
 
 
 def _listed(words: str | None) -> list[str] | None:

@@ -42,18 +42,20 @@ export function start(section, given) {
     (parts.answer = make("div", { class: "data-answer", tabindex: "-1" })),
     (parts.records = make("div", { class: "data-records" }, welcome())));
   root.replaceChildren(make("div", { class: "beside" }, panel, shown));
+  dropping(root);
   lab.onTheme(redraw);
   addEventListener("pagehide", leave);
 }
 
 function welcome() {
   const steps = [
-    "Drop what your rig recorded: displacement, acceleration, forces or sound, in one file or several.",
-    "See the channels as they were understood. You are asked only for what the files do not tell.",
-    "Ask: how much friction, does it stick, what rings, does it squeak, which law. Each answer says how sure it is.",
+    "Drop what your rig recorded: displacement, velocity, acceleration, forces or sound, in one file or several.",
+    "See the channels as they were understood, and say what the files do not tell.",
+    "Ask, and read what was found, with its 95 % interval and what keeps it from being sure.",
   ];
-  return make("div", { class: "card data-welcome" }, make("h2", {}, "From a record to its friction"),
+  return make("div", { class: "card data-welcome" }, make("h2", {}, "Drop a record here: get its friction"),
     make("ol", {}, ...steps.map((text) => make("li", {}, text))),
+    make("h3", {}, "What is answered"), make("ul", {}, ...Object.values(QUESTIONS).map((text) => make("li", {}, text))),
     make("p", { class: "note" }, "Nothing leaves this computer; files are removed when you close the page."));
 }
 
@@ -67,12 +69,21 @@ function dropZone() {
   const zone = make("div", { class: "data-drop" },
     make("p", {}, "Drop files here, or"), input, make("label", { for: "data-input", class: "button" }, "Choose files …"),
     make("p", { class: "note" }, "CSV, TDMS, UFF, MAT, WAV, HDF5, Parquet, LVM, JSON"), example);
-  for (const kind of ["dragenter", "dragover"]) {
-    zone.addEventListener(kind, (event) => { event.preventDefault(); zone.classList.add("data-over"); });
-  }
-  for (const kind of ["dragleave", "drop"]) zone.addEventListener(kind, () => zone.classList.remove("data-over"));
-  zone.addEventListener("drop", (event) => { event.preventDefault(); add([...event.dataTransfer.files]); });
   return zone;
+}
+
+function dropping(place) {
+  for (const kind of ["dragenter", "dragover"]) {
+    place.addEventListener(kind, (event) => { event.preventDefault(); place.classList.add("data-over"); });
+  }
+  place.addEventListener("dragleave", (event) => {
+    if (!place.contains(event.relatedTarget)) place.classList.remove("data-over");
+  });
+  place.addEventListener("drop", (event) => {
+    event.preventDefault();
+    place.classList.remove("data-over");
+    add([...event.dataTransfer.files]);
+  });
 }
 
 async function add(chosen) {
@@ -342,8 +353,25 @@ function options() {
 }
 
 async function askIt() {
-  const answer = await run(parts.question, options());
-  if (answer) showAnswer(answer);
+  const said = options();
+  const answer = await run(parts.question, said);
+  if (answer) showAnswer(answer, commandLine(parts.question, said));
+}
+
+// What to type for the same answer.
+function commandLine(question, said) {
+  const quoted = (text) => (/^[\w.,:+-]+$/.test(text) ? text : `'${String(text).replaceAll("'", "'\\''")}'`);
+  const names = ready().map((entry) => entry.name);
+  const groups = parts.together === "together" ? [names.join("+")] : names;
+  const words = ["stickslip", question, ...groups.map(quoted)];
+  const give = (name, value) => words.push(`--${name.replaceAll("_", "-")}`, quoted(value));
+  const { channels = {}, repair, ...read } = reading();
+  for (const [name, column] of Object.entries(channels)) give("channels", `${name}=${column}`);
+  if (repair.length) give("repair", repair.join(","));
+  const { normal = [], ...plain } = said;
+  for (const [name, value] of Object.entries({ ...read, ...plain })) give(name, value);
+  normal.forEach((load, number) => { if (load) give("normal", groups.length > 1 ? `${groups[number]}=${load}` : load); });
+  return words.join(" ");
 }
 
 // ---- running
@@ -403,7 +431,7 @@ async function guarded(work) {
 
 // ---- the answer
 
-function showAnswer(answer) {
+function showAnswer(answer, command) {
   const link = (path, text) => make("a", { href: `/jobs/${parts.job}/${path}`, download: "", class: "button" }, text);
   const rows = answer.lines.map((line) => make("tr", {}, make("th", { scope: "row" }, line[0]),
     ...line.slice(1).map((cell) => make("td", {}, cell))));
@@ -421,6 +449,8 @@ function showAnswer(answer) {
     make("p", { class: "data-downloads" }, link("report?keep=1", "Report (HTML)"), link("results.json", "Numbers (JSON)"),
       link("results.zip", "All with figures (ZIP)"),
       make("a", { href: `/jobs/${parts.job}/report`, target: "_blank", rel: "noopener", class: "button" }, "Report in a tab")),
+    ...(answer.state ? [playIt(answer.state)] : []),
+    make("details", {}, make("summary", {}, "The same on the command line"), make("pre", {}, command)),
     ...(answer.notes.length ? [make("details", {}, make("summary", {}, "Notes"),
       make("ul", {}, ...answer.notes.map((note) => make("li", {}, note))))] : []),
     page));
@@ -434,6 +464,12 @@ function showAnswer(answer) {
   }
   parts.answer.focus();
   lab.say(answer.headline[0] || "done");
+}
+
+function playIt(state) {
+  const button = make("button", { type: "button", id: "data-play" }, "Play with the fitted law");
+  button.addEventListener("click", () => lab.openInPlay(state));
+  return make("p", {}, button);
 }
 
 // ---- charts, drawn again when the theme changes
