@@ -123,6 +123,7 @@ def test_the_page_shows_tables_and_figures(folder: Path) -> None:
     assert "Simulated response of MKCF system" in text
     assert "decay: damping</dt><dd>0.2" in text, "what it starts from"
     assert re.search(r"0\.86728.*?0\.867277", text, flags=re.DOTALL)
+    assert len(text) < 800_000, "nine such chapters make a page that a phone opens"
     assert "http" not in re.sub(r"http://www\.w3\.org[\w/.]*", "", text), "it asks nothing of a network"
 
 

@@ -87,6 +87,9 @@ def _laws(given: Given) -> Any:
         column[0].set(xlabel="displacement [µm]", xlim=(-4, 60), title=name)
         column[1].plot(1e3 * motion["v"], motion["friction"], color=colour, linewidth=0.9)
         column[1].set(xlabel="velocity [mm/s]")
+    level = max(1.05 * ax.get_ylim()[1] for ax in axes.flat)
+    for ax in axes.flat:
+        ax.set_ylim(-level, level)
     for ax in axes[:, 0]:
         ax.set_ylabel("friction [N]")
     return drawn
@@ -94,8 +97,8 @@ def _laws(given: Given) -> Any:
 
 @functools.lru_cache(64)
 def ringing(system: ss.Oscillator) -> float:
-    """Frequency of the transition oscillation [Hz], found in ten cycles of the simulated acceleration."""
-    record = ss.simulate(system, cycles=10).record(fs=4000)
+    """Frequency of the transition oscillation [Hz], found in the last four of six cycles of simulated acceleration."""
+    record = ss.simulate(system, cycles=6).record(fs=4000)
     return ss.transition(record.between(2 / system.drive.frequency, record.duration)).frequency.value
 
 

@@ -16,6 +16,7 @@ from stickslip.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, sty
 from stickslip.signals.differentiate import five_point_average
 from thesis.drawing import figure, panels, tag
 from thesis.printed import Given, Ours
+from thesis.sketches import apparatus
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,7 @@ def numbers(given: Given) -> Ours:
 def plates(given: Given) -> Iterator[Plate]:
     """The chapter's figures."""
     words = "The virtual rig of chapter 2; amplitude and noise are ours."
+    yield figure("2.1", apparatus(given), "Drawn from the chapter's parameters and the virtual rig's sensors.")
     yield figure("2.2", _free_response(given), words)
     late, early = (np.std(resultant(given, free_vibration(given), sign)[400:-400]) for sign in (1, -1))
     yield figure(

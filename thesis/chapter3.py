@@ -17,6 +17,7 @@ from stickslip.plot.plate import Plate
 from stickslip.plot.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
 from thesis.drawing import RESPONSES, around, characteristics, exact, figure, panels, responses, tag
 from thesis.printed import Given, Ours
+from thesis.sketches import massless_contact
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,6 +50,7 @@ def numbers(given: Given) -> Ours:
 
 def plates(given: Given) -> Iterator[Plate]:
     """The chapter's figures."""
+    yield figure("3.1", massless_contact(given), "Drawn from the parameters of the case of 8.7 Hz.")
     yield from _schematics(given)
     sensors = "The virtual rig of chapter 2 on a slightly rough contact, driven so that it moves as in Table 3.2. "
     for number, case in (("3.8", 0), ("3.10", 1), ("3.11", 2)):
@@ -178,22 +180,13 @@ def _two_phases(ax: Axes, across: Array, up: Array, sliding_now: Array) -> None:
     ax.plot(across, np.where(sliding_now, np.nan, up), color=BLUE, linewidth=1.6)
 
 
-@styled
 def _schematics(given: Given) -> Iterator[Plate]:
     """Figures 3.2 to 3.7, computed with a contact much softer than the rig's, so that its give can be seen."""
     soft = given["schematic"]
     words = (f"Computed, not sketched: the model under an imposed motion, with a contact so soft that 2f_k/K_y is "
              f"{2 / soft['stiffness']:.2g} of the amplitude. ")  # fmt: skip
     time, motion = _imposed(ss.CompliantContact(1.0, stiffness=soft["stiffness"]))
-    drawn, axes = panels(4, height=6.0)
-    rows = ((motion["x"], "x / X_m"), (motion["v"], "ẋ / ωX_m"), (motion["friction"], "y / Y_m"),
-            (motion["friction"], "f / f_k"))  # fmt: skip
-    for ax, letter, (values, label) in zip(axes, "abcd", rows, strict=True):
-        _two_phases(ax, time, values, motion["sliding"])
-        ax.set_ylabel(label)
-        tag(ax, letter)
-    axes[-1].set_xlabel("ωt")
-    yield figure("3.2", drawn, words.strip())
+    yield figure("3.2", _hypothetical(time, motion), words.strip())
     for number, axis, label in (("3.3", "x", "x / X_m"), ("3.4", "v", "ẋ / ωX_m")):
         yield figure(number, _phases(motion, axis, label), _corners(number, soft["stiffness"], words))
     _, over = _imposed(ss.CompliantContact(1.0, stiffness=soft["stiffness"], static=soft["static"]))
@@ -217,6 +210,20 @@ def _corners(number: str, stiffness: float, words: str) -> str:
     if number == "3.3":
         return f"{words}Its slope while it sticks is K_y."
     return f"{words}Sliding begins at V_s = {speed:.3f} ωX_m, as equation 3.4 says."
+
+
+@styled
+def _hypothetical(time: Array, motion: Mapping[str, Array]) -> Any:
+    """Figure 3.2."""
+    drawn, axes = panels(4, height=6.0)
+    rows = ((motion["x"], "x / X_m"), (motion["v"], "ẋ / ωX_m"), (motion["friction"], "y / Y_m"),
+            (motion["friction"], "f / f_k"))  # fmt: skip
+    for ax, letter, (values, label) in zip(axes, "abcd", rows, strict=True):
+        _two_phases(ax, time, values, motion["sliding"])
+        ax.set_ylabel(label)
+        tag(ax, letter)
+    axes[-1].set_xlabel("ωt")
+    return drawn
 
 
 @styled

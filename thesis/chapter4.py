@@ -16,6 +16,7 @@ from stickslip.plot.plate import Plate
 from stickslip.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, styled
 from thesis.drawing import around, characteristics, figure, panels, responses, tag
 from thesis.printed import Given, Ours
+from thesis.sketches import contact_with_inertia
 
 Array = NDArray[np.float64]
 
@@ -262,7 +263,8 @@ def of_contact(given: Given, case: int, *, cycles: int = 1) -> tuple[Array, dict
 
 
 def _inertial(given: Given) -> Iterator[Plate]:
-    """Figures 4.15 to 4.19."""
+    """Figures 4.14 to 4.19."""
+    yield figure("4.14", contact_with_inertia(given), "Drawn from the parameters of section 4.5, which have no units.")
     for number, case in (("4.15", 0), ("4.16", 1)):
         orbit = inertial_contact(given, case)
         normal, abnormal = orbit.stops

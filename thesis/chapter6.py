@@ -17,6 +17,7 @@ from stickslip.plot.plate import Plate
 from stickslip.plot.style import BLUE, ORANGE, styled
 from thesis.drawing import figure, panels
 from thesis.printed import Given, Ours
+from thesis.sketches import system_i, system_ii
 
 Array = NDArray[np.float64]
 
@@ -61,6 +62,7 @@ def plates(given: Given) -> Iterator[Plate]:
         plot_differences(ss.decrement(record, form="plain")),
         "The sums X_i + X_(i+1) shrink by exp(-βπ): dry friction has gone out of them.",
     )
+    yield figure("6.3", system_i(given), "Drawn from Table 6.2 and the chapter's parameters.")
     made_with = "The virtual rig with the values of Table 6.2; mass, spring and release are ours."
     for number, kind, case in (("6.4", "dry", 1), ("6.5", "dry", 2), ("6.6", "viscous", 1), ("6.7", "viscous", 2)):
         yield figure(number, plot_decay(ss.analyze_decay(on_paper(given, case, kind), method="thesis")), made_with)
@@ -69,6 +71,7 @@ def plates(given: Given) -> Iterator[Plate]:
     yield figure("6.9", plot_differences(found[1].thesis), made_with)
     yield figure("6.10", plot_identified(found[2]), made_with)
     yield figure("6.11", plot_differences(found[2].thesis), made_with)
+    yield figure("6.12", system_ii(given), "Drawn from the parameters of section 6.5.")
     bearing = ss.analyze_decay(on_bearing(given), method="thesis")
     made_with = "The virtual rig with section 6.5's mass, spring, damping and friction; the release is ours."
     yield figure("6.13", plot_decay(bearing), made_with)
@@ -254,7 +257,7 @@ def _of_errors(given: Given, number: str, kind: str) -> Plate:
         ax.plot(fine, x, color=BLUE, linewidth=1.2, label="exact")
         ax.plot(times, measured, color=ORANGE, linewidth=0.9, marker="." if sampled else None, label=words)
         ax.set(xlabel="time", ylabel="displacement")
-    turn, span, height = (4, 1.2, 0.1) if sampled else (2, 0.12, 0.012)
+    turn, span, height = {"sampling": (4, 0.5, 0.1), "random": (2, 0.12, 0.012), "quantisation": (2, 0.06, 0.004)}[kind]
     middle, top = float(run.starts[turn]), float(run.states[turn, 0])
     detail.set(xlim=(middle - span, middle + span), ylim=(top - height, top + height))
     whole.legend(ncols=2, loc="upper right")

@@ -14,6 +14,7 @@ from stickslip.plot.plate import Plate
 from stickslip.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
 from thesis.drawing import figure, panels, responses, tag
 from thesis.printed import Given, Ours
+from thesis.sketches import transducers
 
 Array = NDArray[np.float64]
 
@@ -54,6 +55,7 @@ def plates(given: Given) -> Iterator[Plate]:
     for number, condition in (("7.4", CONDITIONS[2]), ("7.5", CONDITIONS[3])):
         yield figure(number, _responses(given, condition), words)
     yield figure("7.6", _compared(given, CONDITIONS[2:]), words)
+    yield figure("7.7", transducers(given), "Drawn from the parameters of the virtual squeak rig.")
     wet = record_of(given, "wet", "heavy")
     yield figure("7.8", _signals(wet, ("a", "friction", "sound", "torsion_velocity")), words)
     yield figure("7.9", _signals(wet, ("normal_acceleration", "friction", "sound", "torsion_velocity")), words)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from stickslip.plot.paths import compact
 from stickslip.plot.style import styled
 
 if TYPE_CHECKING:
@@ -60,14 +61,13 @@ class Plate:
 
 @styled
 def _svg_of(figure: Figure) -> str:
-    """Hundredths of a point are fine enough for a path, and keep a page small."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     drawn = io.StringIO()
     with _kept(figure):
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(drawn, metadata={"Date": None, "Creator": None})
-    return re.sub(r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), drawn.getvalue())
+    return compact(drawn.getvalue())
 
 
 @contextmanager
