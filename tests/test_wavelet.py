@@ -178,6 +178,19 @@ def test_the_inverse_gives_the_signal_back() -> None:
         assert np.abs(found - burst).max() < 1e-10
 
 
+@pytest.mark.parametrize("normalisation", ["energy", "amplitude"])
+@pytest.mark.parametrize(("lowest", "highest"), [(22.5, 90), (45, 180), (5, 1000)])
+def test_the_inverse_is_right_within_a_record_that_begins_and_ends_in_motion(
+    lowest: float, highest: float, normalisation: str
+) -> None:
+    t = np.arange(16000) / 4000
+    tone = 3 * np.sin(2 * np.pi * 45 * t + 0.3)
+    wavelets = ss.wavelet_map(of(tone, 4000.0), "a", frequencies=(lowest, highest), normalisation=normalisation)
+    off = np.abs(ss.inverse_wavelet(wavelets) - tone)
+    assert off[4000:12000].max() < 3 * 5e-3  # what the steps at the ends have below 5 Hz is not in the map
+    assert off[7000:9000].max() < 3 * 1e-4
+
+
 def test_scaling_and_shift() -> None:
     values = RNG.normal(size=4000)
     one = ss.wavelet_map(of(values), "a", frequencies=(10, 200), voices=4)
