@@ -184,6 +184,18 @@ def test_a_stiff_contact_that_leaves_far_less_stands_for_itself() -> None:
     assert not any(each.limit for each in told)
 
 
+def test_the_static_friction_of_a_stribeck_curve_lies_in_its_interval() -> None:
+    """Through sensors that swing, as stated; a load cell that reads as it is does not seem to contradict the law."""
+    rig = ss.Rig.air_track()
+    truth = ss.Oscillator(law=TRUE["Stribeck"], drive=ss.HarmonicBase(0.65e-3, frequency=2.5), **RIG)
+    told = rig.stated(rig.measure(ss.simulate(truth, duration=2.8, rtol=1e-9), fs=FS, rng=5, start=2.0))
+    found = ss.compare_laws(told, slider(), laws=["Coulomb", "Stribeck"])
+    assert (found.law, found.status) == ("Stribeck", "ok")
+    assert found.fit.parameters["static"].includes(1.2)
+    assert found.fit.parameters["static"].value == pytest.approx(1.2, rel=2e-3)
+    assert set(ss.compare_laws(record("Stribeck"), slider(), laws=["Coulomb", "Stribeck"]).best.left) == {"x", "load"}
+
+
 # ---- records that tell nothing
 
 

@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
 from stickslip.fit.search import Knob, Point, Problem, descend
-from stickslip.fit.start import Shown, best_start, better_start, free_names, knob, seen_profile, thinned_out, value_of
+from stickslip.fit.start import (
+    Shown,
+    best_start,
+    better_start,
+    bounded,
+    free_names,
+    knob,
+    seen_profile,
+    thinned_out,
+    value_of,
+)
 from stickslip.fit.stretch import channels_of
 from stickslip.fit.surety import Surety, surety
 from stickslip.laws.base import Law
@@ -30,6 +40,7 @@ WORDS = {
 }  # fmt: skip
 METHOD = "least squares of what the sensors read, the motion simulated"
 MISFIT = 1.2  # times its noise that a channel's residual may be
+STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
 WORK = 60.0  # calls of progress that a fit is taken for
 
 
@@ -203,7 +214,7 @@ def fit_law(
     if surface == "rough":
         profile = seen_profile(shown, value_of(oscillator, "kinetic"))
         names = tuple(name for name in names if name != "kinetic")
-    knobs = [knob(oscillator, name) for name in (*names, *nuisance)]
+    knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in (*names, *nuisance)]
     if profile:
         knobs += [Knob(f"profile {j}", "profile", value, 0.01) for j, value in enumerate(profile.values)]
     problem = Problem.of(oscillator, stretches, knobs, profile)

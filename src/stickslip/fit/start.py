@@ -30,7 +30,7 @@ FINEST = 1e-5  # of a channel's range: noise below it is not asked for
 AUDIBLE = 2.0  # times its noise that a motion must stray
 SHAPES = ("exponent", "printed", "rule", "seed", "error")  # of a law, that are chosen and not fitted
 GRID = {
-    "stiffness": (0.25, 1.0, 4.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0),
+    "stiffness": (0.25, 1.0, 4.0, 64.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0),
 }  # fmt: skip
 EXCESS = (0.04, 0.15, 0.25, 0.4)  # of static over kinetic friction
 SPEEDS = (0.03, 0.1, 0.3)  # of the largest speed
@@ -94,8 +94,7 @@ class Shown:
     @property
     def turns(self) -> NDArray[np.intp]:
         """Rows at which the motion has turned."""
-        moving = np.flatnonzero(np.abs(self.velocity) > TURNED * self.fastest)
-        return np.asarray(moving[1:][np.diff(np.sign(self.velocity[moving])) != 0])
+        return _turns(self.velocity, self.fastest)
 
     def turned(self, first: int, count: int) -> int:
         """The row at which the motion has turned so many times after a first one; the last row where it has not."""
@@ -136,11 +135,18 @@ class Shown:
         return max(found, FINEST * float(np.ptp(values)), 1e-300)
 
 
+def _turns(velocity: Array, fastest: float) -> NDArray[np.intp]:
+    moving = np.flatnonzero(np.abs(velocity) > TURNED * fastest)
+    return np.asarray(moving[1:][np.diff(np.sign(velocity[moving])) != 0])
+
+
 def _middle(record: Record, values: Array, velocity: Array) -> float:
-    """Where the spring is at rest: about the middle of a motion to and fro; of one that creeps one way, as measured."""
+    """Where the spring is at rest: about the middle of whole cycles; of a motion that creeps one way, as measured."""
     fast = velocity[np.abs(velocity) > FAST * np.abs(velocity).max()]
     if np.min(fast) < 0 < np.max(fast):
-        return float(values.mean())
+        turns = _turns(velocity, float(np.abs(fast).max()))
+        there_and_back = slice(turns[0], turns[(len(turns) - 1) // 2 * 2]) if len(turns) > 2 else slice(None)
+        return float(values[there_and_back].mean())
     return float(np.mean(record.samples.get("z", 0.0)))
 
 
@@ -202,6 +208,25 @@ def knob(oscillator: Oscillator, name: str) -> Knob:
     if value > 0:
         return Knob(name, "log", value)
     return Knob(name, "linear", value, abs(value) or 1.0)
+
+
+def stiffest(oscillator: Oscillator, stretches: Sequence[Stretch], share: float) -> float:
+    """The contact [N/m] that gives way by a share of the stroke under the sliding friction."""
+    return value_of(oscillator, "kinetic") / (share * max(float(each.scales[0]) for each in stretches))
+
+
+def bounded(turned: Knob, oscillator: Oscillator, stretches: Sequence[Stretch], share: float) -> Knob:
+    """The knob; a contact gets no stiffer than next to rigid, where it would cost much and tell nothing."""
+    if turned.kind != "log" or turned.name not in ("law.stiffness", "law.damping") or not _slides_at(oscillator):
+        return turned
+    most = stiffest(oscillator, stretches, share)
+    if turned.name == "law.damping":
+        most = 2 * math.sqrt(most * oscillator.mass)
+    return turned._replace(most=max(0.0, math.log(most / turned.origin)))
+
+
+def _slides_at(oscillator: Oscillator) -> bool:
+    return getattr(oscillator.law, "kinetic", 0.0) > 0
 
 
 def better_start(oscillator: Oscillator, names: Sequence[str], shown: Sequence[Shown]) -> Oscillator:

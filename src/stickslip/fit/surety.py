@@ -115,7 +115,7 @@ def _over_places(sensors: Sequence[Sensor], scores: Array, length: float) -> dic
 def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, tell: Callable[[], None]) -> float:
     """Where the likelihood, the others fitted anew, leaves the 95 % interval; infinite where it does not."""
     others = tuple(knob for j, knob in enumerate(problem.knobs) if j != k)
-    least = problem.knobs[k].least
+    least, most = problem.knobs[k].least, problem.knobs[k].most
 
     def rise(u: float) -> float:
         tell()
@@ -126,12 +126,14 @@ def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, te
 
     inside = float(point.u[k])
     for reach in REACH:
-        outside = max(least, float(point.u[k]) + side * reach)
+        outside = min(most, max(least, float(point.u[k]) + side * reach))
         if rise(outside) > allowed:
             break
         inside = outside
         if outside == least:
             return least
+        if outside == most:
+            return math.inf
     else:
         return side * math.inf
     for _ in range(HALVINGS):

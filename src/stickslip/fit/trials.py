@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.fit.choice import Evidence, Key, independent
 from stickslip.fit.search import Knob, Point, Problem, descend, rows_of
-from stickslip.fit.start import Shown, free_names, knob, thinned
+from stickslip.fit.start import Shown, bounded, free_names, knob, stiffest, thinned
 from stickslip.fit.stretch import Motion, Stretch, attempted
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
@@ -124,7 +124,7 @@ def searched(
     ends = []
     for begun, _, still in looks[:FINALISTS]:
         names = (*free_names(still.oscillator, None), *known)
-        problem = replace(still, knobs=tuple(_turned(still, each) for each in names))
+        problem = replace(still, knobs=tuple(_knob(still.oscillator, each, stretches) for each in names))
         point = descend(problem, problem.at(np.zeros(len(names)), begun.starts), passes=FEW, share=ENOUGH, tell=tell)
         if point.chi2 < CONTENDING * least:
             point = descend(problem, point, passes=passes, share=ENOUGH, tell=tell)
@@ -134,20 +134,8 @@ def searched(
     return Trial(name, *min(ends, key=lambda each: each[1].chi2)) if ends else None
 
 
-def _turned(problem: Problem, name: str) -> Knob:
-    """The knob of a parameter; a contact gets no stiffer than next to rigid, where it would cost and tell nothing."""
-    turned = knob(problem.oscillator, name)
-    stiffest = _stiffest(problem)
-    most = {"law.stiffness": stiffest, "law.damping": 2 * math.sqrt(stiffest * problem.oscillator.mass)}
-    if name not in most or turned.kind != "log":
-        return turned
-    return turned._replace(most=max(0.0, math.log(most[name] / turned.origin)))
-
-
-def _stiffest(problem: Problem) -> float:
-    """The contact that gives way a smallest part of the stroke under the friction."""
-    law: Any = problem.oscillator.law
-    return float(law.kinetic) / (STIFFEST * max(float(each.scales[0]) for each in problem.stretches))
+def _knob(oscillator: Oscillator, name: str, stretches: Sequence[Stretch]) -> Knob:
+    return bounded(knob(oscillator, name), oscillator, stretches, STIFFEST)
 
 
 def resumed(trial: Trial, stretches: Sequence[Stretch], least: float, passes: int, tell: Tell) -> Trial | None:
@@ -185,7 +173,7 @@ def from_simpler(name: str, trials: Mapping[str, Trial]) -> list[Any]:
         return [Stribeck(law.kinetic, static, speed=share * fastest) for share in FALLS]
     if name == "compliant" and "Coulomb" in laws:
         rigid: Any = trials["Coulomb"].system
-        stiffness = _stiffest(trials["Coulomb"].problem)
+        stiffness = stiffest(rigid, trials["Coulomb"].problem.stretches, STIFFEST)
         damping = 0.2 * math.sqrt(stiffness * rigid.mass)
         return [CompliantContact(rigid.law.kinetic, stiffness=stiffness, damping=damping)]
     if name == "LuGre" and "compliant" in laws and not trials["compliant"].stiff:
@@ -287,14 +275,16 @@ def _motions(trial: Trial) -> list[Motion | None]:
 
 
 def _unread(trial: Trial, motions: Sequence[Motion | None], stretch: Stretch, j: int, name: str) -> float:
-    """Mean square of what a motion leaves of a sensor's readings, in units of its noise."""
-    motion, u = motions[j], trial.point.u
+    """Mean square of what a motion leaves of a sensor's readings, its gain whatever it may be."""
+    motion = motions[j]
     sensors = [sensor for sensor in stretch.sensors if sensor.channel.name == name]
     if motion is None or not sensors:
         return 0.0
-    late = trial.problem.sensor_knobs(u, "delay").get(name, 0.0)
-    told = trial.problem.sensor_knobs(u, "gain").get(name, 1.0) * sensors[0].predicted(motion, late)[0]
-    return float(np.mean((sensors[0].noise * sensors[0].freed(sensors[0].readings - told)) ** 2))
+    late = trial.problem.sensor_knobs(trial.point.u, "delay").get(name, 0.0)
+    told, read = (sensors[0].freed(each) for each in (sensors[0].predicted(motion, late)[0], sensors[0].readings))
+    return float(
+        sensors[0].noise ** 2 * np.mean((read - told * (float(told @ read) / max(float(told @ told), 1e-300))) ** 2)
+    )
 
 
 def _remounted(shown: Shown, name: str, mount: tuple[float, float]) -> Shown:

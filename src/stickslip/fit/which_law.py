@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit.choice import CALIBRATIONS, FAMILIES, SEPARATED, Misfit, Standing, standings, times, undescribed
+from stickslip.fit.choice import CALIBRATIONS, SEPARATED, Misfit, Standing, standings, times, undescribed
 from stickslip.fit.guess import GUESSES, Seen
 from stickslip.fit.law import LawFit, answered
 from stickslip.fit.search import descend
@@ -57,6 +57,7 @@ SAID = {
     "LuGre": "that of bristles (LuGre)",
 }
 BAD = 0.3  # of a channel's own size: a law that leaves more beyond the noise describes little
+LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
 RETUNED = 8  # times that mounts and law are found in turn
 LEFT = 0.05  # of it: so much comes of more than the chance that an interval knows
 OFF = 0.05  # of a gain, beyond which it is no calibration's error
@@ -255,13 +256,14 @@ def compare_laws(
         for name, given in names:
             least = min((each.point.chi2 for each in {**before, **found}.values()), default=math.inf)
             trial = resumed(before[name], stretches, least, passes, tell) if name in before else None
-            begun = [*(given or GUESSES[name](seen)), *from_simpler(name, found)]
-            trial = trial or searched(name, begun, oscillator, stretches, known, least, passes, tell)
+            if trial is None:
+                begun = [*(given or GUESSES[name](seen)), *from_simpler(name, found)]
+                trial = searched(name, begun, oscillator, stretches, known, least, passes, tell)
             if trial is not None:
                 found[name] = trial
         return found
 
-    rough, silent, stated = tried(_apart(kinds), 2, {}), dict[str, float](), shown
+    rough, silent, stated = tried(kinds, LOOK, {}), dict[str, float](), shown
     if rough:
         nearest = min(rough.values(), key=lambda each: each.point.chi2)
         silent = unexplained(nearest, shown)
@@ -397,11 +399,6 @@ def _kinds(laws: Sequence[Any] | None) -> list[tuple[str, list[Any]]]:
         raise ModelError("no law", "laws are compared by trying some", f"name some of {', '.join(GUESSES)}")
     order = list(GUESSES)
     return sorted(found.items(), key=lambda each: order.index(each[0]) if each[0] in order else len(order))
-
-
-def _apart(kinds: Sequence[tuple[str, list[Any]]]) -> list[tuple[str, list[Any]]]:
-    """One law of each family, the simplest: enough to see how the sensors' mounts swing."""
-    return list(reversed({FAMILIES.get(name, name): (name, given) for name, given in reversed(kinds)}.values()))
 
 
 def _name(law: Any) -> str:
