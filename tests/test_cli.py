@@ -74,6 +74,25 @@ def test_a_pattern_gives_one_report_with_the_coefficient() -> None:
     assert Path("all/figures/0-3-records-compared-friction-load.svg").is_file()
 
 
+def test_files_of_one_name_are_told_apart_by_their_folders() -> None:
+    for load in (1, 2):
+        for kind in ("dry", "wet"):
+            Path(f"{kind}/{load}N").mkdir(parents=True)
+            slide(f"{kind}/{load}N/run.csv", friction=0.3 * load)
+    files = ["dry/1N/run.csv", "dry/2N/run.csv", "wet/2N/run.csv"]
+    Path("dry/1N/run.csv").rename("dry/1N/first.csv")
+    files[0] = "dry/1N/first.csv"
+    result = run("analyze", *files, *MAP, "--normal", "first.csv=1", "--normal", "*/2N/run.csv=2", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)["records"]
+    names = ["first.csv", "dry/2N/run.csv", "wet/2N/run.csv"]
+    assert [record["name"] for record in told] == names
+    assert [record["history"][0]["arguments"]["files"][0]["name"] for record in told] == names
+    assert [record["normal_load"] for record in told] == [1, 2, 2]
+    Path("wet/2N/run.csv").write_text("no numbers")
+    assert "left out: wet/2N/run.csv" in run("analyze", *files, *MAP, "--json").stderr
+
+
 def test_files_joined_by_plus_are_one_record(dataset: Callable[[str], Path]) -> None:
     folder = dataset("frame_base_excited")
     Path("rig.toml").write_text(

@@ -248,6 +248,22 @@ def test_several_records_are_compared(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "figures" / "0-2-conditions-compared-conditions.svg").exists()
 
 
+def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    for surface, load in CONDITIONS[1::2]:
+        (tmp_path / surface / str(load)).mkdir(parents=True)
+        ss.write_record(measured(surface, load), tmp_path / surface / str(load) / "sensors.csv")
+    heavy, light = (tmp_path / "wet" / str(load) / "sensors.csv" for load in (6.13, 1.23))
+    result = run(heavy, light, "--normal", "6.13/*=6.13", "--normal", "sensors.csv=1.23", "--output", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))["comparison"]
+    assert [each["name"] for each in told["conditions"]] == ["6.13/sensors.csv", "1.23/sensors.csv"]
+    assert [each["normal"] for each in told["conditions"]] == [6.13, 1.23]
+    assert "6.13/sensors.csv squeaks; 1.23/sensors.csv does not squeak." in told["verdicts"]
+    wrong = run(heavy, light, "--normal", "*7*=7")
+    assert wrong.exit_code == 2
+    assert "no file fits '*7*': called 6.13/sensors.csv, 1.23/sensors.csv" in wrong.stderr
+
+
 # ---- a seal: friction that grows with the pressure
 
 

@@ -117,8 +117,12 @@ class RigSettings(BaseModel):
     rows: Annotated[str, BeforeValidator(_row_range)] | None = None
 
     def normal_load(self, name: str) -> float | None:
-        """The normal load [N] stated for a file of this name; the first pattern that fits decides."""
-        fits = (load for pattern, load in self.normal.items() if fnmatch.fnmatch(name, pattern))
+        """The normal load [N] stated for a file of this name; the first pattern that fits decides.
+
+        A name with folders before it fits by its last part too.
+        """
+        names = (name, name.rpartition("/")[2])
+        fits = (load for pattern, load in self.normal.items() if any(fnmatch.fnmatch(each, pattern) for each in names))
         return next(fits, None)
 
     def row_range(self) -> tuple[int, int | None] | None:

@@ -8,7 +8,8 @@ import fnmatch
 import functools
 import glob
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
         RigSettings,
         SqueakComparison,
         SqueakFindings,
+        Step,
     )
 
 Answer = TypeVar("Answer")
@@ -95,24 +97,41 @@ def groups_of(argument: str) -> list[list[Path]]:
 
 def require_fits(normal: Sequence[str], groups: Sequence[Sequence[Path]]) -> None:
     """Refuse a load stated for files that are not there: it is a typing error."""
-    names = [name for group in groups for name in (*(path.name for path in group), name_of(group))]
+    told = names_of(groups)
+    known = [name for names in told for name in (*names, " + ".join(names))]
+    known += [name for group in groups for name in (*(path.name for path in group), name_of(group))]
     for load in normal:
         pattern, separator, _ = load.partition("=")
-        if separator and not fnmatch.filter(names, pattern.strip()):
-            raise click.BadParameter(f"no file fits '{pattern.strip()}'", param_hint="--normal")
+        if separator and not fnmatch.filter(known, pattern.strip()):
+            called = ", ".join(" + ".join(names) for names in told[:3]) + (", ..." if len(told) > 3 else "")
+            raise click.BadParameter(f"no file fits '{pattern.strip()}': called {called}", param_hint="--normal")
 
 
 def name_of(files: Sequence[Path]) -> str:
     return " + ".join(path.name for path in files)
 
 
+def names_of(groups: Sequence[Sequence[Path]]) -> list[list[str]]:
+    """What the files of each record are called: their names, with as many folders before as tell records apart."""
+    paths = [tuple(path.absolute() for path in group) for group in groups]
+    told = {each: tuple(path.name for path in each) for each in paths}
+    for depth in range(2, max((len(path.parts) for each in paths for path in each), default=0)):
+        often = Counter(told.values())
+        told = {
+            each: tuple("/".join(path.parts[-depth:]) for path in each) if often[names] > 1 else names
+            for each, names in told.items()
+        }
+    return [list(told[each]) for each in paths]
+
+
 def default_folder(groups: Sequence[Sequence[Path]]) -> Path:
     return Path(f"{groups[0][0].stem}-stickslip") if len(groups) == 1 else Path("comparison-stickslip")
 
 
-def read(files: Sequence[Path], rig: RigSettings) -> Record:
+def read(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = ()) -> Record:
+    """The record, its files called by their names or by those given."""
     record = ss.read_record(_paths(files), rows=rig.row_range(), **_told(rig))
-    return ss.mend(_with_source(record, files), repairs=rig.repair)
+    return ss.mend(_with_source(record, files, names), repairs=rig.repair)
 
 
 def is_long(files: Sequence[Path]) -> bool:
@@ -120,14 +139,16 @@ def is_long(files: Sequence[Path]) -> bool:
     return sum(path.stat().st_size for path in files) > LONG
 
 
-def read_parts(files: Sequence[Path], rig: RigSettings, size: int | None = None) -> Iterator[Record]:
+def read_parts(
+    files: Sequence[Path], rig: RigSettings, size: int | None = None, names: Sequence[str] = ()
+) -> Iterator[Record]:
     """The record in parts that fit into memory; whole where rows of it or repairs are asked for."""
     if rig.rows or rig.repair:
-        yield read(files, rig)
+        yield read(files, rig, names)
         return
     told = {**_told(rig), **({} if size is None else {"size": size})}
     for part in ss.read_blocks(_paths(files), **told):
-        yield _with_source(part, files)
+        yield _with_source(part, files, names)
 
 
 def _paths(files: Sequence[Path]) -> Any:
@@ -138,14 +159,24 @@ def _told(rig: RigSettings) -> dict[str, Any]:
     return {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
 
 
-def _with_source(record: Record, files: Sequence[Path]) -> Record:
-    """The record with its files in the history; one that write_record kept comes back without."""
+def _with_source(record: Record, files: Sequence[Path], names: Sequence[str]) -> Record:
+    """The record with its files in the history, called as told; one that write_record kept comes back without."""
+    called = dict(zip((path.name for path in files), names or (path.name for path in files), strict=True))
     known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
-    if {path.name for path in files} <= known:
-        return record
-    sources = [{"name": path.name, "sha256": _checksum(path)} for path in files]
+    if called.keys() <= known:
+        return dataclasses.replace(record, history=tuple(_called(step, called) for step in record.history))
+    sources = [{"name": called[path.name], "sha256": _checksum(path)} for path in files]
     step = ss.Step("read_record", {"files": sources}, "a record as it was written")
     return dataclasses.replace(record, history=(*record.history, step))
+
+
+def _called(step: Step, names: Mapping[str, str]) -> Step:
+    """The step with other names of the files that it read."""
+    read = step.arguments.get("files")
+    if not read:
+        return step
+    files = [{**file, "name": names.get(file["name"], file["name"])} for file in read]
+    return dataclasses.replace(step, arguments={**step.arguments, "files": files})
 
 
 @functools.cache
@@ -155,15 +186,16 @@ def _checksum(path: Path) -> str:
 
 
 @contextlib.contextmanager
-def collected(refused: list[ss.StickslipError], files: Sequence[Path]) -> Iterator[None]:
+def collected(refused: list[ss.StickslipError], files: Sequence[Path], names: Sequence[str] = ()) -> Iterator[None]:
     """Put what the data can not answer aside, with the file's name; what was asked wrongly ends all."""
+    names = names or [path.name for path in files]
     try:
         yield
     except ss.ModelError:
         raise
     except ss.StickslipError as error:
-        known = any(path.name in str(error) for path in files)
-        value = error.value if known else f"{name_of(files)}: {error.value}"
+        known = any(name in str(error) for name in names)
+        value = error.value if known else f"{' + '.join(names)}: {error.value}"
         refused.append(type(error)(value, error.rule, error.next_step))
 
 
@@ -181,15 +213,16 @@ def answers(
     """
     found: list[Answer] = []
     refused: list[ss.StickslipError] = []
-    for number, group in enumerate(groups):
-        with collected(refused, group):
-            tell(f"reading {name_of(group)}", 2 * number)
+    for number, (group, names) in enumerate(zip(groups, names_of(groups), strict=True)):
+        with collected(refused, group, names):
+            name = " + ".join(names)
+            tell(f"reading {name}", 2 * number)
             if of_parts is not None and is_long(group):
-                say = functools.partial(_say, tell, f"analysing {name_of(group)}", 2 * number)
-                found.append(of_parts(read_parts(group, rig, size=PART), say))
+                say = functools.partial(_say, tell, f"analysing {name}", 2 * number)
+                found.append(of_parts(read_parts(group, rig, PART, names), say))
                 continue
-            record = read(group, rig)
-            tell(f"checking and analysing {name_of(group)}", 2 * number + 1)
+            record = read(group, rig, names)
+            tell(f"checking and analysing {name}", 2 * number + 1)
             found.append(ask(record))
     if found:
         return found, refused
