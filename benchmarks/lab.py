@@ -36,7 +36,8 @@ SLIDE = """async ([count, gap]) => {
       document.addEventListener("traces-drawn", (event) => {
         const begun = performance.now() - event.detail.took;
         requestAnimationFrame(() => { const shown = new MessageChannel();
-          shown.port1.onmessage = () => done([event.detail.took, performance.now() - begun]); shown.port2.postMessage(0); });
+          shown.port1.onmessage = () => done([event.detail.took, performance.now() - begun]);
+          shown.port2.postMessage(0); });
       }, { once: true });
       slider.value = 400 + ((k * 37) % 200);
       slider.dispatchEvent(new Event("input", { bubbles: true }));

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import runpy
 from pathlib import Path
 
 import pytest
@@ -23,3 +25,22 @@ def test_what_is_written_is_read_back(name: str, tmp_path: Path) -> None:
     for other in again:
         assert (other.start, other.run, other.about) == (case.start, case.run, case.about)
         assert ss.export_system(other) == text
+
+
+@pytest.mark.parametrize("name", SEEN.values())
+def test_the_program_makes_the_same_system(name: str, tmp_path: Path) -> None:
+    case = ss.scenario_case(name)
+    made, mark, _ = ss.export_system(case, format="python").partition("result = ")
+    assert mark
+    program = tmp_path / "system.py"
+    program.write_text(made, encoding="utf-8")
+    assert ss.export_system(runpy.run_path(str(program))["case"]) == ss.export_system(case)
+
+
+def test_what_a_file_can_not_name_is_refused() -> None:
+    case = ss.scenario_case("FD-4")
+    own = ss.FrictionCurve(lambda v: 1 + 0.2 / (1 + v))
+    with pytest.raises(ss.ModelError, match="Python function"):
+        ss.export_system(dataclasses.replace(case, system=case.system.having(law=own)))
+    with pytest.raises(ss.ModelError, match="one of toml, json, python"):
+        ss.export_system(case, format="yaml")

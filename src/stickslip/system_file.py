@@ -357,7 +357,7 @@ def _check_run(case: Case) -> None:
 
 def _part(model: type[BaseModel], table: str, values: Mapping[str, Any], source: _Source) -> dict[str, Any]:
     part = checked(model, values, source=source.name, lines=source.lines, table=table)
-    given = {name: getattr(part, name) for name in part.model_fields_set}
+    given = {name: getattr(part, name) for name in values}
     return {name: value for name, value in given.items() if value is not None}
 
 

@@ -17,12 +17,6 @@ from stickslip.lab.forms import Answer, catalog
 Array = NDArray[np.float64]
 GoOn = Callable[[float], None]
 
-WARM = {
-    "system": {"mass": 2.42, "stiffness": 2310},
-    "law": {"name": "CompliantContact", "kinetic": 1.1, "stiffness": 192000, "damping": 11.8},
-    "drive": {"name": "HarmonicBase", "amplitude": 0.00065, "frequency": 2.5},
-    "run": {"cycles": 40},
-}
 MOST_CYCLES, MOST_CONTACTS, MOST_MASSES = 5000, 4, 12  # played on a page
 SHOWN = 200  # cycles drawn, the last ones
 A_CYCLE, LEAST, MOST = 60, 2400, 16_000  # instants
@@ -196,6 +190,8 @@ def _marks(run: ss.Trajectory, first: float, last: float) -> tuple[dict[str, Any
     ends = run.starts + run.durations
     slips = np.flatnonzero((kinds == 0) & (np.arange(len(kinds)) > 0) & (np.arange(len(kinds)) < len(kinds) - 1))
     lengths = run.durations[slips]
+    if isinstance(run.system, ss.Structure) and len(run.system.contacts) > 1:  # a piece ends by any of them
+        slips, lengths = slips[:0], lengths[:0]
     short = slips[lengths < MICROSLIP * lengths.max()] if len(slips) else slips
     middles = (run.starts + ends)[short] / 2
     seen = (ends > first) & (run.starts < last) & (run.durations > 0)

@@ -29,6 +29,7 @@ def catalog(request: Mapping[str, Any], go_on: Any) -> Answer:
         "drives": {name: _part(make) for name, make in ss.scenarios.DRIVES.items()},
         "system": _part(ss.Oscillator),
         "contact": _part(ss.Contact),
+        "boundary": [[b, r] for b, damping, r in ss.scenarios.grid("DH-2")["boundary"] if damping == 0],
         "presets": [_preset(name) for name in ss.scenarios.names()],
     }, {}
 

@@ -1,4 +1,4 @@
-"""A regime map while one looks: coarse in strips, then each cell across which the answer changes, finer and finer."""
+"""A regime map while one looks: coarse in strips, then finer in each where the answer changes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from stickslip.lab.workers import Workers
 
 WANTED = ("map", "cancel")
 COUNTED = ("stops", "micro_slips", "period")  # where an answer jumps, its border is refined
-STRIP, MOST, HALVINGS = 2, 64, 3  # columns at a time, points along an axis, of each cell
+STRIP, MOST, HALVINGS = 2, 64, 3  # columns at a time, points along an axis, of a border
 
 
 class Unanswered(Exception):
@@ -68,21 +68,29 @@ async def _parts(
     """Values on rectangles of the map, with the share that is done."""
     names, (xs, ys) = _axes(request)
     values = np.full((len(xs), len(ys)), math.nan)
-    strips = range(0, len(xs), STRIP)
-    for number, begin in enumerate(strips, start=1):
+    coarse = range(0, len(xs), STRIP)
+    for number, begin in enumerate(coarse, start=1):
         part = xs[begin : begin + STRIP]
         values[begin : begin + STRIP] = await _asked(workers, request, names, part, ys, want="sweep")
-        yield {"level": "coarse", "done": number, "of": len(strips)}, {
+        yield {"level": "coarse", "done": number, "of": len(coarse)}, {
             "x": part, "y": ys, "values": values[begin : begin + STRIP].ravel(),
         }  # fmt: skip
-    cells = _changing(values) if request["measure"] in COUNTED else []
-    for number, (i, j) in enumerate(cells, start=1):
-        x, y = xs[i : i + 2], ys[j : j + 2]
+    strips = _changing(values) if request["measure"] in COUNTED else []
+    for number, (i, begin, end) in enumerate(strips, start=1):
+        x, y = xs[i : i + 2], ys[begin:end]
         found = await _asked(workers, request, names, x, y, want="refine")
-        fine = [np.linspace(ends[0], ends[1], 2**HALVINGS + 1) for ends in (x, y)]
-        yield {"level": "fine", "done": number, "of": len(cells)}, {
-            "x": fine[0], "y": fine[1], "values": found.ravel(),
+        yield {"level": "fine", "done": number, "of": len(strips)}, {
+            "x": _finer(x), "y": _finer(y), "values": found.ravel(),
         }  # fmt: skip
+
+
+def _finer(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Each interval halved as often as a border is."""
+    part = 2**HALVINGS
+    finer: NDArray[np.float64] = np.interp(
+        np.arange((len(values) - 1) * part + 1) / part, np.arange(len(values)), values
+    )
+    return finer
 
 
 def _axes(request: Mapping[str, Any]) -> tuple[list[str], list[NDArray[np.float64]]]:
@@ -116,11 +124,16 @@ async def _asked(
     return found
 
 
-def _changing(values: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Cells whose four corners do not say the same."""
+def _changing(values: NDArray[np.float64]) -> list[tuple[int, int, int]]:
+    """Between which neighbouring columns, and from which to before which row, the answer changes."""
     whole = np.nan_to_num(np.round(values), nan=-3.0)
     corners = np.stack([whole[:-1, :-1], whole[1:, :-1], whole[:-1, 1:], whole[1:, 1:]])
-    return [(int(i), int(j)) for i, j in np.argwhere(corners.min(axis=0) != corners.max(axis=0))]
+    found = []
+    for i, unlike in enumerate(corners.min(axis=0) != corners.max(axis=0)):
+        rows = np.flatnonzero(unlike)
+        if len(rows):
+            found.append((i, int(rows[0]), int(rows[-1]) + 2))
+    return found
 
 
 routes: list[BaseRoute] = [WebSocketRoute("/map", _map)]

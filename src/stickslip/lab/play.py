@@ -19,6 +19,7 @@ from stickslip.lab.openapi import described
 from stickslip.lab.workers import Worker, Workers
 
 QUICK, SLOW = ("run", "tell"), ("sound", "wavelet", "sweep", "refine")
+AFRESH = 1.5  # s: a run of another law does not wait longer for one that no one wants any more
 WANTED = (*QUICK, "sound", "wavelet")  # of the page, in the order in which they are answered
 STATE = {
     "type": "object",
@@ -98,7 +99,7 @@ async def _play(socket: WebSocket) -> None:
         (quick if request["want"] in QUICK else slow).put(request)
         if request["want"] == "run":
             for worker in (*quick.lent, *slow.lent):
-                worker.interrupt()
+                worker.interrupt(within=AFRESH if request.get("afresh") else None)
 
     async def work() -> None:
         async with asyncio.TaskGroup() as both:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import signal
 import struct
@@ -19,6 +20,7 @@ class Worker:
 
     def __init__(self) -> None:
         self.process: asyncio.subprocess.Process | None = None
+        self.answers, self.ready = 0, False  # ready: it has answered, and listens to an interrupt
 
     async def answer(self, request: bytes) -> bytes:
         """The answer to a request; the process is started where it does not run, and ended where it takes too long."""
@@ -30,7 +32,9 @@ class Worker:
             await process.stdin.drain()
             async with asyncio.timeout(LONGEST):
                 (length,) = HEAD.unpack(await process.stdout.readexactly(HEAD.size))
-                return await process.stdout.readexactly(length)
+                answer = await process.stdout.readexactly(length)
+                self.answers, self.ready = self.answers + 1, True
+                return answer
         except BaseException:
             await self.end()  # what it would still say belongs to no one
             raise
@@ -38,22 +42,38 @@ class Worker:
     async def started(self) -> asyncio.subprocess.Process:
         """The process, running."""
         if self.process is None or self.process.returncode is not None:
+            self.ready = False
             self.process = await asyncio.create_subprocess_exec(
                 sys.executable, "-m", "stickslip.lab.worker", stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE, limit=2**22, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
             )  # fmt: skip
         return self.process
 
-    def interrupt(self) -> None:
-        """Tell it that no one waits any more: a long run ends early, a short one is done before."""
-        if INTERRUPTIBLE and self.process is not None and self.process.returncode is None:
-            self.process.send_signal(signal.SIGINT)
+    def interrupt(self, *, within: float | None = None) -> None:
+        """Tell it that no one waits any more: a long run ends early, a short one is done before.
+
+        What does not end within some seconds, as a compilation, is ended with its process.
+        """
+        if INTERRUPTIBLE and self.ready:
+            self._signal(signal.SIGINT)
+        if within is not None:
+            asyncio.get_running_loop().call_later(within, self._end_at, self.answers)
+
+    def _end_at(self, answers: int) -> None:
+        if answers == self.answers:
+            self._signal(signal.SIGKILL if INTERRUPTIBLE else signal.SIGTERM)
+
+    def _signal(self, number: int) -> None:
+        """A signal, sent without asking for the exit status, which asyncio waits for."""
+        if self.process is not None and self.process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self.process.pid, number)
 
     async def end(self) -> None:
         """End the process."""
+        self._signal(signal.SIGKILL if INTERRUPTIBLE else signal.SIGTERM)
         process, self.process = self.process, None
-        if process is not None and process.returncode is None:
-            process.kill()
+        if process is not None:
             await process.wait()
 
 
@@ -75,7 +95,6 @@ class Workers:
         for worker in self.all:
             await worker.started()
             self.free.put_nowait(worker)
-        await self.ask(b"{}")  # the first answer of any
         return self
 
     async def __aexit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:

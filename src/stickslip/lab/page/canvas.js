@@ -4,7 +4,7 @@ const PLAIN = new Set(["", "1", "kg", "rad"]);
 
 export function prefixed(size, unit) {
   if (PLAIN.has(unit) || !(size > 0)) return [1, unit === "1" ? "" : unit];
-  const [factor, letter] = PREFIXES.find(([each]) => size >= each * 0.9995) ?? PREFIXES.at(-1);
+  const [factor, letter] = PREFIXES.find(([each]) => size >= each * 0.9995 && !(each > 1 && unit.startsWith("m/"))) ?? PREFIXES.at(-1);
   return [1 / factor, letter + spelled(unit)];
 }
 export const spelled = (unit) => unit.replace(/\^2/g, "²").replace(/\^3/g, "³").replaceAll(" ", "·");
@@ -38,7 +38,7 @@ export function axes(canvas, x, y, palette, left = 58) {
   const pen = canvas.getContext("2d");
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
-  const box = { left, right: width - 10, top: 8, bottom: height - 38 };
+  const box = { left, right: width - 14, top: 8, bottom: height - 38 };
   const place = (axis, from, to) => {
     const scale = axis.log ? Math.log10 : (value) => value;
     const low = scale(axis.low), span = scale(axis.high) - low || 1;
@@ -60,7 +60,7 @@ export function axes(canvas, x, y, palette, left = 58) {
       pen.stroke();
       pen.fillStyle = palette.soft;
       const words = axis.log ? power(mark * factor) : shortly(mark * factor);
-      if (across) pen.fillText(words, p, box.bottom + 4); else pen.fillText(words, box.left - 5, p);
+      if (across) pen.fillText(words, Math.min(p, width - pen.measureText(words).width / 2 - 1), box.bottom + 4); else pen.fillText(words, box.left - 5, p);
     }
     const label = axis.label + (unit ? ` [${unit}]` : "");
     pen.fillStyle = palette.soft;

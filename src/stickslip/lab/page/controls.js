@@ -23,7 +23,7 @@ export function put(state, path, value) {
 export function readable(value, unit) {
   if (typeof value !== "number") return typeof value === "string" ? value : JSON.stringify(value);
   const [factor, words] = prefixed(Math.abs(value), unit);
-  return `${+(value * factor).toPrecision(10)}${words && ` ${words}`}`;
+  return `${+(value * factor).toPrecision(6)}${words && ` ${words}`}`;
 }
 const LETTERS = { G: 1e9, M: 1e6, k: 1e3, m: 1e-3, "µ": 1e-6, u: 1e-6, n: 1e-9 };
 // A number in SI where the text is one, with or without a prefixed unit; other units are left to the library.
@@ -82,7 +82,7 @@ export class Controls {
       put(this.state, path, this.guessed(kind, choice.value, part));
       this.show(this.state);
       document.getElementById(id)?.focus();
-      this.changed(path, performance.now());
+      this.changed(path, performance.now(), true);
     });
     this.fill(box, known[part.name].parameters.filter((each) => !each.part), path, path.at(-1) === "drive" ? "drive" : "law");
     for (const inner of ["law", "drive"]) if (typeof part[inner] === "object") this.part(inner === "law" ? "Law within" : "Drive within", `${inner}s`, [...path, inner], box);
@@ -171,22 +171,26 @@ export class Controls {
   }
   // A law or drive chosen anew: what it shares with the one before, what the library says, and else a size that fits.
   guessed(kind, name, before) {
+    this.elements = name === "ElastoSlip";
     const part = { name }, old = { ...before, ...(typeof before.law === "object" ? before.law : {}) };
     for (const each of this.catalog[kind][name].parameters) {
-      if (each.part) part[each.name] = each.name === "law" ? { name: "Stribeck", kinetic: +old.kinetic || 1, static: 1.3 * (+old.kinetic || 1), speed: this.size({ unit: "m/s" }) / 5 } : { name: "Belt", speed: this.size({ unit: "m/s" }) };
+      if (each.part) part[each.name] = each.name === "law" ? (name === "InSeries" ? { name: "Coulomb", kinetic: +old.kinetic || 1 } : { name: "Stribeck", kinetic: +old.kinetic || 1, static: 1.3 * (+old.kinetic || 1), speed: this.size({ unit: "m/s" }) / 5 }) : { name: "Belt", speed: this.size({ unit: "m/s" }) };
       else if (typeof old[each.name] === "number" && !(each.name === "amplitude")) part[each.name] = old[each.name];
       else if (each.default !== null) part[each.name] = each.default;
       else if (!each.optional) part[each.name] = this.listed(each) ?? this.size(each);
     }
     if (name === "RateState") Object.assign(part, { normal: 2 * this.size({ unit: "N" }), friction: 0.5, direct: 0.01, evolution: 0.015, distance: this.size({ unit: "m" }) / 50, reference: this.size({ unit: "m/s" }) / 10 });
+    if (name === "RateState") this.state.start = { ...this.state.start, v: part.reference };
+    if (name === "PositionLoad") part.gradient = (+old.kinetic || 1) / (4 * this.size({ unit: "m" }));
+    if (name === "Dithered") Object.assign(part, { amplitude: this.size({ unit: "m" }) / 200, frequency: 100 * this.size({ unit: "Hz" }) });
     if (kind === "drives" && name === "HarmonicForce") part.amplitude = 1.5 * this.size({ unit: "N" });
     return part;
   }
   listed({ name }) {
     const force = this.size({ unit: "N" }), speed = this.size({ unit: "m/s" }), f = +this.size({ unit: "Hz" }).toPrecision(3);
     return {
-      speeds: [0, speed / 5, speed], times: [0, 1 / f, 4 / f], forces: [1.3 * force, force, force], stiffnesses: [50, 20, 5].map((each) => each * (+this.state.system.stiffness || 1)),
-      curve: `${force} * (1 + 0.3 * exp(-v / ${+(speed / 5).toPrecision(3)}))`, tones: [[this.size({ unit: "m" }) / 2, f, 0], [this.size({ unit: "m" }) / 10, 3 * f, 0]],
+      speeds: [0, speed / 5, speed], times: [0, 1 / f, 4 / f], forces: name === "forces" && this.elements ? [force / 2, force / 3, force / 6] : [1.3 * force, force, force], stiffnesses: [50, 20, 5].map((each) => each * (+this.state.system.stiffness || 1)),
+      curve: `${force} * (1 + 0.3 * exp(-v / ${+(speed / 5).toPrecision(3)}))`, tones: [[this.size({ unit: "m" }), f, 0], [this.size({ unit: "m" }) / 3, 3 * f, 0]],
     }[name];
   }
   set(path, value, since = performance.now()) {
@@ -200,6 +204,6 @@ export class Controls {
     const place = this.knobs.get(path?.join(".")) ?? document.getElementById(path?.join("-"))?.parentElement ?? this.root;
     const told = place.appendChild(document.createElement("p"));
     told.className = "fault";
-    told.textContent = words;
+    told.textContent = words.replace(/^the system( \[[^\]]*\])?:? ?/, "").replace(/correct (\w+)=/g, "correct it").replace(/(\w+)=(?=[ ,.;])/g, "$1");
   }
 }

@@ -1,7 +1,7 @@
 // Map: which motion is where, computed while one looks; a click plays the point.
 import { Conversation } from "./socket.js";
 import { at, put, readable, written } from "./controls.js";
-import { axes, cividis, shortly, spelled } from "./canvas.js";
+import { axes, cividis, line, shortly } from "./canvas.js";
 import { current } from "./play.js";
 
 const MEASURES = { stops: "stops per cycle", micro_slips: "micro-slips per cycle", period: "cycles until it repeats (0: never)", stick_share: "share of time that it holds", amplitude: "amplitude [m]" };
@@ -9,6 +9,7 @@ const COUNT = { x: 28, y: 20 };
 const NONE = -1, REST = -2; // as the lab sends them
 const WORDS = { [NONE]: "no such system", [REST]: "comes to rest" };
 
+let begun = 0;
 let lab, state, canvas, conversation, number = 0, parts = [], wanted = null, plan = null, place = [0.5, 0.5];
 
 export function start(root, given) {
@@ -22,6 +23,7 @@ export function start(root, given) {
       <fieldset><legend>Colour</legend><div class="field"><label class="hidden" for="map-measure">What is shown</label><select id="map-measure">${Object.entries(MEASURES).map(([name, words]) => `<option value="${name}">${words}</option>`).join("")}</select></div></fieldset>
       <div class="row"><button class="main" type="submit">Draw the map</button><button type="button" id="map-cancel" disabled>Cancel</button></div>
       <p><label class="hidden" for="map-done">How far it is</label><progress id="map-done" max="1" value="0"></progress></p>
+      <p class="note" id="map-left"></p>
       <p class="fault note" id="map-fault"></p>
     </form>
     <div class="card"><h2 id="map-title">Stops per cycle</h2>
@@ -109,6 +111,7 @@ function draw() {
   $("map-title").textContent = MEASURES[wanted.measure].replace(/^./, (letter) => letter.toUpperCase());
   $("map-fault").textContent = "";
   $("map-cancel").disabled = false;
+  begun = performance.now();
   conversation.send(wanted);
   redraw();
   lab.say("Drawing the map …");
@@ -121,6 +124,9 @@ function heard(answer) {
   else if (answer.kind === "done") ended("The map is done.");
   else {
     parts.push(answer);
+    const points = parts.reduce((sum, part) => sum + part.arrays.values.length, 0), past = (performance.now() - begun) / 1000;
+    const left = answer.level === "coarse" ? "then its borders" : `about ${Math.max(1, Math.round((past * (answer.of - answer.done)) / answer.done))} s left`;
+    if (answer.done % 5 === 0) $("map-left").textContent = `${points} motions so far, ${left}.`;
     $("map-done").value = answer.level === "coarse" ? (0.4 * answer.done) / answer.of : 0.4 + (0.6 * answer.done) / answer.of;
     if (plan && answer.level === "fine") paint(answer); else redraw();
   }
@@ -128,6 +134,8 @@ function heard(answer) {
 function ended(words) {
   $("map-cancel").disabled = true;
   $("map-done").value = words.startsWith("The map") ? 1 : 0;
+  $("map-left").textContent = "";
+  if (plan) boundary();
   lab.say(words);
   legend();
 }
@@ -155,13 +163,29 @@ function redraw() {
     return found ? { low: axis.from, high: axis.to, label: found[1], factor: 1 / found[0], unit: "" } : { low: axis.from, high: axis.to, label: called(axis.dotted.split(".")), unit };
   };
   if (!(wanted.x.to > wanted.x.from && wanted.y.to > wanted.y.from)) return;
-  plan = axes(canvas, tidy(side(wanted.x)), tidy(side(wanted.y)), lab.colours());
+  plan = axes(canvas, side(wanted.x), side(wanted.y), lab.colours());
   for (const part of parts) paint(part);
+  boundary();
   legend();
 }
-// Ticks at round numbers of what the axis shows.
-const tidy = (axis) => (axis.factor ? { ...axis } : axis);
-
+// Where sliding without a stop ends under rigid friction (Den Hartog 1930), at the ratios that the library's table has.
+function boundary() {
+  const { system, law = {}, drive = {} } = wanted.state;
+  const rigid = law.name === "Coulomb" && !("static" in law) && !system.damping && /^Harmonic/.test(drive.name ?? "") && drive.contact !== "base";
+  if (!rigid || wanted.measure !== "stops" || wanted.x.dotted !== "drive.frequency" || wanted.y.dotted !== "law.kinetic") return;
+  const [natural] = ratio(wanted.x.dotted), [force] = ratio(wanted.y.dotted), { pen, box } = plan, ink = "#ffffff";
+  pen.save();
+  pen.beginPath();
+  pen.rect(box.left, box.top, box.right - box.left, box.bottom - box.top);
+  pen.clip();
+  line(plan, lab.boundary.map(([b]) => b * natural), lab.boundary.map(([, r]) => r * force), { colour: ink, width: 1.6 });
+  pen.fillStyle = ink;
+  for (const [b, r] of lab.boundary) { pen.beginPath(); pen.arc(plan.x(b * natural), plan.y(r * force), 3, 0, 7); pen.fill(); }
+  pen.font = "12px system-ui, sans-serif";
+  pen.textAlign = "left";
+  pen.fillText("Den Hartog 1930", plan.x(1.35 * natural), plan.y(0.675 * force) + 22);
+  pen.restore();
+}
 function paint({ arrays: { x, y, values } }) {
   const { pen, box } = plan, high = most(), palette = lab.colours();
   const edges = (line, to) => [...line].map((value, j) => [j ? (line[j - 1] + value) / 2 : value - (line.length > 1 ? (line[1] - value) / 2 : step(to)), j < line.length - 1 ? (line[j + 1] + value) / 2 : value + (line.length > 1 ? (value - line[j - 1]) / 2 : step(to))]);

@@ -5,14 +5,15 @@ import { Stage } from "./stage.js";
 import { axes, cividis, line, prefixed, range, shortly } from "./canvas.js";
 
 const $ = (id) => document.getElementById(id);
-const FIRST = "THESIS rigid 2.5Hz fk=1.1";
-const GROUPS = { x: "displacement", v: "velocity", a: "acceleration", friction: "friction" };
+const FIRST = "THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)", FEW = 8; // cycles: one sees the shape
+const PANELS = [["x", "displacement"], ["x", "angle", true], ["v", "velocity"], ["v", "angular velocity", true], ["a", "acceleration"], ["friction", "friction"]];
 const INKS = { x: "blue", v: "green", a: "purple", friction: "orange" };
 const MORE_INKS = ["blue", "orange", "green", "purple", "sky", "ink"];
 const HEIGHT = 118, REST = 90, IDLE = 350; // pixels of a trace; ms without a change until numbers, and until the rest
 const KINDS = ["slip", "microstick", "stick", "flight"];
 const PACES = [["one cycle in 2 s", null], ["true time", 1], ["2 × slower", 0.5], ["5 × slower", 0.2], ["10 × slower", 0.1], ["100 × slower", 0.01], ["1000 × slower", 0.001], ["10 × faster", 10]];
 
+const newest = {}; // number of the last request of each kind
 let lab, state, controls, stage, conversation, run, charts = [], plans = {}, number = 0, flying = null, next = null;
 let changedLast = null, patience = 0, resting = 0, idling = 0, player = null;
 
@@ -24,10 +25,14 @@ export async function start(given) {
   for (const [words, pace] of PACES) $("pace").add(new Option(words, pace ?? ""));
   buttons();
   const shared = fromLink();
+  const slow = setTimeout(() => lab.say("The lab is starting …"), 700);
   const [catalog, first] = await Promise.all([lab.ask("/catalog"), shared ? { state: shared } : lab.ask(`/scenarios/${encodeURIComponent(FIRST)}`)]).catch((error) => { lab.say(error.message, true); return []; });
+  clearTimeout(slow);
   if (!catalog) return;
-  controls = new Controls($("parts"), catalog, (path, since) => { changedLast = path; ask(since); });
+  lab.boundary = catalog.boundary;
+  controls = new Controls($("parts"), catalog, (path, since, afresh = false) => { changedLast = path; ask(since, afresh); });
   presets(catalog.presets, shared ? "" : FIRST);
+  if (!shared) first.state.run = { cycles: FEW };
   use(first.state);
   lab.onTheme(() => { if (run) { build(); drawTraces(); drawViews(); stage.show(run, lab.colours()); } });
 }
@@ -37,7 +42,7 @@ function use(given) {
   state.run ??= { cycles: 40 };
   changedLast = null;
   controls.show(state);
-  ask(performance.now());
+  ask(performance.now(), true);
 }
 
 function presets(offered, chosen) {
@@ -64,21 +69,28 @@ function presets(offered, chosen) {
 }
 
 // One run is under way at a time, and the newest state waits; one that takes long is overtaken.
-function ask(since) {
-  next = { since, state: structuredClone(state) };
+function ask(since, afresh = false) {
+  next = { since, afresh: afresh || next?.afresh, state: structuredClone(state) };
   clearTimeout(resting);
   clearTimeout(idling);
-  if (flying === null || performance.now() - flying.sent > 100) send();
+  if (flying === null || afresh || performance.now() - flying.sent > 100) send();
 }
 function send() {
   flying = { ...next, id: ++number, sent: performance.now() };
   next = null;
-  conversation.send({ id: flying.id, want: "run", state: flying.state });
+  Object.assign(newest, { run: flying.id, tell: null, wavelet: null });
+  conversation.send({ id: flying.id, want: "run", state: flying.state, afresh: flying.afresh });
   clearTimeout(patience);
-  patience = setTimeout(() => lab.say("Computing … the first run of a law is compiled, which takes some seconds."), 900);
+  patience = setTimeout(() => lab.say("Computing … the first run after an installation, or of a law, is compiled, which takes a while."), 900);
+}
+
+function more(want) {
+  newest[want] = ++number;
+  conversation.send({ id: number, want, state });
 }
 
 function heard(answer) {
+  if (answer.id !== null && answer.id !== newest[answer.want]) return; // no one waits for it any more
   if (answer.want === "run" || answer.kind === "error") arrived(answer);
   else if (answer.kind === "tell") told(answer);
   else if (answer.kind === "wavelet") { plans.map = answer; drawWavelet(); }
@@ -86,10 +98,7 @@ function heard(answer) {
 }
 
 function arrived(answer) {
-  if (answer.want === "run") {
-    if (flying?.id !== answer.id) return;
-    clearTimeout(patience);
-  }
+  if (answer.want === "run") clearTimeout(patience);
   if (answer.kind === "error") {
     controls.fault(changedLast, answer.error);
     lab.say(changedLast ? "" : answer.error, true);
@@ -113,9 +122,9 @@ function arrived(answer) {
   if (answer.want !== "run") return;
   flying = null;
   if (next) { send(); return; }
-  resting = setTimeout(() => conversation.send({ id: ++number, want: "tell", state }), REST);
+  resting = setTimeout(() => more("tell"), REST);
   idling = setTimeout(() => {
-    if (answer.kind === "run") conversation.send({ id: ++number, want: "wavelet", state });
+    if (answer.kind === "run") more("wavelet");
     history.replaceState(null, "", link());
   }, IDLE);
 }
@@ -134,34 +143,45 @@ function kinds({ time, begins, ends, kinds: found }) {
 /* ---------- traces ---------- */
 const shape = () => run.series.map((each) => each.name + each.unit).join();
 
+const tall = () => (innerWidth < 960 ? 72 : HEIGHT);
+
 function build() {
   for (const chart of charts) chart.destroy();
   $("traces").replaceChildren();
   charts = [];
   const palette = lab.colours();
-  for (const [group, words] of Object.entries(GROUPS)) {
-    const lines = run.series.filter((each) => each.group === group || (group === "x" && each.name === "z"));
+  for (const [group, words, turns = false] of PANELS) {
+    const lines = run.series.filter((each) => each.group === group && each.unit.startsWith("rad") === turns);
+    if (!lines.length) continue;
     const box = $("traces").appendChild(document.createElement("div")), caption = box.appendChild(document.createElement("div"));
     box.className = "trace";
     caption.className = "caption";
     box.setAttribute("role", "img");
     box.setAttribute("aria-label", `${words} over time`);
-    const last = group === "friction";
+    const last = group === "friction", several = lines.filter((each) => each.name !== "z").length > 1;
+    const ink = (each, j) => (each.name === "z" ? palette.faint : palette[several ? MORE_INKS[j % 6] : INKS[group]]);
+    const title = caption.appendChild(document.createElement("span"));
+    lines.forEach((each, j) => {
+      if (!several && each.name !== "z") return;
+      const key = caption.appendChild(document.createElement("span"));
+      key.textContent = each.name === "z" ? " ┄ spring's end" : ` — ${each.name}`;
+      key.style.color = each.name === "z" ? palette.soft : ink(each, j);
+    });
     const axis = { stroke: palette.soft, font: "12px system-ui, sans-serif", grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line, width: 1, size: 4 } };
     const chart = new uPlot({
-      width: $("traces").clientWidth - 26, height: HEIGHT + (last ? 42 : 0), padding: [6, 8, last ? 0 : 4, 0], legend: { show: false }, scales: { x: { time: false } },
+      width: $("traces").clientWidth - 26, height: tall() + (last ? 42 : 0), padding: [6, 8, last ? 0 : 4, 0], legend: { show: false }, scales: { x: { time: false } },
       cursor: { sync: { key: "play" }, points: { show: false }, drag: { x: true, y: false } },
       axes: [{ ...axis, show: true, size: last ? 24 : 0, values: last ? undefined : () => [], label: last ? "time [s]" : undefined, labelSize: 18, labelFont: "12px system-ui, sans-serif", gap: 2 },
         { ...axis, size: 52, values: (plot, splits) => splits.map((value) => shortly(value * plot.factor)), space: 24 }],
-      series: [{}, ...lines.map((each, j) => ({ stroke: each.name === "z" ? palette.faint : palette[lines.filter((one) => one.name !== "z").length > 1 ? MORE_INKS[j % 6] : INKS[group]], width: 1.4, dash: each.name === "z" ? [5, 4] : undefined, points: { show: false } }))],
+      series: [{}, ...lines.map((each, j) => ({ stroke: ink(each, j), width: 1.4, dash: each.name === "z" ? [5, 4] : undefined, points: { show: false } }))],
       hooks: { drawClear: [(plot) => shade(plot, group)], setScale: [(plot, key) => { if (key === "x") zoom(plot); }] },
     }, null, box);
-    Object.assign(chart, { lines, words, caption, group, unit: lines[0].unit, factor: 1 });
+    Object.assign(chart, { lines, words, title, group, unit: lines[0].unit, factor: 1 });
     chart.now = chart.over.appendChild(document.createElement("div"));
     chart.now.className = "now";
     charts.push(chart);
   }
-  charts.shape = shape();
+  Object.assign(charts, { shape: shape(), tall: tall() });
 }
 
 function drawTraces() {
@@ -173,7 +193,7 @@ function drawTraces() {
     for (const row of rows) for (let k = 0; k < row.length; k++) { const size = Math.abs(row[k]); if (size > most) most = size; }
     const [factor, unit] = prefixed(most, chart.unit);
     chart.factor = factor;
-    chart.caption.textContent = `${chart.words}${unit ? ` [${unit}]` : ""}`;
+    chart.title.textContent = `${chart.words}${unit ? ` [${unit}]` : ""}`;
     charts.quiet = true;
     chart.setData([arrays.time, ...rows], !kept);
     if (kept) chart.redraw();
@@ -319,7 +339,7 @@ function buttons() {
   $("pace").addEventListener("change", pace);
   $("hear").addEventListener("click", () => {
     if (player) { silence(); return; }
-    conversation.send({ id: ++number, want: "sound", state });
+    more("sound");
   });
   $("share").addEventListener("click", async () => {
     history.replaceState(null, "", link());
@@ -338,9 +358,13 @@ function buttons() {
   });
   addEventListener("hashchange", () => { const shared = fromLink(); if (shared) { $("preset").value = ""; use(shared); } });
   new ResizeObserver(() => {
+    if (!run || !$("traces").clientWidth) return;
+    if (charts.tall !== tall()) { build(); drawTraces(); }
     for (const chart of charts) chart.setSize({ width: $("traces").clientWidth - 26, height: chart.height });
-    if (run) { drawViews(); drawWavelet(); stage.draw(); }
-  }).observe($("shown"));
+    drawViews();
+    drawWavelet();
+    stage.draw();
+  }).observe($("traces"));
 }
 
 async function texts(form, title, file) {

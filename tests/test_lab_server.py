@@ -1,0 +1,178 @@
+"""The lab's door: who may speak with it, what it answers, and that nothing said to it ends it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+starlette = pytest.importorskip("starlette", reason="the extra [lab] is not installed")
+from starlette.testclient import TestClient  # noqa: E402
+from starlette.websockets import WebSocketDisconnect  # noqa: E402
+
+import stickslip as ss  # noqa: E402
+from stickslip.lab.frames import unframed  # noqa: E402
+from stickslip.lab.server import lab_app  # noqa: E402
+
+COMPLIANT = ss.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
+STATE = json.loads(ss.export_system(COMPLIANT, format="json"))
+TOKEN, PORT = "a-token", 8723
+HOME = f"http://127.0.0.1:{PORT}"
+BEARER = {"authorization": f"Bearer {TOKEN}"}
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[TestClient]:
+    with TestClient(lab_app(token=TOKEN, port=PORT), base_url=HOME, raise_server_exceptions=False) as found:
+        yield found
+
+
+def test_the_address_with_its_token_is_exchanged_for_a_cookie(client: TestClient) -> None:
+    answer = client.get(f"/?token={TOKEN}", follow_redirects=False)
+    assert (answer.status_code, answer.headers["location"]) == (303, "/")
+    cookie = answer.headers["set-cookie"].lower()
+    assert "httponly" in cookie
+    assert "samesite=strict" in cookie
+    page = client.get("/")
+    assert "stickslip lab" in page.text
+    client.cookies.clear()
+    assert client.get("/").status_code == 401
+
+
+@pytest.mark.parametrize("path", ["/", "/alive", "/catalog", "/lab.js", "/openapi.json", "/nothing"])
+def test_who_does_not_know_the_token_gets_one_sentence(client: TestClient, path: str) -> None:
+    for headers in ({}, {"authorization": "Bearer guess"}, {"cookie": f"stickslip-{PORT}=guess"}):
+        answer = client.get(path, headers=headers)
+        assert answer.status_code == 401
+        assert answer.json()["error"].endswith(".")
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", f"evil.example:{PORT}", "127.0.0.1", "127.0.0.1:80", "[::1]:8723", ""]
+)
+def test_a_foreign_host_is_refused(client: TestClient, host: str) -> None:
+    assert client.get("/alive", headers={**BEARER, "host": host}).status_code == 400
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1:8723", "http://127.0.0.1:1"])
+def test_a_foreign_origin_is_refused(client: TestClient, origin: str) -> None:
+    assert client.post("/export", headers={**BEARER, "origin": origin}, json=STATE).status_code == 403
+    with (
+        pytest.raises(WebSocketDisconnect),
+        client.websocket_connect(f"ws://127.0.0.1:{PORT}/play", headers={**BEARER, "origin": origin}),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("headers", [{}, {"authorization": "Bearer guess"}, {**BEARER, "host": "evil.example"}])
+@pytest.mark.parametrize("path", ["/play", "/map"])
+def test_a_socket_opens_for_the_page_alone(client: TestClient, path: str, headers: dict[str, str]) -> None:
+    with (
+        pytest.raises(WebSocketDisconnect),
+        client.websocket_connect(f"ws://127.0.0.1:{PORT}{path}", headers=headers),
+    ):
+        pass
+
+
+def test_the_page_may_load_and_reach_nothing_but_the_lab(client: TestClient) -> None:
+    for path in ("/", "/alive", "/nothing", "/play.js"):
+        headers = client.get(path, headers=BEARER).headers
+        policy = dict(part.strip().split(" ", 1) for part in headers["content-security-policy"].split(";"))
+        assert policy["default-src"] == "'none'"
+        assert policy["script-src"] == policy["style-src"] == "'self'"
+        assert policy["frame-ancestors"] == "'none'"
+        assert "unsafe" not in headers["content-security-policy"]
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["cache-control"] == "no-store"
+
+
+def test_the_page_names_no_address_but_its_own(client: TestClient) -> None:
+    for path in (
+        "/",
+        "/lab.css",
+        "/lab.js",
+        "/play.js",
+        "/map.js",
+        "/controls.js",
+        "/stage.js",
+        "/canvas.js",
+        "/socket.js",
+    ):
+        text = client.get(path, headers=BEARER).text
+        assert "https://" not in text
+        assert "http://" not in text
+        assert "innerHTML =" not in text or path == "/map.js"  # a constant form; what is told is set as text
+
+
+def test_what_is_too_large_is_refused_while_it_streams(client: TestClient) -> None:
+    def endless() -> Iterator[bytes]:
+        for _ in range(40):
+            yield b"x" * 100_000
+
+    answer = client.post("/open", headers=BEARER, content=endless())
+    assert answer.status_code == 413
+    assert "1 MB" in answer.json()["error"]
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body", "status"),
+    [
+        ("GET", "/nothing", None, 404), ("GET", "/../../etc/passwd", None, 404),
+        ("GET", "/%2e%2e/server.py", None, 404),
+        ("DELETE", "/alive", None, 405), ("GET", "/scenarios/nope", None, 422), ("POST", "/export", b"{", 400),
+        ("POST", "/export", b"[" * 100_000, 400), ("POST", "/export", b"[]", 422), ("POST", "/export", b"{}", 422),
+        ("POST", "/open", b"\xff\xfe", 422), ("POST", "/open", b"a = .3", 422),
+    ],
+)  # fmt: skip
+def test_what_has_no_answer_gets_one_sentence(
+    client: TestClient, method: str, path: str, body: Any, status: int
+) -> None:
+    answer = client.request(method, path, headers=BEARER, content=body)
+    assert answer.status_code == status
+    assert answer.json()["error"].endswith(".")
+
+
+def test_what_is_understood_stands_in_the_openapi_document(client: TestClient) -> None:
+    document = client.get("/openapi.json", headers=BEARER).json()
+    assert document["openapi"].startswith("3.1")
+    assert {"/catalog", "/export", "/open", "/scenarios/{name}"} <= set(document["paths"])
+    assert document["paths"]["/scenarios/{name}"]["get"]["parameters"][0]["in"] == "path"
+
+
+def test_the_catalog_offers_every_law_drive_and_scenario(client: TestClient) -> None:
+    catalog = client.get("/catalog", headers=BEARER).json()
+    assert set(catalog["laws"]) == set(ss.scenarios.LAWS)
+    assert set(catalog["drives"]) == set(ss.scenarios.DRIVES)
+    assert [each["name"] for each in catalog["presets"]] == list(ss.scenarios.names())
+    told = [each["about"] for kind in ("laws", "drives") for each in catalog[kind].values()]
+    assert not [words for words in told if "\\" in words or ":math:" in words or "`" in words]
+
+
+@pytest.mark.parametrize("kind", ["laws", "drives"])
+def test_each_parameter_is_offered_in_the_unit_that_a_file_takes(client: TestClient, kind: str) -> None:
+    """The unit that the page shows is one that the library reads for that parameter."""
+    for name, part in client.get("/catalog", headers=BEARER).json()[kind].items():
+        for each in part["parameters"]:
+            if not each["unit"] or each["default"] is not None or each["unit"] == "m or N":
+                continue
+            table = {"name": name, each["name"]: f"1 {each['unit']}"}
+            state = {**STATE, "law" if kind == "laws" else "drive": table}
+            refused = client.post("/export", headers=BEARER, json=state).json().get("error", "")
+            assert "measured in" not in refused, (name, each, refused)
+
+
+@pytest.mark.parametrize(
+    "message", ["", "rubbish", "[]", "{}", '{"want": "run"}', '{"want": "rm", "id": 1}', "[" * 9999, b"\x00\xff"]
+)
+@pytest.mark.parametrize("path", ["/play", "/map"])
+def test_a_socket_survives_what_it_does_not_understand(client: TestClient, path: str, message: str | bytes) -> None:
+    with client.websocket_connect(f"ws://127.0.0.1:{PORT}{path}", headers=BEARER) as socket:
+        (socket.send_text if isinstance(message, str) else socket.send_bytes)(message)  # type: ignore[arg-type]
+        header, _ = unframed(socket.receive_bytes())
+        assert header["kind"] == "error"
+        assert header["error"].endswith(".")
+        if path == "/play":
+            socket.send_text(json.dumps({"id": 2, "want": "run", "state": STATE}))
+            assert unframed(socket.receive_bytes())[0]["kind"] == "run"
