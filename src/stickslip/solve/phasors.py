@@ -29,6 +29,7 @@ LONGEST = 8192  # nodes of one table
 HISTORY = 4096  # pieces remembered; the guess is one lap old
 SLIDING, HELD = 1.0, 0.0
 SPLITS = 64
+LOOK = 0.4  # rad between two looks for an exit of which the lap before tells nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,10 +243,11 @@ def _below(g, d, h, j, fourth, length):
 
 
 @compiled(**FAST, forceinline=True)
-def _certified(grid, piece, exits, leaving, w, lr, li, t, end, parts, nodes):
+def _certified(grid, piece, exits, leaving, w, lr, li, t, spread, end, parts, nodes):
     """Whether every exit stays below zero on (0, t): quartic bounds from both ends of `parts` intervals.
 
-    `grid` holds number and density of the drive's nodes, then first, number and density of the mode's (0: held).
+    `grid` holds number and density of the drive's nodes, then first, number and density of the mode's (0: held);
+    `spread` is what a growing motion multiplies the bound of the fourth derivative by.
     """
     half = 0.5 * t / parts
     cr, ci, yr, yi = end
@@ -261,7 +263,7 @@ def _certified(grid, piece, exits, leaving, w, lr, li, t, end, parts, nodes):
         else:
             nr, ni, mr, mi = 0.0, 0.0, 0.0, 0.0
         for q in range(exits):
-            fourth = piece[q, 9]
+            fourth = piece[q, 9] * spread
             if j == 0:
                 if not _below(piece[q, 5], piece[q, 6], piece[q, 7], piece[q, 8], fourth, half):
                     return False
@@ -280,6 +282,60 @@ def _certified(grid, piece, exits, leaving, w, lr, li, t, end, parts, nodes):
             if not _below(g, -d, h, -jerk, fourth, half):
                 return False
     return True
+
+
+@compiled(**FAST, forceinline=True)
+def _sought(grid, piece, exits, w, lr, li, lam, longest, nodes):
+    """Near which time some exit first rises through zero, and which: looks at some distance, only to start from.
+
+    (-1, 0) where none is seen. What lies between two looks is not seen, and left to the certificate.
+    """
+    step = LOOK / max(w, lam)
+    count = int(longest / step) + 1
+    for j in range(1, count + 1):
+        t, best, which = min(j * step, longest), 2.0 * longest, 0
+        nr, ni = _turn(nodes, 0, grid[0], grid[1], 0.0, w, t)
+        mr, mi = 0.0, 0.0
+        if grid[3] > 0:
+            mr, mi = _turn(nodes, grid[2], grid[3], grid[4], lr, li, t)
+        for q in range(exits):
+            g = piece[q, 0] + piece[q, 1] * nr - piece[q, 2] * ni + piece[q, 3] * mr - piece[q, 4] * mi
+            before = piece[q, 5] if j == 1 else piece[q, 10]
+            piece[q, 10] = g
+            if g > 0.0:
+                # the chord's zero; of a rise from zero itself there is none
+                near = t - step * g / (g - before) if before < 0.0 else t
+                if near < best:
+                    best, which = near, q
+        if best < 2.0 * longest:
+            return best, which
+    return -1.0, 0
+
+
+@compiled(**FAST, forceinline=True)
+def _polished(grid, piece, k, w, lr, li, lam, t, nodes):
+    """Halley's steps onto the zero of an exit: whether they end there, the time, and both phasors at it."""
+    cr, ci, yr, yi = 1.0, 0.0, 0.0, 0.0
+    for _ in range(6):
+        cr, ci = _turn(nodes, 0, grid[0], grid[1], 0.0, w, t)
+        if grid[3] > 0:
+            yr, yi = _turn(nodes, grid[2], grid[3], grid[4], lr, li, t)
+        dr, di = piece[k, 1] * cr - piece[k, 2] * ci, piece[k, 1] * ci + piece[k, 2] * cr
+        wr, wi = piece[k, 3] * yr - piece[k, 4] * yi, piece[k, 3] * yi + piece[k, 4] * yr
+        ar, ai = lr * wr - li * wi, lr * wi + li * wr
+        g, d, h = piece[k, 0] + dr + wr, ar - w * di, lr * ar - li * ai - w * w * dr
+        step = -2.0 * g * d / (2.0 * d * d - g * h)
+        if not (d > 0.0 and abs(step) < 0.2 * t):
+            break
+        t += step
+        if abs(step) * max(w, lam) < 2e-6:
+            # the phasors follow the last correction by their Taylor polynomials
+            z = w * step
+            cr, ci = cr - z * ci - 0.5 * z * z * cr, ci + z * cr - 0.5 * z * z * ci
+            p, q = lr * step, li * step
+            p, q = p + 0.5 * (p * p - q * q), q + p * q
+            return True, t, cr, ci, yr + p * yr - q * yi, yi + p * yi + q * yr
+    return False, t, cr, ci, yr, yi
 
 
 @compiled(**FAST)
@@ -387,52 +443,38 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
             mode = target[fired]
             chain += 1
             continue
-        # the same piece one lap ago is the guess
+        # the same piece one lap ago is the guess; where it is none, looks along the way find one
         slot = ring[1]
-        if past_mode[slot] != mode or past_exit[slot] < 0:
-            break
-        t, leaving = past_time[slot], past_exit[slot]
         left = (limit[0] - clock[0]) * period if limit[0] != clock[0] else 0.0
         left += limit[1] - clock[1]
-        if not t < 0.999 * min(left, period):
-            break
-        first_node, mode_nodes, mode_density = int(modes[mode, 8]), int(modes[mode, 9]), modes[mode, 7]
-        k = leaving - low
+        longest = 0.999 * min(left, period)
+        grid = (turns, density, int(modes[mode, 8]), int(modes[mode, 9]), modes[mode, 7])
+        t, leaving, parts = past_time[slot], past_exit[slot], past_parts[slot]
+        guessed = past_mode[slot] == mode and leaving >= 0
         done = False
-        cr, ci, yr, yi = 1.0, 0.0, 0.0, 0.0
-        for _ in range(6):
-            cr, ci = _turn(nodes, 0, turns, density, 0.0, w, t)
-            if sliding:
-                yr, yi = _turn(nodes, first_node, mode_nodes, mode_density, lr, li, t)
-            dr, di = piece[k, 1] * cr - piece[k, 2] * ci, piece[k, 1] * ci + piece[k, 2] * cr
-            wr, wi = piece[k, 3] * yr - piece[k, 4] * yi, piece[k, 3] * yi + piece[k, 4] * yr
-            ar, ai = lr * wr - li * wi, lr * wi + li * wr
-            g, d, h = piece[k, 0] + dr + wr, ar - w * di, lr * ar - li * ai - w * w * dr
-            step = -2.0 * g * d / (2.0 * d * d - g * h)
-            if not (d > 0.0 and abs(step) < 0.2 * t):
+        for attempt in range(2):
+            if attempt == 1:
+                t, k = _sought(grid, piece, number, w, lr, li, lam, longest, nodes)
+                leaving, parts = low + k, 1
+            elif not guessed:
+                continue
+            if not 0.0 < t < longest:
+                continue
+            k = leaving - low
+            done, t, cr, ci, yr, yi = _polished(grid, piece, k, w, lr, li, lam, t, nodes)
+            if done and t < 0.9999 * left and t < period:
+                spread = math.exp(1.000001 * lr * t) if lr > 0.0 else 1.0
+                end = (cr, ci, yr, yi)
+                while parts <= SPLITS and not _certified(
+                    grid, piece, number, k, w, lr, li, t, spread, end, parts, nodes
+                ):
+                    parts *= 2
+                done = parts <= SPLITS
+            else:
+                done = False
+            if done:
                 break
-            t += step
-            if abs(step) * max(w, lam) < 2e-6:
-                # the phasors follow the last correction by their Taylor polynomials
-                z = w * step
-                cr, ci = cr - z * ci - 0.5 * z * z * cr, ci + z * cr - 0.5 * z * z * ci
-                p, q = lr * step, li * step
-                p, q = p + 0.5 * (p * p - q * q), q + p * q
-                yr, yi = yr + p * yr - q * yi, yi + p * yi + q * yr
-                done = True
-                break
-        if not done or t >= 0.9999 * left or t >= period:
-            break
-        if lr > 0.0:
-            grown = math.exp(1.000001 * lr * t)
-            for q in range(number):
-                piece[q, 9] *= grown
-        parts = past_parts[slot]
-        grid = (turns, density, first_node, mode_nodes, mode_density)
-        end = (cr, ci, yr, yi)
-        while parts <= SPLITS and not _certified(grid, piece, number, k, w, lr, li, t, end, parts, nodes):
-            parts *= 2
-        if parts > SPLITS:
+        if not done:
             break
         # the piece stands: write it, carry the state over
         laps_out[count], times_out[count], modes_out[count] = clock[0], clock[1], mode
