@@ -17,7 +17,7 @@ from stickslip.sweeps import tally as log
 from stickslip.sweeps.grid import START
 from stickslip.sweeps.measures import FAILED, NO_SYSTEM, ORDERS
 from stickslip.sweeps.plan import Arrays, Plan
-from stickslip.sweeps.watch import CONSTANT, LAP, ROOM, VARIES, repeats, watch_all
+from stickslip.sweeps.watch import CONSTANT, LAP, MARK, ROOM, VARIES, repeats, watch_all
 
 Index = NDArray[np.int64]
 Watch = Callable[[Any, Any, int, int], None]  # march what is given into what is left; modes and physical entries
@@ -178,4 +178,4 @@ def scratch(rows: int, size: int, physical: int) -> Any:
             np.zeros((rows, ROOM)), np.zeros((rows, ROOM, size)), np.zeros((rows, ROOM), np.int16))  # fmt: skip
     return (np.zeros((rows, 17, wide)), np.zeros((2, rows, LAP), np.int64), np.zeros((rows, LAP)),
             np.zeros((rows, LAP), np.int64), np.zeros((rows, 3), np.int64), np.zeros((rows, 3)), room,
-            np.zeros((rows, physical, size)))  # fmt: skip
+            np.zeros((rows, physical, size)), np.zeros((rows, 4, max(size + MARK + 1, log.ENTRIES))))  # fmt: skip

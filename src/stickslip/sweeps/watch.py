@@ -1,7 +1,8 @@
 """March one oscillator and count as it goes, without keeping its motion: compiled, for CPU and GPU alike.
 
 A march writes a handful of pieces, they are counted, and their room is used again: a map needs no more memory per
-motion than its answers.
+motion than its answers. A motion that is again, to the last digits, where it was some laps before is not marched
+through the laps in which it only repeats: they are skipped, and counted as the laps between.
 """
 
 from __future__ import annotations
@@ -13,12 +14,16 @@ from stickslip.solve.batch import fast_of, slow_of
 from stickslip.solve.kernel import DONE, FULL, advance, follow, march, measure, set_tones, settle
 from stickslip.solve.tangent import carry_tangents
 from stickslip.sweeps.measures import AT_REST, CLOSE, FAILED, MOVING, ORDERS
-from stickslip.sweeps.tally import REACH, SLIP, WORK, note
+from stickslip.sweeps.tally import ABNORMAL, ENTRIES, HELD, NORMAL, REACH, SHORT, SLIP, WORK, note
 
-ROOM = 64  # pieces written before they are counted
+ROOM = 16  # pieces written before they are counted
 LAP = 64  # pieces remembered for the fast path, a power of two
 BUDGET = 10_000  # events in a period; more is taken for chatter
 TIRELESS = 2**62
+PARTS = 256  # of a run, of four laps each where it is short: what moves less than STILL in such a part is steady,
+STILL = 4e-15  # and would not move by more than PARTS times as much, some 1e-12, in the rest
+NEXT, BEGUN, AGAIN, SPAN, PLACE = range(5)  # of a mark: lap from which on the next is made, lap of this one (-1: none),
+MARK = 5  # whether the motion is there again, laps between two marks, and time within the lap; then mode and state
 CONSTANT, VARIES = 1, 2  # what friction does in a mode, beside none (0)
 # Gauss-Legendre points and weights on (0, 1)
 POINTS = (
@@ -36,12 +41,12 @@ def watch_one(i, s, given, out, scratch):
     """March motion i with scratch s, and leave its status, what is counted, and its last states at phase zero."""
     opened, modes, periods, units, slow, fast, look, wants, leaps, weights = given
     statuses, sums, sections, growths, jacobians = out
-    works, names, times, parts, rings, clocks, room, tangents = scratch
+    works, names, times, parts, rings, clocks, room, tangents, marks = scratch
     n, physical, period = opened.shape[1], sections.shape[2], periods[i]
     state, work = works[s, 16, :n], works[s]
     past = (names[0, s], names[1, s], times[s], parts[s], rings[s])
     pieces = (room[0][s], room[1][s], room[2][s], room[3][s], room[4][s], room[5][s])
-    motion = (slow_of(slow, i), fast_of(fast, i), clocks[s], state, period, units[i], past, pieces, work)
+    motion = (slow_of(slow, i), fast_of(fast, i), clocks[s], state, period, units[i], past, pieces, work, marks[s])
     settled, total, rows = wants[0], wants[0] + wants[1], sections.shape[1]
     each, driven = wants[2] == 1, math.isfinite(period)
     mode = _begin(motion, opened[i], modes[i], total)
@@ -49,6 +54,7 @@ def watch_one(i, s, given, out, scratch):
     for k in range(n):
         tangent[0, k] = (1.0 - 0.5 * k / max(1, physical - 1)) / weights[i, k] if k < physical else 0.0
     growths[i] = 0.0
+    _unmarked(marks[s], 4.0 * math.ceil(total / PARTS) if driven and not each else 0.0)
     lap, last, lasted = 0, 0, 0.0
     while lap < total and mode >= 0:
         until = total - max(0, rows - 1)
@@ -73,7 +79,7 @@ def watch_one(i, s, given, out, scratch):
 @compiled(**OPTIONS)
 def _begin(motion, opened, mode, total):
     """Set the state and forget the motion before; the mode in which time passes, -1 where there is none."""
-    tables, _, clock, state, _, unit, past, _, work = motion
+    tables, _, clock, state, _, unit, past, _, work, _ = motion
     n, degree = state.shape[0], tables[3].shape[1]
     for k in range(n):
         state[k] = opened[k]
@@ -90,7 +96,7 @@ def _begin(motion, opened, mode, total):
 def _to(i, lap, until, motion, mode, settled, look, each, leaps, tangent, sums):
     """March to a lap and count; the mode there (-1: the march failed), that of the last piece, and how long it lasted
     where nothing ended it."""
-    tables, quick, clock, state, period, unit, past, pieces, work = motion
+    tables, quick, clock, state, period, unit, past, pieces, work, marks = motion
     driven = math.isfinite(period)
     limit = (float(until), 0.0) if driven else (0.0, until * unit)
     outcome, events, last, lasted = FULL, 0, mode, 0.0
@@ -102,6 +108,8 @@ def _to(i, lap, until, motion, mode, settled, look, each, leaps, tangent, sums):
         if count > 0:
             last, lasted = pieces[2][count - 1], pieces[3][count - 1] if pieces[5][count - 1] < 0 else 0.0
         _count(i, count, motion, settled, look, sums)
+        if marks[0, AGAIN] == 1.0 and outcome == FULL:
+            _skip(clock, marks, settled, until, sums)
         if each:
             _carry(i, count, motion, mode, leaps, tangent)
     return mode, last, lasted
@@ -122,7 +130,7 @@ def _carry(i, count, motion, mode, leaps, tangents):
 @compiled(**OPTIONS)
 def _differentiate(i, total, motion, mode, leaps, tangents, section, jacobian):
     """The derivative of the motion over the laps after which it repeats, where it does."""
-    tables, quick, clock, state, period, _, past, pieces, work = motion
+    tables, quick, clock, state, period, _, past, pieces, work, _ = motion
     physical, order, outcome = jacobian.shape[0], repeats(section), FULL
     for a in range(physical):
         for k in range(state.shape[0]):
@@ -201,7 +209,7 @@ def _read(row, state, tones, time):
 @compiled(**OPTIONS)
 def _count(i, count, motion, settled, look, sums):
     """Count the pieces just written."""
-    tables, _, clock, state, period, unit, _, pieces, work = motion
+    tables, _, clock, state, period, unit, _, pieces, work, marks = motion
     laps, offsets, modes, durations, states, _ = pieces
     kinds, sides, inner, works, _, slip, gap, friction, constant = look
     n, tones = state.shape[0], tables[8]
@@ -211,6 +219,8 @@ def _count(i, count, motion, settled, look, sums):
     place = _read(gap[i], states[0], tones, offsets[0])
     for p in range(count):
         m, length = modes[p], durations[p]
+        if laps[p] >= marks[0, NEXT]:
+            _mark(laps[p], offsets[p] / period, m, states[p], tones, sums, marks)
         begin = (laps[p] - settled) * period + offsets[p] if math.isfinite(period) else offsets[p] - settled * unit
         last = p == count - 1
         x = state[0] if last else states[p + 1, 0]
@@ -232,6 +242,49 @@ def _count(i, count, motion, settled, look, sums):
             if inner[m] or works[m] == VARIES:
                 _inside(tables, m, held, span, inner[m], works[m] == VARIES, friction[i, m], slip[i], sums, work)
         place = after
+
+
+@compiled(**OPTIONS)
+def _unmarked(marks, span):
+    """Forget the motion before; without a span, no marks are made."""
+    marks[0, NEXT], marks[0, BEGUN], marks[0, AGAIN], marks[0, SPAN] = 0.0 if span else math.inf, -1.0, 0.0, span
+    for k in range(marks.shape[1]):
+        marks[1, k] = 0.0
+
+
+@compiled(**OPTIONS)
+def _mark(lap, place, mode, state, tones, sums, marks):
+    """Remember the motion at its first event of a lap, and tell whether it is again where the last mark was."""
+    here, size, before, gains = marks[0], marks[1], marks[2], marks[3]
+    again = here[BEGUN] >= 0.0 and lap == here[BEGUN] + here[SPAN] and mode == here[MARK]
+    again = again and abs(place - here[PLACE]) <= STILL
+    for k in range(state.shape[0]):
+        turns = tones.shape[0] == 1 and (k == int(tones[0, 0]) or k == int(tones[0, 1]))
+        size[k] = max(size[k], abs(state[k]))
+        if not turns:
+            again = again and abs(state[k] - here[MARK + 1 + k]) <= STILL * size[k]
+            here[MARK + 1 + k] = state[k]
+    for k in range(ENTRIES):
+        gains[k] = sums[k] - before[k]
+        before[k] = sums[k]
+    here[AGAIN] = 1.0 if again else 0.0
+    here[PLACE], here[MARK], here[BEGUN], here[NEXT] = place, mode, lap, lap + here[SPAN]
+
+
+@compiled(**OPTIONS)
+def _skip(clock, marks, settled, until, sums):
+    """Leave out the laps in which a motion repeats: all but the last that is not measured, or the last."""
+    here, gains = marks[0], marks[3]
+    span, measured = here[SPAN], here[BEGUN] - here[SPAN] >= settled
+    times = math.floor(((until if measured else min(settled, until)) - 1.0 - clock[0]) / span)
+    here[AGAIN] = 0.0
+    if times < 1.0:
+        return
+    if measured:
+        for k in (NORMAL, ABNORMAL, HELD, SHORT, WORK):
+            sums[k] += times * gains[k]
+    clock[0] += times * span
+    here[BEGUN], here[NEXT] = -1.0, until if measured else settled
 
 
 @compiled(**OPTIONS)
