@@ -24,6 +24,7 @@ from stickslip.solve.phasors import Phasors, phasors
 
 Index = NDArray[np.int64]
 TERMS = 26  # of a Taylor series whose flow turns half a radian at most: the rest is below the last digit
+NEAR = 256  # different rows among which an equal one is looked for
 PART = 4  # a cell turns one radian; its exponential is summed over a fourth of it, and squared twice
 
 
@@ -194,43 +195,35 @@ class _Builder:
             flow[:, self.names.index(name)] = rate + self.moved(name, 1)
         return friction, flow
 
-    def carry(self, mode: int, number: int, friction: Array, held: bool) -> Array:
-        """R of an exit."""
+    def carry(self, mode: int, number: int, friction: Array, held: bool, carry: Array) -> None:
+        """R of an exit, written over the unit matrices of `carry`."""
         exits = [table[mode].exits[number] for table in self.tables]
-        carry = np.tile(np.eye(self.size), (self.count, 1, 1))
         for name in exits[0].reset:
             row = self.relative([e.reset[name] for e in exits], friction) + self.moved(name, 0)
             carry[:, self.names.index(name)] = row
         if held:
-            stop = np.tile(np.eye(self.size), (self.count, 1, 1))
-            stop[:, 1] = self.face[1]
-            carry = stop @ carry
-        return carry
+            carry[:, 1] = _through(self.face[1], carry)
 
     def build(self) -> Tables:
         modes, law, motion = self.tables[0], self.fleet.laws[0], self.motions[0]
         order = {mode.name: j for j, mode in enumerate(modes)}
-        frictions, flows = zip(*(self.motion_in(j) for j in range(len(modes))), strict=True)
-        series, targets, resets, first, cells, hops = [], [], [], [0], [], []
-        for j, mode in enumerate(modes):
-            slope = _through(frictions[j], flows[j])
-            rows = [
-                self.relative([table[j].exits[e].quantity for table in self.tables], frictions[j], slope)
-                for e in range(len(mode.exits))
-            ]
-            quantities = np.stack(rows, axis=1) if rows else np.zeros((self.count, 0, self.size))
-            powers = np.empty((*quantities.shape[:2], DEGREE + 1, self.size))
-            _derive(quantities, flows[j], powers)
-            series.append(powers)
-            cell, hop = _cells(flows[j], self.names.index("1"))
-            cells.append(cell)
-            hops.append(hop)
-            for e, exit_ in enumerate(mode.exits):
-                target = order[exit_.to]
-                targets.append(target)
-                stopped = set(exit_.quantity) == {"v"}
-                resets.append(self.carry(j, e, frictions[j], stopped or modes[target].friction is None))
-            first.append(len(targets))
+        frictions, flows = (np.stack(rows, axis=1) for rows in zip(*map(self.motion_in, range(len(modes))), strict=True))
+        exits = [(j, e, exit_) for j, mode in enumerate(modes) for e, exit_ in enumerate(mode.exits)]
+        first = np.cumsum([0] + [len(mode.exits) for mode in modes])
+        target = np.array([order[exit_.to] for *_, exit_ in exits], dtype=np.int64)
+        quantities = np.empty((self.count, len(exits), self.size))
+        reset = np.empty((self.count, len(exits), self.size, self.size))
+        reset[...] = np.eye(self.size)
+        slopes = np.einsum("bmi,bmij->bmj", frictions, flows)
+        for row, (j, e, exit_) in enumerate(exits):
+            forms = [table[j].exits[e].quantity for table in self.tables]
+            quantities[:, row] = self.relative(forms, frictions[:, j], slopes[:, j])
+            # an exit at zero velocity leaves exactly none: rounding must not decide what follows
+            stopped = set(exit_.quantity) == {"v"}
+            self.carry(j, e, frictions[:, j], stopped or modes[target[row]].friction is None, reset[:, row])
+        series = np.empty((self.count, len(exits), DEGREE + 1, self.size))
+        _derive(quantities, flows, first, series, np.empty((2, self.size**2), np.int64), np.empty(self.size**2))
+        cell, hop = _cells(flows, self.names.index("1"))
         none = np.zeros((self.count, self.size))
         opening = [none, self.face[1]]
         for name in self.memory:
@@ -241,12 +234,10 @@ class _Builder:
         places = [(self.names.index(c), self.names.index(s)) for c, s, *_ in motion.tones]
         tones = np.array([[(*p, *t[2:]) for p, t in zip(places, m.tones, strict=True)] for m in self.motions])
         return Tables(
-            names=self.names, modes=modes, flow=np.stack(flows, axis=1), cell=np.stack(cells, axis=1),
-            hop=np.stack(hops, axis=1), series=np.concatenate(series, axis=1), target=np.array(targets, dtype=np.int64),
-            crossing=np.array([e.crossing for mode in modes for e in mode.exits], dtype=np.bool_),
-            reset=np.stack(resets, axis=1), first=np.array(first, dtype=np.int64),
+            names=self.names, modes=modes, flow=flows, cell=cell, hop=hop, series=series, target=target,
+            crossing=np.array([exit_.crossing for *_, exit_ in exits], dtype=np.bool_), reset=reset, first=first,
             tones=tones.reshape(len(self.motions), len(places), 4)[self.fleet.drive],
-            friction=np.stack(frictions, axis=1), slip=self.v - self.face[1], gap=self.x - self.face[0],
+            friction=frictions, slip=self.v - self.face[1], gap=self.x - self.face[0],
             period=np.array([m.period for m in self.motions])[self.fleet.drive], opening=np.stack(opening, axis=1),
             begin=begin, entry=(order[law.entry[0]], order[law.entry[1]], order[law.entry[2]]),
             physical=2 + len(self.memory),
@@ -264,40 +255,76 @@ def _through(rows: Array, flow: Array) -> Array:
 
 
 @compiled(**OPTIONS)
-def _derive(quantities, flows, out):
+def _derive(quantities, flows, first, out, places, work):
     """q A^k of every exit; where terms cancel but for their rounding, nothing is left."""
-    count, exits, n = quantities.shape
+    count, modes, n, _ = flows.shape
     for b in range(count):
-        for e in range(exits):
+        for m in range(modes):
+            filled = 0  # entries of the flow, column by column
             for j in range(n):
-                out[b, e, 0, j] = quantities[b, e, j]
-            for k in range(DEGREE):
+                for i in range(n):
+                    if flows[b, m, i, j] != 0.0:
+                        places[0, filled], work[filled] = i, flows[b, m, i, j]
+                        filled += 1
+                places[1, j] = filled
+            for e in range(first[m], first[m + 1]):
                 for j in range(n):
-                    total, size = 0.0, 0.0
-                    for i in range(n):
-                        term = out[b, e, k, i] * flows[b, i, j]
-                        total += term
-                        size += abs(term)
-                    out[b, e, k + 1, j] = total if abs(total) > CANCELLED * size else 0.0
+                    out[b, e, 0, j] = quantities[b, e, j]
+                for k in range(out.shape[2] - 1):
+                    f = 0
+                    for j in range(n):
+                        total, size = 0.0, 0.0
+                        while f < places[1, j]:
+                            term = out[b, e, k, places[0, f]] * work[f]
+                            total += term
+                            size += abs(term)
+                            f += 1
+                        out[b, e, k + 1, j] = total if abs(total) > CANCELLED * size else 0.0
 
 
 def _cells(flow: Array, constant: int) -> tuple[Array, Array]:
-    """Length of a Taylor cell [s] of each flow, and exp(A cell) as `hop` has it.
+    """Length of a Taylor cell [s] of each flow (B, M, N, N), and exp(A cell) as `hop` has it.
 
     The column of the constant stands for a force that does not change: the exponential is linear in it, and that of
     the rest is the same for all flows that differ in that force alone.
     """
-    core = flow.copy()
+    count, modes, size, _ = flow.shape
+    whole = flow.reshape(-1, size, size)
+    core = whole.copy()
     core[:, :, constant] = 0.0
-    keys = core.reshape(len(core), -1).view(f"V{core[0].nbytes}")
-    _, where, which = np.unique(keys, return_index=True, return_inverse=True)
-    core, which = core[where], which.reshape(-1)
-    rate = _fastest(core)
-    cell = np.divide(1.0, rate, out=np.full(len(rate), np.inf), where=rate > 0)
+    where, which = np.empty((2, len(core)), np.int64)
+    found = _distinct(core.reshape(len(core), -1), where, which)
+    where = where[:found]
+    core, rate = core[where], np.zeros(found)
+    for mode in range(modes):
+        own = where % modes == mode
+        rate[own] = _fastest(core[own])
+    cell = np.divide(1.0, rate, out=np.full(found, np.inf), where=rate > 0)
     turned, integral = _exponentials(core, np.where(np.isfinite(cell), cell, 0.0))
-    hop = turned[which]
-    hop[:, :, constant] += np.einsum("bij,bj->bi", integral[which], flow[:, :, constant].astype(np.longdouble))
-    return cell[which], np.moveaxis(halved(hop), 0, 1).copy()
+    hop = np.moveaxis(halved(turned), 0, 1)[which]
+    pushed = np.einsum("bij,bj->bi", integral[which], whole[:, :, constant].astype(np.longdouble))
+    hop[:, :, :, constant] = np.moveaxis(halved(turned[which, :, constant] + pushed), 0, 1)
+    return cell[which].reshape(count, modes), hop.reshape(count, modes, 3, size, size)
+
+
+@compiled(**OPTIONS)
+def _distinct(rows, where, which):
+    """Where each different row stands first, and which of them each row is; how many there are. Rows that are far apart
+    may count as different though they are equal."""
+    count, width = 0, rows.shape[1]
+    for r in range(rows.shape[0]):
+        which[r] = -1
+        for u in range(count - 1, max(-1, count - 1 - NEAR), -1):
+            j = 0
+            while j < width and rows[where[u], j] == rows[r, j]:
+                j += 1
+            if j == width:
+                which[r] = u
+                break
+        if which[r] < 0:
+            where[count], which[r] = r, count
+            count += 1
+    return count
 
 
 def _fastest(flow: Array) -> Array:

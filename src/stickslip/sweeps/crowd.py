@@ -156,7 +156,8 @@ def _answers(plan: Plan, out: Sequence[NDArray[Any]], units: Array, period: Arra
             "amplitude": sums[:, log.REACH], "energy": sums[:, log.WORK] / cycles,
             "lyapunov": np.where(np.isfinite(period), growths / (units * cycles), np.nan),
         }  # fmt: skip
-    found["order"] = np.array([float(repeats(section)) for section in sections])
+    if sections.shape[1]:
+        found["order"] = np.array([float(repeats(section)) for section in sections])
     known = np.all(np.isfinite(jacobians), axis=(1, 2))
     found["multiplier"] = np.full(len(known), complex(np.nan, np.nan))
     if np.any(known):
