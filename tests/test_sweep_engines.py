@@ -77,6 +77,17 @@ def test_marched_together_they_are_as_each_alone(name: str) -> None:
                 ), key
 
 
+@pytest.mark.parametrize("system", [RIGID, COMPLIANT], ids=["rigid", "compliant"])
+def test_what_repeats_is_counted_as_if_it_were_marched(system: ss.Oscillator) -> None:
+    """The exponent is carried through every lap; the other measures alone skip those in which a motion repeats."""
+    values = {"frequency": [2.5, 4.1, 9.0], "kinetic": [0.3, 1.1]}
+    whole = ss.sweep(system, values, measures=list(MEASURES), settle=200, cycles=41)
+    for measure in MEASURES:
+        alone = ss.sweep(system, values, measures=[measure], settle=200, cycles=41)
+        for name in alone.data_vars:
+            assert np.allclose(alone[name], whole[name], rtol=1e-12, atol=1e-15, equal_nan=True), name
+
+
 @pytest.mark.parametrize("engine", ["threads", "threads://1", "threads://5"])
 def test_threads_give_the_same_bytes(engine: str) -> None:
     values = {"frequency": np.linspace(2, 9, 9), "kinetic": np.linspace(0.2, 1.6, 9)}

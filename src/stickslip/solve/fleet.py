@@ -207,7 +207,9 @@ class _Builder:
     def build(self) -> Tables:
         modes, law, motion = self.tables[0], self.fleet.laws[0], self.motions[0]
         order = {mode.name: j for j, mode in enumerate(modes)}
-        frictions, flows = (np.stack(rows, axis=1) for rows in zip(*map(self.motion_in, range(len(modes))), strict=True))
+        frictions, flows = (
+            np.stack(rows, axis=1) for rows in zip(*map(self.motion_in, range(len(modes))), strict=True)
+        )
         exits = [(j, e, exit_) for j, mode in enumerate(modes) for e, exit_ in enumerate(mode.exits)]
         first = np.cumsum([0] + [len(mode.exits) for mode in modes])
         target = np.array([order[exit_.to] for *_, exit_ in exits], dtype=np.int64)

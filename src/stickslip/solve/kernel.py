@@ -241,8 +241,8 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
     past_mode, past_exit, past_time, past_parts, ring = past
     while True:
         if quick:
-            count, came = glide(fast, tables, clock, state, mode, limit, period, past, out, count, work[6:])
-            mode = settle(tables, came, state, scale, cells[came], scratch, c, noise)
+            count, came, settled = glide(fast, tables, clock, state, mode, limit, period, past, out, count, work[6:])
+            mode = came if settled else settle(tables, came, state, scale, cells[came], scratch, c, noise)
             if mode < 0:
                 return CHATTER, count, came
         if count == capacity or spent >= patience:

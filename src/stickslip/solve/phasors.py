@@ -360,8 +360,9 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
 
     Returns
     -------
-    tuple of int
-        Number of pieces in `out`, and the mode; the general march settles it and takes the next piece.
+    tuple of (int, int, bool)
+        Number of pieces in `out`, the mode, and whether time passes in it: else the general march settles it. The next
+        piece is the general march's.
     """
     drive, modes, level, exits, rest, nodes = fast
     target, crossing, reset, first = tables[4], tables[5], tables[6], tables[7]
@@ -376,7 +377,8 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
     x, v = state[0], state[1]
     ec, es = state[size - 2], state[size - 1]
     since, chain = 0, 0
-    while count < capacity and chain < 8:
+    settled = False
+    while chain < 8:
         sliding = modes[mode, 0] == SLIDING
         lr, li, lam = modes[mode, 1], modes[mode, 2], modes[mode, 6]
         hr, hi = modes[mode, 3], modes[mode, 4]
@@ -443,6 +445,9 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
             mode = target[fired]
             chain += 1
             continue
+        settled = count == capacity
+        if settled:
+            break
         # the same piece one lap ago is the guess; where it is none, looks along the way find one
         slot = ring[1]
         left = (limit[0] - clock[0]) * period if limit[0] != clock[0] else 0.0
@@ -515,7 +520,7 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
         mode = target[leaving]
         chain = 0
     state[0], state[1], state[size - 2], state[size - 1] = x, v, ec, es
-    return count, mode
+    return count, mode, settled
 
 
 @compiled(**FAST)

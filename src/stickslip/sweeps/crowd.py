@@ -23,6 +23,7 @@ Index = NDArray[np.int64]
 Watch = Callable[[Any, Any, int, int], None]  # march what is given into what is left; modes and physical entries
 KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
 PARTS = ("law", "drive")
+PATHS = {"micro_slips", "transition_speed", "energy"}  # measures of how far and how fast the contact slips
 
 
 def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[str, Any]]]:
@@ -124,7 +125,8 @@ def watched(plan: Plan, fleet: Fleet, start: Mapping[str, Any], watch: Watch) ->
 
 def _look(table: Tables, asked: set[str]) -> tuple[NDArray[Any], ...]:
     """What the watch looks at in each mode: kind, side, whether the mass may turn within, what friction does there,
-    whether nothing moves; and slip, displacement from the counter-face and friction as linear forms."""
+    whether nothing moves; slip, displacement from the counter-face and friction as linear forms; the entry of the
+    constant, and whether it matters how far the contact slips."""
     fixed = np.arange(len(table.names)) != 0
     still_face = not np.any(table.gap[:, fixed])
     inner, works, still = [], [], []
@@ -140,7 +142,7 @@ def _look(table: Tables, asked: set[str]) -> tuple[NDArray[Any], ...]:
     return (
         np.array(kinds, dtype=np.int64), np.array([float(mode.side) for mode in table.modes]), np.array(inner),
         np.array(works, dtype=np.int64), np.array(still), table.slip, table.gap, table.friction,
-        np.array([table.physical]),
+        np.array([table.physical, bool(asked & PATHS)]),
     )  # fmt: skip
 
 
@@ -156,8 +158,9 @@ def _answers(plan: Plan, out: Sequence[NDArray[Any]], units: Array, period: Arra
             "amplitude": sums[:, log.REACH], "energy": sums[:, log.WORK] / cycles,
             "lyapunov": np.where(np.isfinite(period), growths / (units * cycles), np.nan),
         }  # fmt: skip
+    found["order"] = np.zeros(len(sums))
     if sections.shape[1]:
-        found["order"] = np.array([float(repeats(section)) for section in sections])
+        found["order"][:] = [repeats(section) for section in sections]
     known = np.all(np.isfinite(jacobians), axis=(1, 2))
     found["multiplier"] = np.full(len(known), complex(np.nan, np.nan))
     if np.any(known):

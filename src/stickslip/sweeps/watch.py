@@ -211,12 +211,13 @@ def _count(i, count, motion, settled, look, sums):
     """Count the pieces just written."""
     tables, _, clock, state, period, unit, _, pieces, work, marks = motion
     laps, offsets, modes, durations, states, _ = pieces
-    kinds, sides, inner, works, _, slip, gap, friction, constant = look
+    kinds, sides, inner, works, _, slip, gap, friction, fixed = look
+    paths = fixed[1] == 1
     n, tones = state.shape[0], tables[8]
     held = work[6, :n]
     if count == 0:
         return
-    place = _read(gap[i], states[0], tones, offsets[0])
+    place, after, speed = _read(gap[i], states[0], tones, offsets[0]) if paths else 0.0, 0.0, 0.0
     for p in range(count):
         m, length = modes[p], durations[p]
         if laps[p] >= marks[0, NEXT]:
@@ -224,8 +225,10 @@ def _count(i, count, motion, settled, look, sums):
         begin = (laps[p] - settled) * period + offsets[p] if math.isfinite(period) else offsets[p] - settled * unit
         last = p == count - 1
         x = state[0] if last else states[p + 1, 0]
-        after = _read(gap[i], state, tones, clock[1]) if last else _read(gap[i], states[p + 1], tones, offsets[p + 1])
-        speed = abs(_read(slip[i], states[p], tones, offsets[p])) if kinds[m] == SLIP else 0.0
+        if paths:
+            follows, then = (state, clock[1]) if last else (states[p + 1], offsets[p + 1])
+            after = _read(gap[i], follows, tones, then)
+            speed = abs(_read(slip[i], states[p], tones, offsets[p])) if kinds[m] == SLIP else 0.0
         note(kinds[m], sides[m], begin, length, abs(after - place), speed, sums)
         if begin + length > 0.0:
             first, span = begin >= 0.0, min(length, begin + length)
@@ -238,7 +241,7 @@ def _count(i, count, motion, settled, look, sums):
                     place = _read(gap[i], held, tones, offsets[p] - begin)
             sums[REACH] = max(sums[REACH], abs(x), abs(states[p, 0] if first else held[0]))
             if works[m] == CONSTANT:
-                sums[WORK] += friction[i, m, constant[0]] * (after - place)
+                sums[WORK] += friction[i, m, fixed[0]] * (after - place)
             if inner[m] or works[m] == VARIES:
                 _inside(tables, m, held, span, inner[m], works[m] == VARIES, friction[i, m], slip[i], sums, work)
         place = after
