@@ -27,6 +27,7 @@ let root;
 let files = [];
 let described = null;
 let job = null;
+let asked = 0;
 let charts = [];
 const parts = {};
 
@@ -173,17 +174,21 @@ function records() {
 
 const told = { columns: null, fs: "", repair: [] };
 
+// What stands is replaced when the answer comes, and the focus stays where it was.
 async function describe() {
-  described = null;
-  parts.answer.replaceChildren();
-  parts.records.replaceChildren(welcome());
-  parts.asking.replaceChildren();
-  if (!ready().length) return;
+  if (!ready().length) {
+    parts.records.replaceChildren(welcome());
+    parts.asking.replaceChildren();
+    parts.answer.replaceChildren();
+    return;
+  }
   const answer = await run("describe", {});
   if (!answer) return;
   described = answer;
+  const focus = document.activeElement?.id;
   parts.records.replaceChildren(...answer.records.map(showRecord));
   showQuestions();
+  if (focus) document.getElementById(focus)?.focus();
   lab.say(`${answer.records.map((record) => record.name).join(", ")} read`);
 }
 
@@ -228,9 +233,10 @@ function channelTable(record, number) {
     const column = told.columns?.[row]?.column || channel.column;
     const words = { ...ROLES };
     if (!(channel.name in words)) words[channel.name] = `${channel.name} (not used)`;
-    const role = select(`data-role-${number}-${channel.name}`, words, channel.name);
+    const role = select(`data-role-${number}-${column}`, words, channel.name);
     role.setAttribute("aria-label", `What ${column} is`);
     const unit = make("input", { type: "text", size: "7", value: record.unknown.includes(channel.name) ? "" : channel.unit });
+    unit.id = `data-unit-${number}-${column}`;
     unit.setAttribute("aria-label", `Unit of ${column}`);
     if (record.unknown.includes(channel.name)) {
       unit.placeholder = channel.unit === "1" ? "unit?" : `${channel.unit}?`;
@@ -376,10 +382,18 @@ function commandLine(question, said) {
 
 // ---- running
 
+// One at a time: a new question stops the one before, whose answer nobody waits for any more.
 async function run(question, said) {
   parts.answer.replaceChildren();
+  const mine = ++asked;
+  if (job) await lab.ask(`/jobs/${job}`, { method: "DELETE" });
+  if (mine !== asked) return null;
   const body = JSON.stringify({ question, records: records(), reading: reading(), options: said });
   const { id } = await lab.ask("/jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body });
+  if (mine !== asked) {
+    await lab.ask(`/jobs/${id}`, { method: "DELETE" });
+    return null;
+  }
   job = id;
   const bar = make("progress", { max: 1, "aria-label": "How far it is" });
   const words = make("span", { class: "data-words" }, "starting");
@@ -391,6 +405,7 @@ async function run(question, said) {
     if (told.state === "running") bar.value = told.share;
   });
   const { state, message, answer } = await lab.ask(`/jobs/${id}`);
+  if (mine !== asked) return null;
   job = null;
   parts.progress.replaceChildren();
   if (state === "done") {

@@ -1,0 +1,293 @@
+"""The lab as a person meets it, in a real browser."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from labs import Lab, running_lab
+from PIL import Image
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+import stickslip as ss
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+PICTURES = Path(__file__).parent / "pictures"
+PATIENCE = 60_000.0  # ms, for an analysis on a busy machine
+KINETIC = 'input[type=range][aria-label="kinetic friction, slider"]'
+SHOWN = """(rows) => JSON.stringify(rows) ===
+  JSON.stringify([...document.querySelectorAll("#rows tr")].map((row) => [...row.cells].map((cell) => cell.textContent)))"""
+STATE = {
+    "system": {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12, "damper": "ground"},
+    "law": {"name": "Coulomb", "kinetic": 1.1},
+    "drive": {"name": "HarmonicBase", "amplitude": 0.00065, "frequency": 2.5},
+    "run": {"cycles": 8},
+}
+
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine (apt-get install chromium)"),
+    pytest.mark.timeout(180),
+]
+
+
+@pytest.fixture(scope="module")
+def lab() -> Iterator[Lab]:
+    with running_lab() as lab:
+        yield lab
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(lab: Lab, browser: Browser) -> Iterator[Page]:
+    """The page, opened by the address that the lab prints; no error and no request to elsewhere may come of its use."""
+    context = browser.new_context(viewport={"width": 1200, "height": 900}, accept_downloads=True, color_scheme="light")
+    page = context.new_page()
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda told: wrong.append(told.text) if told.type == "error" else None)
+    page.on("request", lambda asked: None if is_ours(asked.url, lab) else wrong.append(asked.url))
+    page.goto(lab.address)
+    page.locator("#rows tr").first.wait_for(timeout=PATIENCE)
+    yield page
+    context.close()
+    assert wrong == []
+
+
+def is_ours(address: str, lab: Lab) -> bool:
+    return address.startswith((lab.base, f"ws://127.0.0.1:{lab.port}", "data:", "blob:"))
+
+
+def link(lab: Lab, state: dict[str, Any]) -> str:
+    text = base64.urlsafe_b64encode(json.dumps(state).encode()).decode().rstrip("=")
+    return f"{lab.base}/#{text}"
+
+
+def state_of(page: Page) -> dict[str, Any]:
+    text = page.evaluate("location.hash.slice(1)")
+    told: dict[str, Any] = json.loads(base64.urlsafe_b64decode(text + "=" * (-len(text) % 4)))
+    return told
+
+
+def open_data(page: Page) -> None:
+    page.get_by_role("tab", name="Data").click()
+    page.get_by_role("button", name="Try the example record").wait_for()
+
+
+def drop(page: Page, *paths: Path) -> None:
+    """Let go of files over the page, as a person does."""
+    files = [{"name": path.name, "bytes": base64.b64encode(path.read_bytes()).decode()} for path in paths]
+    page.evaluate(
+        """(files) => {
+          const carried = new DataTransfer();
+          for (const { name, bytes } of files)
+            carried.items.add(new File([Uint8Array.from(atob(bytes), (sign) => sign.charCodeAt(0))], name));
+          const place = document.querySelector(".data-welcome, .data-drop");
+          for (const kind of ["dragenter", "dragover", "drop"])
+            place.dispatchEvent(new DragEvent(kind, { dataTransfer: carried, bubbles: true, cancelable: true }));
+        }""",
+        files,
+    )
+
+
+@pytest.fixture(scope="module")
+def rubbing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    time = np.arange(2000) / 500
+    friction = 1.5 * np.sign(np.cos(2 * np.pi * time)) + np.random.default_rng(1).normal(0, 0.01, time.size)
+    record = ss.Record.of({"x": np.sin(2 * np.pi * time) / (2 * np.pi), "friction": friction}, fs=500)
+    return ss.write_record(record, tmp_path_factory.mktemp("records") / "rubbing.csv")
+
+
+def test_a_slider_moves_the_motion_and_the_link_holds_it(page: Page, lab: Lab) -> None:
+    show(page, lab)
+    page.locator(KINETIC).focus()
+    page.keyboard.press("ArrowRight")
+    page.wait_for_function("(before) => location.hash !== before", arg=page.evaluate("location.hash"))
+    moved = state_of(page)
+    assert moved["law"]["kinetic"] != STATE["law"]["kinetic"]
+    rows = printed(moved)
+    page.wait_for_function(SHOWN, arg=rows)
+    other = page.context.new_page()
+    other.goto(page.url)
+    other.wait_for_function(SHOWN, arg=rows)
+    assert state_of(other) == moved
+    other.close()
+
+
+def show(page: Page, lab: Lab) -> None:
+    """Open the link of the state, and wait for what the library says of it."""
+    page.goto(link(lab, STATE))
+    page.wait_for_function(SHOWN, arg=printed(STATE))
+
+
+def told(page: Page) -> list[list[str]]:
+    rows: list[list[str]] = page.eval_on_selector_all(
+        "#rows tr", "(rows) => rows.map((row) => [...row.cells].map((cell) => cell.textContent))"
+    )
+    return rows
+
+
+def printed(state: dict[str, Any]) -> list[list[str]]:
+    """What the library prints of that state."""
+    return [list(row) for row in ss.outcome(ss.read_system(state)).rows]
+
+
+def test_the_numbers_of_a_motion_are_the_librarys_to_the_last_digit(page: Page, lab: Lab) -> None:
+    show(page, lab)
+    assert told(page) == printed(STATE)
+
+
+def test_a_dropped_record_is_answered_with_the_librarys_own_digits(page: Page, rubbing: Path, tmp_path: Path) -> None:
+    open_data(page)
+    drop(page, rubbing)
+    page.locator("#data-run").wait_for(timeout=PATIENCE)
+    page.locator("#data-run").click()
+    page.locator("#data-results").wait_for(timeout=PATIENCE)
+    rows = page.eval_on_selector_all(
+        "#data-results tbody tr", "(rows) => rows.map((row) => [...row.cells].map((cell) => cell.textContent))"
+    )
+    words = ss.summary(ss.analyze(ss.read_record(rubbing)))
+    assert rows == [[line.name, line.value, line.interval, line.status] for line in words.lines]
+    assert page.locator(".data-headline").all_inner_texts() == list(words.headline)
+    with page.expect_download() as coming:
+        page.get_by_role("link", name="Report (HTML)").click()
+    coming.value.save_as(tmp_path / "report.html")
+    report = (tmp_path / "report.html").read_text("utf-8")
+    assert all(line.value in report for line in words.lines)
+    with page.expect_download() as coming:
+        page.get_by_role("link", name="Numbers (JSON)").click()
+    coming.value.save_as(tmp_path / "results.json")
+    assert json.loads((tmp_path / "results.json").read_text("utf-8"))["name"] == "rubbing.csv"
+    inside = page.frame_locator("iframe.data-report").locator("body")
+    expect(inside).to_contain_text(words.lines[0].value)
+
+
+def test_a_real_record_of_two_files_is_asked_for_what_they_do_not_tell(
+    page: Page, dataset: Callable[[str], Path], tmp_path: Path
+) -> None:
+    folder = dataset("frame_base_excited")
+    open_data(page)
+    drop(page, folder / "s_b_450g_x.mat", folder / "s_b_450g_y.mat")
+    page.get_by_label("These files are").select_option("together")
+    page.get_by_label("What y is").wait_for(timeout=PATIENCE)
+    expect(page.get_by_text("The file states no unit for x, y")).to_be_visible()
+    page.get_by_label("What y is").select_option("z")
+    for column in ("x", "y"):
+        unit = page.get_by_label(f"Unit of {column}")
+        unit.fill("mm")
+        unit.press("Tab")
+        expect(unit).to_have_value("m", timeout=PATIENCE)  # read again, in SI
+    expect(page.get_by_text("The record can not tell this")).to_be_visible(timeout=PATIENCE)
+    page.get_by_label("Mass [kg]").fill("3.0799")
+    page.get_by_label("Spring [N/m]").fill("1191 N/m")
+    page.get_by_text("What else you know of the rig").click()
+    page.get_by_label("Damping [N s/m]").fill("0.669")
+    page.get_by_label("Damper ends on").select_option("base")
+    page.locator("#data-run").click()
+    page.locator("#data-results").wait_for(timeout=PATIENCE)
+    record = ss.read_record(
+        [folder / "s_b_450g_x.mat", folder / "s_b_450g_y.mat"], channels={"x": "x [mm]", "z": "y [mm]"}
+    )
+    words = ss.summary(ss.analyze(record, mass=3.0799, stiffness=1191, damping=0.669, damper="base"))
+    assert page.locator("#data-results tbody td:nth-child(2)").all_inner_texts() == [line.value for line in words.lines]
+
+
+def test_work_can_be_cancelled(page: Page) -> None:
+    open_data(page)
+    page.get_by_role("button", name="Try the example record").click()
+    page.get_by_label("What rings, and when?").check(timeout=PATIENCE)
+    page.locator("#data-run").click()
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.get_by_role("alert")).to_contain_text("Cancelled")
+    expect(page.get_by_role("progressbar")).to_have_count(0)
+    expect(page.locator("#data-run")).to_be_enabled()
+
+
+def test_a_bad_file_is_told_in_one_sentence_and_the_page_goes_on(page: Page, rubbing: Path, tmp_path: Path) -> None:
+    bad = tmp_path / "broken.tdms"
+    bad.write_bytes(b"TDSm" + b"\xff" * 300)
+    open_data(page)
+    drop(page, bad)
+    expect(page.get_by_role("alert")).to_contain_text("broken.tdms", timeout=PATIENCE)
+    page.get_by_role("button", name="Remove broken.tdms").click()
+    drop(page, rubbing)
+    page.locator("#data-run").wait_for(timeout=PATIENCE)
+
+
+def test_all_of_it_is_reached_by_keyboard(page: Page) -> None:
+    """Tab to Data, the example, a question, the answer's downloads: no mouse."""
+    page.locator("#tab-play").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    expect(page.get_by_role("tab", name="Data")).to_be_focused()
+    tab_to(page, "#data-input")
+    tab_to(page, "#data-example")
+    page.keyboard.press("Enter")
+    page.locator("#data-ask-analyze").wait_for(timeout=PATIENCE)
+    tab_to(page, "#data-ask-analyze")
+    page.keyboard.press("ArrowDown")
+    assert page.locator("#data-ask-decay").is_checked()
+    tab_to(page, "#data-run")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("alert")).to_contain_text("free decay", timeout=PATIENCE)
+
+
+def tab_to(page: Page, place: str) -> None:
+    """Press Tab until the focus is there."""
+    for _ in range(60):
+        if page.evaluate("(place) => document.activeElement === document.querySelector(place)", place):
+            return
+        page.keyboard.press("Tab")
+    raise AssertionError(f"Tab never comes to {place}")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_nothing_that_axe_knows_keeps_anybody_out(page: Page, rubbing: Path, theme: str) -> None:
+    if theme == "dark":
+        page.get_by_role("button", name="Dark or light").click()
+    page.locator("#rows tr").first.wait_for()
+    for tab in ("Play", "Map", "Data"):
+        page.get_by_role("tab", name=tab).click()
+        if tab == "Data":
+            page.locator(".data-welcome").wait_for()
+            drop(page, rubbing)
+            page.locator("#data-run").wait_for(timeout=PATIENCE)
+        found = Axe().run(page)
+        assert found.violations_count == 0, f"{tab}: {found.generate_report()}"
+
+
+@pytest.mark.parametrize("width", [360, 1200])
+@pytest.mark.parametrize("tab", ["Play", "Map", "Data"])
+def test_the_page_fits_the_width_of_a_phone(page: Page, tab: str, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 800})
+    page.get_by_role("tab", name=tab).click()
+    page.locator("main section:not([hidden]) *").first.wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_the_first_sight_of_records_is_as_it_was(page: Page) -> None:
+    """Against a kept picture: the same to a few grey levels, but for the edges of letters."""
+    open_data(page)
+    page.evaluate("document.activeElement.blur()")
+    page.mouse.move(0, 0)
+    sight = Image.open(io.BytesIO(page.locator("#data").screenshot(animations="disabled"))).convert("L")
+    kept = Image.open(PICTURES / "lab-data.png").convert("L")
+    assert abs(sight.width - kept.width) <= 2
+    assert abs(sight.height - kept.height) <= 40  # the machine's own letters are higher or lower
+    size = (60, 40)
+    seen, known = (np.asarray(each.resize(size, Image.Resampling.BOX), dtype=float) for each in (sight, kept))
+    assert np.mean(np.abs(seen - known)) < 6
