@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from labs import Lab, running_lab
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 import stickslip as ss
+from labs import Lab, running_lab
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PICTURES = Path(__file__).parent / "pictures"
 PATIENCE = 60_000.0  # ms, for an analysis on a busy machine
 KINETIC = 'input[type=range][aria-label="kinetic friction, slider"]'
-SHOWN = """(rows) => JSON.stringify(rows) ===
-  JSON.stringify([...document.querySelectorAll("#rows tr")].map((row) => [...row.cells].map((cell) => cell.textContent)))"""
+SHOWN = """(rows) => JSON.stringify(rows) === JSON.stringify(
+  [...document.querySelectorAll("#rows tr")].map((row) => [...row.cells].map((cell) => cell.textContent)))"""
 STATE = {
     "system": {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12, "damper": "ground"},
     "law": {"name": "Coulomb", "kinetic": 1.1},
@@ -34,7 +34,7 @@ STATE = {
 
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine (apt-get install chromium)"),
-    pytest.mark.timeout(180),
+    pytest.mark.timeout(240),
 ]
 
 
@@ -62,7 +62,7 @@ def page(lab: Lab, browser: Browser) -> Iterator[Page]:
     page.on("console", lambda told: wrong.append(told.text) if told.type == "error" else None)
     page.on("request", lambda asked: None if is_ours(asked.url, lab) else wrong.append(asked.url))
     page.goto(lab.address)
-    page.locator("#rows tr").first.wait_for(timeout=PATIENCE)
+    page.locator("#rows tr").first.wait_for(timeout=2 * PATIENCE)
     yield page
     context.close()
     assert wrong == []
