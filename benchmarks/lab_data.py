@@ -19,7 +19,7 @@ import numpy as np
 from nptdms import ChannelObject, TdmsWriter
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-from labs import Lab, running_lab  # noqa: E402
+from labs import Lab, running_lab
 
 FS, SEGMENT = 1000.0, 1_000_000
 
