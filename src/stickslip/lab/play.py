@@ -67,8 +67,13 @@ async def conversation(
     """Hear each message while the work goes on, until the page has gone."""
     await socket.accept()
     working = asyncio.create_task(work())
+    hearing = asyncio.create_task(socket.receive())
     try:
-        while (message := await socket.receive())["type"] != "websocket.disconnect":
+        while True:
+            await asyncio.wait((working, hearing), return_when=asyncio.FIRST_COMPLETED)
+            if working.done() or (message := hearing.result())["type"] == "websocket.disconnect":
+                break
+            hearing = asyncio.create_task(socket.receive())
             try:
                 heard(message)
             except ValueError as error:
@@ -76,8 +81,9 @@ async def conversation(
     except (WebSocketDisconnect, RuntimeError):  # it went while it was spoken to
         pass
     finally:
-        working.cancel()
-        await asyncio.wait([working])
+        for task in (working, hearing):
+            task.cancel()
+        await asyncio.wait((working, hearing))
         failed = None if working.cancelled() else working.exception()
         if failed is not None:
             _require_gone(failed)

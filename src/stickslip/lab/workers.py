@@ -57,10 +57,10 @@ class Worker:
         if INTERRUPTIBLE and self.ready:
             self._signal(signal.SIGINT)
         if within is not None:
-            asyncio.get_running_loop().call_later(within, self._end_at, self.answers)
+            asyncio.get_running_loop().call_later(within, self._end_at, self.process, self.answers)
 
-    def _end_at(self, answers: int) -> None:
-        if answers == self.answers:
+    def _end_at(self, process: asyncio.subprocess.Process | None, answers: int) -> None:
+        if process is self.process and answers == self.answers:
             self._signal(signal.SIGKILL if INTERRUPTIBLE else signal.SIGTERM)
 
     def _signal(self, number: int) -> None:

@@ -50,7 +50,7 @@ export function show(name) {
 }
 
 const opened = {
-  map: () => { startMap($("map"), lab); opened.map = null; },
+  map: () => { opened.map = null; ready.then(() => startMap($("map"), lab)); },
   data: () => {
     opened.data = null;
     import("./data.js").then((page) => page.start($("data"), lab), () => say("Data is not part of this lab yet.", true));
@@ -92,4 +92,4 @@ const dark = matchMedia("(prefers-color-scheme: dark)");
 theme(dark.matches ? "dark" : "light");
 dark.addEventListener("change", () => theme(dark.matches ? "dark" : "light"));
 $("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
-startPlay(lab);
+const ready = startPlay(lab);

@@ -19,9 +19,10 @@ let changedLast = null, patience = 0, resting = 0, idling = 0, player = null;
 
 export async function start(given) {
   lab = given;
-  lab.openInPlay = (opened) => { use(opened); lab.show("play"); };
+  lab.openInPlay = (opened) => { own(); use(opened); lab.show("play"); };
   stage = new Stage($("stage"), moved);
   conversation = new Conversation("/play", heard, () => lab.say("The lab does not answer; is 'stickslip lab' still running?", true));
+  conversation.again = () => { if (state) ask(performance.now(), true); };
   for (const [words, pace] of PACES) $("pace").add(new Option(words, pace ?? ""));
   buttons();
   const shared = fromLink();
@@ -30,10 +31,11 @@ export async function start(given) {
   clearTimeout(slow);
   if (!catalog) return;
   lab.boundary = catalog.boundary;
-  controls = new Controls($("parts"), catalog, (path, since, afresh = false) => { changedLast = path; ask(since, afresh); });
+  controls = new Controls($("parts"), catalog, (path, since, afresh = false) => { changedLast = path; own(); ask(since, afresh); });
   presets(catalog.presets, shared ? "" : FIRST);
   if (!shared) first.state.run = { cycles: FEW };
   use(first.state);
+  addEventListener("hashchange", () => { const link = fromLink(); if (link) { own(); use(link); } });
   lab.onTheme(() => { if (run) { build(); drawTraces(); drawViews(); stage.show(run, lab.colours()); } });
 }
 
@@ -43,6 +45,13 @@ function use(given) {
   changedLast = null;
   controls.show(state);
   ask(performance.now(), true);
+}
+
+// What is changed is no scenario any more; choosing it again goes back.
+function own() {
+  if (!$("preset").value) return;
+  $("about").textContent = `Changed from ${$("preset").value}; choose it again to go back.`;
+  $("preset").value = "";
 }
 
 function presets(offered, chosen) {
@@ -356,7 +365,6 @@ function buttons() {
     if (!file) return;
     try { use((await lab.ask("/open", { method: "POST", body: await file.text(), headers: { "content-type": "text/plain" } })).state); $("preset").value = ""; lab.say(`${file.name} is open.`); } catch (error) { lab.say(error.message, true); }
   });
-  addEventListener("hashchange", () => { const shared = fromLink(); if (shared) { $("preset").value = ""; use(shared); } });
   new ResizeObserver(() => {
     if (!run || !$("traces").clientWidth) return;
     if (charts.tall !== tall()) { build(); drawTraces(); }
