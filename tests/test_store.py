@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip import Coulomb, HarmonicForce, ModelError, Oscillator, SolveError, sweep
+from stickslip import Coulomb, HarmonicForce, ModelError, Oscillator, SolveError, simulate, sweep
 
 pytest.importorskip("zarr")
 SLIDER = Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=HarmonicForce(1.0, frequency=0.127))
@@ -150,6 +150,32 @@ def test_a_full_disk_is_one_sentence_and_the_map_goes_on(whole: Path, tmp_path: 
             sweep(SLIDER, GRID, store=path, **SETTINGS)
     sweep(SLIDER, GRID, store=path, **SETTINGS)
     assert files(path) == files(whole)
+
+
+def test_every_event_is_kept_beside_the_map(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    path, grid = tmp_path / "map.zarr", {"kinetic": [0.5, 1.1], "frequency": [2.5, 5.0]}
+    found = sweep(SLIDER, grid, measures=["events", "stops"], settle=3, cycles=2, store=path)
+    kept = parquet.read_table(path.with_suffix(".events")).to_pandas()
+    for j, kinetic in enumerate(grid["kinetic"]):
+        for k, frequency in enumerate(grid["frequency"]):
+            run = simulate(SLIDER.having(kinetic=kinetic, frequency=frequency), cycles=5)
+            own = kept[(kept.kinetic == j) & (kept.frequency == k)]
+            late = [event for event in run.events if event.time >= 3 / frequency]
+            assert [tuple(row) for row in own[list(late[0]._fields)].itertuples(index=False)] == late
+            assert int(found.events[j, k]) == len(late) > 0
+    before = files(path.with_suffix(".events"))
+    (path.with_suffix(".events") / "00000000.parquet").unlink()
+    sweep(SLIDER, grid, measures=["events", "stops"], settle=3, cycles=2, store=path)
+    assert files(path.with_suffix(".events")) == before
+
+
+def test_a_sweep_that_can_not_begin_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    numba_cuda = pytest.importorskip("numba.cuda")
+    monkeypatch.setattr(numba_cuda, "is_available", lambda: False)
+    with pytest.raises(SolveError, match="finds no NVIDIA GPU"):
+        sweep(SLIDER, GRID, store=tmp_path / "map.zarr", **{**SETTINGS, "engine": "cuda"})
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_cluster_gives_the_same_bytes(whole: Path, tmp_path: Path) -> None:

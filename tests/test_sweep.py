@@ -100,6 +100,18 @@ def test_a_sweep_without_meaning_is_refused(options: dict[str, object], words: s
         ss.sweep(UNIT, {"kinetic": [0.5]}, **options)  # type: ignore[arg-type]
 
 
+def test_a_parameter_called_as_an_answer_goes_by_its_place() -> None:
+    found = ss.sweep(RIGID, {"amplitude": [5e-4, 6e-4]}, measures=["amplitude"], settle=2, cycles=2)
+    assert found.amplitude.dims == ("drive.amplitude",)
+    assert found["drive.amplitude"].values.tolist() == [5e-4, 6e-4]
+
+    def mass(run: ss.Trajectory) -> float:
+        return 1.0
+
+    with pytest.raises(ModelError, match="'mass' is a parameter and a measure"):
+        ss.sweep(RIGID, {"mass": [1.0]}, measures=[mass])
+
+
 def test_a_point_without_meaning_is_marked_and_the_rest_stands() -> None:
     found = ss.sweep(UNIT.having(static=0.6), {"kinetic": [0.5, 0.7]}, settle=2, cycles=2)
     words = dict(zip(found.status.flag_values, found.status.flag_meanings.split(), strict=True))

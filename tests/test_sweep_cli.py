@@ -48,6 +48,20 @@ def test_a_file_is_the_sweep_it_says(file: Path) -> None:
     assert (asked.measures, asked.cycles, asked.settle) == (("stops", "amplitude"), 4, 40)
 
 
+def test_a_file_has_laws_and_what_changes_together(file: Path) -> None:
+    laws = (
+        'law = [{ name = "Coulomb", kinetic = "1.1 N" }, { name = "CompliantContact", kinetic = 1, stiffness = 2e5 }]'
+    )
+    pairs = '"mass, stiffness" = [[1, 4], ["2 kg", "8 N/m"]]'
+    file.write_text(GRID.replace('kinetic = ["200 mN", 0.7, 1.2]', f"{laws}\n{pairs}"))
+    grid = ss.read_sweep(file).grid
+    assert grid["law"] == [ss.Coulomb(1.1), ss.CompliantContact(1.0, 2e5)]
+    assert grid["mass", "stiffness"] == [(1.0, 4.0), (2.0, 8.0)]
+    file.write_text(GRID.replace('kinetic = ["200 mN", 0.7, 1.2]', '"mass, stiffness" = [[1, 4], [2]]'))
+    with pytest.raises(ModelError, match=r"line 8.*mass, stiffness.*list of lists"):
+        ss.read_sweep(file)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

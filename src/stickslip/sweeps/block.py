@@ -9,11 +9,13 @@ import numpy as np
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve.simulate import simulate
+from stickslip.solve.trajectory import Event
 from stickslip.sweeps.crowd import Watch, crowds, on_cpu, watched
-from stickslip.sweeps.measures import FAILED, NO_SYSTEM, own_name
+from stickslip.sweeps.measures import FAILED, LOG, NO_SYSTEM, own_name
 from stickslip.sweeps.plan import Arrays, Plan
-from stickslip.sweeps.trajectory import measured, outcome
+from stickslip.sweeps.trajectory import logged, measured, outcome
 
+KEPT = {"time": np.float64, "kind": np.str_, "mode": np.str_}  # of an event; the rest are whole numbers
 Alone = Callable[[Plan, tuple[int, ...]], Mapping[str, Any]]  # the measures of one point by itself
 
 
@@ -29,6 +31,7 @@ def run_block(
     points = plan.points(number)
     found: Arrays = {name: np.full(len(points), v.fill, v.dtype) for name, v in plan.variables.items()}
     left = set(range(len(points)))
+    logs: list[list[Any]] = []
     for rows, fleet, known in crowds(plan, number):
         values = known if fleet is None else watched(plan, fleet, known, watch)
         for name in found.keys() & values.keys():
@@ -37,10 +40,19 @@ def run_block(
     own = [measure for measure in plan.measures if callable(measure)]
     for row, steps in enumerate(points):
         if row in left or (own and found["status"][row] not in (NO_SYSTEM, FAILED)):
+            told: Mapping[str, Any]
             told = (alone or _alone)(plan, steps) if row in left else {own_name(m): m(_run(plan, steps)) for m in own}
             for name in found.keys() & told.keys():
                 found[name][row] = told[name]
-    return {name: values.reshape(shape) for name, values in found.items()}, None
+            logs += [[*steps, *event] for event in told.get("log", ())]
+    arrays = {name: values.reshape(shape) for name, values in found.items()}
+    return arrays, _columns(plan, logs) if LOG in plan.measures else None
+
+
+def _columns(plan: Plan, logs: list[list[Any]]) -> Arrays:
+    """The events of a block, column by column: which step along each dimension, and what an event is."""
+    names = [*plan.dims, *Event._fields]
+    return {name: np.array([row[j] for row in logs], KEPT.get(name, np.int64)) for j, name in enumerate(names)}
 
 
 def _run(plan: Plan, steps: tuple[int, ...]) -> Any:
@@ -52,8 +64,12 @@ def _alone(plan: Plan, steps: tuple[int, ...]) -> Mapping[str, Any]:
     """One motion simulated, and its Trajectory measured."""
     try:
         run = _run(plan, steps)
-        return {"status": outcome(run), **measured(run, plan, plan.at(steps)[1])}
+        told = {"status": outcome(run), **measured(run, plan, plan.at(steps)[1])}
     except ModelError:
         return {"status": NO_SYSTEM}
     except SolveError:
         return {"status": FAILED}
+    if LOG in plan.measures:
+        log = logged(run, plan.settle)
+        told |= {LOG: len(log), "log": log}
+    return told

@@ -15,7 +15,7 @@ from stickslip.solve.automaton import DEGREE, Array, leaps_between
 from stickslip.solve.fleet import Fleet, Tables, fleet_tables, kind_of_drive, kind_of_law, opened
 from stickslip.sweeps import tally as log
 from stickslip.sweeps.grid import START
-from stickslip.sweeps.measures import FAILED, NO_SYSTEM, ORDERS
+from stickslip.sweeps.measures import FAILED, LOG, NO_SYSTEM, ORDERS
 from stickslip.sweeps.plan import Arrays, Plan
 from stickslip.sweeps.watch import CONSTANT, LAP, MARK, ROOM, VARIES, repeats, watch_all
 
@@ -33,7 +33,7 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[
     of come not at all.
     """
     named = {f"{START}{name}" for name in plan.start} | {name for axis in plan.axes for name in axis.names}
-    if not isinstance(plan.system, Oscillator) or f"{START}mode" in named:
+    if not isinstance(plan.system, Oscillator) or f"{START}mode" in named or LOG in plan.measures:
         return
     steps = np.array(plan.points(number), dtype=np.int64).reshape(-1, len(plan.axes))
     (laws, law), (drives, drive), (owners, own) = (_different(plan, steps, part) for part in (*PARTS, ""))

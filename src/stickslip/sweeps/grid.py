@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -59,6 +59,28 @@ def read_grid(system: System, grid: Grid) -> tuple[Axis, ...]:
                 )  # fmt: skip
             taken[path] = name
     return axes
+
+
+def apart(system: System, axes: tuple[Axis, ...], answers: Iterable[str]) -> tuple[Axis, ...]:
+    """The axes, a parameter that is called as an answer of the map named by its place: "drive.amplitude".
+
+    Raises
+    ------
+    ModelError
+        The parameter is the system's own or several parts', and so has no such name.
+    """
+    taken = set(answers)
+
+    def own(name: str) -> str:
+        found = _paths(system, name) if name in taken else ((name,),)
+        if name in taken and (len(found) > 1 or len(found[0]) == 1):
+            raise ModelError(
+                f"'{name}' is a parameter and a measure", "a name stands for one of them", "rename the measure"
+            )
+        return ".".join(found[0])
+
+    named = [replace(axis, names=tuple(map(own, axis.names))) for axis in axes]
+    return tuple(axis if axis.dim == "point" else replace(axis, dim="_".join(axis.names)) for axis in named)
 
 
 def _dimensions(grid: Mapping[Any, Any]) -> tuple[Axis, ...]:

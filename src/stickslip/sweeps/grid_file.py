@@ -74,6 +74,8 @@ def read_sweep(path: str | Path) -> SweepFile:
             [grid]
             frequency = { from = "2 Hz", to = "9 Hz", points = 200 }   # scale = "log" where wanted
             kinetic = [0.9, "1.1 N", 1.3] # a bare number is SI
+            "mass, stiffness" = [[1, 4], ["2 kg", 8]]              # they change together: one axis
+            # law = [{ name = "Coulomb", kinetic = 1 }, ...]       # whole laws, instead of kinetic
 
     Returns
     -------
@@ -97,8 +99,27 @@ def read_sweep(path: str | Path) -> SweepFile:
     whole = checked(_File, values, source=path.name, lines=lines)
     beside = path.parent / whole.system
     case = read_system(beside) if whole.system.endswith(".toml") else scenario_case(whole.system)
-    grid = {name: _values(case.system, name, column, path.name, lines) for name, column in whole.grid.items()}
+    grid = dict(_axis(case.system, name, column, path.name, lines) for name, column in whole.grid.items())
     return SweepFile(case, grid, tuple(whole.measures), whole.cycles, whole.settle)
+
+
+def _axis(system: System, name: str, column: Any, source: str, lines: list[str]) -> tuple[Any, Any]:
+    """What an axis is called in a grid, and its values: of one parameter, or of several that change together."""
+    names = tuple(part.strip() for part in name.split(","))
+    if len(names) == 1:
+        return name, _values(system, name, column, source, lines)
+    rows = column if isinstance(column, list) else []
+    if not rows or any(not isinstance(row, list) or len(row) != len(names) for row in rows):
+        raise ModelError(
+            f"{source}{line_of(['grid', name], lines)} sets {name} = {column!r}",
+            f"{len(names)} parameters that change together have as many values at each step",
+            "write a list of lists",
+        )
+    columns = [
+        _values(system, part, list(own), source, lines)
+        for part, own in zip(names, zip(*rows, strict=True), strict=True)
+    ]
+    return names, list(zip(*columns, strict=True))
 
 
 def _values(system: System, name: str, column: Any, source: str, lines: list[str]) -> Any:
@@ -107,6 +128,8 @@ def _values(system: System, name: str, column: Any, source: str, lines: list[str
     place = f"{source}{line_of(['grid', name], lines)}"
 
     def number(value: Any) -> Any:
+        if name == "law" and isinstance(value, dict):
+            return read_system({"system": {"mass": 1.0, "stiffness": 1.0}, "law": value}).system.law  # type: ignore[union-attr]
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise ModelError(f"{place} sets {name} = {value!r}", "an axis has numbers or words", "correct it")
         try:
@@ -116,7 +139,7 @@ def _values(system: System, name: str, column: Any, source: str, lines: list[str
                 f"{place} sets {name} = {value!r}", f"{error.value}; {error.rule}", "correct it"
             ) from error
 
-    if isinstance(column, dict):
+    if isinstance(column, dict) and name != "law":
         part = checked(_Range, column, source=source, lines=lines, table=f"grid.{name}")
         begin, end = number(part.begin), number(part.end)
         if part.scale == "log" and not (begin > 0 and end > 0):

@@ -42,6 +42,7 @@ class Variable:
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
 
+LOG = "events"  # the measure that keeps every event
 EVENTS = {"stops", "stick_share", "micro_slips", "transition_speed"}  # measures that count events of one contact
 STATUS = Variable(
     "1", "what became of the motion", "int8", -1,
@@ -62,6 +63,7 @@ MEASURES: dict[str, dict[str, Variable]] = {
         "multiplier": Variable("1", "largest Floquet multiplier", "complex128", complex(math.nan, math.nan))
     },
     "lyapunov": {"lyapunov": Variable("1/s", "largest Lyapunov exponent")},
+    LOG: {LOG: Variable("1", "events of the measured periods")},
 }
 
 

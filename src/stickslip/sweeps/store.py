@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, SolveError
+from stickslip.sweeps.measures import LOG
 from stickslip.sweeps.plan import Plan, assemble, required
 
 DONE = "done"
@@ -39,8 +40,9 @@ class Store(AbstractContextManager["Store"]):
     def __init__(self, path: str | Path, plan: Plan) -> None:
         self.path, self.plan = Path(path), plan
         self._zarr = required("zarr")
+        self._new = not self.path.exists()
         with self._on_disk():
-            if not self.path.exists():
+            if self._new:
                 self._lay_out()
             self._lock = _locked(self.path)
         try:
@@ -55,6 +57,8 @@ class Store(AbstractContextManager["Store"]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if error is not None and self._new and not self._done.any():
+            shutil.rmtree(self.path, ignore_errors=True)  # a sweep that could not begin leaves nothing
         os.close(self._lock)
 
     @property
@@ -141,20 +145,23 @@ class Store(AbstractContextManager["Store"]):
         """Ask again for the blocks whose bytes are not what was written."""
         for number in np.flatnonzero(self._done):
             place = self.plan.slices(int(number))
+            if LOG in self.plan.measures and not self._events_of(int(number)).exists():
+                self._done[number] = False
             try:
                 for name in self.plan.variables:
                     self._group[name][place]
             except (ValueError, RuntimeError):  # a checksum or a frame that does not fit
                 self._done[number] = False
 
-    def _keep_events(self, number: int, events: Mapping[str, NDArray[Any]]) -> None:
-        import pyarrow as pa
-        from pyarrow import parquet
+    def _events_of(self, number: int) -> Path:
+        return self.events / f"{number:08d}.parquet"
 
+    def _keep_events(self, number: int, events: Mapping[str, NDArray[Any]]) -> None:
+        table = required("pyarrow").table(dict(events))
         self.events.mkdir(exist_ok=True)
-        whole = self.events / f"{number:08d}.parquet"
+        whole = self._events_of(number)
         part = whole.with_suffix(".partial")
-        parquet.write_table(pa.table(dict(events)), part)
+        required("pyarrow.parquet").write_table(table, part)
         os.replace(part, whole)
 
     @contextmanager

@@ -21,8 +21,8 @@ from stickslip.solve.poincare import tables
 from stickslip.solve.simulate import opening
 from stickslip.structure import Structure
 from stickslip.sweeps.engines import read_engine
-from stickslip.sweeps.grid import Grid, read_grid
-from stickslip.sweeps.measures import EVENTS, Measure, read_measures
+from stickslip.sweeps.grid import Grid, apart, read_grid
+from stickslip.sweeps.measures import EVENTS, Measure, read_measures, variables
 from stickslip.sweeps.plan import Arrays, Plan, assemble, blank, chunked, required
 from stickslip.sweeps.progress import told
 from stickslip.sweeps.store import Store
@@ -55,7 +55,8 @@ def sweep(
         ``{("mass", "stiffness"): [(1, 4), (2, 8)]}``. A list of mappings is a list of points.
     measures : sequence of str or callable
         What is asked of each motion: "stops", "amplitude" [m], "stick_share", "micro_slips", "transition_speed"
-        [m/s], "energy" [J], "period", "multipliers", "lyapunov" [1/s], or a function of a Trajectory.
+        [m/s], "energy" [J], "period", "multipliers", "lyapunov" [1/s], "events" (their number, and with a store
+        each of them in Parquet files beside it), or a function of a Trajectory.
     cycles : int
         Periods of the drive that are measured; without a periodic drive, natural periods.
     settle : int
@@ -125,9 +126,10 @@ def planned(
             raise ModelError(
                 f"{name} = {count}", f"{name} is a whole number of periods, at least {least}", "correct it"
             )
-    axes = read_grid(system, grid)
+    asked_for = read_measures(measures)
+    axes = apart(system, read_grid(system, grid), variables(asked_for))
     chunks = chunked([len(axis.values) for axis in axes])
-    plan = Plan(system, axes, read_measures(measures), int(cycles), int(settle), dict(start or {}), chunks)
+    plan = Plan(system, axes, asked_for, int(cycles), int(settle), dict(start or {}), chunks)
     asked = {measure for measure in plan.measures if isinstance(measure, str)}
     system, begun = plan.at([0] * len(axes))
     if begun and not (isinstance(system, Oscillator) and isinstance(system.law, TimeDelay)):

@@ -11,7 +11,7 @@ import numpy as np
 from stickslip.solve.automaton import Array, Automaton, System
 from stickslip.solve.lyapunov import lyapunov
 from stickslip.solve.poincare import derivative, end_of, lap, tables
-from stickslip.solve.trajectory import Trajectory
+from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.sweeps import tally as log
 from stickslip.sweeps.measures import AT_REST, EVENTS, MOVING, ORDERS, own_name
 from stickslip.sweeps.plan import Plan
@@ -61,6 +61,12 @@ def counted(run: Trajectory, begin: float) -> Array:
     sums = np.zeros(log.ENTRIES)
     log.tally(kinds, sides, run.modes, run.starts - begin, run.durations, _paths(run), np.abs(slip), sums)
     return sums
+
+
+def logged(run: Trajectory, settle: int) -> list[Event]:
+    """Every event after the periods in which the motion settles."""
+    begin = settle * period(run.system, run)
+    return [event for event in run.each_event() if event.time >= begin]
 
 
 def farthest(run: Trajectory, begin: float) -> float:
