@@ -47,8 +47,8 @@ SLIDE = """async ([count, gap]) => {
   }
   return { drawn, seen };
 }"""
-WEIGHT = """() => performance.getEntriesByType("resource").concat(performance.getEntriesByType("navigation"))
-  .filter((each) => !/catalog|scenarios/.test(each.name)).map((each) => [each.name, each.encodedBodySize])"""
+WEIGHT = """() => ["resource", "navigation"].flatMap((kind) => performance.getEntriesByType(kind))
+  .map((each) => [each.name, each.encodedBodySize])"""
 
 
 @contextmanager

@@ -16,19 +16,21 @@ import pytest
 
 pytest.importorskip("uvicorn", reason="the extra [lab] is not installed")
 import stickslip as ss
-from stickslip.lab import drawn
+from stickslip.lab import drawn, forms
 from stickslip.lab.frames import frame
 
 COMPLIANT = ss.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
 STATE = json.loads(ss.export_system(COMPLIANT, format="json"))
 PAGE = Path(ss.__file__).parent / "lab" / "page"
-FIRST = ("index.html", "lab.css", "data.css", "lab.js", "play.js", "map.js", "controls.js", "stage.js", "canvas.js",
+FIRST = ("index.html", "lab.css", "data.css", "lab.js", "play.js", "controls.js", "stage.js", "canvas.js",
          "socket.js", "vendor/uPlot.min.js", "vendor/uPlot.min.css")  # fmt: skip
 
 
 def test_the_first_page_is_light() -> None:
-    """What a browser loads before anything is chosen; Data loads its part when it is opened."""
-    assert sum((PAGE / name).stat().st_size for name in FIRST if (PAGE / name).exists()) < 150_000
+    """What a browser loads before anything is chosen, the catalog too; Map and Data load their parts when opened."""
+    catalog, _ = forms.catalog({}, None)
+    page = sum((PAGE / name).stat().st_size for name in FIRST)
+    assert page + len(json.dumps(catalog, ensure_ascii=False, separators=(",", ":")).encode()) < 150_000
     assert "Permission is hereby granted" in (PAGE / "vendor" / "uPlot.LICENSE.txt").read_text("utf-8")
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import itertools
+import json
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -19,6 +21,7 @@ TEX = (
     (r"\\le\b", "≤"), (r"\\,", " "), (r"\\varphi", "φ"), (r"\\pi", "π"), (r"\\tau", "τ"), (r"\\?theta", "θ"),
     (r"\\gamma", "γ"), (r"\\sigma", "σ"), (r"\\delta", "δ"), (r"\\alpha", "α"), (r"\\(\w+)", r"\1"),
 )  # fmt: skip
+FIRST = "THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)"
 MORE = ("law", "drive", "contacts")
 
 
@@ -30,13 +33,22 @@ def catalog(request: Mapping[str, Any], go_on: Any) -> Answer:
         "system": _part(ss.Oscillator),
         "contact": _part(ss.Contact),
         "boundary": [[b, r] for b, damping, r in ss.scenarios.grid("DH-2")["boundary"] if damping == 0],
-        "presets": [_preset(name) for name in ss.scenarios.names()],
+        "presets": _presets(),
+        "first": {"name": FIRST, "state": first_state()},
     }, {}
 
 
-def _preset(name: str) -> dict[str, Any]:
-    case = ss.scenario_case(name)
-    return {"name": name, "about": case.about, "parts": case.parts}
+def first_state() -> dict[str, Any]:
+    """What plays when the page opens: few cycles, so that one sees their shape."""
+    held: dict[str, Any] = json.loads(ss.export_system(ss.scenario_case(FIRST).lasting(cycles=8), format="json"))
+    return held
+
+
+def _presets() -> list[dict[str, Any]]:
+    """The scenarios, those together that are told alike."""
+    cases = [ss.scenario_case(name) for name in ss.scenarios.names()]
+    alike = itertools.groupby(cases, key=lambda case: (case.about, case.parts))
+    return [{"about": about, "parts": parts, "names": [case.name for case in each]} for (about, parts), each in alike]
 
 
 def _part(make: Any) -> dict[str, Any]:
@@ -60,7 +72,7 @@ def _parameter(field: dataclasses.Field[Any], text: str) -> dict[str, Any]:
     kind, words = (found[1], " ".join(found[2].split())) if found else ("", "")
     choice, unit = CHOICE.match(kind), UNIT.search(words)
     default = None if field.default is dataclasses.MISSING else field.default
-    return {
+    told = {
         "name": field.name,
         "unit": unit[1] if unit else "",
         "words": _plain(words),
@@ -69,3 +81,5 @@ def _parameter(field: dataclasses.Field[Any], text: str) -> dict[str, Any]:
         "choices": re.findall(r'"(.*?)"', choice[1]) if choice else [],
         "part": field.name in MORE and not choice,
     }
+    empty: dict[str, Any] = {"unit": "", "words": "", "default": None, "optional": False, "choices": [], "part": False}
+    return {name: value for name, value in told.items() if name == "name" or value != empty[name]}

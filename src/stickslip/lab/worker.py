@@ -11,7 +11,7 @@ import time
 from typing import Any, BinaryIO
 
 import stickslip as ss
-from stickslip.lab import drawn, explored
+from stickslip.lab import drawn, explored, forms
 from stickslip.lab.frames import frame
 from stickslip.lab.workers import HEAD
 
@@ -70,9 +70,12 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer one request after the other until there are no more."""
     patience = Patience()
     while len(head := requests.read(HEAD.size)) == HEAD.size:
-        answer = answered(json.loads(requests.read(HEAD.unpack(head)[0])), patience)
+        request = json.loads(requests.read(HEAD.unpack(head)[0]))
+        answer = answered(request, patience)
         answers.write(HEAD.pack(len(answer)) + answer)
         answers.flush()
+        if request.get("want") == "catalog":  # while the page draws its form, the kernels are loaded
+            answered({"want": "run", "state": forms.first_state()}, patience)
 
 
 def main() -> None:

@@ -88,13 +88,13 @@ class Workers:
 
     def __init__(self, count: int) -> None:
         self.all = [Worker() for _ in range(count)]
-        self.free: asyncio.Queue[Worker] = asyncio.Queue()
+        self.free: asyncio.LifoQueue[Worker] = asyncio.LifoQueue()  # who has worked is warm
         self.slow = asyncio.Semaphore(max(1, count - 1))  # slow answers leave one worker to the quick ones
 
     async def __aenter__(self) -> Workers:
         for worker in self.all:
-            await worker.started()
             self.free.put_nowait(worker)
+        await self.all[-1].started()  # the others when they are needed
         return self
 
     async def __aexit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:

@@ -1,6 +1,5 @@
 // The page itself: tabs, theme, what is said aloud, and how the lab is asked.
 import { start as startPlay } from "./play.js";
-import { start as startMap } from "./map.js";
 
 const $ = (id) => document.getElementById(id);
 const TABS = ["play", "map", "data"];
@@ -50,7 +49,7 @@ export function show(name) {
 }
 
 const opened = {
-  map: () => { opened.map = null; ready.then(() => startMap($("map"), lab)); },
+  map: () => { opened.map = null; ready.then(() => import("./map.js")).then((page) => page.start($("map"), lab)); },
   data: () => {
     opened.data = null;
     import("./data.js").then((page) => page.start($("data"), lab), () => say("Data is not part of this lab yet.", true));

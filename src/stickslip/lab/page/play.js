@@ -5,7 +5,6 @@ import { Stage } from "./stage.js";
 import { axes, cividis, line, prefixed, range, shortly } from "./canvas.js";
 
 const $ = (id) => document.getElementById(id);
-const FIRST = "THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)", FEW = 8; // cycles: one sees the shape
 const PANELS = [["x", "displacement"], ["x", "angle", true], ["v", "velocity"], ["v", "angular velocity", true], ["a", "acceleration"], ["friction", "friction"]];
 const INKS = { x: "blue", v: "green", a: "purple", friction: "orange" };
 const MORE_INKS = ["blue", "orange", "green", "purple", "sky", "ink"];
@@ -27,14 +26,15 @@ export async function start(given) {
   buttons();
   const shared = fromLink();
   const slow = setTimeout(() => lab.say("The lab is starting …"), 700);
-  const [catalog, first] = await Promise.all([lab.ask("/catalog"), shared ? { state: shared } : lab.ask(`/scenarios/${encodeURIComponent(FIRST)}`)]).catch((error) => { lab.say(error.message, true); return []; });
+  const catalog = await lab.ask("/catalog").catch((error) => lab.say(error.message, true));
   clearTimeout(slow);
   if (!catalog) return;
   lab.boundary = catalog.boundary;
+  const plain = { unit: "", words: "", default: null, optional: false, choices: [], part: false };
+  for (const part of [...Object.values(catalog.laws), ...Object.values(catalog.drives), catalog.system, catalog.contact]) part.parameters = part.parameters.map((each) => ({ ...plain, ...each }));
   controls = new Controls($("parts"), catalog, (path, since, afresh = false) => { changedLast = path; own(); ask(since, afresh); });
-  presets(catalog.presets, shared ? "" : FIRST);
-  if (!shared) first.state.run = { cycles: FEW };
-  use(first.state);
+  presets(catalog.presets, shared ? "" : catalog.first.name);
+  use(shared ?? catalog.first.state);
   addEventListener("hashchange", () => { const link = fromLink(); if (link) { own(); use(link); } });
   lab.onTheme(() => { if (run) { build(); drawTraces(); drawViews(); stage.show(run, lab.colours()); } });
 }
@@ -55,7 +55,7 @@ function own() {
 }
 
 function presets(offered, chosen) {
-  const groups = new Map(), about = new Map(offered.map((each) => [each.name, each]));
+  const groups = new Map(), about = new Map(offered.flatMap((each) => each.names.map((name) => [name, each])));
   for (const each of offered) {
     const key = each.about.startsWith("thesis") ? "From the thesis" : each.parts.replace(/, /, " · ");
     if (!groups.has(key)) groups.set(key, []);
@@ -65,7 +65,7 @@ function presets(offered, chosen) {
   for (const [key, members] of [...groups].sort(([a], [b]) => (b === "From the thesis") - (a === "From the thesis") || a.localeCompare(b))) {
     const group = document.createElement("optgroup");
     group.label = key;
-    for (const each of members) group.append(new Option(each.name, each.name, false, each.name === chosen));
+    for (const name of members.flatMap((each) => each.names)) group.append(new Option(name, name, false, name === chosen));
     $("preset").append(group);
   }
   const told = () => { $("about").textContent = about.get($("preset").value)?.about ?? "A system of your own, or from a link or file."; };
@@ -121,11 +121,12 @@ function arrived(answer) {
     queueMicrotask(() => {
       const drawn = performance.now();
       document.dispatchEvent(new CustomEvent("traces-drawn", { detail: { id: answer.id, took: drawn - since } }));
-      requestAnimationFrame(() => {
+      requestAnimationFrame(() => setTimeout(() => { // the traces are seen first
+        if (run !== answer) return;
         drawViews();
         stage.show(run, lab.colours());
         pace();
-      });
+      }));
     });
   }
   if (answer.want !== "run") return;
