@@ -15,7 +15,7 @@ version = release = __version__
 extensions = [
     "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_parser", "sphinx_gallery.gen_gallery", "offline",
 ]  # fmt: skip
-exclude_patterns = ["_build", "examples"]
+exclude_patterns = ["_build", "_templates", "examples"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 autosummary_generate = True
@@ -42,6 +42,7 @@ sphinx_gallery_conf = {
 }
 suppress_warnings = ["config.cache"]  # the gallery's settings hold functions by name
 
+templates_path = ["_templates"]
 html_theme = "pydata_sphinx_theme"
 html_math_renderer = "mathml"
 html_title = "stickslip"

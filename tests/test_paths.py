@@ -1,4 +1,4 @@
-"""An SVG written short looks the same: every place of a long path within a tenth of a point, everything else untouched."""
+"""An SVG written short looks the same: each place of a long path within a tenth of a point, the rest as it was."""
 
 from __future__ import annotations
 

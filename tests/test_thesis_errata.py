@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from thesis import chapter2, chapter3, chapter4, chapter6
+from thesis import beyond, chapter2, chapter3, chapter4, chapter6
 from thesis.printed import given
 
 import stickslip as ss
@@ -44,6 +44,18 @@ def test_equation_3_4_is_exact_without_damping(case: int) -> None:
     assert orbit.transition_speed == pytest.approx(2 * w * math.sqrt(orbit.amplitude * give - give**2), rel=1e-9)
     damped = chapter3.sliding(GIVEN, case)
     assert damped.transition_speed < 0.99 * 2 * w * math.sqrt(damped.amplitude * give - give**2)
+
+
+def test_the_identity_holds_whatever_the_law() -> None:
+    """Without damper beside the spring; sums over the drawing's points leave some 1e-4 of what went to and fro."""
+    found = {**beyond.orbits(GIVEN), "stick-slip": chapter4.stick_slip(GIVEN, GIVEN["stick_slip"]["case1"])}
+    assert len(found) == 4
+    for name, orbit in found.items():
+        running = beyond.identity(orbit)[1]
+        assert np.ptp(running) > 0.1, name
+        assert abs(running[-1]) < 1e-3, name
+    damped = ss.steady_state(beyond.stick_slip(GIVEN).having(damping=20.0))
+    assert abs(beyond.identity(damped)[1][-1]) > 0.03, "and not with one"
 
 
 def test_with_several_microsticks_their_sum_vanishes() -> None:

@@ -8,13 +8,16 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.plot.plate import Plate
-from stickslip.plot.style import BLUE, FAINT, GREEN, ORANGE, styled
+from stickslip.plot.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
 from thesis import chapter3
 from thesis.drawing import around, exact, figure, panels, tag
 from thesis.printed import Given, Ours
+
+Array = NDArray[np.float64]
 
 TITLE = "Beyond the thesis: what section 8.2 leaves for future studies"
 STARTS_FROM = ("beyond", "stick_slip", "sliding")  # sections of given.toml
@@ -35,6 +38,16 @@ def plates(given: Given) -> Iterator[Plate]:
         f"with friction that follows its level late (state variable, {told['lag']:g} s). Falling friction "
         "overshoots where sliding begins; memory rounds the corner: sliding begins earlier, and friction rises on.",
         title="Stribeck friction and memory behind the contact's spring",
+    )
+    ends = [abs(identity(orbit)[1][-1]) for orbit in orbits(given).values()]
+    yield figure(
+        "identity",
+        _identity(given),
+        "Friction of each kind behind the contact's spring, and stick-slip of case 2. Of any motion with the drive's "
+        "period and without a viscous damper, ∮ (ẍ + ω²x) df = 0, whichever law f "
+        f"follows: equation 3.4 is the case of one microstick at each reversal. Left after a period: {max(ends):.0e} "
+        "of what went to and fro, by the drawing's points.",
+        title="An identity that every friction law obeys",
     )
     yield figure(
         "ringing",
@@ -73,15 +86,42 @@ def behind_the_spring(given: Given) -> dict[str, Any]:
     }
 
 
+def orbits(given: Given) -> dict[str, ss.SteadyState]:
+    """The steady motion at 8.7 Hz with each of them."""
+    told = given["sliding"]
+    drive = ss.HarmonicBase(chapter3.base_for(given, 1), frequency=told["frequency"][1])
+    return {name: _orbit(told["mass"], told["spring"], law, drive) for name, law in behind_the_spring(given).items()}
+
+
+@functools.lru_cache(8)
+def _orbit(mass: float, spring: float, law: Any, drive: Any) -> ss.SteadyState:
+    return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive))
+
+
+def identity(orbit: ss.SteadyState) -> tuple[Array, Array]:
+    """Time, and the integral of (x" + w^2 x) df up to it, over that of its magnitude: zero after a whole period."""
+    time, motion = around(orbit)
+    level = motion["a"] + (2 * math.pi / orbit.period) ** 2 * motion["x"]
+    steps = (level[1:] + level[:-1]) / 2 * np.diff(motion["friction"])
+    return time, np.concatenate([[0.0], np.cumsum(steps)]) / np.sum(np.abs(steps))
+
+
+@styled
+def _identity(given: Given) -> Any:
+    drawn, ax = panels(1, height=3.0)
+    shown = {**orbits(given), "stick-slip": ss.steady_state(stick_slip(given))}
+    for (name, orbit), colour in zip(shown.items(), (BLUE, ORANGE, GREEN, PURPLE), strict=True):
+        time, running = identity(orbit)
+        ax.plot(time / orbit.period, running, color=colour, linewidth=1.0, label=name)
+    ax.set(xlabel="time / period", ylabel="∫ (ẍ + ω²x) df, relative")
+    ax.legend(ncols=4, loc="lower right", bbox_to_anchor=(1, 1))
+    return drawn
+
+
 @styled
 def _laws(given: Given) -> Any:
-    told = given["sliding"]
     drawn, axes = panels(2, 3, height=4.8)
-    for (name, law), column, colour in zip(
-        behind_the_spring(given).items(), axes.T, (BLUE, ORANGE, GREEN), strict=True
-    ):
-        drive = ss.HarmonicBase(chapter3.base_for(given, 1), frequency=told["frequency"][1])
-        orbit = ss.steady_state(ss.Oscillator(mass=told["mass"], stiffness=told["spring"], law=law, drive=drive))
+    for (name, orbit), column, colour in zip(orbits(given).items(), axes.T, (BLUE, ORANGE, GREEN), strict=True):
         _, motion = around(orbit)
         column[0].plot(1e6 * (motion["x"] - np.min(motion["x"])), motion["friction"], color=colour, linewidth=0.9)
         column[0].set(xlabel="displacement [µm]", xlim=(-4, 60), title=name)
