@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
@@ -108,6 +109,19 @@ def test_a_unit_whose_clock_runs_fast_is_found() -> None:
     true, fast = (ss.Rig((sensor,), rate=rate).measure(run(), fs=1000, rng=1) for rate in (0.0, 2e-3))
     assert len(fast) == pytest.approx(len(true) * 1.002, abs=2)
     assert 1 / ss.clock_rate(true, fast).value - 1 == pytest.approx(2e-3, rel=0.01)
+
+
+@pytest.mark.parametrize(("rig", "seen"), [(ss.Rig(), 0.0326), (ss.Rig().having("x", lag=1.461e-3), 0.0389)])
+def test_the_lead_of_the_accelerometer_is_made_of_three_parts(rig: ss.Rig, seen: float) -> None:
+    """Section 2.3, in a free vibration: the lag of x, less that of the mount, and 2 zeta of the decay."""
+    natural, ratio = 30.91, 0.0008
+    slider = ss.Oscillator(mass=1.0, stiffness=natural**2, damping=2 * ratio * natural, law=ss.Coulomb(0.0))
+    record = rig.measure(ss.simulate(slider, start={"x": 0.005}, duration=10), fs=4000, rng=2)
+    turning = np.hanning(len(record)) * np.exp(-1j * natural * record.time)
+    lead = np.angle(np.sum(turning * record["a"]) / np.sum(turning * -record["x"]))
+    parts = natural * (rig.sensors[0].lag - 2 * 0.1 / (2 * math.pi * 125)) + 2 * ratio
+    assert lead == pytest.approx(parts, abs=1e-4)
+    assert lead == pytest.approx(seen, abs=1e-4)
 
 
 def test_the_presets_are_the_rigs_of_the_thesis() -> None:
