@@ -95,7 +95,7 @@ def sound(request: Mapping[str, Any], go_on: GoOn) -> Answer:
         lasts = min(LASTS, run.duration / quicker)
         times = np.linspace(run.duration - lasts * quicker, run.duration, max(2, int(lasts * HEARD)))
         heard = run.sample(np.clip(times, 0, run.duration), ("friction",))[0][0]
-        words = f"friction, {quicker:.3g} times as fast"
+        words = f"friction, {float(f'{quicker:.3g}'):g} times as fast"
     heard = heard - heard.mean()
     return {"fs": HEARD, "words": words}, {"sound": heard / (np.abs(heard).max() or 1.0)}
 

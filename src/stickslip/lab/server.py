@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
@@ -17,7 +16,7 @@ from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 
 import stickslip as ss
-from stickslip.lab import maps, play
+from stickslip.lab import data, maps, play
 from stickslip.lab.openapi import described, document
 from stickslip.lab.security import Guard
 from stickslip.lab.workers import Workers
@@ -52,25 +51,17 @@ def _routes() -> list[BaseRoute]:
     return [
         *play.routes,
         *maps.routes,
-        *(_data().routes if _data() else []),
+        *data.routes,
         Route("/openapi.json", _openapi),
         Route("/alive", _alive),
     ]
-
-
-def _data() -> Any:
-    try:
-        return importlib.import_module("stickslip.lab.data")
-    except ModuleNotFoundError:
-        return None
 
 
 @asynccontextmanager
 async def _lifespan(app: Starlette) -> AsyncIterator[None]:
     async with AsyncExitStack() as stack:
         app.state.workers = await stack.enter_async_context(Workers(WORKERS))
-        if _data():
-            await stack.enter_async_context(_data().lifespan(app))
+        await stack.enter_async_context(data.lifespan(app))
         yield
 
 

@@ -55,7 +55,7 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[], None]) -> Non
 
     app = lab_app(token=token, port=door.getsockname()[1])
     settings = uvicorn.Config(
-        app, log_level="warning", ws_max_size=LARGEST_MESSAGE, server_header=False, date_header=False,
+        app, log_level="warning", access_log=False, ws_max_size=LARGEST_MESSAGE, server_header=False, date_header=False,
         timeout_graceful_shutdown=2, ws_per_message_deflate=False,
     )  # fmt: skip
     Server(settings).run(sockets=[door])

@@ -26,10 +26,12 @@ export function readable(value, unit) {
   return `${+(value * factor).toPrecision(6)}${words && ` ${words}`}`;
 }
 const LETTERS = { G: 1e9, M: 1e6, k: 1e3, m: 1e-3, "µ": 1e-6, u: 1e-6, n: 1e-9 };
+const THOUSANDS = /^\s*[-+]?\d{1,3}(,\d{3})+(?!\d)/; // or a decimal comma: no one can tell
 // A number in SI where the text is one, with or without a prefixed unit; other units are left to the library.
 export function written(text, unit) {
+  if (THOUSANDS.test(text)) throw new Error(`${text.trim()} may be read in two ways; write ${text.trim().replace(/,/g, "")}, or a decimal point.`);
   const found = /^\s*([-+]?[\d.]+(?:e[-+]?\d+)?)\s*(.*?)\s*$/i.exec(text.replace(",", "."));
-  if (!found) return text.trim() || undefined;
+  if (!found || !Number.isFinite(Number(found[1]))) return text.trim() || undefined;
   const given = found[2].replaceAll("·", " ").replace("²", "^2"), number = Number(found[1]);
   if (!given || given === unit) return number;
   return given.slice(1) === unit && LETTERS[given[0]] ? number * LETTERS[given[0]] : text.trim();
@@ -141,7 +143,8 @@ export class Controls {
       this.set(place, now, event.timeStamp);
     });
     text.addEventListener("change", (event) => {
-      const now = written(text.value, each.unit);
+      let now;
+      try { now = written(text.value, each.unit); } catch (error) { this.fault(place, error.message); return; }
       if (typeof now === "number") { slide.value = scale.place(now); text.value = readable(now, each.unit); told(now); }
       this.set(place, now, event.timeStamp);
     });
@@ -204,6 +207,6 @@ export class Controls {
     const place = this.knobs.get(path?.join(".")) ?? document.getElementById(path?.join("-"))?.parentElement ?? this.root;
     const told = place.appendChild(document.createElement("p"));
     told.className = "fault";
-    told.textContent = words.replace(/^the system( \[[^\]]*\])?:? ?/, "").replace(/correct (\w+)=/g, "correct it").replace(/(\w+)=(?=[ ,.;])/g, "$1");
+    told.textContent = words.replace(/^the system( \[[^\]]*\])?:? ?/, "").replace(", or raise budget=", "").replace(/correct (\w+)=/g, "correct it").replace(/(\w+)=(?=[ ,.;])/g, "$1");
   }
 }

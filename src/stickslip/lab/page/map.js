@@ -106,7 +106,13 @@ function draw() {
     const dotted = $(`map-${side}`).value;
     return { name: named(dotted), dotted, from: written($(`map-${side}-from`).value, unitOf(dotted)), to: written($(`map-${side}-to`).value, unitOf(dotted)), count: COUNT[side] };
   };
-  wanted = { id: ++number, want: "map", state, measure: $("map-measure").value, x: axis("x"), y: axis("y") };
+  let ends;
+  try { ends = [axis("x"), axis("y")]; } catch (error) { $("map-fault").textContent = error.message; return; }
+  if (ends.some(({ from, to }) => !(typeof from === "number" && to > from))) {
+    $("map-fault").textContent = "An axis goes from a number to a larger one; write both, with their unit or in SI.";
+    return;
+  }
+  wanted = { id: ++number, want: "map", state, measure: $("map-measure").value, x: ends[0], y: ends[1] };
   parts = [];
   $("map-title").textContent = MEASURES[wanted.measure].replace(/^./, (letter) => letter.toUpperCase());
   $("map-fault").textContent = "";

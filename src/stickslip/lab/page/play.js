@@ -51,18 +51,19 @@ function use(given) {
 function own() {
   if (!$("preset").value) return;
   $("about").textContent = `Changed from ${$("preset").value}; choose it again to go back.`;
+  if (state) state.about = `changed from ${$("preset").value}`;
   $("preset").value = "";
 }
 
 function presets(offered, chosen) {
   const groups = new Map(), about = new Map(offered.flatMap((each) => each.names.map((name) => [name, each])));
   for (const each of offered) {
-    const key = each.about.startsWith("thesis") ? "From the thesis" : each.parts.replace(/, /, " · ");
+    const key = each.about.replace(/^./, (letter) => letter.toUpperCase());
     if (!groups.has(key)) groups.set(key, []);
     groups.get(key).push(each);
   }
   $("preset").add(new Option("your own", ""));
-  for (const [key, members] of [...groups].sort(([a], [b]) => (b === "From the thesis") - (a === "From the thesis") || a.localeCompare(b))) {
+  for (const [key, members] of groups) {
     const group = document.createElement("optgroup");
     group.label = key;
     for (const name of members.flatMap((each) => each.names)) group.append(new Option(name, name, false, name === chosen));
@@ -79,6 +80,7 @@ function presets(offered, chosen) {
 
 // One run is under way at a time, and the newest state waits; one that takes long is overtaken.
 function ask(since, afresh = false) {
+  if (player) silence();
   next = { since, afresh: afresh || next?.afresh, state: structuredClone(state) };
   clearTimeout(resting);
   clearTimeout(idling);
@@ -90,7 +92,7 @@ function send() {
   Object.assign(newest, { run: flying.id, tell: null, wavelet: null });
   conversation.send({ id: flying.id, want: "run", state: flying.state, afresh: flying.afresh });
   clearTimeout(patience);
-  patience = setTimeout(() => lab.say("Computing … the first run after an installation, or of a law, is compiled, which takes a while."), 900);
+  patience = setTimeout(() => { stale(true); lab.say("Computing … what is shown is the motion before. The first run of a law is compiled, which takes a while."); }, 600);
 }
 
 function more(want) {
@@ -110,10 +112,13 @@ function arrived(answer) {
   if (answer.want === "run") clearTimeout(patience);
   if (answer.kind === "error") {
     controls.fault(changedLast, answer.error);
+    if (answer.want === "run") stale(true);
     lab.say(changedLast ? "" : answer.error, true);
   } else if (answer.kind === "run") {
     controls.fault(null);
     lab.say("");
+    stale(false);
+    $("told").classList.add("stale");
     run = answer;
     run.kinds = kinds(run.arrays);
     drawTraces();
@@ -312,7 +317,14 @@ function drawWavelet() {
   plan.pen.drawImage(picture, left, top, right - left, bottom - top);
 }
 
+// What is shown is not what is asked for.
+function stale(is) {
+  for (const card of document.querySelectorAll("#shown .card")) card.classList.toggle("stale", is);
+}
+
 function told({ sentences, rows }) {
+  $("told").classList.remove("stale");
+  $("happened").textContent = sentences[0] ?? "";
   const body = $("rows");
   $("sentences").replaceChildren(...sentences.map((each) => Object.assign(document.createElement("p"), { textContent: each })));
   body.replaceChildren(...rows.map(([name, value]) => {
@@ -338,7 +350,7 @@ function pace() {
   const chosen = $("pace").value;
   stage.pace = chosen ? Number(chosen) : run.cycle / 2;
   const slower = 1 / stage.pace;
-  $("stage-note").textContent = Math.abs(slower - 1) < 0.01 ? "in true time" : slower > 1 ? `${shortly(+slower.toPrecision(2))} times slower than it is` : `${shortly(+(1 / slower).toPrecision(2))} times faster than it is`;
+  $("stage-note").textContent = Math.abs(slower - 1) < 0.04 ? "in true time" : slower > 1 ? `${shortly(+slower.toPrecision(2))} times slower than it is` : `${shortly(+(1 / slower).toPrecision(2))} times faster than it is`;
 }
 
 /* ---------- buttons ---------- */
@@ -372,7 +384,7 @@ function buttons() {
     for (const chart of charts) chart.setSize({ width: $("traces").clientWidth - 26, height: chart.height });
     drawViews();
     drawWavelet();
-    stage.draw();
+    if (stage.run) stage.draw();
   }).observe($("traces"));
 }
 
