@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -43,6 +44,50 @@ def test_a_delay_is_found_with_its_interval(lag: float) -> None:
     assert pair.coupled
 
 
+@pytest.mark.parametrize(("lag", "told"), [(9.6e-4, True), (9.95e-4, False), (1e-3, False), (1.005e-3, False)])
+def test_a_delay_that_can_not_be_told_from_half_a_period_is_not_told(lag: float, told: bool) -> None:
+    pair = joined(*tones(lag, noise=0.02)).of("a", "sound")
+    assert (pair.delay is not None) == told
+    assert abs(pair.phase.value) == pytest.approx(2 * math.pi * 500 * lag, abs=0.05)
+    assert pair.leads == ("a" if told else "neither")
+    assert not pair.tied
+
+
+def test_what_moves_together_all_along_gains_nothing_by_the_squeak() -> None:
+    """Both channels shake with one noise throughout; in a second record each with its own."""
+    record, found = tones(0.0, noise=0.0)
+    rng = np.random.default_rng(4)
+    for shared in (True, False):
+        one, other = rng.standard_normal((2, len(record)))
+        shaken = {"a": record["a"] + one, "sound": record["sound"] + 0.5 * (one if shared else other)}
+        pair = joined(ss.Record.of(shaken, fs=10_000), found).of("a", "sound")
+        assert pair.coupled
+        assert pair.adds != shared
+        assert (pair.added.interval[0] > 0.1) != shared
+        assert pair.added.value == pytest.approx(pair.inside - pair.outside)
+
+
+def test_a_squeak_is_said_to_add_by_chance_as_seldom_as_told() -> None:
+    record, found = tones(0.0)
+    added = []
+    for seed in range(60):
+        own, shared = np.random.default_rng(seed).standard_normal((2, len(record)))
+        record = record.with_channel("a", own + shared, unit="m/s^2").with_channel("load", shared, unit="N")
+        record = record.with_channel("friction", shared, unit="N")
+        added.append(joined(record, found).of("a", "friction").adds)
+    assert sum(added) <= 5  # of 60; one and a half by chance
+
+
+def test_without_a_rest_what_a_squeak_adds_is_not_told() -> None:
+    record, found = tones(0.0)
+    inside = record.between(0.35, 0.65)
+    within = replace(found, record=inside, bursts=tuple(replace(b, start=0.35, duration=0.3) for b in found.bursts))
+    pair = joined(inside, within).of("a", "sound")
+    assert pair.added is None
+    assert math.isnan(pair.outside)
+    assert not pair.adds
+
+
 def test_intervals_hold_the_delay_as_often_as_they_say() -> None:
     held = [joined(*tones(2e-4, seed=seed)).of("a", "sound").delay.includes(2e-4) for seed in range(40)]
     assert sum(held) >= 34
@@ -73,6 +118,23 @@ def test_friction_is_against_the_mass_that_it_accelerates() -> None:
     pair = virtual()[1].of("a", "friction")  # m a = ... - f
     assert abs(pair.phase.value) == pytest.approx(math.pi, abs=0.02)
     assert pair.inside > 0.99
+    assert pair.tied
+    assert pair.delay is None
+    assert not pair.adds
+
+
+def test_friction_computed_from_the_acceleration_tells_of_no_coupling() -> None:
+    record, found = tones(2e-4)
+    force = record.with_channel("friction", -record["sound"], unit="N", source="friction_force")
+    assert joined(force, found).of("a", "friction").tied
+    assert not joined(force, found).of("a", "sound").tied
+
+
+def test_an_energy_that_may_be_nothing_is_not_ok() -> None:
+    _, found = virtual()
+    assert found.energy_per_cycle.includes(0.0)
+    assert "whether friction feeds or damps can not be told" in found.energy_per_cycle.status
+    assert "can not be told" not in found.dissipated_per_cycle.status
 
 
 def test_normal_and_torsional_motion_couple_while_it_squeaks() -> None:
@@ -93,6 +155,8 @@ def test_it_is_plain_data() -> None:
 
     told = json.loads(json.dumps(virtual()[1].to_dict(), allow_nan=False))
     assert len(told["pairs"]) == 10
+    (tied,) = (pair for pair in told["pairs"] if pair["tied"])
+    assert (tied["first"], tied["second"], tied["delay"], tied["adds"]) == ("a", "friction", None, False)
 
 
 def test_what_holds_no_coupling_is_refused() -> None:

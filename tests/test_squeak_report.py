@@ -177,6 +177,48 @@ def test_a_record_of_silence_between_clicks_has_no_spectra() -> None:
     assert not squeaks.squeaking
 
 
+# ---- coupling in words
+
+
+def told_of(pairs: tuple[ss.Pair, ...], found: ss.SqueakFindings) -> list[str]:
+    joined = replace(found.coupling, pairs=pairs)
+    return list(ss.summary(replace(found, coupling=joined)).headline)
+
+
+def test_what_a_squeak_adds_is_said_and_not_what_is_there_without_it() -> None:
+    found = findings("wet", 6.13)
+    bare = tuple(replace(pair, outside=np.nan, added=None) for pair in found.coupling.pairs)
+    assert any("nothing outside to tell what of that the squeak adds" in each for each in told_of(bare, found))
+    same = tuple(
+        replace(p, added=p.added and replace(p.added, value=0.0, interval=(-0.1, 0.1))) for p in found.coupling.pairs
+    )
+    assert any("that the squeak adds to any of them, against the rest, is not shown" in e for e in told_of(same, found))
+    more = replace(same[0], inside=0.9, outside=0.3, added=replace(same[0].added, value=0.6, interval=(0.4, 0.8)))
+    (said,) = (each for each in told_of((more, *same[1:]), found) if "more than outside" in each)
+    assert said.startswith("While it squeaks, 1 of 9 pairs of channels move together more than outside")
+    assert said.endswith("acceleration and normal acceleration: coherence 0.90 against 0.30.")
+
+
+def test_half_a_period_is_no_delay_and_inertia_no_coupling() -> None:
+    (table,) = (each for each in ss.summary(findings("wet", 6.13)).tables if each.title.startswith("What moves"))
+    assert table.rows[-1][0] == "a, friction"
+    assert table.rows[-1][-1] == "half a period"
+    assert "it can not be told which leads" in table.note
+    assert "m a = ... - f" in table.note
+
+
+def test_where_the_energy_is_not_told_the_lever_is_asked_for() -> None:
+    told = [spoken(each) for each in ss.summary(findings("wet", 6.13)).headline]
+    assert any(
+        "can not be told; what it gives the torsion is told where" in each and "--lever" in each for each in told
+    )
+    found = findings("wet", 6.13)
+    stated = ss.coupling(found.record, squeaks=found.squeaks, lever="1.7 mm")
+    told = list(ss.summary(replace(found, coupling=stated)).headline)
+    assert any(each.startswith("Friction feeds the torsion: ") for each in told)
+    assert not any("lever" in each for each in told)
+
+
 # ---- sounds
 
 
@@ -251,11 +293,12 @@ def test_several_records_are_compared(tmp_path: Path) -> None:
 def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
     for surface, load in CONDITIONS[1::2]:
         (tmp_path / surface / str(load)).mkdir(parents=True)
-        ss.write_record(measured(surface, load), tmp_path / surface / str(load) / "sensors.csv")
+        part = measured(surface, load).between(0.4, 1.2).select("x", "v", "friction", "normal_acceleration")
+        ss.write_record(part, tmp_path / surface / str(load) / "sensors.csv")
     heavy, light = (tmp_path / "wet" / str(load) / "sensors.csv" for load in (6.13, 1.23))
-    result = run(heavy, light, "--normal", "6.13/*=6.13", "--normal", "sensors.csv=1.23", "--output", tmp_path / "out")
+    result = run(heavy, light, "--normal", "6.13/*=6.13", "--normal", "sensors.csv=1.23", "--json")
     assert result.exit_code == 0, result.output
-    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))["comparison"]
+    told = json.loads(result.stdout)["comparison"]
     assert [each["name"] for each in told["conditions"]] == ["6.13/sensors.csv", "1.23/sensors.csv"]
     assert [each["normal"] for each in told["conditions"]] == [6.13, 1.23]
     assert "6.13/sensors.csv squeaks; 1.23/sensors.csv does not squeak." in told["verdicts"]

@@ -24,7 +24,7 @@ _SPOKEN = (
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
     (r'\bfriction_force\(record, \.\.\., method="(\w+)"\)', r"--method \1"),
     (
-        r"\b(channels|channel|frequencies|normal|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness)=(?=\W|$)",
+        r"\b(channels|channel|frequencies|normal|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness|lever)=(?=\W|$)",
         r"--\1",
     ),
 )

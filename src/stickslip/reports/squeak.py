@@ -45,19 +45,53 @@ def headline(found: SqueakFindings) -> Iterator[str]:
     if loudest is not None:
         yield _of_one(loudest, squeaks)
     if found.coupling is not None:
-        joined = [pair for pair in found.coupling.pairs if pair.coupled]
-        told = f"{len(joined)} of {len(found.coupling.pairs)} pairs of channels move together beyond chance"
-        yield f"While it squeaks, {told}."
-        fed = {"tangential vibration": found.coupling.energy_per_cycle, "torsion": found.coupling.energy_to_torsion}
-        for motion, energy in fed.items():
-            if energy is not None and not energy.includes(0.0):
-                verb = "feeds" if energy.value > 0 else "damps"
-                yield f"Friction {verb} the {motion}: {value_of(energy)} in each cycle of the squeak."
+        yield _of_pairs(found.coupling)
+        yield from _of_energy(found.coupling, torsion="torsion_velocity" in record)
     if found.loops is not None:
         slope = found.loops.slope
         trend = trend_of(slope)
         sure = f" {trend}" if trend in ("falls", "rises") else " can not be told to change"
         yield (f"Friction is {value_of(found.loops.level)} and{sure} with speed: {value_of(slope)} ({_ends(slope)}).")
+
+
+def _of_pairs(joined: Coupling) -> str:
+    """What the squeak adds to how the channels move together."""
+    pairs = [pair for pair in joined.pairs if not pair.tied]
+    coupled, adding = [pair for pair in pairs if pair.coupled], [pair for pair in pairs if pair.adds]
+    if not pairs:
+        return "Of two channels of which one follows from the other no coupling can be told."
+    if all(pair.added is None for pair in pairs):
+        return (
+            f"While it squeaks, {len(coupled)} of {len(pairs)} pairs of channels move together beyond chance; there is "
+            "nothing outside to tell what of that the squeak adds."
+        )
+    if not adding:
+        many = f"{len(coupled)} of {len(pairs)} pairs of channels move together beyond chance"
+        return f"While it squeaks, {many}; that the squeak adds to any of them, against the rest, is not shown."
+    most = max(adding, key=lambda pair: 0.0 if pair.added is None else pair.added.value)
+    return (
+        f"While it squeaks, {len(adding)} of {len(pairs)} pairs of channels move together more than outside, most of "
+        f"all {spoken_name(most.first)} and {spoken_name(most.second)}: coherence {most.inside:.2f} against "
+        f"{most.outside:.2f}."
+    )
+
+
+def _of_energy(joined: Coupling, *, torsion: bool) -> Iterator[str]:
+    """Which motion friction feeds, where that is told."""
+    fed = {"tangential vibration": joined.energy_per_cycle, "torsion": joined.energy_to_torsion}
+    for motion, energy in fed.items():
+        if energy is not None and not energy.includes(0.0):
+            verb = "feeds" if energy.value > 0 else "damps"
+            yield f"Friction {verb} the {motion}: {value_of(energy)} in each cycle of the squeak."
+    if joined.energy_per_cycle is not None and joined.energy_per_cycle.includes(0.0):
+        lever = "; what it gives the torsion is told where its distance from the axis is stated, as lever= in m"
+        told = lever if torsion and joined.energy_to_torsion is None else ""
+        yield f"Whether friction feeds or damps the tangential vibration can not be told{told}."
+
+
+def spoken_name(channel: str) -> str:
+    """A channel's name as words."""
+    return {"a": "acceleration"}.get(channel, channel.replace("_", " "))
 
 
 def _of_one(burst: Squeak, squeaks: Squeaks) -> str:
@@ -158,34 +192,52 @@ def hearing_note(found: SqueakFindings) -> str:
 
 
 def coupling_table(joined: Coupling) -> tuple[Sequence[str], list[list[str]]]:
-    """Headings and a row for each pair of channels, the one that leads before the other."""
-    headings = ["channels, the first leads", "coherence", "outside", "phase", "later by"]
-    return headings, [_pair(pair) for pair in joined.pairs]
+    """Headings and a row for each pair of channels: first those that the squeak adds to, last what is no coupling."""
+    rest = any(pair.added is not None for pair in joined.pairs)
+    headings = [
+        "channels, the first leads", "coherence", *(["outside", "added (95 %)"] if rest else []), "phase", "later by"
+    ]  # fmt: skip
+
+    def order(pair: Pair) -> tuple[bool, bool, float]:
+        return pair.tied, not pair.adds, 0.0 if pair.added is None else -pair.added.value
+
+    return headings, [_pair(pair, rest=rest) for pair in sorted(joined.pairs, key=order)]
 
 
 def coupling_note(joined: Coupling) -> str:
     """How to read the table of pairs."""
+    tied = (
+        " Friction and acceleration of one mass go together by its inertia, m a = ... - f: that is no coupling."
+        if any(pair.tied for pair in joined.pairs)
+        else ""
+    )
+    half = (
+        " At half a period it can not be told which leads: that is a sign, and no delay."
+        if any(pair.delay is None for pair in joined.pairs)
+        else ""
+    )
     return (
         f"Compared: {joined.compared}. Channels that have nothing to do with each other have a coherence below "
         f"{joined.pairs[0].significant:.2f} in 95 of 100 cases. A tone has no beginning: which channel leads holds "
-        "within half a period, and is no cause."
+        f"within half a period, and is no cause.{half}{tied}"
     )
 
 
-def _pair(pair: Pair) -> list[str]:
+def _pair(pair: Pair, *, rest: bool) -> list[str]:
     sign = -1 if pair.leads == pair.second else 1
     first, second = (pair.second, pair.first) if sign < 0 else (pair.first, pair.second)
-    told = [
-        f"{first}{' → ' if pair.leads != 'neither' else ', '}{second}",
-        f"{pair.inside:.2f}",
-        _or_none(pair.outside, ".2f"),
-    ]
+    told = [f"{first}{' → ' if pair.leads != 'neither' else ', '}{second}", f"{pair.inside:.2f}"]
+    if rest:
+        low, high = pair.added.interval if pair.added is not None else (math.nan, math.nan)
+        told += [f"{pair.outside:.2f}", f"{round(low, 2) + 0.0:.2f} to {round(high, 2) + 0.0:.2f}"]
     if not pair.coupled:
         return [*told, NONE, "by chance"]
+    phase = f"{math.degrees(sign * pair.phase.value):.0f}°"
+    if pair.delay is None:
+        return [*told, phase, "half a period"]
     delay, half = sign * pair.delay.value, (pair.delay.interval[1] - pair.delay.interval[0]) / 2
     factor, unit = prefixed(delay, "s")
     digits = decimals(factor * half, factor * delay)
-    phase = f"{math.degrees(sign * pair.phase.value):.0f}°"
     return [*told, phase, f"{factor * delay:.{digits}f} ± {factor * half:.{digits}f} {unit}"]
 
 

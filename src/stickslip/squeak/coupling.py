@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate
+from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.laws.base import finite
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
@@ -26,6 +26,9 @@ Waves = NDArray[np.complex128]
 MOTIONS = ("a", "normal_acceleration", "torsion_velocity", "friction", "sound")
 CYCLES = 8.0  # of the tone in a segment: its line is an eighth of its frequency wide
 FEWEST = 4  # segments
+OPPOSED = math.radians(5.0)  # nearer to half a period nobody tells which leads: a channel's sign may be chosen
+NOTICED = 0.05  # of coherence: less is no change that matters
+UNSURE = "the interval holds zero: whether friction feeds or damps can not be told"
 ENERGIES = ("energy_per_cycle", "dissipated_per_cycle", "energy_to_torsion", "energy_to_normal")
 
 
@@ -41,10 +44,16 @@ class Pair:
         Coherence in the bursts and outside of them, 0 to 1; outside NaN where too little lies there.
     significant : float
         Coherence that channels that have nothing to do with each other exceed once in twenty times.
+    added : Estimate or None
+        `inside` less `outside`: what the squeak adds; None where too little lies outside.
     phase : Estimate
         By which the second lags the first [rad], -pi to pi.
-    delay : Estimate
-        The same as a time [s], within half a period; positive where the first leads.
+    delay : Estimate or None
+        The same as a time [s], within half a period; positive where the first leads. None where it can not be told from
+        half a period, which is a sign.
+    tied : bool
+        Whether one follows from the other without any coupling: the friction and the acceleration of one mass, in
+        opposite phase (m a = ... - f) or computed from each other.
     """
 
     first: str
@@ -52,8 +61,10 @@ class Pair:
     inside: float
     outside: float
     significant: float
+    added: Estimate | None
     phase: Estimate
-    delay: Estimate
+    delay: Estimate | None
+    tied: bool
 
     @property
     def coupled(self) -> bool:
@@ -61,18 +72,27 @@ class Pair:
         return self.inside > self.significant
 
     @property
+    def adds(self) -> bool:
+        """Whether they move together in the bursts noticeably more than outside, and beyond chance."""
+        if self.added is None or self.tied or not self.coupled:
+            return False
+        return self.added.value > NOTICED and self.added.interval[0] > 0
+
+    @property
     def leads(self) -> str:
-        """The channel that leads, within half a period; "neither" where the delay's interval holds zero."""
-        low, high = self.delay.interval
-        return "neither" if low <= 0 <= high or not self.coupled else self.first if low > 0 else self.second
+        """The channel that leads, within half a period; "neither" where the delay's interval holds zero, or none is."""
+        if self.delay is None or self.delay.includes(0.0) or not self.coupled:
+            return "neither"
+        return self.first if self.delay.value > 0 else self.second
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return {
             "first": self.first, "second": self.second, "inside": self.inside,
             "outside": None if math.isnan(self.outside) else self.outside, "significant": self.significant,
-            "coupled": self.coupled, "leads": self.leads,
-            "phase": self.phase.to_dict(), "delay": self.delay.to_dict(),
+            "coupled": self.coupled, "adds": self.adds, "tied": self.tied, "leads": self.leads,
+            "added": None if self.added is None else self.added.to_dict(), "phase": self.phase.to_dict(),
+            "delay": None if self.delay is None else self.delay.to_dict(),
         }  # fmt: skip
 
 
@@ -150,7 +170,12 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None, lever: float | s
     :math:`1 - 0.05^{1/(n-1)}` once in twenty times (Carter, Knapp and Nuttall, "Estimation of the magnitude-squared
     coherence function", 1973). The phase is that of the sum, with the variance
     :math:`(1-\gamma^2)/(2 n \gamma^2)` (Bendat and Piersol, "Random Data", 9.2.4). A tone has no beginning, so a delay
-    is told within half a period alone: which leads is a convention there, not a cause.
+    is told within half a period alone: which leads is a convention there, not a cause. Within five degrees of half a
+    period, or where the interval reaches it, no delay is told: it would be that of a sign.
+
+    What the squeak adds is the coherence inside less that outside. Of each, :math:`\mathrm{artanh}\,\gamma` is spread
+    with the variance :math:`1/(2(n-1))` (Enochson and Goodman, AFFDL-TR-65-57, 1965); the interval of the difference
+    joins both by their distances from the values (Zou and Donner, Statistics in Medicine 27, 2008).
 
     Friction opposes positive velocity (m a = ... - f), so its work on the vibration is minus the mean of f v in the
     band of the squeak. By a lever l it works on the torsion too, with minus the mean of l f times its velocity.
@@ -212,8 +237,9 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None, lever: float | s
         )
     inside = {name: _tones(record[name], within, size, frequency / record.fs) for name in names}
     outside = {name: _tones(record[name], beyond, size, frequency / record.fs) for name in names}
+    computed = "friction" in record and record.channels["friction"].source == "friction_force"
     pairs = [
-        _pair(one, other, inside, outside if len(beyond) >= FEWEST else None, frequency)
+        _pair(one, other, inside, outside if len(beyond) >= FEWEST else None, frequency, computed)
         for one, other in itertools.combinations(names, 2)
     ]
     arm = None if lever is None else finite("lever", parse_value(lever, "m"), unit="m")
@@ -229,7 +255,9 @@ def _tones(values: Array, rows: list[int], size: int, frequency: float) -> Waves
     return np.asarray((parts - parts.mean(axis=1, keepdims=True)) @ wave)
 
 
-def _pair(one: str, other: str, inside: dict[str, Waves], outside: dict[str, Waves] | None, frequency: float) -> Pair:
+def _pair(
+    one: str, other: str, inside: dict[str, Waves], outside: dict[str, Waves] | None, frequency: float, computed: bool
+) -> Pair:
     count = len(inside[one])
     coherence, angle = _coherence(inside[one], inside[other])
     sd, chance = math.sqrt(max(1 - coherence, 1e-12) / (2 * count * max(coherence, 1e-12))), coherence_by_chance(count)
@@ -239,8 +267,38 @@ def _pair(one: str, other: str, inside: dict[str, Waves], outside: dict[str, Wav
         status="ok" if coherence > chance else "no coherence beyond chance: the phase means nothing",
     )  # fmt: skip
     delay = phase.scaled(1 / (2 * math.pi * frequency), "s", f"delay of {other} behind {one}")
-    beyond = math.nan if outside is None else _coherence(outside[one], outside[other])[0]
-    return Pair(one, other, coherence, beyond, chance, phase, delay)
+    opposed = max(map(abs, phase.interval)) >= math.pi or abs(angle) > math.pi - OPPOSED
+    beyond, added = math.nan, None
+    if outside is not None:
+        beyond = _coherence(outside[one], outside[other])[0]
+        added = _added(one, other, (coherence, count), (beyond, len(outside[one])))
+    tied = {one, other} == {"a", "friction"} and (computed or (opposed and coherence > chance))
+    told = None if opposed and coherence > chance else delay
+    return Pair(one, other, coherence, beyond, chance, added, phase, told, tied)
+
+
+def _added(one: str, other: str, inside: tuple[float, int], outside: tuple[float, int]) -> Estimate:
+    """The difference of two coherences, each with its count of segments."""
+    (low, high), (least, most) = (_coherence_interval(*each) for each in (inside, outside))
+    value = inside[0] - outside[0]
+    ends = (
+        value - math.hypot(inside[0] - low, most - outside[0]), value + math.hypot(high - inside[0], outside[0] - least)
+    )  # fmt: skip
+    return Estimate(
+        f"coherence that the squeak adds to {one} and {other}",
+        value,
+        ends,
+        (ends[1] - ends[0]) / (2 * NORMAL_95),
+        "1",
+        f"{inside[1]} segments in the squeaks less {outside[1]} outside",
+    )
+
+
+def _coherence_interval(coherence: float, count: int) -> tuple[float, float]:
+    middle = math.atanh(math.sqrt(min(coherence, 1 - 1e-12))) - 1 / (2 * (count - 1))
+    reach = NORMAL_95 / math.sqrt(2 * (count - 1))
+    low, high = (math.tanh(max(0.0, middle + side * reach)) ** 2 for side in (-1, 1))
+    return min(low, coherence), max(high, coherence)
 
 
 def _coherence(one: Waves, other: Waves) -> tuple[float, float]:
@@ -300,9 +358,11 @@ class _Work:
 
 def _mean(name: str, values: list[float]) -> Estimate:
     count = len(values)
-    status = "ok" if count > 2 else f"only {count} bursts: the interval is crude"
+    status = "ok" if count > 2 else f"only {count} burst{'s' * (count > 1)}: the interval is crude"
     sd = float(np.std(values, ddof=1) / math.sqrt(count)) if count > 1 else math.inf
-    return Estimate.normal(
+    found = Estimate.normal(
         name, float(np.mean(values)), sd=sd, unit="J", method=f"mean of {count} bursts",
         quantile=student(max(1, count - 1)), status=status,
     )  # fmt: skip
+    unsure = count > 2 and found.includes(0.0)
+    return replace(found, status=UNSURE) if unsure else found
