@@ -93,10 +93,16 @@ def test_what_creaks_or_whistles_is_not_called_silent() -> None:
         of_sound(*each) for each in ((tone(), "Chalk"), (creak * (t > 0.1) * (t < 0.9), "Door"), (whistle, "Pipe"))
     ]
     together = ss.compare_squeaks(found)
-    assert [each.answer for each in together.conditions] == ["squeals", "does not squeak", "can not be told"]
-    assert together.verdicts == ("Chalk squeals; Door does not squeak.", "Whether Pipe squeaks can not be told.")
-    assert [row[5] for row in ss.summary(together).tables[0].rows][1:] == ["none", "can not be told"]
-    assert ss.compare_squeaks(found[1:2] * 2).verdicts == ("No condition squeaks.",)
+    assert [each.answer for each in together.conditions] == ["squeals", "creaks", "can not be told"]
+    assert together.verdicts == ("Chalk squeals; Door creaks.", "Whether Pipe squeaks can not be told.")
+    (table,) = ss.summary(together).tables
+    assert table.headings == ["condition", "heard", "Hz", "dB"]  # no column of dashes
+    heard = [row[1] for row in table.rows]
+    assert heard[0] == "1 squeal (1 in a second)"
+    assert heard[1].startswith("creak, 2")
+    assert heard[1].endswith(" pulses in a second")
+    assert heard[2] == "can not be told"
+    assert ss.compare_squeaks(found[1:2] * 2).verdicts == ("No condition squeaks.", "Door and Door creak.")
     assert ss.compare_squeaks(found[2:] * 2).verdicts == ("Whether Pipe and Pipe squeak can not be told.",)
 
 
@@ -115,6 +121,16 @@ def test_friction_falls_too_only_where_it_is_known_to_fall_in_what_squeaks() -> 
         (told,) = (each for each in ss.compare_squeaks([squeaking, pair[1]]).verdicts if "falls" in each)
         assert (" too," in told) == too
         assert "a falling friction alone is not enough" in told
+
+
+def test_bursts_that_are_not_told_are_counted_among_all() -> None:
+    t = np.arange(int(FS)) / FS
+    ring = np.where(t > 0.1, np.exp(-(t - 0.1) / 0.02), 0.0) * np.sin(2 * np.pi * 900 * t)
+    pipe = np.sin(2 * np.pi * 800 * t) * np.exp(-(((t - 0.65) / 0.1) ** 2))
+    alone, both = (of_sound(each + 1e-4 * np.random.default_rng(0).standard_normal(t.size), "Pipe")
+                   for each in (pipe, ring + pipe))  # fmt: skip
+    assert ss.summary(alone).headline[0].endswith("one tonal burst may be friction's, or not.")
+    assert ss.summary(both).headline[0].endswith("of 2 tonal bursts 1 may be friction's, or not; the other one is not.")
 
 
 def test_one_record_is_no_comparison() -> None:
@@ -283,6 +299,8 @@ def test_several_records_are_compared(tmp_path: Path) -> None:
         ss.write_record(measured(surface, load), tmp_path / f"{surface}_{load}.csv")
     result = run(tmp_path / "*.csv", "--normal", "*6.13*=6.13", "--normal", "*1.23*=1.23", "--output", tmp_path / "out")
     assert result.exit_code == 0, result.output
+    assert len(result.stdout.splitlines()) < 30, "a line for each record, then the comparison"
+    assert "wet_6.13.csv: It squeaks" in result.stdout
     told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
     rows = {each["name"]: each for each in told["comparison"]["conditions"]}
     assert rows["wet_6.13.csv"]["normal"] == 6.13

@@ -102,7 +102,7 @@ def test_the_sampling_rate_does_not_matter(fs: float) -> None:
         ((1,), 0.4, "no overtone in a whole ratio"),
         ((1, 2), 0.4, "one overtone in a whole ratio"),
         ((1, 2, 3), 0.4, "2 overtones in whole ratios"),
-        ((1, 2, 3), 0.08, "cycles, and whole ratios are told in 100"),
+        ((1, 2, 3), 0.08, "cycles of its tone; 100 are needed to tell overtones in whole ratios"),
     ],
 )
 def test_a_tone_says_which_reason_it_was(orders: tuple[int, ...], length: float, words: str) -> None:
@@ -159,6 +159,9 @@ def test_a_clipped_burst_has_no_level() -> None:
     assert found.harmonics == ()
     assert "clipped" in found.status
     assert found.frequency == pytest.approx(500, rel=2e-3)
+    printed = repr(ss.find_squeaks(ss.Record.of({"sound": np.clip(burst(), -0.5, 0.5)}, fs=FS)))
+    assert "clipped, no level" in printed
+    assert "nan" not in printed
 
 
 def test_a_burst_cut_by_the_end_says_so() -> None:

@@ -218,3 +218,12 @@ def test_what_is_refused_says_what_would_do() -> None:
     for values, step in (([6.0], "linspace"), ([], "linspace"), ([[1, 2, 3]], "linspace"), ([1, 3, 2], "sort")):
         with pytest.raises(ss.ModelError, match=step):
             ss.limit_cycles(inclined(), "kinetic", values=values)
+
+
+def test_a_threshold_and_what_dies_away_are_told_in_words() -> None:
+    rig = ss.squeak_rig("wet", load=6.13)
+    load = ss.critical_value(rig, lambda n: ss.squeak_rig("wet", n), between=(1.23, 6.13), speed=-0.1)
+    assert repr(load).startswith("Threshold: stable below 1.79")
+    assert repr(load).endswith("; beyond, mode coupling at 421 Hz")
+    assert " dies away by 0.5" in repr(ss.stability(ss.squeak_rig("wet", 1.23), speed=-0.1))
+    assert " grows by 61.88 " in repr(ss.stability(rig, speed=-0.1))

@@ -35,13 +35,16 @@ class Condition:
     coefficient, slope_of_coefficient : Estimate or None
         Both over the normal load, where it is known.
     answer : str
-        Whether it "squeaks", "squeals" or "does not squeak", or that this "can not be told", as :attr:`Squeaks.answer`.
+        Whether it "squeaks", "squeals", "creaks" or "does not squeak", or that this "can not be told", as
+        :attr:`Squeaks.answer`.
     kind : str
         What most of the sounding time is, as :attr:`Squeaks.kind`.
     count : int
         Squeaks and squeals.
     rate : float
         How many there are in a second [1/s].
+    pulses : float
+        Stick-slip pulses in a second of its longest creak [1/s]; NaN where nothing creaks.
     frequency : Estimate or None
         Mean frequency of the squeaks and squeals [Hz].
     sound : float
@@ -62,6 +65,7 @@ class Condition:
     kind: str
     count: int
     rate: float
+    pulses: float
     frequency: Estimate | None
     sound: float
     reference: str
@@ -168,6 +172,7 @@ def _condition(found: SqueakFindings) -> Condition:
         level=None if loops is None else loops.level, slope=None if loops is None else loops.slope,
         coefficient=found.coefficient, slope_of_coefficient=found.slope_of_coefficient,
         answer=squeaks.answer, kind=squeaks.kind, count=len(heard), rate=len(heard) / record.duration,
+        pulses=max(squeaks.of("creak"), key=lambda burst: burst.duration).rate if squeaks.of("creak") else float("nan"),
         frequency=found.frequency, sound=max(levels, default=float("nan")), reference=squeaks.reference,
     )  # fmt: skip
 
@@ -176,11 +181,13 @@ def _verdicts(conditions: Sequence[Condition]) -> list[str]:
     """Which squeak, and what their slopes say of that."""
     loud = [each for each in conditions if each.squeaks]
     quiet, untold = _answering(conditions, "does not squeak"), _answering(conditions, "can not be told")
+    creaking = _answering(conditions, "creaks")
     if not loud and not untold:
-        return ["No condition squeaks."]
+        return ["No condition squeaks.", *(f"{words}." for words in _say(creaking, "creaks", "creak"))]
     heard = [
         *_say(_answering(conditions, "squeaks"), "squeaks", "squeak"),
         *_say(_answering(conditions, "squeals"), "squeals", "squeal"),
+        *_say(creaking, "creaks", "creak"),
         *_say(quiet, "does not squeak", "do not squeak"),
     ]
     told = [f"{'; '.join(heard)}."] if heard else []

@@ -47,10 +47,22 @@ def show(
     from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=False)
-    for part in (*getattr(results, "findings", ()), results):
+    parts = getattr(results, "findings", ())
+    if isinstance(results, ss.SqueakComparison):  # a line each: the page has the rest
+        _print_lines(console, parts)
+        parts = ()
+    for part in (*parts, results):
         _print_table(console, part)
     if written is not None:
         click.echo(f"Report: {written / 'report.html'}")
+
+
+def _print_lines(console: Any, parts: Sequence[Asked]) -> None:
+    from rich.markup import escape
+
+    for part in parts:
+        told = ss.summary(part)
+        console.print(f"[bold]{escape(told.title)}[/bold]: {escape(spoken(told.headline[0]))}")
 
 
 def _print_table(console: Any, results: Asked) -> None:

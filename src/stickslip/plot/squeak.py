@@ -42,7 +42,8 @@ if TYPE_CHECKING:
     from stickslip.squeak.spectra import BurstSpectra
 
 MARKS = {
-    "squeaks": (ORANGE, "D"), "squeals": (ORANGE, "D"), "does not squeak": (BLUE, "o"), "can not be told": (FAINT, "s"),
+    "squeaks": (ORANGE, "D"), "squeals": (ORANGE, "D"), "creaks": (PURPLE, "^"), "does not squeak": (BLUE, "o"),
+    "can not be told": (FAINT, "s"),
 }  # fmt: skip
 COLOURS = {"squeak": ORANGE, "squeal": ORANGE, "creak": PURPLE, "scrape": GREEN, "tonal": BLUE, "noise": FAINT}
 TRACED = {

@@ -17,7 +17,6 @@ from stickslip.units import prefixed
 
 MOST = 40  # bursts in a table
 NONE = "–"
-NO_SQUEAK = {"does not squeak": "none", "can not be told": "can not be told"}
 
 
 def headline(found: SqueakFindings) -> Iterator[str]:
@@ -32,8 +31,7 @@ def headline(found: SqueakFindings) -> Iterator[str]:
     if not heard and creaks:
         yield f"It creaks{where}: stick-slip pulses, {' and '.join(creaks)} in a second."
     elif squeaks.answer == "can not be told":
-        many = f"{len(squeaks.untold)} tonal burst{'s' if len(squeaks.untold) > 1 else ''}"
-        yield f"Whether it squeaks{where} can not be told: {many}."
+        yield f"Whether it squeaks{where} can not be told: {_untold(squeaks)}."
     elif not heard:
         kinds = [(squeaks.of(kind), words) for kind, words in WORDS.items()]
         yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {words}' for of, words in kinds if of)}."
@@ -92,6 +90,19 @@ def _of_energy(joined: Coupling, *, torsion: bool) -> Iterator[str]:
 def spoken_name(channel: str) -> str:
     """A channel's name as words."""
     return {"a": "acceleration"}.get(channel, channel.replace("_", " "))
+
+
+def _untold(squeaks: Squeaks) -> str:
+    """Of how many bursts it can not be told whether friction makes them."""
+    every, asked = len(squeaks.of("tonal")), len(squeaks.untold)
+    if every == asked:
+        return (
+            "one tonal burst may be friction's, or not"
+            if every == 1
+            else (f"each of {every} tonal bursts may be friction's, or not")
+        )
+    rest = "the other one is not" if every - asked == 1 else f"the other {every - asked} are not"
+    return f"of {every} tonal bursts {asked} may be friction's, or not; {rest}"
 
 
 def _of_one(burst: Squeak, squeaks: Squeaks) -> str:
@@ -242,9 +253,11 @@ def _pair(pair: Pair, *, rest: bool) -> list[str]:
 
 
 def condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[list[str]]]:
-    """Headings and a row for each condition."""
-    headings = ["condition", "load", "driven, stroke", "friction", "slope against speed (95 %)", "squeaks", "Hz", "dB"]
-    return headings, [_condition(each) for each in comparison.conditions]
+    """Headings and a row for each condition; a column that is known of none is left out."""
+    headings = ["condition", "load", "driven, stroke", "friction", "slope against speed (95 %)", "heard", "Hz", "dB"]
+    rows = [_condition(each) for each in comparison.conditions]
+    known = [place for place in range(len(headings)) if any(row[place] != NONE for row in rows)]
+    return [headings[place] for place in known], [[row[place] for place in known] for row in rows]
 
 
 def _condition(each: Condition) -> list[str]:
@@ -253,10 +266,19 @@ def _condition(each: Condition) -> list[str]:
     slope = NONE if each.slope is None else f"{value_of(each.slope)} ({_ends(each.slope)})"
     return [
         each.name, NONE if each.normal is None else number(each.normal, 0.0, "N"),
-        ", ".join(part for part in (forcing, stroke) if part) or NONE, _value(each.level), slope,
-        f"{each.count} ({each.rate:.2g} in a second)" if each.squeaks else NO_SQUEAK[each.answer],
+        ", ".join(part for part in (forcing, stroke) if part) or NONE, _value(each.level), slope, _heard(each),
         NONE if each.frequency is None else f"{each.frequency.value:.1f}", _or_none(each.sound, ".1f"),
     ]  # fmt: skip
+
+
+def _heard(each: Condition) -> str:
+    """Squeaks and their number, or what is heard instead."""
+    if each.squeaks:
+        name = "squeal" if each.answer == "squeals" else "squeak"
+        return f"{each.count} {name}{'s' * (each.count > 1)} ({each.rate:.2g} in a second)"
+    if each.answer == "creaks":
+        return f"creak, {each.pulses:.3g} pulses in a second"
+    return "can not be told" if each.answer == "can not be told" else f"no squeak ({each.kind})"
 
 
 def _ends(estimate: Estimate) -> str:

@@ -157,9 +157,11 @@ class Squeaks:
 
     @property
     def answer(self) -> str:
-        """Whether it "squeaks", "squeals" or "does not squeak", or that this "can not be told"."""
+        """Whether it "squeaks", "squeals", "creaks" or "does not squeak", or that this "can not be told"."""
         if self.squeaking:
             return "squeals" if len(self.of("squeal")) > len(self.of("squeak")) else "squeaks"
+        if self.of("creak"):
+            return "creaks"
         return "can not be told" if self.untold else "does not squeak"
 
     def of(self, *kinds: str) -> tuple[Squeak, ...]:
@@ -177,7 +179,8 @@ class Squeaks:
 
     def __repr__(self) -> str:
         rows = [
-            f"{b.start:.3f} to {b.end:.3f} s: {b.kind}, {b.frequency:.4g} Hz, {b.level:.1f} dB re {self.reference}"
+            f"{b.start:.3f} to {b.end:.3f} s: {b.kind}, {b.frequency:.4g} Hz, "
+            + ("clipped, no level" if math.isnan(b.level) else f"{b.level:.1f} dB re {self.reference}")
             for b in self.bursts
         ]
         return "\n  ".join([f"Squeaks in {self.channel}: {self.kind}", *rows])
@@ -375,7 +378,10 @@ class _Listener:
             return kind, "likely", f"it grows for {part.growth:.0f} cycles while the contact slides"
         locked, cycles = sum(strength > WEAK for _, strength in harmonics), duration * part.line
         if cycles < TOLD:
-            return "tonal", "not told", f"of sound alone: {cycles:.0f} cycles, and whole ratios are told in {TOLD:g}"
+            short = (
+                f"of sound alone: it lasts {cycles:.0f} cycles of its tone; {TOLD:g} are needed to tell overtones in"
+            )
+            return "tonal", "not told", f"{short} whole ratios, as a rubbing contact has, from those of a bell"
         if locked < LOCKED:
             many = "one overtone" if locked else "no overtone"
             return "tonal", "not told", f"of sound alone: {many} in a whole ratio, and a rubbing contact has {LOCKED}"

@@ -100,7 +100,8 @@ class Stability:
         return self.modes[0].frequency
 
     def __repr__(self) -> str:
-        head = f"Stability: {self.mechanism}, {self.frequency:.4g} Hz grows by {self.growth:.4g} 1/s"
+        change = "grows" if self.growth > 0 else "dies away"
+        head = f"Stability: {self.mechanism}, {self.frequency:.4g} Hz {change} by {abs(self.growth):.4g} 1/s"
         rows = [f"{mode.frequency:.5g} Hz, damping ratio {mode.damping_ratio:.3g}" for mode in self.modes]
         return "\n  ".join([head if self.status == "ok" else f"{head} [{self.status}]", *rows])
 
@@ -125,6 +126,10 @@ class Threshold:
     frequency: float
     mechanism: str
     stable_below: bool
+
+    def __repr__(self) -> str:
+        side = "below" if self.stable_below else "above"
+        return f"Threshold: stable {side} {self.value:.6g}; beyond, {self.mechanism} at {self.frequency:.4g} Hz"
 
 
 @dataclass(frozen=True, eq=False)
