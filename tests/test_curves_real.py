@@ -42,6 +42,7 @@ def test_emps_by_its_curves(dataset: Sets) -> None:
         assert found.parameters[name].value == pytest.approx(published, rel=0.03)
     for name, published in (("kinetic_forward", 20.144), ("kinetic_back", 20.628)):
         assert found.parameters[name].value == pytest.approx(published, rel=0.03)
+        assert found.parameters[name].includes(published)
     assert "static and" not in found.status
 
 

@@ -129,7 +129,7 @@ def _driven(record: Record, channel: str, on: str, contact: str) -> DriveFrom:
     if on == "force":
         raise EstimateError(
             "an applied force that is no tone with harmonics", "the force on the mass is periodic",
-            "cut the record to where it is, or drive the base",
+            "cut the record to where it is, drive the base, or fit a curve of friction instead (fit_curve, --curve)",
         )  # fmt: skip
     bandwidth = best_bandwidth(values, record.fs)
     smooth = Filter("smoother", record.fs, bandwidth).apply(values - values.mean(), {0: 1.0})
