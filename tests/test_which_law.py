@@ -165,6 +165,16 @@ def test_rigid_laws_are_told_apart_by_the_friction_around_rest() -> None:
     assert kept(plain, misfit("static", 2, 0.4))[0] == {"static"}
 
 
+def test_further_parameters_that_explain_nothing_more_are_rejected() -> None:
+    """Where the records tell many stories; few leave the richer law possible."""
+    many = Evidence({("x", 0): 300.0, ("load", 0): 300.0}, EVIDENCE.noise)
+    pair = [misfit("compliant", 3, 1.0), misfit("LuGre", 5, 1.05)]
+    told, confidence = standings(pair, many)
+    assert [each.name for each in told if each.kept] == ["compliant"]
+    assert confidence > 0.9
+    assert kept(misfit("compliant", 3, 1.0), misfit("LuGre", 5, 1.0))[0] == {"compliant", "LuGre"}
+
+
 def stiff(name: str, count: int, size: float) -> Misfit:
     return Misfit(name, count, misfit(name, count, size).squares, stiff=True)
 

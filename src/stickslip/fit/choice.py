@@ -24,6 +24,7 @@ SEPARATED = 2.0  # times the misfit of the best law, from which on another famil
 CALIBRATIONS = 3.0  # times the calibration's error, below which an effect is not to be told from it
 CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
 SHARPNESS = 4.0  # power of the ratio of misfits that the odds between two families follow
+IDLE = 10.0  # of the criterion, by which a richer law that leaves no less is rejected
 UNLIKELY = 0.05  # a law less probable than this within its family is rejected
 FAMILIES = {"Coulomb": "rigid", "static": "rigid", "Stribeck": "rigid"}
 
@@ -129,8 +130,9 @@ def standings(
     ratios = {each.name: evidence.over(each.squares, best.squares) for each in order}
     forecasts = _forecasts(order, evidence)
     others = {each.name for each in order if each.family != best.family} - limits
-    near = {name for name in others if ratios[name] <= SEPARATED or forecasts[name] < 1}
     level = evidence.criterion(best.squares, best.count)
+    idle = _idle([each for each in order if each.name in others], best, evidence, forecasts)
+    near = {name for name in others - set(idle) if ratios[name] <= SEPARATED or forecasts[name] < 1}
     told = []
     for each in order:
         kept = each.name in (near if each.name in others else inner)
@@ -144,7 +146,10 @@ def standings(
         )
     rivals = [each for each in order if each.name not in limits]
     nearest = {name: min(ratio, forecasts[name]) if forecasts[name] < 1 else ratio for name, ratio in ratios.items()}
-    odds = math.fsum(ratio**-SHARPNESS for ratio in _nearest(rivals, nearest, best.family))
+    odds = math.fsum(
+        min(nearest[each.name] ** -SHARPNESS, idle.get(each.name, math.inf))
+        for each in _nearest(rivals, nearest, best.family)
+    )
     return told, min(CERTAIN, sure / (1 + odds))
 
 
@@ -173,10 +178,23 @@ def _forecasts(order: Sequence[Misfit], evidence: Evidence) -> dict[str, float]:
     }
 
 
-def _nearest(order: Sequence[Misfit], ratios: Mapping[str, float], best: str) -> list[float]:
-    """The least misfit of each other family."""
+def _nearest(order: Sequence[Misfit], ratios: Mapping[str, float], best: str) -> list[Misfit]:
+    """The law of least misfit of each other family."""
     families = {each.family for each in order} - {best}
-    return [min(ratios[each.name] for each in order if each.family == family) for family in families]
+    return [min((each for each in order if each.family == family), key=lambda e: ratios[e.name]) for family in families]
+
+
+def _idle(
+    others: Sequence[Misfit], best: Misfit, evidence: Evidence, forecasts: Mapping[str, float]
+) -> dict[str, float]:
+    """Richer laws of other families whose further parameters explain nothing more, and the odds that they hold."""
+    found = {}
+    for each in others:
+        worse = evidence.criterion(each.squares, each.count) - evidence.criterion(best.squares, best.count)
+        explains = evidence.over(each.squares, best.squares) < 1 or forecasts[each.name] < 1
+        if each.count > best.count and not explains and worse > IDLE:
+            found[each.name] = math.exp(-min(worse, 100.0) / 4)
+    return found
 
 
 def _within(

@@ -73,6 +73,11 @@ class Sampled:
     contact: str
     unsure: tuple[float]
 
+    def coarser(self, share: float) -> Sampled:
+        """At fewer instants, a share of the motion's deviation away: each instant costs the engine a new start."""
+        knots, rate = _knots(self.values, self.fs, share * float(np.std(self.values)) / NEAR)
+        return replace(self, values=knots, fs=rate)
+
     def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
         """The drive whose time 0 is `begin`."""
         share = float(np.sum(off))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.fit.choice import Evidence, Key, independent
+from stickslip.fit.drive import Sampled
 from stickslip.fit.search import Knob, Point, Problem, descend, rows_of
 from stickslip.fit.start import Shown, bounded, free_names, knob, stiffest, thinned
 from stickslip.fit.stretch import Motion, Stretch, attempted
@@ -35,6 +36,7 @@ FALLS = (0.01, 0.05)  # of the largest speed, within which a Stribeck curve fall
 TURNS = 24  # of the motion, after which a record tells laws apart no better
 DETUNED = (0.01, 0.0025)  # steps in which a mount is tried, against what is stated
 SILENT = 0.2  # of a channel's size, left by the best law: nothing is known of such a sensor
+COARSE = 0.3  # of the calibration's error, by which a base's motion may be missed where laws are compared
 STILL = 1e-12  # scale of a knob that is not turned
 
 
@@ -97,7 +99,10 @@ def weighed(shown: Shown, number: int, calibration: float, *, whole: bool = Fals
         replace(each, noise=math.hypot(each.noise, calibration * float(np.std(each.readings))))
         for each in stretch.sensors
     )
-    return replace(stretch, sensors=sensors)
+    drive = stretch.drive
+    if isinstance(drive, Sampled) and not whole:
+        drive = drive.coarser(COARSE * calibration)
+    return replace(stretch, sensors=sensors, drive=drive)
 
 
 def searched(

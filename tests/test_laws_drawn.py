@@ -1,0 +1,50 @@
+"""Laws drawn at random on a rig that is off its calibration and on a rough surface: a few of the benchmark's draws."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+BENCHMARK = Path(__file__).resolve().parents[1] / "benchmarks" / "laws.py"
+
+
+@pytest.fixture(scope="module")
+def laws() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("benchmarks_laws", BENCHMARK)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(
+    ("truth", "tried"),
+    [
+        ("Coulomb", ["Coulomb", "static"]),
+        ("static", ["Coulomb", "static"]),
+        ("Stribeck", ["Coulomb", "Stribeck"]),
+        ("CompliantContact", ["static", "compliant"]),
+    ],
+)
+def test_the_law_is_named_or_left_open(laws: ModuleType, truth: str, tried: list[str]) -> None:
+    """The family rightly, and the law never wrongly."""
+    found = laws.draw(truth, "both", seed=1000, laws=tried)
+    assert found["family"] == laws.family(laws.NAMES[truth])
+    assert laws.NAMES[truth] in found["kept"]
+    assert 0.5 < found["confidence"] <= 0.999
+
+
+def test_what_is_told_is_counted(laws: ModuleType) -> None:
+    """A wrong answer of high confidence is shown as such."""
+    right = {"truth": "static", "seed": 0, "family": "rigid", "law": "static", "kept": ["static"], "confidence": 0.99,
+             "seconds": 1.0}  # fmt: skip
+    wrong = right | {"seed": 1, "law": "Coulomb", "kept": ["Coulomb"], "confidence": 0.97}
+    lines = laws.told([right, wrong])
+    assert "law right  50.0 %, open   0.0 %, wrong  50.0 %" in lines[0]
+    assert "wrong with a confidence above 95%: 1 of 2" in lines[2]
