@@ -19,7 +19,7 @@ GoOn = Callable[[float], None]
 
 MOST_CYCLES, MOST_CONTACTS, MOST_MASSES = 5000, 4, 12  # played on a page
 SHOWN = 200  # cycles drawn, the last ones
-A_CYCLE, LEAST, MOST = 60, 2400, 16_000  # instants
+A_CYCLE, A_CELL, LEAST, MOST = 60, 3, 2400, 16_000  # instants
 A_PIECE, FEW_PIECES, EDGES = 5, 400, 6000
 SPECTRUM, OF_SPECTRUM = 4096, 20  # instants and cycles of a spectrum
 MAP, COLUMNS, SPAN = 16_384, 400, 60.0  # samples, columns and dB of a wavelet map
@@ -156,7 +156,8 @@ def _window(run: ss.Trajectory, cycle: float) -> tuple[float, float]:
 
 def _instants(run: ss.Trajectory, first: float, last: float, cycle: float) -> Array:
     """Even ones, and both sides of every event, so that jumps stay upright."""
-    count = int(np.clip(A_CYCLE * (last - first) / cycle, LEAST, MOST))
+    cells = int(np.count_nonzero(run.cells[0] >= first))  # as many as the fastest motion asks for
+    count = int(np.clip(max(A_CYCLE * (last - first) / cycle, A_CELL * cells), LEAST, MOST))
     begin, end = np.clip(run.starts, first, last), np.clip(run.starts + run.durations, first, last)
     inside = end > begin
     begin, end = begin[inside], end[inside]

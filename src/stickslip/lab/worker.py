@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 import time
+import warnings
 from typing import Any, BinaryIO
 
 import stickslip as ss
@@ -84,6 +85,9 @@ def main() -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    warnings.simplefilter(
+        "ignore", RuntimeWarning
+    )  # what overflows is refused in a sentence; the terminal is the user's
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)
         serve(sys.stdin.buffer, answers)

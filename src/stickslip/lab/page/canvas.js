@@ -18,6 +18,7 @@ export function ticks(low, high, count) {
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * span; k++) found.push(k * step);
   return found;
 }
+export const tick = (value) => (Math.abs(value) < 1e-12 ? "0" : String(+value.toPrecision(8))); // as fine as the step is
 export const shortly = (value) => (Math.abs(value) < 1e-12 ? "0" : String(+value.toPrecision(4)));
 
 export function range(values, margin = 0.06) {
@@ -59,7 +60,7 @@ export function axes(canvas, x, y, palette, left = 58) {
       if (across) { pen.moveTo(p, box.top); pen.lineTo(p, box.bottom); } else { pen.moveTo(box.left, p); pen.lineTo(box.right, p); }
       pen.stroke();
       pen.fillStyle = palette.soft;
-      const words = axis.log ? power(mark * factor) : shortly(mark * factor);
+      const words = axis.log ? power(mark * factor) : tick(mark * factor);
       if (across) pen.fillText(words, Math.min(p, width - pen.measureText(words).width / 2 - 1), box.bottom + 4); else pen.fillText(words, box.left - 5, p);
     }
     const label = axis.label + (unit ? ` [${unit}]` : "");

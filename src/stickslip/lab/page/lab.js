@@ -1,4 +1,5 @@
 // The page itself: tabs, theme, what is said aloud, and how the lab is asked.
+import { tick } from "./canvas.js";
 import { start as startPlay } from "./play.js";
 
 const $ = (id) => document.getElementById(id);
@@ -59,7 +60,7 @@ const opened = {
 // A chart over time for any tab: {title, unit, time, series: [{label, values, colour, dash}]}.
 function plot(element, { title, unit, time, series }) {
   const palette = colours();
-  const axis = { stroke: palette.soft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line } };
+  const axis = { stroke: palette.soft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line }, values: (chart, splits) => splits.map(tick) };
   const inks = ["blue", "orange", "green", "purple", "sky", "ink"];
   const chart = new uPlot({
     width: element.clientWidth || 600, height: 220, title, legend: { show: true }, scales: { x: { time: false } },

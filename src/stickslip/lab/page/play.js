@@ -2,7 +2,7 @@
 import { Controls } from "./controls.js";
 import { Conversation } from "./socket.js";
 import { Stage } from "./stage.js";
-import { axes, cividis, line, prefixed, range, shortly } from "./canvas.js";
+import { axes, cividis, line, prefixed, range, shortly, tick } from "./canvas.js";
 
 const $ = (id) => document.getElementById(id);
 const PANELS = [["x", "displacement"], ["x", "angle", true], ["v", "velocity"], ["v", "angular velocity", true], ["a", "acceleration"], ["friction", "friction"]];
@@ -186,8 +186,8 @@ function build() {
     const chart = new uPlot({
       width: $("traces").clientWidth - 26, height: tall() + (last ? 42 : 0), padding: [6, 8, last ? 0 : 4, 0], legend: { show: false }, scales: { x: { time: false } },
       cursor: { sync: { key: "play" }, points: { show: false }, drag: { x: true, y: false } },
-      axes: [{ ...axis, show: true, size: last ? 24 : 0, values: last ? undefined : () => [], label: last ? "time [s]" : undefined, labelSize: 18, labelFont: "12px system-ui, sans-serif", gap: 2 },
-        { ...axis, size: 52, values: (plot, splits) => splits.map((value) => shortly(value * plot.factor)), space: 24 }],
+      axes: [{ ...axis, show: true, size: last ? 24 : 0, values: (plot, splits) => (last ? splits.map(tick) : []), label: last ? "time [s]" : undefined, labelSize: 18, labelFont: "12px system-ui, sans-serif", gap: 2 },
+        { ...axis, size: 60, values: (plot, splits) => splits.map((value) => tick(value * plot.factor)), space: 24 }],
       series: [{}, ...lines.map((each, j) => ({ stroke: ink(each, j), width: 1.4, dash: each.name === "z" ? [5, 4] : undefined, points: { show: false } }))],
       hooks: { drawClear: [(plot) => shade(plot, group)], setScale: [(plot, key) => { if (key === "x") zoom(plot); }] },
     }, null, box);

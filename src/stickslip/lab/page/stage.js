@@ -120,7 +120,7 @@ export class Stage {
   }
   // How long a stretch of the picture is, and the time.
   ruler(pen, width, scale, palette) {
-    const most = 120 / scale, decade = 10 ** Math.floor(Math.log10(most));
+    const most = Math.min(120, width / 8) / scale, decade = 10 ** Math.floor(Math.log10(most));
     const length = SCALES.map((each) => each * decade).filter((each) => each <= most).at(-1);
     const [factor, unit] = prefixed(length, this.bodies[0].unit);
     pen.strokeStyle = pen.fillStyle = palette.soft;
@@ -130,6 +130,6 @@ export class Stage {
     pen.textAlign = "right";
     pen.textBaseline = "top";
     pen.fillText(`${shortly(length * factor)} ${unit}`, width - 14, 18);
-    pen.fillText(`t = ${this.time.toFixed(this.run.cycle < 0.05 ? 4 : 2)} s`, width - 14, 34);
+    if (width > 560) pen.fillText(`t = ${this.time.toFixed(this.run.cycle < 0.05 ? 4 : 2)} s`, width - 14, 34);
   }
 }
