@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 
 SHOWN_EVENTS = 12
+WHOLE = 28  # letters of a name that is not broken
 
 
 def show(
@@ -127,9 +128,11 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Any:
     from rich.markup import escape
     from rich.table import Table
 
+    rows = list(rows)
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in headings:
-        table.add_column(escape(heading), overflow="fold")
+    for place, heading in enumerate(headings):
+        whole = place == 0 and max((len(row[0]) for row in rows), default=0) <= WHOLE
+        table.add_column(escape(heading), overflow="fold", no_wrap=whole)
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     return table
