@@ -125,6 +125,17 @@ def test_what_sounds_while_the_motion_dwells_says_how_much_of_it_slides(centre: 
     assert (found.kind, found.friction) == ("tonal", "no")
 
 
+def test_a_ring_that_fades_into_a_lower_hum_is_named_by_what_is_loud() -> None:
+    t = np.arange(10_000) / FS
+    ring = np.where(t > 0.2, np.exp(-(t - 0.2) / 0.02), 0.0) * np.sin(2 * np.pi * 415 * t)
+    sound = (
+        ring + 0.004 * np.sin(2 * np.pi * 390 * t) * (t > 0.2) + 1e-5 * np.random.default_rng(0).standard_normal(t.size)
+    )
+    found = max(ss.find_squeaks(ss.Record.of({"sound": sound}, fs=FS)).bursts, key=lambda each: each.level)
+    assert found.frequency == pytest.approx(415, rel=0.01)
+    assert found.tonality > 0.8
+
+
 def test_pulses_at_even_intervals_are_a_creak() -> None:
     t = np.arange(20_000) / 20_000
     rng = np.random.default_rng(3)

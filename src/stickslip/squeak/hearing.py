@@ -179,13 +179,13 @@ class Hearing:
                 near = np.flatnonzero(stretch[begin:end] < stretch[peak] - self.span) + begin
                 begin = int(max(near[near < peak].max(initial=-1) + 1, begin))
                 end = int(min(near[near > peak].min(initial=len(stretch)), end))
-                found.append(self._tonal(first + begin, first + end, line[first + begin : first + end]))
+                part = slice(first + begin, first + end)
+                found.append(self._tonal(part.start, part.stop, _middle(line[part], strength[part])))
         return [part for part in found if (part.last - part.first) * part.line > SHORTEST * self.fs]
 
-    def _tonal(self, begin: int, end: int, line: Array) -> Span:
-        """A stretch of frames as a burst, with how it grew."""
+    def _tonal(self, begin: int, end: int, middle: float) -> Span:
+        """A stretch of frames about a line [Hz] as a burst, with how it grew."""
         first, last = self._rows(begin, end)
-        middle = float(np.median(line))
         before = max(0, first - self.size)
         near = self.values[before : last + self.size]
         around = filtered(near, self.fs, (0.7 * middle, min(1.4 * middle, 0.49 * self.fs)))[first - before :]
@@ -279,6 +279,13 @@ def _smooth(values: Array, width: int) -> Array:
     from scipy.ndimage import uniform_filter1d
 
     return np.asarray(uniform_filter1d(uniform_filter1d(values, width), width))
+
+
+def _middle(values: Array, levels: Array) -> float:
+    """Median weighted by power: what fades into noise has long tails, and little power in them."""
+    order = np.argsort(values)
+    share = np.cumsum(10 ** ((levels[order] - levels.max()) / 10))
+    return float(values[order][np.searchsorted(share, share[-1] / 2)])
 
 
 def _decibel(power: Array | float) -> Array:
