@@ -128,12 +128,11 @@ def test_what_sounds_while_the_motion_dwells_says_how_much_of_it_slides(centre: 
 def test_a_ring_that_fades_into_a_lower_hum_is_named_by_what_is_loud() -> None:
     t = np.arange(10_000) / FS
     ring = np.where(t > 0.2, np.exp(-(t - 0.2) / 0.02), 0.0) * np.sin(2 * np.pi * 415 * t)
-    sound = (
-        ring + 0.004 * np.sin(2 * np.pi * 390 * t) * (t > 0.2) + 1e-5 * np.random.default_rng(0).standard_normal(t.size)
-    )
-    found = max(ss.find_squeaks(ss.Record.of({"sound": sound}, fs=FS)).bursts, key=lambda each: each.level)
+    hum = 0.12 * np.sin(2 * np.pi * 345 * t) * ((t > 0.2) & (t < 0.45))
+    record = ss.Record.of({"sound": ring + hum + 1e-5 * np.random.default_rng(0).standard_normal(t.size)}, fs=FS)
+    found = max(ss.find_squeaks(record).bursts, key=lambda each: each.level)
     assert found.frequency == pytest.approx(415, rel=0.01)
-    assert found.tonality > 0.8
+    assert found.duration > 0.2
 
 
 def test_pulses_at_even_intervals_are_a_creak() -> None:
