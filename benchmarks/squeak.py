@@ -93,14 +93,13 @@ def alike(first: tuple[float, float], second: tuple[float, float]) -> bool:
     return shared > 0.5 * max(first[1] - first[0], second[1] - second[0])
 
 
-def around(count: int) -> tuple[Score, list[tuple[float, bool]]]:
-    """Score of `count` wet recordings under loads about the threshold at 30 dB, and whether each is told to squeak."""
+def around(count: int) -> tuple[Score, list[tuple[float, str]]]:
+    """Score of `count` wet recordings under loads about the threshold at 30 dB, and what is told of each."""
     loads = np.linspace(*BETWEEN, count)
     told = []
     score = Score(recordings=count)
     for number, load in enumerate(loads):
-        squeaking = scored(score, "wet", float(load), 30.0, number, squeaks=bool(load > THRESHOLD))
-        told.append((float(load), squeaking))
+        told.append((float(load), scored(score, "wet", float(load), 30.0, number, squeaks=bool(load > THRESHOLD))))
     return score, told
 
 
@@ -113,8 +112,8 @@ def measured(count: int, *, snr: float | None = None) -> Score:
     return score
 
 
-def scored(score: Score, surface: str, load: float, snr: float, seed: int, *, squeaks: bool) -> bool:
-    """Whether a recording is told to squeak; what is right and wrong of it is added to the score."""
+def scored(score: Score, surface: str, load: float, snr: float, seed: int, *, squeaks: bool) -> str:
+    """What is told of a recording; what is right and wrong of it is added to the score."""
     run = ss.simulate(ss.squeak_rig(surface, load), duration=END + 0.3)
     heard = ss.find_squeaks(ss.squeak_record(run, snr=snr, rng=seed).between(BEGIN, END))
     score.wrong_conditions += heard.squeaking != squeaks
@@ -128,7 +127,7 @@ def scored(score: Score, surface: str, load: float, snr: float, seed: int, *, sq
     score.true += len(inside)
     score.heard += sum(any(alike(each[:2], other) for other in everything) for each in inside)
     score.frequencies += tuple(abs(b.frequency / each[2] - 1) for b, each in pairs)
-    return heard.squeaking
+    return heard.answer
 
 
 if __name__ == "__main__":
@@ -140,8 +139,10 @@ if __name__ == "__main__":
     print(f"  frequency off by {median:.2f} % (median), {most:.2f} % (98 of 100), {worst:.2f} % (largest)")
     print(f"conditions told wrong: {noisy.wrong_conditions}; at 30 dB {clean.wrong_conditions} of {clean.recordings}")
     near, told = around(max(10, count // 4))
-    wrong = [load for load, squeaking in told if squeaking != (load > THRESHOLD)]
+    untold = [load for load, answer in told if answer == "can not be told"]
+    wrong = [load for load, answer in told if load not in untold and (answer == "squeaks") != (load > THRESHOLD)]
     print(f"apart from these, {near.recordings} wet ones under {BETWEEN[0]} to {BETWEEN[1]} N, about the threshold:")
     worst = 100 * max(near.frequencies)
     print(f"  recall {near.recall:.4f}, precision {near.precision:.4f}; frequency off by {worst:.2f} % (largest)")
-    print(f"  conditions told wrong: {len(wrong)}" + (f", of {min(wrong):.2f} to {max(wrong):.2f} N" if wrong else ""))
+    for what, loads in (("not told", untold), ("told wrong", wrong)):
+        print(f"  conditions {what}: {len(loads)}" + (f", of {min(loads):.3f} to {max(loads):.3f} N" if loads else ""))

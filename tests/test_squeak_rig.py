@@ -148,3 +148,12 @@ def test_what_is_no_rig_is_refused_in_words() -> None:
 def test_an_angle_that_is_no_degree_of_freedom_is_refused(rotations: Any) -> None:
     with pytest.raises(ss.ModelError, match=r"rotations = .*from 1 to 3"):
         ss.squeak_rig().having(rotations=rotations)
+
+
+@pytest.mark.parametrize(("load", "answer"), [(1.4, "does not squeak"), (1.7, "can not be told"), (2.0, "squeaks")])
+def test_just_below_the_threshold_it_can_not_be_told_whether_it_squeaks(load: float, answer: str) -> None:
+    """Sliding is stable up to 1.797 N, and what is struck at a reversal hardly dies away just below."""
+    run = ss.simulate(ss.squeak_rig("wet", load), duration=1.7)
+    found = ss.find_squeaks(ss.squeak_record(run, snr=30, rng=1).between(0.4, 1.4))
+    assert found.answer == answer
+    assert all("near the threshold" in burst.evidence for burst in found.untold)

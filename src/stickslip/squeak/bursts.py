@@ -24,7 +24,7 @@ EVEN = 0.35  # of a burst's length at which half of its energy has come: a ring 
 SUSTAINED = 0.25  # s: a squeak is shorter
 LOCKED, WEAK = 2, -35.0  # overtones that a contact's limit cycle has, and dB below the fundamental at which they count
 TOLD = 100.0  # cycles in which partials at whole ratios are told from those of a bell
-SWINGS = 0.25  # of the friction's level: beneath a squeak it swings by a third, beneath a free ringing by a sixth
+FREE, FED = 0.21, 0.3  # of the friction's level: it swings less beneath a free ringing, and more beneath a squeak
 THROUGH = 1.5  # periods of the forced motion: what sounds longer goes on through reversals
 QUIET = 45.0  # dB re 20 uPa: less is not heard beside a running rig
 RINGS = 30.0  # cycles around a burst that a filter about its tone needs
@@ -195,8 +195,8 @@ def find_squeaks(
     its level falls by ten decibel and rises again. What remains is a creak where pulses follow each other at even
     intervals, else broad band. Which tonal bursts are friction's is told by what is recorded beside them:
 
-    - motion and friction: those in which the contact slides and the friction force swings by more than a quarter of its
-      level at that frequency;
+    - motion and friction: those in which the contact slides and the friction force swings by 30 % of its level or more
+      at that frequency; from 21 % on it can not be told, as near the load or speed at which squeaking begins;
     - motion alone: those that are not struck (they grow for twelve cycles, or half of their energy comes later than a
       third of their length) while the contact slides;
     - sound alone: those that moreover last for a hundred cycles and have two overtones at least in whole ratios, as the
@@ -365,9 +365,7 @@ class _Listener:
             return "tonal", "no", f"{much}, less than a squeak needs" if sliding else "nothing slides meanwhile"
         kind = "squeal" if duration * self.motion.frequency > THROUGH else "squeak"
         if self.motion.velocity is not None and "friction" in self.record:
-            share = self._modulation(part)
-            words = f"the friction force swings by {100 * share:.0f} % of its level at {part.line:.0f} Hz as it slides"
-            return (kind, "shown", words) if share > SWINGS else ("tonal", "no", f"{words}: too little to feed it")
+            return self._swinging(part, kind)
         if part.growth < GROWN and self._cut(part):
             return "tonal", "not told", "cut by the record: whether it grew or was struck can not be told"
         if self.record.channels[self.name].unit == "Pa" and self._loudness(part) < QUIET:
@@ -393,6 +391,17 @@ class _Listener:
                 "friction: a reed or a voice has them too"
             ),
         )
+
+    def _swinging(self, part: Span, kind: str) -> tuple[str, str, str]:
+        """Of a tone while the contact slides: whether the friction force swings with it as it must to feed it."""
+        share = self._modulation(part)
+        words = f"the friction force swings by {100 * share:.0f} % of its level at {part.line:.0f} Hz as it slides"
+        if share >= FED:
+            return kind, "shown", words
+        if share <= FREE:
+            return "tonal", "no", f"{words}: too little to feed it"
+        between = f"more than beneath a free ringing, {FREE:.0%}, and less than beneath a squeak, {FED:.0%}"
+        return "tonal", "not told", f"{words}: {between}; near the threshold it can not be told"
 
     def _broad(self, part: Span, rate: float, slides: bool) -> tuple[str, str, str]:
         if not math.isnan(rate) and self.name in TANGENTIAL and self._at_reversals(rate):
