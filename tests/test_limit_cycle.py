@@ -81,6 +81,25 @@ def rig(load: float) -> ss.LimitCycle:
     return ss.limit_cycle(ss.squeak_rig("wet", load), speed=-0.1)
 
 
+def test_an_unstable_cycle_separates_the_vibration_from_stable_sliding() -> None:
+    """It begins at the threshold with the root of the distance; within it a vibration dies away, beyond it grows."""
+    law = ss.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
+    block = ss.Oscillator(1.0, 1.0, law, ss.Belt(0.2), damping=0.3)
+    found = ss.limit_cycles(block, "drive.speed", values=[0.22, 0.2313, 0.2343])
+    assert found.between[0] is None, "sliding is unstable"
+    near, far = found.amplitudes("between")[1:]
+    assert found.threshold is not None
+    distance = found.values[1:] - found.threshold.value
+    assert far / near == pytest.approx(math.sqrt(distance[1] / distance[0]), rel=0.02)
+    cycle = found.between[2]
+    assert cycle is not None
+    assert cycle.multipliers[0].real > 1
+    place, (x, v) = cycle.sliding.place[0], cycle.motion.states[0, :2]
+    ends = [ss.limit_cycle(block, speed=0.2343, start={"x": place + s * (x - place), "v": s * v}) for s in (0.97, 1.03)]
+    assert [end.status for end in ends] == ["steady sliding", "periodic"]
+    assert "unstable, between" in [str(line.get_label()) for line in ss.plot_limit_cycles(found).axes[0].get_lines()]
+
+
 @pytest.mark.parametrize("load", [1.9, 3.0, 6.13])
 def test_the_rig_squeaks_by_lifting_a_contact(load: float) -> None:
     found = rig(load)

@@ -71,6 +71,9 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
         top.plot(branches.values, factor * branches.amplitudes(way), label=words, **style)
         frequencies = [cycle.frequency if cycle.vibrates else np.nan for cycle in cycles]
         middle.plot(branches.values, frequencies, **style)
+    separating = branches.amplitudes("between")
+    if np.isfinite(separating).any():
+        top.plot(branches.values, factor * separating, color=INK, linestyle=":", marker="x", label="unstable, between")
     pairs = zip(branches.up, branches.down, strict=True)
     vibrating = [one if one.vibrates else other for one, other in pairs]
     shares = {"sticks": "stick_share", "lifted": "separation_share"}

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.drives import Belt
 from stickslip.errors import ModelError
-from stickslip.squeak.limit_cycle import LimitCycle, limit_cycle
+from stickslip.squeak.limit_cycle import LimitCycle, limit_cycle, separating_cycle
 from stickslip.squeak.stability import System, Threshold, critical_value, numbers, stability
 
 Array = NDArray[np.float64]
@@ -46,6 +46,9 @@ class CycleBranches:
         Lowest and highest value at which vibration and stable sliding were both found.
     evidence : str
         Why it is called so.
+    between : tuple of LimitCycle or None
+        At each value the unstable cycle that separates the vibration from stable sliding: None where not both last, or
+        where nothing but whether a contact just sticks or lifts separates them.
     """
 
     values: Array
@@ -56,19 +59,22 @@ class CycleBranches:
     exponent: float
     both: tuple[float, float] | None
     evidence: str
+    between: tuple[LimitCycle | None, ...]
 
     def amplitudes(self, direction: str = "up") -> Array:
         """Of the contact that slides to and fro most [m], (K,).
 
         Parameters
         ----------
-        direction : {"up", "down"}
-            Of which way.
+        direction : {"up", "down", "between"}
+            Of which way, or of the unstable cycles between: nan where there is none.
 
         Returns
         -------
         ndarray
         """
+        if direction == "between":
+            return np.array([math.nan if cycle is None else cycle.amplitude for cycle in self.between])
         return np.array([cycle.amplitude for cycle in (self.up if direction == "up" else self.down)])
 
     def __repr__(self) -> str:
@@ -131,7 +137,9 @@ def limit_cycles(
 
     up = _along(at, places, SMALL)
     down = _along(at, places[::-1], SMALL if any(one.vibrates for one in up) else LARGE)[::-1]
-    beside = [float(v) for v, *two in zip(places, up, down, strict=True) if any(map(_lasts_beside, two))]
+    lasting = [next(filter(_lasts_beside, two), None) for two in zip(down, up, strict=True)]
+    beside = [float(v) for v, one in zip(places, lasting, strict=True) if one is not None]
+    between = tuple(one and separating_cycle(at(float(v)), one) for v, one in zip(places, lasting, strict=True))
     ends, width = (float(places[0]), float(places[-1])), float(np.ptp(places))
     try:
         threshold = critical_value(at(ends[0]), at, between=ends)
@@ -140,8 +148,8 @@ def limit_cycles(
         if beside:
             words += f"; a vibration lasts beside it from {beside[0]:.4g} to {beside[-1]:.4g}"
         both = (beside[0], beside[-1]) if beside else None
-        return CycleBranches(places, up, down, None, UNTOLD, math.nan, both, words)
-    return CycleBranches(places, up, down, threshold, *_called(at, threshold, beside, width))
+        return CycleBranches(places, up, down, None, UNTOLD, math.nan, both, words, between)
+    return CycleBranches(places, up, down, threshold, *_called(at, threshold, beside, width), between)
 
 
 def _lasts_beside(cycle: LimitCycle) -> bool:

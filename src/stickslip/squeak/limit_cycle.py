@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ LEAST = 1e-2  # of that vibration: a cycle is looked for beyond it
 DYING = 0.3  # of the vibration at the beginning: what is left of one that dies away
 UNSETTLED = 0.1  # change of the size in the last round of a motion that has no size of its own yet
 SAMPLES = 4096  # of a cycle whose extremes are looked for
+HALVINGS = 14  # of the starts between one that dies away and one that lasts
+NEAR = (4, 8, 16, 32)  # cycles after which such a start is still close to the unstable cycle
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +42,8 @@ class LimitCycle:
     ----------
     status : str
         "periodic", "steady sliding" (the vibration dies away), "held" (every contact sticks or has lifted off),
-        "not periodic" (it lasts and does not repeat), or "not settled" (it still grew or died away when it was left, or
-        does neither for want of damping).
+        "not periodic" (it lasts and does not repeat), "not settled" (it still grew or died away when it was left, or
+        does neither for want of damping), or "unstable" (it repeats, and every small deviation leads away from it).
     frequency : float
         At which the motion repeats [Hz]; of one that does not, of its strongest line; 0 where nothing vibrates.
     amplitudes : ndarray (n,)
@@ -146,7 +149,42 @@ def limit_cycle(
     table = tables(system)
     cycle = 1 / (sliding.frequency or system.frequency)
     begin = _pushed(system, table, sliding, push) if start is None else opening(table, start)
-    status, motion, multipliers = _followed(system, table, sliding, begin, cycle, patience)
+    return _told(system, sliding, *_followed(system, table, sliding, begin, cycle, patience))
+
+
+def separating_cycle(system: System, lasting: LimitCycle) -> LimitCycle | None:
+    """The unstable cycle between stable sliding and a vibration that lasts beside it; None where none is found.
+
+    Of the starts on the line from steady sliding to that vibration the last one that dies away is bisected. From there
+    the motion stays close to the cycle that separates both for a while, and Newton's method closes it. There is none
+    where all that separates them is whether a contact just sticks.
+    """
+    sliding, table = lasting.sliding, tables(system)
+    cycle = 1 / (sliding.frequency or system.frequency)
+    count = 2 * len(sliding.place)
+    rest = np.append(sliding.place, np.zeros(len(sliding.place)))
+    away = lasting.motion.states[0, :count] - rest
+
+    def start(share: float) -> dict[str, float]:
+        return dict(zip(table.names, map(float, rest + share * away), strict=False))
+
+    dies, lasts = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (dies + lasts) / 2
+        vibrates = limit_cycle(system, start=start(middle)).vibrates
+        dies, lasts = (dies, middle) if vibrates else (middle, lasts)
+    for share, cycles in itertools.product((lasts, dies), NEAR):
+        near = stretch(system, table, *opening(table, start(share)), span=(0.0, cycles * cycle))
+        found = settled_cycle(near, cycle)
+        if found is not None and abs(found[1][0]) > 1:
+            return _told(system, sliding, "unstable", *found)
+    return None
+
+
+def _told(
+    system: System, sliding: Stability, status: str, motion: Trajectory, multipliers: NDArray[np.complex128]
+) -> LimitCycle:
+    """What there is to say of a motion."""
     shares, still = _shares(motion), status in ("steady sliding", "held")
     swing, slide = (np.zeros(len(sliding.place)), 0.0) if still else _swings(motion)
     return LimitCycle(
@@ -156,7 +194,7 @@ def limit_cycle(
         amplitude=slide,
         stick_share=shares[0],
         separation_share=shares[1],
-        growth=_growth(system, table, sliding, cycle),
+        growth=_growth(system, tables(system), sliding, 1 / (sliding.frequency or system.frequency)),
         energy=energy_flow(motion),
         multipliers=multipliers,
         sliding=sliding,
@@ -288,7 +326,7 @@ def _half(paths: Array) -> Array:
 
 def _frequency(status: str, motion: Trajectory, sliding: Stability) -> float:
     """At which the motion repeats, or rises through its mean where it moves most [Hz]."""
-    if status == "periodic":
+    if status in ("periodic", "unstable"):
         return 1 / motion.duration
     if status in ("steady sliding", "held"):
         return 0.0
