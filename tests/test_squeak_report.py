@@ -457,9 +457,16 @@ def test_a_spike_may_be_a_contact() -> None:
     assert not any("lifts or lands" in each for each in ss.summary(found).cautions)
 
 
+def test_what_is_asked_in_vain_is_said() -> None:
+    record = ss.Record.of({"sound": tone()}, fs=FS)
+    assert any("no torsion is recorded" in note for note in ss.analyze_squeaks(record, lever=0.003).notes)
+    with pytest.raises(ss.RecordError, match="no kind of burst is called 'hiss'; there are squeak, squeal"):
+        ss.find_squeaks(record).of("hiss")
+
+
 def test_json_alone_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     ss.write_sound(ss.Record.of({"sound": tone()}, fs=FS), tmp_path / "squeal.wav")
     told = json.loads(run("squeal.wav", "--json").output)
-    assert told["squeaks"]["reference"] == "1"
+    assert (told["program"], told["version"], told["squeaks"]["reference"]) == ("stickslip", ss.__version__, "1")
     assert [path.name for path in tmp_path.iterdir()] == ["squeal.wav"]

@@ -227,3 +227,8 @@ def test_a_threshold_and_what_dies_away_are_told_in_words() -> None:
     assert repr(load).endswith("; beyond, mode coupling at 421 Hz")
     assert " dies away by 0.5" in repr(ss.stability(ss.squeak_rig("wet", 1.23), speed=-0.1))
     assert " grows by 61.88 " in repr(ss.stability(rig, speed=-0.1))
+
+
+def test_a_map_that_turns_back_is_refused() -> None:
+    with pytest.raises(ss.ModelError, match="sort them, each of them once"):
+        ss.stability_map(lambda load: ss.squeak_rig("wet", load), grid={"load": [2, 1, 1]}, speed=-0.1)

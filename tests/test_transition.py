@@ -148,8 +148,9 @@ def test_friction_with_a_memory_is_no_contact_that_rings() -> None:
     assert stated.probability == found.probabilities[found.name]
 
 
-def test_a_mount_that_rings_is_not_told_from_a_memory() -> None:
-    rig = ss.Rig.perfect().having("a", mount=ss.Mount(125, 0.1))
+@pytest.mark.parametrize("mount", [ss.Mount(125, 0.1), ss.Mount(285, 0.158)])
+def test_a_mount_that_rings_is_not_told_from_a_memory(mount: ss.Mount) -> None:
+    rig = ss.Rig.perfect().having("a", mount=mount)
     record = rig.measure(truth("none")[1], fs=FS, rng=1, start=2.4)
     found = ss.mechanism(ss.Record.of({"a": record["a"]}, fs=FS))
     assert found.name == UNTOLD

@@ -226,6 +226,20 @@ def test_blocks_of_a_stream_equal_the_whole() -> None:
         list(ss.wavelet_blocks(iter([record.rows(0, 500), record.rows(0, 500)]), "a", frequencies=(10, 200)))
 
 
+def test_an_overview_of_blocks_is_that_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Columns are joined two by two on the way, of odd numbers too, and no peak is moved."""
+    monkeypatch.setattr("stickslip.signals.wavelet.BLOCK_BYTES", 16 * 13 * 701)
+    spikes = np.zeros(9000)
+    spikes[[700, 2900, 4300, 8888]] = 1.0
+    record = of(spikes)
+    seen = ss.wavelet_overview(record, "a", frequencies=(50, 200), voices=6, columns=30)
+    width = round(float(seen.time[1] - seen.time[0]) * record.fs)
+    whole = np.abs(ss.wavelet_map(record, "a", frequencies=(50, 200), voices=6).values)
+    starts = np.arange(0, len(record), width)
+    assert 15 <= seen.sizes["time"] == len(starts) <= 31
+    assert seen.values == pytest.approx(np.maximum.reduceat(whole, starts, axis=1), rel=1e-6, abs=1e-9)
+
+
 def test_an_overview_keeps_the_largest() -> None:
     values = np.zeros(50000)
     values[31234] = 1.0

@@ -214,6 +214,8 @@ def analyze_squeaks(
         loops = ask("Friction over the cycle", lambda: friction_loops(record, contact=contact))
     else:
         notes.append("No friction beside a motion is recorded: how it changes with speed can not be told.")
+    if lever is not None and "torsion_velocity" not in record:
+        notes.append("The lever is not used: no torsion is recorded, in a channel torsion_velocity.")
     return SqueakFindings(
         name=name or record_name(record),
         record=record,

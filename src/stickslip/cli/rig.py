@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import stickslip as ss
 from stickslip.cli.cases import case_options, folder_name, wanted_case
 from stickslip.cli.options import pair, result_options
 from stickslip.cli.progress import progress
-from stickslip.cli.show import table
+from stickslip.cli.show import print_json, table
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
@@ -99,7 +98,7 @@ def rig(case: str, output: Path | None, as_json: bool, plan: bool, **options: An
         results = _planned(run, bench, tell, options) if plan else _measured(run, bench, tell, options)
         written = ss.publish_rig(results, folder=folder, form=form) if folder else None
     if as_json:
-        click.echo(json.dumps(_told(results), indent=2, ensure_ascii=False, allow_nan=False))
+        print_json(_told(results))
         return
     if isinstance(results, ss.ExperimentPlan):
         _show_plan(results, needs)

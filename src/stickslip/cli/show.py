@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,12 @@ SHOWN_EVENTS = 12
 WHOLE = 28  # letters of a name that is not broken
 
 
+def print_json(told: Mapping[str, Any]) -> None:
+    """Results for a machine, which begin as results.json does: with what made them."""
+    made = {"program": "stickslip", "version": ss.__version__, **told}
+    click.echo(json.dumps(made, indent=2, ensure_ascii=False, allow_nan=False))
+
+
 def show(
     results: Asked,
     written: Path | None,
@@ -43,7 +49,7 @@ def show(
     as_json: bool,
 ) -> None:
     if as_json:
-        click.echo(json.dumps(results.to_dict(), indent=2, ensure_ascii=False, allow_nan=False))
+        print_json(results.to_dict())
         return
     from rich.console import Console
 
@@ -94,7 +100,7 @@ def _print_table(console: Any, results: Asked) -> None:
 
 def show_run(result: Outcome, written: Path | None, *, as_json: bool) -> None:
     if as_json:
-        click.echo(json.dumps(result.to_dict(), indent=2, ensure_ascii=False, allow_nan=False))
+        print_json(result.to_dict())
         return
     from rich.console import Console
     from rich.markup import escape

@@ -30,8 +30,9 @@ MEANINGS = {
 LIKELY = 0.5
 SURE = 0.7  # probability that a verdict has at least
 FASTEST = 10.0  # cycles of the mode in a window: there the search for it ends
-CHOPPED = 5.0  # micro-slips a stick: more are rather a mount's that rings than the friction's
+CHOPPED = 4.5  # micro-slips a stick: more are rather a mount's that rings than the friction's
 ALONE = 0.8  # how often it is friction, where fewer are told by an acceleration whose mount nothing is known of
+STATE_MOUNT = "state the mount, record.with_details('a', mount=(frequency, damping)), or give x"
 STRANGE = 4.5  # standard deviations from what the simulated records of its kind were like
 
 
@@ -121,37 +122,63 @@ def mechanism(
 
 def mechanism_of(ringing: Ringing) -> Mechanism:
     """The mechanism of sticks that are cut into pieces already."""
-    found, table = features(ringing), _learnt()
-    if ringing.doubt:
-        return Mechanism(UNTOLD, math.nan, features=found, reason=ringing.doubt)
-    if found["frequency"] >= FASTEST and not ringing.silent:
-        reason = f"what rings in the sticks is faster than {FASTEST:g} cycles in each, and was not looked for"
-        return Mechanism(UNTOLD, math.nan, features=found, reason=reason)
-    vector = columns(found)
-    scaled = (vector - np.array(table["mean"])) / np.array(table["sd"])
-    score = np.array(table["weights"]) @ np.append(scaled, 1.0)
-    probability = np.exp(score - score.max())
-    probability /= probability.sum()
-    names, best = table["names"], int(probability.argmax())
-    probabilities = {name: float(p) for name, p in zip(names, probability, strict=True)}
-    apart = np.abs((vector - np.array(table["centres"][best])) / np.array(table["spreads"][best]))
-    name, reason = names[best], MEANINGS[names[best]]
-    if apart.max() > STRANGE:
-        strange = table["columns"][int(apart.argmax())]
-        name, reason = UNTOLD, f"the sticks are unlike those of any simulated contact (by their {strange})"
-    elif probability[best] < SURE:
-        likely = sorted(probabilities, key=lambda each: -probabilities[each])[:2]
-        name, reason = UNTOLD, f"{likely[0]} or {likely[1]}"
-    if name == SWINGING and ringing.blurred:
-        name, reason = UNTOLD, f"{SWINGING}, or what a smoother leaves of a mount where no load cell helps it"
-    sure = float(probability[best])
-    if name == SWINGING and ringing.record.channels[ringing.channel].mount is None and "x" not in ringing.record:
-        known = "state the mount, record.with_details('a', mount=(frequency, damping)), or give x"
-        if found["glides"] > CHOPPED:
-            name, reason = UNTOLD, f"{SWINGING}, or an accelerometer whose mount rings: {known}"
-        else:
-            sure, reason = ALONE * sure, f"{reason}; an accelerometer whose mount rings looks alike: {known}"
+    found = features(ringing)
+    doubt = ringing.doubt or _too_fast(ringing, found)
+    if doubt:
+        return Mechanism(UNTOLD, math.nan, features=found, reason=doubt)
+    probabilities = _weighed(found)
+    name = max(probabilities, key=lambda each: probabilities[each])
+    sure, reason = probabilities[name], MEANINGS[name]
+    against = _unlike(found, name) or _undecided(probabilities) or (name == SWINGING and _swings_otherwise(ringing))
+    if against:
+        return Mechanism(UNTOLD, sure, probabilities, found, against)
+    if name == SWINGING and _mount_unknown(ringing):
+        sure, reason = ALONE * sure, f"{reason}; an accelerometer whose mount rings looks alike: {STATE_MOUNT}"
     return Mechanism(name, sure, probabilities, found, reason)
+
+
+def _too_fast(ringing: Ringing, found: Mapping[str, float]) -> str:
+    if found["frequency"] < FASTEST or ringing.silent:
+        return ""
+    return f"what rings in the sticks is faster than {FASTEST:g} cycles in each, and was not looked for"
+
+
+def _weighed(found: Mapping[str, float]) -> dict[str, float]:
+    """Probability of each mechanism by multinomial logistic regression."""
+    table = _learnt()
+    scaled = (columns(found) - np.array(table["mean"])) / np.array(table["sd"])
+    score = np.array(table["weights"]) @ np.append(scaled, 1.0)
+    weight = np.exp(score - score.max())
+    return {name: float(w / weight.sum()) for name, w in zip(table["names"], weight, strict=True)}
+
+
+def _unlike(found: Mapping[str, float], name: str) -> str:
+    """In words: what no simulated record of that name was like."""
+    table = _learnt()
+    kind = table["names"].index(name)
+    apart = np.abs((columns(found) - np.array(table["centres"][kind])) / np.array(table["spreads"][kind]))
+    if apart.max() <= STRANGE:
+        return ""
+    return f"the sticks are unlike those of any simulated contact (by their {table['columns'][int(apart.argmax())]})"
+
+
+def _undecided(probabilities: Mapping[str, float]) -> str:
+    first, second, *_ = sorted(probabilities, key=lambda each: -probabilities[each])
+    return f"{first} or {second}" if probabilities[first] < SURE else ""
+
+
+def _swings_otherwise(ringing: Ringing) -> str:
+    """In words: what else than a memory may swing in sticks like these."""
+    if ringing.blurred:
+        return f"{SWINGING}, or what a smoother leaves of a mount where no load cell helps it"
+    if _mount_unknown(ringing) and features(ringing)["glides"] > CHOPPED:
+        return f"{SWINGING}, or an accelerometer whose mount rings: {STATE_MOUNT}"
+    return ""
+
+
+def _mount_unknown(ringing: Ringing) -> bool:
+    """Whether nothing shows how the accelerometer is mounted: nobody said, and no displacement stands beside it."""
+    return ringing.record.channels[ringing.channel].mount is None and "x" not in ringing.record
 
 
 def not_one_mode(ringing: Ringing) -> str:

@@ -230,44 +230,35 @@ def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> _Mode | None:
     """The mode of the windows' rings by least squares; amplitudes are eliminated (variable projection)."""
     from scipy.optimize import least_squares as nonlinear
 
-    fs, start = ringing.fs, ringing.pole
-    used = [(window, rows) for window in windows if (rows := _stretches(window, start, fs))]
+    used = [(window, rows) for window in windows if (rows := _stretches(window, ringing.pole, ringing.fs))]
     if not used:
         return None
 
     def left(parameters: Array) -> Array:
-        pole = complex(parameters[0], parameters[1])
         rests = []
         for window, rows in used:
-            design, data = _design(window, rows, pole, ringing)
+            design, data = _design(window, rows, complex(*parameters), ringing)
             q, _ = np.linalg.qr(design)
             rests.append(data - q @ (q.T @ data))
         return np.concatenate(rests)
 
-    scale = abs(start)
-    found = nonlinear(left, [start.real, start.imag], x_scale=[scale, scale], jac="3-point", method="lm", max_nfev=60)
-    linear = sum(2 * len(rows) + 2 for _, rows in used)
-    free = len(found.fun) - linear - 2
-    slopes = np.asarray(found.jac)
-    normal = slopes.T @ slopes
-    if free < 4 or not np.isfinite(normal).all() or np.linalg.cond(normal) > 1e12:
+    start, scale = [ringing.pole.real, ringing.pole.imag], abs(ringing.pole)
+    found = nonlinear(left, start, x_scale=[scale, scale], jac="3-point", method="lm", max_nfev=60)
+    pole, slopes, rings = complex(*found.x), np.asarray(found.jac), sum(len(rows) for _, rows in used)
+    free, normal = len(found.fun) - sum(2 * len(rows) + 2 for _, rows in used) - 2, slopes.T @ slopes
+    told = free >= 4 and np.isfinite(normal).all() and np.linalg.cond(normal) <= 1e12
+    if not told or pole.imag <= 0 or abs(pole - ringing.pole) >= 0.5 * scale:
         return None
-    variance = float(found.fun @ found.fun) / free
-    tau = max(1.0, float(correlation_time(found.fun)))
-    spread = np.linalg.inv(normal) * variance * tau
-    pole = complex(*found.x)
-    if not (pole.imag > 0 and abs(pole - start) < 0.5 * abs(start)):
-        return None
-    size = abs(pole)
-    slope = np.array([-(pole.imag**2), pole.real * pole.imag]) / size**3  # of the damping ratio
-    quantile = student(free / tau)
-    method = f"one decaying mode, least squares over {sum(len(rows) for _, rows in used)} rings"
+    variance, tau = float(found.fun @ found.fun) / free, max(1.0, float(correlation_time(found.fun)))
+    spread, quantile = np.linalg.inv(normal) * variance * tau, student(free / tau)
+    slope = np.array([-(pole.imag**2), pole.real * pole.imag]) / abs(pole) ** 3  # of the damping ratio
+    method = f"one decaying mode, least squares over {rings} rings"
     frequency = Estimate.normal(
         "transition frequency", pole.imag / (2 * math.pi), sd=math.sqrt(spread[1, 1]) / (2 * math.pi), unit="Hz",
         method=method, quantile=quantile, checks=(f"{len(used)} sticks",),
     )  # fmt: skip
     damping = Estimate.normal(
-        "transition damping ratio", -pole.real / size, sd=math.sqrt(float(slope @ spread @ slope)), unit="1",
+        "transition damping ratio", -pole.real / abs(pole), sd=math.sqrt(float(slope @ spread @ slope)), unit="1",
         method=method, quantile=quantile,
     )  # fmt: skip
     return _Mode(pole, frequency, damping, math.sqrt(variance), tuple(window for window, _ in used), tau)
@@ -286,9 +277,7 @@ def _amplitude(window: Window, mode: _Mode, ringing: Ringing) -> tuple[float, fl
     return size * growth, math.sqrt(float(along @ inverse @ along)) * growth
 
 
-def _stick_by_stick(
-    record: Record, channel: str, ringing: Ringing, pooled: _Mode
-) -> tuple[StickTransition, ...]:  # fmt: skip
+def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: _Mode) -> tuple[StickTransition, ...]:
     found, events = [], [event for event in ringing.sticks.events if event.kind == "stick" and event.whole]
     peaks = _local_maxima(record, channel, ringing, pooled)
     for window, peak in zip(pooled.windows, peaks, strict=True):
@@ -296,13 +285,7 @@ def _stick_by_stick(
         begin, middle = window.rings[0].first, ringing.time(window, len(window.values) / 2)
         event = min(events, key=lambda event: abs(event.time + event.duration / 2 - middle))
         size, sd = _amplitude(window, pooled, ringing)
-        unsure = "this stick alone does not tell it"
-        frequency, damping = (
-            (own.frequency, own.damping)
-            if own is not None
-            else (replace(each, sd=math.inf, interval=(-math.inf, math.inf), status=unsure)
-                  for each in (pooled.frequency, pooled.damping))
-        )  # fmt: skip
+        frequency, damping = (own.frequency, own.damping) if own is not None else _untold_alone(pooled)
         found.append(
             StickTransition(
                 time=ringing.time(window, begin), duration=event.duration, frequency=frequency, damping=damping,
@@ -314,6 +297,14 @@ def _stick_by_stick(
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def _untold_alone(pooled: _Mode) -> tuple[Estimate, ...]:
+    """Frequency and damping of all sticks, for one that does not tell them by itself."""
+    nothing, why = (-math.inf, math.inf), "this stick alone does not tell it"
+    return tuple(
+        replace(each, sd=math.inf, interval=nothing, status=why) for each in (pooled.frequency, pooled.damping)
+    )
 
 
 def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: _Mode) -> list[float]:

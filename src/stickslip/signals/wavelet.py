@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -239,37 +240,31 @@ def wavelet_overview(
     """
     if columns < 2:
         raise RecordError(f"columns = {columns}", "an overview has two columns at least", "ask for more")
-    parts: list[Array] = []
-    width = 1
-    rest: Array | None = None
-    last: Any = None
-    for last in wavelet_blocks(
+    blocks = wavelet_blocks(
         source, channel, frequencies=frequencies, voices=voices, wavelet_frequency=wavelet_frequency,
         normalisation=normalisation, corrected=corrected,
-    ):  # fmt: skip
-        if not parts:
-            first = last
-            width = 1 << max(0, math.ceil(math.log2(max(1, last.sizes["time"] / columns))))
-        values = np.abs(last.values)
-        values = values if rest is None else np.hstack([rest, values])
-        whole = values.shape[1] // width * width
-        parts.append(values[:, :whole].reshape(len(values), -1, width).max(axis=2))
-        rest = values[:, whole:]
-        if sum(part.shape[1] for part in parts) > columns:  # columns of twice the width
-            joined = np.hstack(parts)
-            even = joined.shape[1] // 2 * 2
-            parts, rest = (
-                [joined[:, :even].reshape(len(joined), -1, 2).max(axis=2)],
-                np.hstack([joined[:, even:], rest]),
-            )
-            width *= 2
-    if rest is not None and rest.shape[1]:
-        parts.append(rest.max(axis=1, keepdims=True))
-    shown = np.hstack(parts)
+    )  # fmt: skip
+    first = last = next(blocks)
+    width = 1 << max(0, math.ceil(math.log2(max(1, first.sizes["time"] / columns))))  # samples of a column
+    shown = rest = np.empty((first.sizes["frequency"], 0))
+    for last in itertools.chain([first], blocks):
+        more, rest = _largest(np.hstack([rest, np.abs(last.values)]), width)
+        shown = np.hstack([shown, more])
+        while shown.shape[1] > columns:
+            shown, odd = _largest(shown, 2)
+            rest, width = np.hstack([np.repeat(odd, width, axis=1), rest]), 2 * width
+    if rest.shape[1]:
+        shown = np.hstack([shown, rest.max(axis=1, keepdims=True)])
     times = first.time.values[0] + (np.arange(shown.shape[1]) + 0.5) * width / first.attrs["fs"]
     found = last.isel(time=np.zeros(shown.shape[1], dtype=int)).assign_coords(time=("time", times, {"units": "s"}))
     result: xr.DataArray = found.copy(data=shown)
     return result.assign_attrs(start=float(first.time.values[0]), end=float(last.time.values[-1]))
+
+
+def _largest(values: Array, width: int) -> tuple[Array, Array]:
+    """Largest of each `width` columns; the columns that are left over."""
+    whole = values.shape[1] // width * width
+    return values[:, :whole].reshape(len(values), -1, width).max(axis=2), values[:, whole:]
 
 
 def dyadic_map(record: Record, channel: str, *, wavelet_frequency: float = CENTRE) -> xr.DataArray:

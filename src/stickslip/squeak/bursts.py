@@ -166,6 +166,9 @@ class Squeaks:
 
     def of(self, *kinds: str) -> tuple[Squeak, ...]:
         """The bursts of some kinds."""
+        unknown = [kind for kind in kinds if kind not in WORDS]
+        if unknown:
+            raise RecordError(f"no kind of burst is called '{unknown[0]}'", f"there are {', '.join(WORDS)}", "name one")
         return tuple(burst for burst in self.bursts if burst.kind in kinds)
 
     def to_dict(self) -> dict[str, Any]:

@@ -330,6 +330,9 @@ def stability_map(
         raise ModelError(
             f"grid = {dict(grid)!r}", "a map has values for each of its parameters", "give lists of numbers"
         )
+    for name, axis in axes.items():
+        if np.any(np.diff(axis) <= 0):
+            raise ModelError(f"{name} = {axis.tolist()}", "the values of a map rise", "sort them, each of them once")
     shape = tuple(len(values) for values in axes.values())
     if callable(system):
         _require_taken(system, axes)
