@@ -256,7 +256,7 @@ def _through(rows: Array, flow: Array) -> Array:
     return np.asarray(np.einsum("bi,bij->bj", rows, flow))
 
 
-@compiled(**OPTIONS)
+@compiled(**OPTIONS, nogil=True)
 def _derive(quantities, flows, first, out, places, work):
     """q A^k of every exit; where terms cancel but for their rounding, nothing is left."""
     count, modes, n, _ = flows.shape

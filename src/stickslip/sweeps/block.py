@@ -38,8 +38,9 @@ def run_block(
             found[name][rows] = values[name]
         left -= set(rows.tolist())
     own = [measure for measure in plan.measures if callable(measure)]
-    for row, steps in enumerate(points):
-        if row in left or (own and found["status"][row] not in (NO_SYSTEM, FAILED)):
+    for row in range(len(points)) if own else sorted(left):
+        steps = points[row]
+        if row in left or found["status"][row] not in (NO_SYSTEM, FAILED):
             told: Mapping[str, Any]
             told = (alone or _alone)(plan, steps) if row in left else {own_name(m): m(_run(plan, steps)) for m in own}
             for name in found.keys() & told.keys():

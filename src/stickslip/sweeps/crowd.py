@@ -41,21 +41,26 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[
     real &= np.array([s is not None for s in owners])[own]
     yield np.flatnonzero(~real), None, {"status": NO_SYSTEM}
     kinds = [s and kind_of_law(s.law) for s in laws], [s and kind_of_drive(s.drive) for s in drives]
-    groups: dict[Any, list[int]] = {}
-    for row in np.flatnonzero(real):
-        kind = kinds[0][law[row]], kinds[1][drive[row]]
-        if None not in kind:
-            groups.setdefault(kind, []).append(int(row))
+    which = np.array([_numbers(kinds[0])[law], _numbers(kinds[1])[drive]])
+    which[:, ~real] = -1
+    pairs = np.unique(which[:, np.all(which >= 0, axis=0)], axis=1).T
     values = np.array([[s.mass, s.stiffness, s.damping, s.damper == "base"] if s else [0.0] * 4 for s in owners])
-    for rows in map(np.array, groups.values()):
-        used, which = np.unique(law[rows], return_inverse=True)
+    for pair in pairs:
+        rows = np.flatnonzero(np.all(which == pair[:, None], axis=0))
+        used, its = np.unique(law[rows], return_inverse=True)
         moved, whose = np.unique(drive[rows], return_inverse=True)
         mass, stiffness, damping, base = values[own[rows]].T
         fleet = Fleet(
-            tuple(laws[j].law for j in used), tuple(drives[j].drive for j in moved), which, whose,
+            tuple(laws[j].law for j in used), tuple(drives[j].drive for j in moved), its, whose,
             mass, stiffness, damping, base == 1.0,
         )  # fmt: skip
         yield rows, fleet, {**plan.start, **_starts(plan, steps[rows])}
+
+
+def _numbers(kinds: Sequence[Any]) -> Index:
+    """A number for each kind, the same for equal ones; -1 for none."""
+    known = {kind: number for number, kind in enumerate(dict.fromkeys(kinds)) if kind is not None}
+    return np.array([known.get(kind, -1) for kind in kinds], dtype=np.int64)
 
 
 def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Any], Index]:
