@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import struct
+import subprocess
+import sys
 import time
 import zlib
 from collections.abc import Iterator
@@ -137,12 +139,19 @@ def uff_set(node: int, name: str, values: np.ndarray, unit: str) -> dict[str, An
 ENDINGS = (".csv", ".txt", ".h5", ".parquet", ".mat", ".tdms", ".uff", ".wav", ".lvm", ".json")
 
 
+@pytest.fixture(scope="module")
+def each_format(client: Client, tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, dict[str, Any]]]:
+    """A file of each format, with what the lab says of it."""
+    paths = [written(tmp_path_factory.mktemp("formats"), ending) for ending in ENDINGS]
+    records = answered(client, "describe", *(send(client, path) for path in paths))["records"]
+    return dict(zip(ENDINGS, zip(paths, records, strict=True), strict=True))
+
+
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_a_file_of_each_format_is_described_as_the_library_reads_it(
-    client: Client, tmp_path: Path, ending: str
+    each_format: dict[str, tuple[Path, dict[str, Any]]], ending: str
 ) -> None:
-    path = written(tmp_path, ending)
-    (told,) = answered(client, "describe", send(client, path))["records"]
+    path, told = each_format[ending]
     record = ss.read_record(path)
     assert told["name"] == path.name
     assert (told["rows"], told["fs"]) == (len(record), record.fs)
@@ -157,6 +166,8 @@ def test_a_file_of_each_format_is_described_as_the_library_reads_it(
 def test_the_answer_is_the_librarys_to_the_last_printed_digit(client: Client, tmp_path: Path) -> None:
     path = written(tmp_path, ".csv")
     job = ask(client, "analyze", send(client, path))
+    with client.stream("GET", f"/jobs/{job}/events") as stream:
+        steps = [json.loads(line.removeprefix("data: ")) for line in stream.iter_lines() if line.startswith("data: ")]
     told = ended(client, job)
     findings = ss.analyze(ss.read_record(path))
     words = ss.summary(findings)
@@ -171,6 +182,9 @@ def test_the_answer_is_the_librarys_to_the_last_printed_digit(client: Client, tm
     assert client.get(f"/jobs/{job}/results.zip").content[:2] == b"PK"
     assert client.get(f"/jobs/{job}/figures/0").text.lstrip().startswith("<?xml")
     assert client.get(f"/jobs/{job}/figures/99").status_code == 404
+    assert steps[-1]["state"] == "done"
+    assert {"analysing rubbing.csv", "drawing and writing"} <= {step["words"] for step in steps}
+    assert [step["share"] for step in steps] == sorted(step["share"] for step in steps)
 
 
 def test_only_what_the_library_can_not_infer_is_asked_for(client: Client, tmp_path: Path) -> None:
@@ -325,18 +339,6 @@ def test_cancel_ends_the_process_and_what_it_started(client: Client, tmp_path: P
     assert answered(client, "describe", key)["records"][0]["rows"] == 24000
 
 
-def test_progress_is_told_line_by_line(client: Client, tmp_path: Path) -> None:
-    job = ask(client, "analyze", send(client, written(tmp_path, ".csv")))
-    with client.stream("GET", f"/jobs/{job}/events") as stream:
-        told = [json.loads(line.removeprefix("data: ")) for line in stream.iter_lines() if line.startswith("data: ")]
-    assert [each["state"] for each in told][-1] == "done"
-    words = [each["words"] for each in told]
-    assert "analysing rubbing.csv" in words
-    assert "drawing and writing" in words
-    shares = [each["share"] for each in told]
-    assert shares == sorted(shares)
-
-
 WORKERS = {
     "dies": "import os; os.kill(os.getpid(), 11)",
     "raises": "raise RuntimeError('a bug of ours')",
@@ -368,6 +370,19 @@ def test_a_worker_that_fails_is_one_message_to_one_user(
         assert told["state"] == "broken"
         assert SAID[fate] in told["message"]
         assert "\n" not in told["message"]
+
+
+@pytest.mark.parametrize(
+    "deed",
+    ["import socket; socket.create_connection(('127.0.0.1', 9))", "import os; os.system('true')",
+     "import subprocess; subprocess.run(['true'])", "import os; os.fork()",
+     "import urllib.request; urllib.request.urlopen('http://127.0.0.1:9')"],
+)  # fmt: skip
+def test_an_analysis_reaches_no_network_and_starts_no_program(deed: str) -> None:
+    begin = "from stickslip.lab.task import limit; limit(memory=1 << 30, processor=5, written=1 << 20)"
+    code = f"{begin}\ntry:\n    {deed}\nexcept OSError as error:\n    print(error)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "is not for an analysis" in run.stdout
 
 
 def test_limits_hold_an_analysis_that_asks_for_too_much(tmp_path: Path) -> None:

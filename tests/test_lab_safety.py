@@ -158,7 +158,7 @@ class Bomb:
         return os.system, (f"touch {self.path}",)
 
 
-@pytest.mark.parametrize("name", ["a.pkl", "a.mat", "a.csv", "a.h5", "a.lvm", "a.npy", "a.parquet", "a.json"])
+@pytest.mark.parametrize("name", ["a.pkl", "a.mat", "a.lvm", "a.npy"])
 def test_a_pickle_is_never_opened(client: httpx.Client, tmp_path: Path, name: str) -> None:
     mark = tmp_path / "gone-off"
     array = np.array([Bomb(mark)], dtype=object)
