@@ -166,7 +166,7 @@ class Jobs:
             return broken("it said something that is no word of ours")
         finally:
             _kill(process)
-            await process.wait()
+            await process.communicate()  # what it still said is read away: a full pipe would keep it from having ended
         answer = await asyncio.to_thread(_read, job.folder / ANSWER)
         if isinstance(answer, dict) and process.returncode == 0 and "answer" in answer:
             return {"state": "done", "answer": answer["answer"], "share": 1.0}
