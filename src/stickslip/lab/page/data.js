@@ -13,6 +13,10 @@ const QUESTIONS = {
   squeak: "Does it squeak?",
   fit: "Which friction law is it?",
 };
+const READING = {
+  fs: ["Sampling rate", "Hz", "1000"], time: ["Time column", "", "t, or #1 [ms]"], rows: ["Rows", "", "0:5000"],
+  delimiter: ["Delimiter of a text", "", ";"], decimal: ["Decimal sign of a text", "", ","],
+};
 const FIELDS = {
   mass: ["Mass", "kg", "2.42, or 250 g"], stiffness: ["Spring", "N/m", "2310, or 1.2 N/mm"],
   damping: ["Damping", "N s/m", "0.12"], frequencies: ["Range", "Hz", "500:8000"],
@@ -88,6 +92,7 @@ function dropping(place) {
 }
 
 async function add(chosen) {
+  if (!ready().length) told = nothing();
   const { largest } = await lab.ask("/files");
   for (const file of chosen) {
     const entry = { name: file.name, size: file.size, sent: 0, id: null, error: "" };
@@ -146,10 +151,24 @@ function showFiles() {
     pieces.push(choice("data-together", "These files are", { apart: "one record each", together: "parts of one record" },
       parts.together || "apart", (value) => { parts.together = value; guarded(describe); }));
   }
+  if (ready().length) pieces.push(howRead());
   parts.files.replaceChildren(...(files.length ? pieces : []));
 }
 
+// What the files may leave open, to be said at any time: also where one could not be read.
+function howRead() {
+  const boxes = Object.entries(READING).map(([name, [label, unit, hint]]) => {
+    const [box, input] = field(`data-read-${name}`, label, unit, hint, told[name]);
+    input.addEventListener("change", () => { told[name] = input.value.trim(); guarded(describe); });
+    return box;
+  });
+  const more = make("details", {}, make("summary", {}, "How the files are read"), ...boxes);
+  more.open = Object.keys(READING).some((name) => told[name]);
+  return more;
+}
+
 async function forget(entry) {
+  if (entry === ready()[0]) told = nothing(); // what was said of its columns
   files = files.filter((each) => each !== entry);
   if (entry.id) await lab.ask(`/files/${entry.id}`, { method: "DELETE" });
   showFiles();
@@ -172,7 +191,8 @@ function records() {
 
 // ---- channels
 
-const told = { columns: null, fs: "", repair: [] };
+const nothing = () => ({ columns: null, repair: [], fs: "", time: "", delimiter: "", decimal: "", rows: "" });
+let told = nothing();
 
 // What stands is replaced when the answer comes, and the focus stays where it was.
 async function describe() {
@@ -194,7 +214,7 @@ async function describe() {
 
 function reading() {
   const said = { repair: told.repair };
-  if (told.fs) said.fs = told.fs;
+  for (const name of Object.keys(READING)) if (told[name]) said[name] = told[name];
   if (told.columns) {
     said.channels = Object.fromEntries(told.columns.map(({ name, column, unit }) =>
       [name, `\`${column}\`${unit ? ` [${unit}]` : ""}`]));
@@ -211,7 +231,8 @@ function showRecord(record, number) {
     box.append(make("p", { class: "data-needed" }, `The file states no unit for ${record.unknown.join(", ")}: ` +
       "write it below (what has a known meaning is taken in SI units otherwise)."));
   }
-  box.append(channelTable(record, number), previews(record));
+  box.append(make("p", { class: "note" }, "Where a column was not understood, choose under “Is” what it measures."),
+    channelTable(record, number), previews(record));
   if (record.faults.length) box.append(make("h3", {}, "What the check-up found"), faults(record));
   if (record.notes.length) {
     box.append(make("details", {}, make("summary", {}, "How it was read"),
@@ -223,7 +244,7 @@ function showRecord(record, number) {
 function rateField(asks) {
   const [box, input] = field("data-fs", "Sampling rate", "Hz", "1000", told.fs);
   input.required = true;
-  input.addEventListener("change", () => { told.fs = input.value.trim(); guarded(describe); });
+  input.addEventListener("change", () => { told.fs = input.value.trim(); showFiles(); guarded(describe); });
   return make("div", { class: "data-needed" }, make("p", {}, asks), box);
 }
 
