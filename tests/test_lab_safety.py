@@ -78,7 +78,7 @@ ROUTES = paths(lab_app(token="t", port=1))
 def test_every_door_wants_our_host_our_page_and_the_token(lab: Lab, method: str, path: str) -> None:
     known = lab.headers
     ours = f"127.0.0.1:{lab.port}"
-    with httpx.Client(base_url=lab.base) as anyone:
+    with httpx.Client(base_url=lab.base, timeout=60) as anyone:
         assert anyone.request(method, path).status_code == 401
         assert anyone.request(method, path, headers={"Authorization": "Bearer wrong"}).status_code == 401
         for host in ("evil.example", f"evil.example:{lab.port}", "127.0.0.1", f"127.0.0.1.evil.example:{lab.port}"):
@@ -290,7 +290,7 @@ def test_twenty_at_once_are_all_answered(lab: Lab, client: httpx.Client) -> None
 def test_all_is_removed_at_the_end(tmp_path: Path) -> None:
     with running_lab() as lab:
         (place,) = Path(os.environ.get("TMPDIR", "/tmp")).glob(f"stickslip-lab-{lab.process.pid}-*")
-        with httpx.Client(base_url=lab.base, headers=lab.headers) as client:
+        with httpx.Client(base_url=lab.base, headers=lab.headers, timeout=60) as client:
             send(client, "a.csv", b"a,b\n1,2\n")
         assert len(list((place / "files").iterdir())) == 1
     assert not place.exists()
