@@ -48,6 +48,8 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/squeak.py 40
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/sweep.py
 	$(BIN)/python benchmarks/squeak_model.py
+	command -v chromium >/dev/null && $(BIN)/python benchmarks/lab.py || echo "no chromium: the lab is not timed"
+	$(BIN)/python benchmarks/lab_data.py
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 SSQ_PARALLEL=0 MALLOC_TOP_PAD_=268435456 \
 	  MALLOC_MMAP_THRESHOLD_=17179869184 MALLOC_TRIM_THRESHOLD_=17179869184 $(BIN)/python benchmarks/wavelet.py
 
