@@ -11,6 +11,7 @@ import sys
 from types import TracebackType
 
 LONGEST = 180.0  # s of one answer, the first compilation of a law included
+ABANDONED = 5.0  # s that a worker may go on with what no one waits for: a compilation that ends by then is kept
 HEAD = struct.Struct("<I")
 INTERRUPTIBLE = os.name == "posix"
 
@@ -115,13 +116,18 @@ class Workers:
         lent = [] if lent is None else lent
         lent.append(worker)
         answer = asyncio.create_task(worker.answer(request))
-        answer.add_done_callback(lambda _: self.free.put_nowait(worker))
+        answer.add_done_callback(lambda done: self._freed(worker, done))
         try:
             return await asyncio.shield(answer)
         except asyncio.CancelledError:
-            worker.interrupt()  # it ends what it does, and is free then
+            worker.interrupt(within=ABANDONED)  # it ends what it does, and is free then
             raise
         except (ConnectionError, asyncio.IncompleteReadError) as error:
             raise EOFError("the process ended") from error
         finally:
             lent.remove(worker)
+
+    def _freed(self, worker: Worker, answer: asyncio.Task[bytes]) -> None:
+        if not answer.cancelled():
+            answer.exception()  # told to who asked, where someone still waits
+        self.free.put_nowait(worker)
