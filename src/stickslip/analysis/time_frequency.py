@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from stickslip.analysis.findings import record_name
 from stickslip.errors import EstimateError, RecordError
@@ -16,7 +16,7 @@ from stickslip.estimate import Estimate, Result
 from stickslip.identify.mechanism import UNTOLD, Mechanism, mechanism_of
 from stickslip.identify.microslip import MicroSlips, microslips_of
 from stickslip.identify.motion import is_measured
-from stickslip.identify.ringing import Ringing, find_ringing
+from stickslip.identify.ringing import Ringing, checked_mass, find_ringing
 from stickslip.identify.slip_ringing import SlipRinging, slip_ringing
 from stickslip.identify.transition import Transition, transition_of
 from stickslip.record.record import Record
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Answer = TypeVar("Answer")
+Array = NDArray[np.float64]
 
 CHOSEN = ("a", "sound", "force", "load", "friction", "v", "x")  # the channel that is looked at, the first that is there
 LONG = 400_000  # samples, from which on the largest moduli of each stretch of time are kept
@@ -123,7 +124,8 @@ def time_frequency(
     source : Record or iterable of Record
         At one rate; or the parts of a long one in order, as :func:`read_blocks` yields them, to be held one at a time.
     channel : str, optional
-        Which channel; the first of a, sound, force, load, friction, v, x, or any other, when not given. The sticks are
+        Which channel; the first of a, sound, force, load, friction, v, x, or any other that does not only rise or only
+        fall, as times do, when not given. The sticks are
         asked of an acceleration, the ringing after slips begin of a measured friction beside a motion.
     frequencies : array_like, optional
         As in :func:`wavelet_map`.
@@ -143,7 +145,9 @@ def time_frequency(
     Raises
     ------
     RecordError
-        As :func:`wavelet_map`; or no part at all.
+        As :func:`wavelet_map`; or no part at all, or no channel that moves to and fro.
+    EstimateError
+        A mass that is not positive, a negative spring.
 
     Examples
     --------
@@ -154,6 +158,7 @@ def time_frequency(
     >>> found.mechanism.name, found.microslips.kind
     ('double stick-slip', 'double stick-slip')
     """
+    checked_mass(mass, stiffness)
     parts = iter([source] if isinstance(source, Record) else source)
     first, second = next(parts, None), next(parts, None)
     if first is None:
@@ -210,16 +215,32 @@ def _spikes_and_sticks(
     found["ringing"] = ringing
     found["mechanism"] = mechanism_of(ringing)
     found["transition"] = asked("Transition", lambda: transition_of(ringing, mass, stiffness))
-    found["microslips"] = asked("Micro-slips", lambda: microslips_of(ringing))
+    if found["transition"] is not None:  # where nothing rings, nothing cuts a ring off
+        found["microslips"] = asked("Micro-slips", lambda: microslips_of(ringing))
     return found, notes
 
 
 def chosen_channel(record: Record, channel: str | None) -> str:
-    """The channel asked for, or the first that is usual."""
+    """The channel asked for, or the first that is usual, or else the first that is no clock."""
     if channel is not None:
         record.require(channel, question=QUESTION)
         return channel
-    return next((name for name in CHOSEN if name in record), next(iter(record)))
+    usual = next((name for name in CHOSEN if name in record), None)
+    if usual is not None:
+        return usual
+    swings = next((name for name in record if not _runs_on(record[name])), None)
+    if swings is None:
+        raise RecordError(
+            f"channels {', '.join(record)} only rise or only fall", "a clock or a ramp is no vibration to be mapped",
+            "name the channels of the file, or the one that is meant",
+        )  # fmt: skip
+    return swings
+
+
+def _runs_on(values: Array) -> bool:
+    """Whether values only rise or only fall, as a column of times does."""
+    steps = np.diff(values)
+    return bool(len(steps) > 1 and ((steps > 0).all() or (steps < 0).all()))
 
 
 def _stick(stick: Any) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.identify.ringing import Ringing, find_ringing
+from stickslip.identify.ringing import MISFIT, Ringing, checked_mass, find_ringing
 from stickslip.record.record import Record
 
 QUESTION = "the mechanism"
@@ -105,6 +105,8 @@ def mechanism(
     ------
     RecordError
         A channel that is missing or not finite, a broken clock.
+    EstimateError
+        A mass that is not positive, a negative spring.
 
     Examples
     --------
@@ -114,6 +116,7 @@ def mechanism(
     >>> mechanism(record).name
     'bare spikes'
     """
+    checked_mass(mass, stiffness)
     try:
         return mechanism_of(find_ringing(record, channel, question=QUESTION, mass=mass, stiffness=stiffness))
     except EstimateError as error:
@@ -123,7 +126,7 @@ def mechanism(
 def mechanism_of(ringing: Ringing) -> Mechanism:
     """The mechanism of sticks that are cut into pieces already."""
     found = features(ringing)
-    doubt = ringing.doubt or _too_fast(ringing, found)
+    doubt = ringing.doubt or too_fast(ringing)
     if doubt:
         return Mechanism(UNTOLD, math.nan, features=found, reason=doubt)
     probabilities = _weighed(found)
@@ -137,8 +140,9 @@ def mechanism_of(ringing: Ringing) -> Mechanism:
     return Mechanism(name, sure, probabilities, found, reason)
 
 
-def _too_fast(ringing: Ringing, found: Mapping[str, float]) -> str:
-    if found["frequency"] < FASTEST or ringing.silent:
+def too_fast(ringing: Ringing) -> str:
+    """In words: that the mode is faster than was looked for; "" otherwise."""
+    if features(ringing)["frequency"] < FASTEST or ringing.silent:
         return ""
     return f"what rings in the sticks is faster than {FASTEST:g} cycles in each, and was not looked for"
 
@@ -186,7 +190,7 @@ def not_one_mode(ringing: Ringing) -> str:
     likely = mechanism_of(ringing).probabilities.get(SWINGING, 0.0)
     if likely < LIKELY:
         return ""
-    return f"the sticks swing, but not as one mode ({likely:.0%}), as no contact rings: see mechanism(record)"
+    return f"the sticks swing, but not as one mode ({likely:.0%}), as no contact rings"
 
 
 def features(ringing: Ringing) -> dict[str, float]:
@@ -216,12 +220,15 @@ COLUMNS = ("loudness", "excess", "gain over rest", "noise", "glides", "any glide
 
 
 def columns(found: Mapping[str, float]) -> NDArray[np.float64]:
-    """The features as the regression takes them: logarithms and bounds keep single ones from deciding alone."""
+    """The features as the regression takes them: logarithms and bounds keep single ones from deciding alone.
+
+    Noise counts from where it is larger than the pieces' misfit: less leaves them as they are, and moves no verdict.
+    """
     return np.array([
         math.log10(found["loudness"] + 0.005),
         math.log10(min(max(found["excess"], 1.0), 10.0)),
         math.log10(min(max(found["rest"] / max(found["excess"], 1.0), 1.0), 1e3)),
-        math.log10(min(max(found["noise"], 3e-3), 0.3)),
+        math.log10(min(max(found["noise"], MISFIT), 0.3)),
         min(found["glides"], 6.0),
         min(found["glides"], 1.0),
         min(found["shortest"], 1.0),

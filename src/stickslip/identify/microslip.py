@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
-from stickslip.identify.mechanism import not_one_mode
+from stickslip.identify.mechanism import UNTOLD, not_one_mode, too_fast
 from stickslip.identify.ringing import Ringing, Window, find_ringing
+from stickslip.identify.transition import heard_mode
 from stickslip.record.record import Record
 from stickslip.signals.pieces import Piece
 from stickslip.statistics import mean_of_cycles
@@ -55,7 +56,8 @@ class MicroSlips(Result):
     counts : tuple of int
         How many in each stick.
     kind : str
-        "double stick-slip" where most sticks hold a micro-slip; "no micro-slips", or "some sticks slip".
+        "double stick-slip" where most sticks hold a micro-slip; "no micro-slips", or "some sticks slip";
+        "cannot be told from this record" where the sticks swing, but not as one mode.
     status : str
         "ok", or in words what to beware of.
     """
@@ -117,7 +119,14 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
         raise EstimateError(
             "no transition: the sticks do not ring",
             "a micro-slip interrupts the ringing of a contact, and a mass at rest shows none",
-            "see mechanism(record) for what the sticks are like",
+            "the mechanism tells what the sticks are like",
+        )
+    heard_mode(ringing)  # what cuts no ring off is no micro-slip
+    if too_fast(ringing):
+        raise EstimateError(
+            f"no transition: {too_fast(ringing)}",
+            "a micro-slip interrupts a ringing that is told",
+            "record at a higher rate, or give x or v beside it, that sticks are told from",
         )
     counts = tuple(len(window.glides) for window in ringing.windows)
     events = []
@@ -126,16 +135,27 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
             begin, end = _edges(window, piece, ringing.pole / ringing.fs)
             events.append(MicroSlip(ringing.time(window, begin), (end - begin) / ringing.fs, number))
     share = sum(count > 0 for count in counts) / len(counts)
-    kind = "double stick-slip" if share > 0.5 else "some sticks slip" if share > 0 else "no micro-slips"
+    astray = not_one_mode(ringing)
+    kind = (
+        UNTOLD
+        if astray
+        else "double stick-slip"
+        if share > 0.5
+        else "some sticks slip"
+        if share > 0
+        else "no micro-slips"
+    )
     per_stick = mean_of_cycles(
         "micro-slips per stick", [float(count) for count in counts], unit="1",
         method="cuts between rings of one mode, by dynamic programming",
     )  # fmt: skip
     blurred = "without a load cell whose mount is stated, one may be missed or seen twice" if ringing.blurred else ""
-    status = (
-        "; ".join(word for word in (ringing.status, not_one_mode(ringing), blurred) if word not in ("", "ok")) or "ok"
+    status = "; ".join(word for word in (ringing.status, astray, blurred) if word not in ("", "ok")) or "ok"
+    low, high = per_stick.interval
+    per_stick = replace(
+        per_stick, interval=(max(low, 0.0), high), status=per_stick.status if status == "ok" else status
     )
-    return MicroSlips(replace(per_stick, status=status), tuple(events), counts, kind, status)
+    return MicroSlips(per_stick, tuple(events), counts, kind, status)
 
 
 def _edges(window: Window, glide: Piece, pole: complex) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from stickslip.identify.sticks import Sticks, find_sticks
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
 from stickslip.signals.pieces import GLIDE, RING, Piece, Splitter
+from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,7 @@ QUIET = 1.05  # times the mean square that rings leave: then rest explains as mu
 FAINT = 0.02  # of the acceleration's range, root mean square: rings that are smaller are none
 FORBIDDEN = 1e30  # cost outside of the search, finite since costs are subtracted
 SETTLED = 0.2  # of a cycle: a ring lasts longer
+SWINGS = 3  # reversals within one motion between sticks, from which on it swings and does not slide
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,14 +146,18 @@ def find_ringing(
     Sticks come from ``x`` or ``v`` where the record has them, else from the acceleration's integral. The mode is
     searched on a grid and refined for the least cost of all windows together.
     """
+    checked_mass(mass, stiffness)
     record.require_clean(channel, question=question, samples=256)
     if np.ptp(record[channel]) == 0:
         raise EstimateError(f"{channel} is constant", f"{question} needs sticks and slips", "choose another channel")
     seen = acceleration_of_mass(record, channel, mass=mass, stiffness=stiffness, question=question)
     record = seen.record
     values, stated = record[channel], record.channels[channel].noise
-    moving = record if any(name in record for name in ("x", "v")) else with_velocity(record, channel, question)
+    alone = not any(name in record for name in ("x", "v"))
+    moving = with_velocity(record, channel, question) if alone else record
     sticks = _sticks(moving, question)
+    if alone:
+        _require_slips(sticks, moving, question)
     spans = _spans(sticks, record, values)
     noise = noise_level(values, record.fs) if stated is None else stated
     trusted = max(noise, MISFIT * float(values.std()))
@@ -170,6 +176,18 @@ def find_ringing(
         doubt = doubt or f"what rings at {rings:.3g} Hz may be left of a mount, where no load cell helps to take it out"
     cut = tuple(Window(first, v, p) for (first, _), v, p in zip(spans, windows, pieces, strict=True))
     return Ringing(cut, pole, noise, left / count, rest / count, sticks, record, channel, doubt, seen.blurred)
+
+
+def checked_mass(mass: float | str | None, stiffness: float | str | None) -> tuple[float | None, float]:
+    """Mass [kg] and spring [N/m] as numbers, 0 for no spring; refused where they are none of a mass and a spring."""
+    kilograms = parse_value(mass, "kg") if mass is not None else None
+    spring = parse_value(stiffness, "N/m") if stiffness is not None else 0.0
+    if not (kilograms is None or 0 < kilograms < math.inf) or not 0 <= spring < math.inf:
+        raise EstimateError(
+            f"mass = {mass}, stiffness = {stiffness}", "a mass is positive, a spring not negative",
+            "give the mass in kg and the spring in N/m",
+        )  # fmt: skip
+    return kilograms, spring
 
 
 def with_velocity(record: Record, channel: str, question: str) -> Record:
@@ -206,6 +224,23 @@ def _sticks(record: Record, question: str) -> Sticks:
             "give a record in which it sticks and slips",
         )
     return sticks
+
+
+def _require_slips(sticks: Sticks, record: Record, question: str) -> None:
+    """A blow's ringing fades to rest as a slip does to a stick; but a slip goes one way, and ringing swings."""
+    rows = np.flatnonzero(np.abs(record["v"]) > sticks.threshold)
+    turns = rows[1:][np.diff(np.sign(record["v"][rows])) != 0] / record.fs + record.start
+    moves = [event for event in sticks.events if event.kind == "slip"]
+    many = [np.sum((turns > move.time) & (turns < move.time + move.duration)) for move in moves]
+    swinging = sum(move.duration for move, count in zip(moves, many, strict=True) if count >= SWINGS)
+    if swinging > 0.5 * sum(move.duration for move in moves):
+        raise EstimateError(
+            f"no transition: between its rests the mass swings to and fro, up to {max(many)} times",
+            f"{question} needs sticks that a slip leads to, which goes one way; ringing that fades, as after a blow, "
+            "sticks nowhere",
+            "give a record in which it sticks and slips, or x, v or friction beside it; a fading vibration is one for "
+            "decrement",
+        )
 
 
 def _spans(sticks: Sticks, record: Record, values: Array) -> list[tuple[int, int]]:
@@ -264,7 +299,9 @@ def _pole(windows: list[Array], fs: float, noise: float, sticks: Sticks) -> comp
     grid = [(cost(few, f, z), f, z) for f in FREQUENCIES / long if f <= highest for z in DAMPINGS]
     if not grid:
         raise EstimateError(
-            f"no transition: a rate of {fs:g} Hz", "a ring needs five samples a cycle", "record at a higher rate"
+            f"no transition: half of the sticks last less than {1e3 * long:.3g} ms among others far longer",
+            "a ring needs a cycle in a stick, and five samples in that",
+            "give a part of the record whose sticks are alike, or one at a higher rate",
         )
     some = Splitter(short[:: max(1, len(short) // 16)][:16], variance, PENALTY)
     tried = []

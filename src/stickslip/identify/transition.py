@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.identify.mechanism import not_one_mode
-from stickslip.identify.ringing import Ringing, Window, find_ringing
+from stickslip.identify.ringing import Ringing, Window, checked_mass, find_ringing
 from stickslip.record.record import Record
 from stickslip.signals.morlet import ridge_centre
 from stickslip.signals.wavelet import CENTRE, wavelet_map
 from stickslip.statistics import correlation_time, least_squares, mean_of_cycles, student
-from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
@@ -143,16 +142,7 @@ def transition(
 def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float | str | None) -> Transition:
     """The transition of sticks that are cut into pieces already."""
     record, channel = ringing.record, ringing.channel
-    pooled = _fitted(ringing.windows, ringing)
-    if pooled is None:
-        raise _none("the sticks hold no stretch of ringing", "ringing lasts a third of a cycle at least")
-    loud = float(np.median([_amplitude(window, pooled, ringing)[0] for window in pooled.windows]))
-    spread = float(np.median([np.ptp(window.values) for window in ringing.windows]))
-    if loud < max(FAINT * spread, AUDIBLE * pooled.noise):
-        raise _none(
-            f"the sticks are quiet: {loud:.3g} m/s^2 where the acceleration changes by {spread:.3g}",
-            f"a ring is {FAINT:.0%} of that change at least, and five times the noise, {pooled.noise:.3g}",
-        )
+    pooled = heard_mode(ringing)
     sticks = _stick_by_stick(record, channel, ringing, pooled)
     unit = record.channels[channel].unit
     frequency, damping = pooled.frequency, pooled.damping
@@ -181,8 +171,23 @@ def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float |
     )  # fmt: skip
 
 
+def heard_mode(ringing: Ringing) -> Mode:
+    """The mode in which the sticks ring, where there is one that is heard."""
+    pooled = _fitted(ringing.windows, ringing)
+    if pooled is None:
+        raise _none("the sticks hold no stretch of ringing", "ringing lasts a third of a cycle at least")
+    loud = float(np.median([_amplitude(window, pooled, ringing)[0] for window in pooled.windows]))
+    spread = float(np.median([np.ptp(window.values) for window in ringing.windows]))
+    if loud < max(FAINT * spread, AUDIBLE * pooled.noise):
+        raise _none(
+            f"the sticks are quiet: {loud:.3g} m/s^2 where the acceleration changes by {spread:.3g}",
+            f"a ring is {FAINT:.0%} of that change at least, and five times the noise, {pooled.noise:.3g}",
+        )
+    return pooled
+
+
 @dataclass(frozen=True, eq=False)
-class _Mode:
+class Mode:
     """One mode fitted to the rings of some windows."""
 
     pole: complex
@@ -195,7 +200,7 @@ class _Mode:
 
 def _none(value: str, rule: str) -> EstimateError:
     return EstimateError(
-        f"no transition: {value}", rule, "see mechanism(record) for what the sticks are like, or take a quieter record"
+        f"no transition: {value}", rule, "the mechanism tells what the sticks are like; or take a quieter record"
     )
 
 
@@ -226,7 +231,7 @@ def _design(window: Window, rows: list[slice], pole: complex, ringing: Ringing) 
     return design, np.concatenate([window.values[part] for part in rows])
 
 
-def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> _Mode | None:
+def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> Mode | None:
     """The mode of the windows' rings by least squares; amplitudes are eliminated (variable projection)."""
     from scipy.optimize import least_squares as nonlinear
 
@@ -261,10 +266,10 @@ def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> _Mode | None:
         "transition damping ratio", -pole.real / abs(pole), sd=math.sqrt(float(slope @ spread @ slope)), unit="1",
         method=method, quantile=quantile,
     )  # fmt: skip
-    return _Mode(pole, frequency, damping, math.sqrt(variance), tuple(window for window, _ in used), tau)
+    return Mode(pole, frequency, damping, math.sqrt(variance), tuple(window for window, _ in used), tau)
 
 
-def _amplitude(window: Window, mode: _Mode, ringing: Ringing) -> tuple[float, float]:
+def _amplitude(window: Window, mode: Mode, ringing: Ringing) -> tuple[float, float]:
     """Amplitude at which the window's first ring begins, and its standard deviation."""
     rows = _stretches(window, ringing.pole, ringing.fs)
     design, data = _design(window, rows, mode.pole, ringing)
@@ -277,7 +282,7 @@ def _amplitude(window: Window, mode: _Mode, ringing: Ringing) -> tuple[float, fl
     return size * growth, math.sqrt(float(along @ inverse @ along)) * growth
 
 
-def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: _Mode) -> tuple[StickTransition, ...]:
+def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: Mode) -> tuple[StickTransition, ...]:
     found, events = [], [event for event in ringing.sticks.events if event.kind == "stick" and event.whole]
     peaks = _local_maxima(record, channel, ringing, pooled)
     for window, peak in zip(pooled.windows, peaks, strict=True):
@@ -299,7 +304,7 @@ def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: _Mod
     return tuple(found)
 
 
-def _untold_alone(pooled: _Mode) -> tuple[Estimate, ...]:
+def _untold_alone(pooled: Mode) -> tuple[Estimate, ...]:
     """Frequency and damping of all sticks, for one that does not tell them by itself."""
     nothing, why = (-math.inf, math.inf), "this stick alone does not tell it"
     return tuple(
@@ -307,7 +312,7 @@ def _untold_alone(pooled: _Mode) -> tuple[Estimate, ...]:
     )
 
 
-def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: _Mode) -> list[float]:
+def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: Mode) -> list[float]:
     """Frequency [Hz] of the largest local maximum of the wavelet map within each stick, near the mode's."""
     centre = pooled.frequency.value
     wanted = centre * np.geomspace(1 / OCTAVE, min(OCTAVE, 0.45 * ringing.fs / centre), 61)
@@ -344,19 +349,18 @@ def _agreement(frequency: Estimate, wavelet: Estimate) -> str:
     if not math.isfinite(apart):
         return "the wavelet map has no local maximum near it"
     if frequency.interval[0] <= wavelet.value <= frequency.interval[1]:
-        return f"they agree: the wavelet reads {wavelet.value:.4g} Hz, within the interval"
+        return f"the mode and the wavelet agree: the wavelet reads {wavelet.value:.4g} Hz, within the interval"
     width = math.sqrt(math.log(2)) * 2 / ridge_centre(CENTRE, "energy")  # half of the bandwidth at half power
     side = "lower" if apart < 0 else "higher"
     why = "less than its bandwidth resolves" if abs(apart) < width / 2 else "more than its bandwidth explains"
-    return f"they differ: the wavelet reads {wavelet.value:.4g} Hz, {100 * abs(apart):.1f} % {side}, {why}"
+    reads = f"the wavelet reads {wavelet.value:.4g} Hz, {100 * abs(apart):.1f} % {side}"
+    return f"the mode and the wavelet differ: {reads}, {why}"
 
 
-def _stiffness(mode: _Mode, mass: float | str | None, spring: float | str | None) -> Estimate | None:
-    if mass is None:
+def _stiffness(mode: Mode, mass: float | str | None, spring: float | str | None) -> Estimate | None:
+    kilograms, k = checked_mass(mass, spring)
+    if kilograms is None:
         return None
-    kilograms, k = parse_value(mass, "kg"), parse_value(spring, "N/m") if spring is not None else 0.0
-    if not (kilograms > 0 and k >= 0):
-        raise EstimateError(f"mass = {mass}, stiffness = {spring}", "a mass is positive, a spring not negative", "mend")
     square = abs(mode.pole) ** 2
     # |p|^2 = w^2 / (1 - z^2): the frequency carries nearly all of its uncertainty
     z, sd_z = mode.damping.value, mode.damping.sd
@@ -369,7 +373,7 @@ def _stiffness(mode: _Mode, mass: float | str | None, spring: float | str | None
     )  # fmt: skip
 
 
-def _loop_stiffness(record: Record, ringing: Ringing, mode: _Mode) -> Estimate | None:
+def _loop_stiffness(record: Record, ringing: Ringing, mode: Mode) -> Estimate | None:
     """Slope of friction against displacement in the rings, beside a term in the velocity and a level for each ring."""
     if "friction" not in record or "x" not in record or record.channels["friction"].unit != "N":
         return None
@@ -390,7 +394,7 @@ def _loop_stiffness(record: Record, ringing: Ringing, mode: _Mode) -> Estimate |
     return line.estimate(0, "contact stiffness by loops", "N/m", "friction on x and v in the rings")
 
 
-def _status(ringing: Ringing, pooled: _Mode, doubt: str) -> str:
+def _status(ringing: Ringing, pooled: Mode, doubt: str) -> str:
     words = [each for each in (doubt, ringing.sticks.status) if each not in ("", "ok")]
     silent = len(ringing.windows) - len(pooled.windows)
     if silent:

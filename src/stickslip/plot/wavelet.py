@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import RecordError
+from stickslip.identify.mechanism import UNTOLD
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import (
     BLUE,
@@ -139,14 +140,16 @@ def plot_stick(found: TimeFrequency) -> Figure:
     wavelets = wavelet_map(around, found.channel, frequencies=(lowest, 0.4 * ringing.fs))
     shown = wavelets.sel(time=slice(record.time[first], record.time[last - 1]))
     figure = plot_wavelet(shown, record=record)
-    top = figure.axes[0]
-    for number, piece in enumerate(window.pieces):
+    top, heard = figure.axes[0], found.transition is not None and not ringing.silent
+    slips = heard and found.microslips is not None and found.microslips.kind != UNTOLD
+    for number, piece in enumerate(window.pieces if heard else ()):
         begin, end = ringing.time(window, piece.first), ringing.time(window, piece.last)
         if piece.kind == RING:
             top.axvspan(begin, end, color=ORANGE, alpha=0.18, linewidth=0, label="rings" if number == 1 else None)
-        elif 0 < number < len(window.pieces) - 1:
+        elif slips and 0 < number < len(window.pieces) - 1:
             top.axvspan(begin, end, color=SHADE, alpha=0.8, linewidth=0, label="micro-slip" if number == 2 else None)
-    legend_above(top, columns=2)
+    if heard:
+        legend_above(top, columns=2)
     return figure
 
 
@@ -161,11 +164,13 @@ def plates_of(found: TimeFrequency) -> list[Plate]:
     )
     plates = [plate("map", plot_wavelet(found.wavelets, record=record), "Time and frequency", words)]
     if found.ringing is not None:
-        plates.append(
-            plate("stick", plot_stick(found), "A stick, looked at closely",
-                  "A closed island is a contact that rings while the mass sticks; the spikes around it are where it "
-                  "sticks, slips by a little, and slips. The map reads lower than the mode where micro-slips cut in.")
-        )  # fmt: skip
+        rings = (
+            "A closed island is a contact that rings while the mass sticks; the spikes around it are where it "
+            "sticks, slips by a little, and slips. The map reads lower than the mode where micro-slips cut in."
+        )
+        rests = "No ringing of a contact is told in it; the spikes are where the mass sticks and slips."
+        told = rings if found.transition is not None else rests
+        plates.append(plate("stick", plot_stick(found), "A stick, looked at closely", told))
     lines = plot_wavelet(found.wavelets, record=record, style="lines")
     plates.append(plate("contours", lines, "The same map in contour lines", f"{LEVELS} lines span {SPAN:g} dB."))
     return plates

@@ -15,6 +15,7 @@ from stickslip.analysis.preparation import LEFT_OUT
 from stickslip.analysis.time_frequency import TimeFrequency
 from stickslip.estimate import NORMAL_95, Estimate, decimals
 from stickslip.identify.breakaway import Breakaway
+from stickslip.identify.mechanism import UNTOLD
 from stickslip.identify.presliding import Presliding
 from stickslip.identify.pull import Pull
 from stickslip.identify.slip_ringing import SlipRinging
@@ -132,7 +133,7 @@ def ringing_told(found: TimeFrequency) -> Iterator[str]:
         )
         if ring.stiffness is not None:
             yield f"That takes a contact of {value_of(ring.stiffness)} (95 % sure: {interval_of(ring.stiffness)})."
-    if found.microslips is not None:
+    if found.microslips is not None and found.microslips.kind != UNTOLD:
         slips = found.microslips
         yield f"{len(slips.events)} micro-slips are found in {len(slips.counts)} sticks: {slips.kind}."
     if found.slip_ringing is not None:
