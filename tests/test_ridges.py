@@ -160,3 +160,13 @@ def test_a_band_brake_rings_after_slip_begins(dataset: Callable[[str], Path]) ->
     )
     assert 41 < forward < 50
     assert 50 < back < 58
+
+
+def test_a_steady_tone_is_a_line_and_no_island() -> None:
+    """The ends of the record bend the map near them: they belong to no ridge, and rounding makes no peak."""
+    t = np.arange(16000) / 4000
+    tone = ss.Record.of({"a": 3 * np.sin(2 * np.pi * 45 * t)}, fs=4000)
+    wavelets = ss.wavelet_map(tone, "a", frequencies=(5, 1000))
+    (ridge,) = ss.find_ridges(wavelets)
+    np.testing.assert_allclose(ridge.frequency, 45, rtol=3e-3)
+    assert ss.local_maxima(wavelets) == ()

@@ -149,7 +149,9 @@ def find_ringing(
     checked_mass(mass, stiffness)
     record.require_clean(channel, question=question, samples=256)
     if np.ptp(record[channel]) == 0:
-        raise EstimateError(f"{channel} is constant", f"{question} needs sticks and slips", "choose another channel")
+        raise EstimateError(
+            f"{channel} is constant", "sticks and slips change an acceleration", "choose another channel"
+        )
     seen = acceleration_of_mass(record, channel, mass=mass, stiffness=stiffness, question=question)
     record = seen.record
     values, stated = record[channel], record.channels[channel].noise
@@ -197,12 +199,18 @@ def with_velocity(record: Record, channel: str, question: str) -> Record:
     velocity = np.concatenate([[0.0], np.cumsum((level[1:] + level[:-1]) / 2)]) / fs
     frequency = forcing_frequency(velocity, fs).value  # harmonics are weaker in it than in the acceleration
     cycle = fs / frequency
-    if not 32 <= cycle <= len(values) / 3:
+    if cycle > len(values) / 3:
         raise EstimateError(
-            f"no transition: the strongest line of {channel}, {frequency:.4g} Hz, has {cycle:.3g} samples a cycle and "
+            f"no transition: the motion that {channel} integrates to, strongest at {frequency:.4g} Hz, has "
             f"{len(values) / cycle:.3g} cycles",
-            f"{question} of an acceleration alone needs three cycles of 32 samples at least",
+            f"three cycles at least tell {question} from an acceleration alone, and noise has no cycle",
             "give a longer record, or one with x or v",
+        )
+    if cycle < 32:
+        raise EstimateError(
+            f"no transition: the strongest line of {channel}, {frequency:.4g} Hz, has {cycle:.3g} samples a cycle",
+            f"32 samples at least tell {question} from an acceleration alone",
+            "record at a higher rate, or give x or v",
         )
     total = np.concatenate([[0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2)])
     rows = np.arange(math.ceil(cycle / 2), len(values) - math.ceil(cycle / 2))
@@ -220,7 +228,7 @@ def _sticks(record: Record, question: str) -> Sticks:
     if not any(event.kind == "stick" and event.whole for event in sticks.events):
         raise EstimateError(
             "no transition: the record holds no whole stick",
-            f"{question} looks at what the contact does while the mass sticks",
+            f"what a contact does while the mass sticks tells {question}",
             "give a record in which it sticks and slips",
         )
     return sticks
@@ -236,10 +244,9 @@ def _require_slips(sticks: Sticks, record: Record, question: str) -> None:
     if swinging > 0.5 * sum(move.duration for move in moves):
         raise EstimateError(
             f"no transition: between its rests the mass swings to and fro, up to {max(many)} times",
-            f"{question} needs sticks that a slip leads to, which goes one way; ringing that fades, as after a blow, "
-            "sticks nowhere",
-            "give a record in which it sticks and slips, or x, v or friction beside it; a fading vibration is one for "
-            "decrement",
+            f"sticks that a slip leads to tell {question}, and a slip goes one way; ringing that fades, as after a "
+            "blow, sticks nowhere",
+            "give a record in which it sticks and slips, or x or v beside it",
         )
 
 

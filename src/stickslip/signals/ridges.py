@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
 from stickslip.record.record import Record
-from stickslip.signals.wavelet import wavelet_map
+from stickslip.signals.wavelet import ends, wavelet_map
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -92,7 +92,7 @@ def find_ridges(wavelets: xr.DataArray, *, span: float = 40.0, cycles: float = 3
 
     At each time the local maxima over the frequencies, refined by a parabola through the logarithms, are joined with
     those at the next time that are at most one frequency of the map away: a ridge ends where it can not go on, and
-    never jumps.
+    never jumps. Where an end of the record is felt, within the map's cone, there is none: the end bends it.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def find_ridges(wavelets: xr.DataArray, *, span: float = 40.0, cycles: float = 3
     level = np.log(np.maximum(modulus, modulus.max() * 1e-12))
     crest = np.zeros(modulus.shape, dtype=bool)
     crest[1:-1] = (level[1:-1] >= level[:-2]) & (level[1:-1] > level[2:])
-    crest &= level > level.max() - span * math.log(10) / 20
+    crest &= (level > level.max() - span * math.log(10) / 20) & ~_near_ends(wavelets, times)
     if not crest.any():
         return ()
     found = []
@@ -157,7 +157,8 @@ def local_maxima(wavelets: xr.DataArray, *, prominence: float = 3.0, span: float
     Returns
     -------
     tuple of LocalMaximum
-        In the order of time; none at the edge of the map.
+        In the order of time; none at the edge of the map, and none whose surroundings, down to the prominence, reach
+        where an end of the record is felt: a tone that runs through is no peak.
 
     Raises
     ------
@@ -184,6 +185,7 @@ def local_maxima(wavelets: xr.DataArray, *, prominence: float = 3.0, span: float
     peak[[0, -1]] = peak[:, [0, -1]] = False
     rows, columns = np.nonzero(peak)
     heights, stands = level[rows, columns], np.full(len(rows), np.inf)
+    felt = _near_ends(wavelets, times)
     order = np.argsort(-heights, kind="stable")
     for floor in np.arange(0.0, -span - LEVEL_STEP, -LEVEL_STEP):
         regions, _ = label(level >= floor, structure=np.ones((3, 3)))
@@ -193,6 +195,8 @@ def local_maxima(wavelets: xr.DataArray, *, prominence: float = 3.0, span: float
         lower = np.setdiff1d(above, above[first])
         new = lower[np.isinf(stands[lower])]
         stands[new] = heights[new] - floor
+        cut = np.isin(regions[rows, columns], np.unique(regions[felt & (regions > 0)])) & (heights >= floor)
+        stands[cut] = np.minimum(stands[cut], heights[cut] - floor)
     stands = np.minimum(stands, heights + span)  # lower, nothing is known of the map
     kept = [n for n in range(len(rows)) if stands[n] >= prominence]
     found = [
@@ -291,6 +295,13 @@ def _coarse(wavelets: xr.DataArray) -> tuple[Array, Array, Array]:
     step = max(1, int(STEP * float(wavelets.scale.min()) * float(wavelets.attrs["fs"])))
     part: Any = wavelets[:, ::step]
     return np.abs(part.values).astype(float), part.time.values, part.frequency.values
+
+
+def _near_ends(wavelets: xr.DataArray, times: Array) -> NDArray[np.bool_]:
+    """Where in a map an end of the record is felt."""
+    first, last = ends(wavelets)
+    cone = wavelets.cone.values[:, None]
+    return np.asarray((times < first + cone) | (times > last - cone))
 
 
 def _chains(crest: NDArray[np.bool_], level: Array) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:

@@ -534,7 +534,9 @@ def _grid(
 def _checked_centre(centre: float) -> None:
     if not 3 <= centre <= 100:
         raise RecordError(
-            f"wavelet_frequency = {centre}", "it is 3 to 100: below, the wavelet sees the mean", "leave it at 4.5"
+            f"wavelet_frequency = {centre}",
+            "it is 3 to 100: below, a wavelet sees the mean; above, it is longer than what it is to tell apart",
+            "leave it at 4.5",
         )
 
 
