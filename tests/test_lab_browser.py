@@ -283,4 +283,4 @@ def test_the_first_sight_of_records_is_as_it_was(page: Page) -> None:
     assert abs(sight.height - kept.height) <= 40  # the machine's own letters are higher or lower
     size = (60, 40)
     seen, known = (np.asarray(each.resize(size, Image.Resampling.BOX), dtype=float) for each in (sight, kept))
-    assert np.mean(np.abs(seen - known)) < 6
+    assert np.mean(np.abs(seen - known)) < 1.5  # a third of it blank makes 2

@@ -11,6 +11,7 @@ import time
 import zlib
 from collections.abc import Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -294,6 +295,9 @@ def test_a_file_that_is_too_large_ends_as_it_comes_and_leaves_nothing() -> None:
     with TestClient(app_with(largest=1 << 20, altogether=3 << 20)) as client:
         codes = [client.post("/files", content=b"x" * (1 << 20)).status_code for _ in range(4)]
         assert codes == [201, 201, 201, 413]
+    with TestClient(app_with(largest=1 << 10)) as client:
+        assert client.post("/files/example").status_code == 413
+        assert list(client.app.state.data.uploads.folder.iterdir()) == []
 
 
 def test_files_and_answers_are_removed(tmp_path: Path) -> None:
@@ -416,6 +420,26 @@ def test_what_unpacks_to_more_than_there_is_ends_as_one_sentence() -> None:
         told = ended(client, ask(client, "describe", key, reading={"fs": 100}))
         assert told["state"] == "refused"
         assert "memory" in told["message"]
+
+
+def test_answers_that_are_kept_are_bounded(tmp_path: Path) -> None:
+    with TestClient(app_with(limits=Limits(kept=1))) as client:
+        key = send(client, written(tmp_path, ".csv"))
+        jobs = [ask(client, "describe", key) for _ in range(2)]
+        assert [ended(client, job)["state"] for job in jobs] == ["done", "done"]
+        held = client.app.state.data.jobs
+        client.portal.call(partial(held.remove_ended, before=0.0))
+        assert [client.get(f"/jobs/{job}").status_code for job in jobs].count(404) == 1
+        assert len(list(held.folder.iterdir())) == 1
+
+
+def test_a_curve_is_fitted_to_one_record(tmp_path: Path) -> None:
+    with TestClient(app_with()) as client:
+        keys = [[send(client, ss.write_record(ss.datasets.demo(), tmp_path / name))] for name in ("a.csv", "b.csv")]
+        asked = {"question": "fit", "records": keys, "options": {"curve": "stribeck"}}
+        told = ended(client, client.post("/jobs", json=asked).json()["id"])
+        assert told["state"] == "refused"
+        assert "2 records" in told["message"]
 
 
 def test_what_waits_is_bounded(tmp_path: Path) -> None:

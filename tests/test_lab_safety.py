@@ -6,6 +6,7 @@ import http.client
 import io
 import os
 import pickle
+import signal
 import socket
 import time
 from collections.abc import Iterator
@@ -287,10 +288,13 @@ def test_twenty_at_once_are_all_answered(lab: Lab, client: httpx.Client) -> None
     assert slowest < 2.0
 
 
-def test_all_is_removed_at_the_end(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_all_is_removed_at_the_end(number: signal.Signals) -> None:
     with running_lab() as lab:
         (place,) = Path(os.environ.get("TMPDIR", "/tmp")).glob(f"stickslip-lab-{lab.process.pid}-*")
         with httpx.Client(base_url=lab.base, headers=lab.headers, timeout=60) as client:
             send(client, "a.csv", b"a,b\n1,2\n")
         assert len(list((place / "files").iterdir())) == 1
+        lab.process.send_signal(number)
+        lab.process.wait(30)
     assert not place.exists()

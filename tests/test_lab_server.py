@@ -34,11 +34,16 @@ def test_the_address_with_its_token_is_exchanged_for_a_cookie(client: TestClient
     assert (answer.status_code, answer.headers["location"]) == (303, "/")
     cookie = answer.headers["set-cookie"].lower()
     assert "httponly" in cookie
-    assert "samesite=strict" in cookie
+    assert "samesite=lax" in cookie
     page = client.get("/")
     assert "stickslip lab" in page.text
     client.cookies.clear()
     assert client.get("/").status_code == 401
+
+
+@pytest.mark.parametrize("foreign", ['a={"x": 1}; ', "foo; ", "a[b]=1; "])
+def test_cookies_of_other_programs_on_this_machine_lock_nobody_out(client: TestClient, foreign: str) -> None:
+    assert client.get("/alive", headers={"cookie": f"{foreign}stickslip-{PORT}={TOKEN}"}).status_code == 200
 
 
 @pytest.mark.parametrize("path", ["/", "/alive", "/catalog", "/lab.js", "/openapi.json", "/nothing"])

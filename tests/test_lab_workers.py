@@ -6,6 +6,7 @@ import asyncio
 import json
 import os
 import signal
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +16,17 @@ from stickslip.lab.frames import unframed
 from stickslip.lab.workers import Workers
 
 CATALOG = json.dumps({"id": 1, "want": "catalog"}).encode()
+
+
+def test_no_file_of_the_folder_it_was_started_in_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "numpy.py").write_text("raise SystemExit('not numpy')", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+
+    async def asked() -> bytes:
+        async with Workers(1) as some:
+            return await some.ask(CATALOG)
+
+    assert unframed(asyncio.run(asked()))[0]["kind"] == "catalog"
 
 
 @pytest.mark.skipif(not workers.INTERRUPTIBLE, reason="no signals to stop a process with")

@@ -303,9 +303,9 @@ async def events(request: Request) -> Response:
     return StreamingResponse(lines(), media_type="text/event-stream", headers={"Cache-Control": "no-store"})
 
 
-@described("Stop an analysis", answer=STATUS)
+@described("Stop an analysis, or remove its answer", answer=STATUS)
 async def cancel(request: Request) -> Response:
-    """Stop an analysis."""
+    """Stop an analysis, or remove its answer."""
     job = _job(request)
     await _of(request).jobs.cancel(job)
     return JSONResponse(job.told())

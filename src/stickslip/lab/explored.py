@@ -18,7 +18,6 @@ SHOWN = {
     "stops": ("normal_stops", "abnormal_stops"), "micro_slips": ("micro_slips",), "period": ("order",),
     "stick_share": ("stick_share",), "amplitude": ("amplitude",),
 }  # fmt: skip
-COUNTED = ("stops", "micro_slips", "period")  # where the answer jumps, the map is refined
 NO_SYSTEM, AT_REST = -1.0, -2.0  # in place of a value
 MOST = 2000  # points of one part
 

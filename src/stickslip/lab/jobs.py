@@ -41,8 +41,8 @@ class Limits:
         Processor time, and time by the clock [s].
     written : int
         Size of a file that it writes [bytes].
-    at_once, waiting : int
-        Analyses that run at a time, and that may wait for their turn.
+    at_once, waiting, kept : int
+        Analyses that run at a time, that may wait for their turn, and whose answers are kept.
     """
 
     memory: int = 6 << 30
@@ -51,6 +51,7 @@ class Limits:
     written: int = 1 << 30
     at_once: int = os.cpu_count() or 2
     waiting: int = 64
+    kept: int = 64
 
 
 class Job:
@@ -122,18 +123,25 @@ class Jobs:
                     yield None
 
     async def cancel(self, job: Job) -> None:
-        """Stop it, with every process that it started; what has ended stays as it is."""
-        if job.ended is None and job.task is not None:
+        """Stop it, with every process that it started; of what has ended, the answer is removed."""
+        if job.ended is not None:
+            await self._remove(job)
+        elif job.task is not None:
             job.tell(state="cancelled", words="cancelled", message="Cancelled; nothing of it was kept.", ended=now())
             job.task.cancel()
             await asyncio.gather(job.task, return_exceptions=True)
             shutil.rmtree(job.folder, ignore_errors=True)
 
     async def remove_ended(self, *, before: float) -> None:
-        """Remove the answers that are older."""
-        old = [key for key, job in self._jobs.items() if job.ended is not None and job.ended < before]
-        for job in [self._jobs.pop(key) for key in old]:
-            await asyncio.to_thread(shutil.rmtree, job.folder, ignore_errors=True)
+        """Remove the answers that are older, and the oldest of more than are kept."""
+        ended = sorted((job.ended, key) for key, job in self._jobs.items() if job.ended is not None)
+        for number, (when, key) in enumerate(reversed(ended)):
+            if when < before or number >= self.limits.kept:
+                await self._remove(self._jobs[key])
+
+    async def _remove(self, job: Job) -> None:
+        self._jobs.pop(job.key, None)
+        await asyncio.to_thread(shutil.rmtree, job.folder, ignore_errors=True)
 
     async def close(self) -> None:
         """Stop all."""

@@ -57,7 +57,9 @@ async def _map(socket: WebSocket) -> None:
             try:
                 await asyncio.wait(drawing)
             finally:
-                drawing.pop().cancel()
+                (done := drawing.pop()).cancel()
+            if not done.cancelled():
+                done.result()  # a fault of ours is told as one, and ends the conversation
 
     await conversation(socket, heard, work)
 
@@ -118,8 +120,8 @@ async def _asked(
     asking = {"id": request["id"], "want": want, "state": request.get("state"), "measure": request["measure"],
               "grid": grid, "halvings": HALVINGS}  # fmt: skip
     header, arrays = unframed(await asked(workers, asking))
-    if header["kind"] == "error":
-        raise Unanswered(header["error"])
+    if header["kind"] != want:
+        raise Unanswered(header.get("error", "The map was given up; draw it again."))
     found: NDArray[np.float64] = arrays["values"].reshape(header["shape"])
     return found
 

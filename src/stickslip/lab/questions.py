@@ -123,6 +123,8 @@ def fit(asked: Asked) -> dict[str, Any]:
     rig, curve_name = asked.rig(), asked.options.get("curve")
     asked.say("reading", 0.0)
     records = [asked.record(number) for number in range(len(asked.records))]
+    if curve_name and len(records) > 1:
+        raise ss.ModelError(f"a curve and {len(records)} records", "a curve is fitted to one", "drop one file alone")
     if curve_name:
         friction = with_friction(records[0], rig)
         found: Any = ss.fit_curve(friction, curve=curve_name, contact=rig.contact)

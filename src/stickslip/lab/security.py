@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import secrets
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
+from starlette.requests import cookie_parser
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
+from stickslip.lab.uploads import LARGEST
+
 HOSTS = ("127.0.0.1", "localhost")
 LIMIT = 2**20  # bytes of a request
-LIMITS = {"/files": 4 * 2**30}  # by how the path begins: records are large
+LIMITS = {"/files": LARGEST}  # by how the path begins: records are large
 VIOLATION = 1008  # RFC 6455: against the policy
 HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -30,7 +32,7 @@ HEADERS = {
 
 
 class Guard:
-    """The door: every request states our host and origin and knows the token; none is larger than it may be.
+    """The door: every request states our host, comes from no other page and knows the token; none is too large.
 
     Parameters
     ----------
@@ -74,10 +76,12 @@ class Guard:
         told = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
         if scope["type"] == "http" and scope["path"] == "/" and self._known(told):
             page = RedirectResponse("/", status_code=303)
-            page.set_cookie(self.cookie, self.token, httponly=True, samesite="strict", path="/")
+            page.set_cookie(self.cookie, self.token, httponly=True, samesite="lax", path="/")
             return page
         scheme, _, bearer = headers.get("authorization", "").partition(" ")
-        if self._known(_cookies(headers).get(self.cookie, "")) or (scheme.lower() == "bearer" and self._known(bearer)):
+        if self._known(cookie_parser(headers.get("cookie", "")).get(self.cookie, "")) or (
+            scheme.lower() == "bearer" and self._known(bearer)
+        ):
             return None
         return _told(401, "The token is missing or of another start; open the address that 'stickslip lab' printed.")
 
@@ -111,13 +115,6 @@ def _counted(scope: Scope, receive: Receive) -> Receive:
         return message
 
     return receiving
-
-
-def _cookies(headers: Headers) -> dict[str, str]:
-    try:
-        return {name: morsel.value for name, morsel in SimpleCookie(headers.get("cookie", "")).items()}
-    except CookieError:
-        return {}
 
 
 def _told(status: int, sentence: str) -> Response:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import socket
 from collections.abc import Callable
 
@@ -58,4 +59,7 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[], None]) -> Non
         app, log_level="warning", access_log=False, ws_max_size=LARGEST_MESSAGE, server_header=False, date_header=False,
         timeout_graceful_shutdown=2, ws_per_message_deflate=False,
     )  # fmt: skip
-    Server(settings).run(sockets=[door])
+    server = Server(settings)
+    if hasattr(signal, "SIGHUP"):
+        signal.signal(signal.SIGHUP, server.handle_exit)  # a terminal that closes leaves no files behind either
+    server.run(sockets=[door])

@@ -72,8 +72,13 @@ class Uploads:
     async def write(self, writer: Callable[[Path], None], *, label: str) -> Upload:
         """Keep a file that the lab itself writes."""
         key, path = self._place(label)
-        await asyncio.to_thread(writer, path)
-        size = path.stat().st_size
+        try:
+            await asyncio.to_thread(writer, path)
+            size = path.stat().st_size
+            self._require_room(size, size)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
         self._size += size
         return self._keep(Upload(key, label, path, size))
 

@@ -68,7 +68,7 @@ function welcome() {
 
 function dropZone() {
   const input = make("input", { type: "file", multiple: "", id: "data-input", class: "hidden" });
-  input.addEventListener("change", () => { add([...input.files]); input.value = ""; });
+  input.addEventListener("change", () => { const chosen = [...input.files]; input.value = ""; guarded(() => add(chosen)); });
   const example = make("button", { type: "button", id: "data-example" }, "Try the example record");
   example.addEventListener("click", () => guarded(useExample));
   const zone = make("div", { class: "data-drop" },
@@ -87,7 +87,8 @@ function dropping(place) {
   place.addEventListener("drop", (event) => {
     event.preventDefault();
     place.classList.remove("data-over");
-    add([...event.dataTransfer.files]);
+    const dropped = [...event.dataTransfer.files];
+    guarded(() => add(dropped));
   });
 }
 
@@ -117,7 +118,8 @@ async function add(chosen) {
 
 function send(file, entry) {
   return new Promise((resolve, reject) => {
-    const request = new XMLHttpRequest();
+    const request = entry.request = new XMLHttpRequest();
+    request.onabort = () => reject(new Error("removed before it was sent"));
     request.open("POST", `/files?name=${encodeURIComponent(file.name)}`);
     request.setRequestHeader("Content-Type", "application/octet-stream");
     request.upload.onprogress = (event) => { entry.sent = event.loaded; entry.bar?.setAttribute("value", event.loaded); };
@@ -170,13 +172,14 @@ function howRead() {
 async function forget(entry) {
   if (entry === ready()[0]) told = nothing(); // what was said of its columns
   files = files.filter((each) => each !== entry);
+  entry.request?.abort();
   if (entry.id) await lab.ask(`/files/${entry.id}`, { method: "DELETE" });
   showFiles();
   await describe();
 }
 
 function leave() {
-  if (job) fetch(`/jobs/${job}`, { method: "DELETE", keepalive: true });
+  for (const id of [job, parts.job]) if (id) fetch(`/jobs/${id}`, { method: "DELETE", keepalive: true });
   for (const { id } of ready()) fetch(`/files/${id}`, { method: "DELETE", keepalive: true });
 }
 
@@ -407,7 +410,9 @@ function commandLine(question, said) {
 async function run(question, said) {
   parts.answer.replaceChildren();
   const mine = ++asked;
-  if (job) await lab.ask(`/jobs/${job}`, { method: "DELETE" });
+  const before = [job, parts.job].filter(Boolean);
+  job = parts.job = null;
+  for (const id of before) await lab.ask(`/jobs/${id}`, { method: "DELETE" }).catch(() => {}); // it may be gone already
   if (mine !== asked) return null;
   const body = JSON.stringify({ question, records: records(), reading: reading(), options: said });
   const { id } = await lab.ask("/jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body });
