@@ -284,9 +284,17 @@ def test_a_channel_that_is_no_acceleration_is_mapped_alone() -> None:
 def test_a_column_of_times_is_not_taken_for_a_vibration() -> None:
     t = np.arange(2000) / 1000
     record = ss.Record.of({"c1": 3 * t, "c2": np.sin(2 * np.pi * 40 * t)}, fs=1000.0)
-    assert ss.time_frequency(record).channel == "c2"
+    found = ss.time_frequency(record)
+    assert found.channel == "c2"
+    assert found.notes[0] == "Channel c1 only rises or only falls, as times do: c2 is mapped."
     with pytest.raises(RecordError, match="c1 only rise"):
         ss.time_frequency(ss.Record.of({"c1": 3 * t}, fs=1000.0))
+
+
+def test_a_ridge_that_wanders_is_told_as_one_that_may_be_chance() -> None:
+    words = {kind: " ".join(ss.summary(ss.time_frequency(spurious(kind))).headline) for kind in ("noise", "fast tone")}
+    assert "chance in noise" in words["noise"]
+    assert "chance" not in words["fast tone"]
 
 
 def test_the_page_tells_no_micro_slips_against_its_verdict() -> None:

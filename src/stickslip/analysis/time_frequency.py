@@ -193,7 +193,8 @@ def _spikes_and_sticks(
     if len(record) < LEAST:
         return {}, [f"{len(record)} samples are mapped, and too few to ask about spikes and sticks: give {LEAST}."]
     found: dict[str, Any] = {"spikes": find_spikes(record, name)}
-    notes: list[str] = []
+    clocks = [each for each in record if name not in CHOSEN and _runs_on(record[each])]
+    notes = [f"Channel {each} only rises or only falls, as times do: {name} is mapped." for each in clocks[:1]]
 
     def asked(what: str, question: Callable[[], Answer]) -> Answer | None:
         try:

@@ -23,6 +23,7 @@ from stickslip.units import NOTHING, prefixed
 
 NEVER = "The contact never sticks."
 RARELY = 0.005  # of the time
+WANDERS = 1.5  # times its lowest frequency: a ridge that goes farther may be chance
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
 FIGURES = 5  # significant figures at most: what is surer than that still reads well
@@ -142,7 +143,9 @@ def ringing_told(found: TimeFrequency) -> Iterator[str]:
         ridge = found.ridges[0]
         low, middle, high = (number(float(end(ridge.frequency)), 0.0, "Hz") for end in (np.min, np.median, np.max))
         span = middle if low == high else f"near {middle} ({low} to {high})"
-        yield f"The strongest ridge of the map: {span}, from {ridge.time[0]:.4g} s to {ridge.time[-1]:.4g} s."
+        wanders = ridge.frequency.max() > WANDERS * ridge.frequency.min()
+        beware = "; it wanders that far, as a sweep does, or chance in noise" if wanders else ""
+        yield f"The strongest ridge of the map: {span}, from {ridge.time[0]:.4g} s to {ridge.time[-1]:.4g} s{beware}."
     if found.spikes:
         groups = found.spikes[-1].group + 1
         yield f"The signal jumps or kinks {len(found.spikes)} times, in {groups} group{'s' * (groups > 1)}."
