@@ -93,6 +93,13 @@ def test_a_contact_of_47_hz() -> None:
     assert stiffness / told["stiffness"] == pytest.approx(1.087, abs=5e-4)
 
 
+def test_the_state_variable_model_jumps_past_the_motion_that_was_measured() -> None:
+    below, above = (chapter4.state_variable(GIVEN, 1, base=base).amplitude for base in (0.554e-3, 0.556e-3))
+    assert below == pytest.approx(0.09e-3, rel=0.05)
+    assert above == pytest.approx(1.06e-3, rel=0.05)
+    assert chapter4.base_of_state_variable(GIVEN, 1) is None
+
+
 def test_the_third_stop_of_case_1_is_none() -> None:
     orbits = [chapter4.inertial_contact(GIVEN, case) for case in (0, 1)]
     assert [orbit.stops for orbit in orbits] == [(2, 4), (2, 6)]

@@ -35,7 +35,7 @@ def numbers(given: Given) -> Ours:
         "coupled frequency": math.sqrt((told["spring"] + told["stiffness"]) / told["mass"]) / (2 * math.pi),
         "free frequency": strongest(time, friction),
         "not tuned": None,
-        "base of the state variable": [1e3 * base_of_state_variable(given, case) for case in (1, 2)],
+        "base of the state variable": [base_of_state_variable(given, case) for case in (1, 2)],
         "micro-slips": [micro_slips(stick_slip(given, told[name])) for name in ("case1", "case2")],
         "abnormal stops": orbits[0].stops[1] / 2,
         "static deflection": inertial["kinetic"] / inertial["stiffness"],
@@ -116,12 +116,19 @@ def state_variable(given: Given, case: int, *, base: float | None = None) -> ss.
     return _steady(slider["mass"], slider["spring"], law, base, told["frequency"][case])
 
 
-def base_of_state_variable(given: Given, case: int) -> float:
-    """The base amplitude [m] under which the state-variable model moves as far as the experiment of Table 3.2."""
+def base_of_state_variable(given: Given, case: int) -> float | None:
+    """The base amplitude [mm] under which the state-variable model moves as far as the experiment of Table 3.2.
+
+    None where the motion jumps from less to more as the base moves farther.
+    """
     wanted = given["sliding"]["amplitude"][case - 1]
-    low, high = 0.7 * given["state_variable"]["base"][case], given["state_variable"]["base"][case]
-    found = brentq(lambda base: state_variable(given, case, base=base).amplitude - wanted, low, high, xtol=1e-7)
-    return float(found)
+
+    def excess(base: float) -> float:
+        return state_variable(given, case, base=base).amplitude - wanted
+
+    most = given["state_variable"]["base"][case]
+    found = brentq(excess, 0.7 * most, most, xtol=1e-7)
+    return 1e3 * found if abs(excess(found)) < 0.01 * wanted else None
 
 
 @functools.lru_cache(8)

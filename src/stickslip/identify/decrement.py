@@ -102,8 +102,8 @@ class Decrement(Result):
         "viscous and dry", "viscous", "dry" or "no friction": what the intervals hold apart from zero.
     time, extremes, sd : ndarray, shape (k,)
         Instants [s], values and standard deviations of the extremes used, in the channel's unit.
-    differences : ndarray, shape (k - 2,)
-        Their amplitude differences, which dry friction does not touch.
+    differences : ndarray, shape (k - 2,), or (k - 1,) of the plain form
+        Their amplitude differences, which dry friction does not touch; of the plain form the sums of neighbours.
     bounds : Bounds
         What the errors of the extremes can do.
     scatter : Scatter

@@ -128,7 +128,8 @@ def plot_differences(found: Decrement, *, ax: Axes | None = None) -> Axes:
     """
     ax = axes_of(ax)
     factor, unit = prefixed(found.differences, found.ring_down.unit)
-    spread = np.hypot(found.sd[2:], found.sd[:-2]) if len(found.differences) == len(found.sd) - 2 else found.sd[1:]
+    apart = len(found.sd) - len(found.differences)  # 2: differences of extremes two apart; 1: sums of neighbours
+    spread = np.hypot(found.sd[apart:], found.sd[:-apart])
     number = np.arange(1, len(found.differences) + 1)
     zeta = found.damping_ratio.value
     beta = zeta / math.sqrt(1 - zeta**2)
@@ -140,10 +141,12 @@ def plot_differences(found: Decrement, *, ax: Axes | None = None) -> Axes:
         ax.plot(along, side * factor * scale * np.exp(-math.pi * beta * along), color=BLUE, linestyle="--", label=label)
     ax.errorbar(
         number, factor * found.differences, yerr=1.96 * factor * spread, fmt="o", color=INK, markersize=3.5,
-        linewidth=0.9, label="amplitude differences, 95 %", zorder=3,
+        linewidth=0.9, label=f"amplitude {'differences' if apart == 2 else 'sums'}, 95 %", zorder=3,
     )  # fmt: skip
     ax.axhline(0, color=FAINT, linewidth=0.8)
-    ax.set(xlabel="number i of the extreme", ylabel=axis_label("X(i+1) - X(i-1)", unit))
+    ax.set(
+        xlabel="number i of the extreme", ylabel=axis_label("X(i+1) - X(i-1)" if apart == 2 else "X(i-1) + X(i)", unit)
+    )
     legend_above(ax, columns=2)
     return ax
 

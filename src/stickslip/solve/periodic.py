@@ -34,9 +34,10 @@ class SteadyState:
     Attributes
     ----------
     status : str
-        "unique" (isolated and stable), "unstable", "grazing" (an exit is met at a tangent: no
-        derivative, no multipliers), "not unique" (a family of orbits: a multiplier is 1), "rest" (held
-        all the time), "unbounded" (the amplitude grows without end), "not periodic" (no orbit found).
+        "unique" (isolated and stable; from other starts there may be others), "unstable", "grazing" (an
+        exit is met at a tangent: no derivative, no multipliers), "not unique" (a family of orbits: a
+        multiplier is 1), "rest" (held all the time), "unbounded" (the amplitude grows without end), "not
+        periodic" (no orbit found).
     period : float
         Period [s]; of several periods of the drive where `order` is above 1.
     order : int
