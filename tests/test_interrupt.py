@@ -14,6 +14,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.solve import kernel
+from stickslip.solve.interrupts import held_back
 
 RIGID = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5))
 DITHER = ss.MultiTone([(0.65e-3, 2.5, 0.0), (1e-5, 31.0, 0.0)])
@@ -57,6 +58,23 @@ def test_a_real_signal_leaves_what_was_done(name: str, duration: float) -> None:
     # what is there is what the same run, not interrupted, has
     whole = ss.simulate(LONG[name], duration=done)
     assert whole.state(done) == pytest.approx(state, rel=1e-8, abs=1e-12)
+
+
+@pytest.mark.parametrize(("times", "ended"), [(1, True), (2, False)])
+def test_a_first_ctrl_c_within_a_chunk_waits_for_its_end(times: int, ended: bool) -> None:
+    """numba answered one that came while it handed functions over with a TypeError."""
+    done = []
+
+    def chunk() -> None:
+        with held_back():
+            for _ in range(times):
+                signal.raise_signal(signal.SIGINT)
+            done.append("all of it")
+
+    with pytest.raises(KeyboardInterrupt):
+        chunk()
+    assert bool(done) is ended
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_progress_rises_to_one() -> None:

@@ -154,7 +154,7 @@ def test_a_full_disk_is_one_sentence_and_the_map_goes_on(whole: Path, tmp_path: 
 
 def test_every_event_is_kept_beside_the_map(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
-    path, grid = tmp_path / "map.zarr", {"kinetic": [0.5, 1.1], "frequency": [2.5, 5.0]}
+    path, grid = tmp_path / "map.zarr", {"kinetic": [0.3, 0.6], "frequency": [0.1, 0.127]}
     found = sweep(SLIDER, grid, measures=["events", "stops"], settle=3, cycles=2, store=path)
     kept = parquet.read_table(path.with_suffix(".events")).to_pandas()
     for j, kinetic in enumerate(grid["kinetic"]):

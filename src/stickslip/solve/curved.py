@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -22,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve import collocation, march
+from stickslip.solve.interrupts import held_back
 from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
 from stickslip.solve.series import expansion
 from stickslip.solve.tape import Tape
@@ -174,10 +176,11 @@ def run_curved(
             while outcome == march.FULL:
                 room, (polys, reach) = room_for(CHUNK, size), _room_of_leaps(size)
                 before = clock.copy()
-                outcome, written, leapt, mode = follow(
-                    clock, state, mode, at, table.physical, SHARE * rtol, order, big, room, polys, reach, work,
-                    long_work,
-                )  # fmt: skip
+                with held_back() if kept else nullcontext():  # the first call may compile for long
+                    outcome, written, leapt, mode = follow(
+                        clock, state, mode, at, table.physical, SHARE * rtol, order, big, room, polys, reach, work,
+                        long_work,
+                    )  # fmt: skip
                 if written:
                     room[6][:written][room[6][:written] >= 0] += sum(len(part[1]) for part in leaps)
                     kept.append(tuple(column[:written] for column in room))
