@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 
 import stickslip as ss
 from stickslip.cli.program import main
+from stickslip.units import parse_range
 
 RIG = ["--mass", "2.42", "--stiffness", "2310"]
 
@@ -106,6 +107,26 @@ def test_what_is_asked_wrongly_is_said_before_it_is_read() -> None:
         result = fit(*arguments)
         assert result.exit_code == 2, result.output
         assert word in result.stderr
+
+
+def test_a_range_of_frequencies_is_read_with_its_units_or_refused() -> None:
+    ss.write_record(ss.datasets.demo(), "demo.csv")
+    for words in ("500-8000", "5", "1:2:3", "5:8 mm", "5:nan"):
+        for command in ("wavelet", "squeak"):
+            result = CliRunner().invoke(main, [command, "demo.csv", "--frequencies", words])
+            assert result.exit_code == 2, result.output
+            assert f"'{words}' is no range" in result.stderr
+    assert parse_range("0.5 kHz:8000", "Hz") == (500.0, 8000.0)
+
+
+def test_a_curve_is_not_fitted_to_several_records_nor_a_law_to_several_masses() -> None:
+    demo, rig = ss.datasets.demo(), ss.rig_settings({"mass": 2.42, "stiffness": 2310})
+    with pytest.raises(ss.ModelError, match="a curve and 2 records"):
+        ss.fit_records([demo, demo], rig=rig, curve="coulomb")
+    with pytest.raises(ss.ModelError, match="no mass and no stiffness"):
+        ss.fit_records([demo], rig=ss.rig_settings({}), laws=["Coulomb"])
+    with pytest.raises(ss.ModelError, match="several masses"):
+        ss.fit_records([demo], rig=rig, system=ss.squeak_rig())
 
 
 def test_laws_are_not_fitted_without_motion() -> None:

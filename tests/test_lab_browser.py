@@ -128,6 +128,18 @@ def test_a_slider_moves_the_motion_and_the_link_holds_it(page: Page, lab: Lab) -
     other.close()
 
 
+def test_a_curve_is_asked_without_mass_and_spring_where_friction_is_measured(page: Page, rubbing: Path) -> None:
+    open_data(page)
+    drop(page, rubbing)
+    page.locator("#data-ask-fit").check(timeout=PATIENCE)
+    expect(page.locator("#data-option-mass")).to_have_attribute("required", "")
+    page.locator(".data-form summary").click()
+    page.locator("#data-option-curve").select_option("coulomb")
+    expect(page.locator("#data-option-mass")).not_to_have_attribute("required", "")
+    page.locator("#data-run").click()
+    expect(page.locator("#data-results tbody tr").first).to_contain_text("sliding friction", timeout=PATIENCE)
+
+
 def show(page: Page, lab: Lab) -> None:
     """Open the link of the state, and wait for what the library says of it."""
     page.goto(link(lab, STATE))

@@ -442,6 +442,20 @@ def test_a_curve_is_fitted_to_one_record(tmp_path: Path) -> None:
         assert "2 records" in told["message"]
 
 
+def test_a_record_of_velocity_and_friction_is_fitted_without_mass_and_spring(client: Client, tmp_path: Path) -> None:
+    speed = 0.02 * np.sin(2 * np.pi * np.arange(4000) / 1000)
+    force = (1.0 + 0.3 * np.exp(-((speed / 4e-3) ** 2))) * np.sign(speed)
+    noise = 1e-3 * np.random.default_rng(1).normal(size=speed.size)
+    path = ss.write_record(ss.Record.of({"v": speed, "friction": force + noise}, fs=1000), tmp_path / "curve.csv")
+    key = send(client, path)
+    assert answered(client, "describe", key)["questions"]["fit"]["needs"] == []
+    answer = answered(client, "fit", key)
+    assert 'the curve "stribeck"' in answer["headline"][0]
+    record = ss.read_record(path)
+    told = ss.fit_summary(ss.fit_curve(record, curve="stribeck"), records=[record], name="").lines[0]
+    assert answer["lines"][0][:2] == [told.name, told.value]
+
+
 def test_what_waits_is_bounded(tmp_path: Path) -> None:
     with TestClient(app_with(limits=Limits(at_once=1, waiting=2))) as client:
         key = send(client, written(tmp_path, ".csv"))

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         StickslipError as StickslipError,
     )
     from stickslip.estimate import Estimate as Estimate
+    from stickslip.analysis.fits import fit_records as fit_records
     from stickslip.analysis.experiment import ExperimentPlan as ExperimentPlan, plan_experiment as plan_experiment
     from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
     from stickslip.files.write import write_record as write_record
@@ -308,6 +309,7 @@ _ROOMS = {
     "friction_over_load": "curves.load", "LoadLine": "curves.load",
     "friction_memory": "curves.memory", "FrictionMemory": "curves.memory",
     "fit_law": "fit.law", "LawFit": "fit.law",
+    "fit_records": "analysis.fits",
     "publish_fit": "reports.fit", "fit_summary": "reports.fit", "fit_numbers": "reports.fit",
     "compare_laws": "fit.which_law", "LawComparison": "fit.which_law",
     "choose_motion": "decay.which_motion", "DecayMotion": "decay.which_motion",

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import RecordError
+from stickslip.errors import ModelError, RecordError
 
 GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
 POUND_FORCE = 4.4482216152605  # N
@@ -164,6 +164,25 @@ def parse_value(text: str | float, expect: str) -> float:
         )
     value, unit = float(match[1]), match[2].strip()
     return value * parse_unit(unit, expect).scale if unit else value
+
+
+def parse_range(text: str | None, expect: str) -> tuple[float, float] | None:
+    """LOW:HIGH as two numbers in SI, each as :func:`parse_value` reads it; None where nothing is said.
+
+    Examples
+    --------
+    >>> parse_range("500:8 kHz", "Hz")
+    (500.0, 8000.0)
+    """
+    if not text:
+        return None
+    try:
+        low, high = (parse_value(end, expect) for end in text.split(":"))
+    except (RecordError, ValueError) as error:
+        raise ModelError(
+            f"'{text}' is no range", f"a range is written LOW:HIGH in {expect}", "write it as in 500:8000"
+        ) from error
+    return low, high
 
 
 def prefixed(values: NDArray[np.float64] | float, unit: str) -> tuple[float, str]:

@@ -16,7 +16,7 @@ from stickslip.cli.show import table
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip import CurveFit, LawComparison, Oscillator, Record, RigSettings
+    from stickslip import CurveFit, LawComparison, Record
 
 
 CURVES = (
@@ -74,16 +74,18 @@ def fit(
     """
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
-    asked = bool(laws or system)
-    _require_one_question(groups, curve, asked=asked)
+    _require_one_question(groups, curve, asked=bool(laws or system))
     folder = output or (None if as_json else default_folder(groups))
+    names = [name for name in laws.split(",") if name.strip()] if laws else None
+    words = f"{len(names) if names else 'six'} laws"
     with progress(3) as tell:
         tell("reading", 0)
         records = [read(group, rig) for group in groups]
-        curve = curve or _only_curve(records[0], asked=asked)
-        if curve is not None:
-            records = [_with_friction(records[0], rig)]
-        result = _answer(records, rig, laws, calibration, curve, system, tell)
+        tell("fitting", 1)
+        result, records = ss.fit_records(
+            records, rig=rig, curve=curve, laws=names, system=_oscillator(system), calibration=calibration,
+            progress=lambda share: tell(f"fitting and comparing {words}, {share:.0%}", 1 + share),
+        )  # fmt: skip
         tell("drawing and writing", 2)
         name = name_of(groups[0]) if len(groups) == 1 else f"{len(groups)} records"
         written = ss.publish_fit(result, folder=folder, records=records, name=name) if folder else None
@@ -99,67 +101,9 @@ def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked:
         raise click.BadParameter(f"a curve is fitted to one record, not to {len(groups)}", param_hint="FILES")
 
 
-def _only_curve(record: Record, *, asked: bool) -> str | None:
-    """The curve of a record that holds friction and velocity alone, unless laws were asked for."""
-    if not asked and "x" not in record and {"friction", "coefficient"} & set(record):
-        return "stribeck"
-    if not {"x", "v"} & set(record):
-        raise ss.RecordError(
-            f"no motion of the mass (the record has {', '.join(record)})",
-            "a law is fitted to the displacement x or the velocity v of the mass",
-            'name its column, as in channels={"x": "COLUMN [mm]"}',
-        )  # fmt: skip
-    return None
-
-
-def _with_friction(record: Record, rig: RigSettings) -> Record:
-    """The record with friction: measured, or what the motion leaves of the forces where the mass is known."""
-    if {"friction", "coefficient"} & set(record):
-        return record
-    if rig.mass is None:
-        raise ss.RecordError(
-            f"neither friction nor a mass (the record has {', '.join(record)})",
-            "a curve is fitted to friction: measured, or what the motion leaves of the forces on a known mass",
-            'name its column, as in channels={"friction": "COLUMN [N]"}, or give mass= and stiffness= '
-            "(0 where there is no spring)",
-        )  # fmt: skip
-    told = {name: value for name in ("damping", "damper", "contact") if (value := getattr(rig, name)) is not None}
-    return ss.friction_force(record, mass=rig.mass, stiffness=rig.stiffness, **told)
-
-
-def _answer(
-    records: list[Record], rig: RigSettings, laws: str | None, calibration: float, curve: str | None,
-    system: Path | None, tell: Any,
-) -> LawComparison | CurveFit:  # fmt: skip
-    if curve is not None:
-        tell("fitting", 1)
-        return ss.fit_curve(records[0], curve=curve, contact=rig.contact)
-    names = [name for name in laws.split(",") if name.strip()] if laws else None
-    words = f"{len(names) if names else 'six'} laws"
-    return ss.compare_laws(
-        records, _slider(rig, system), laws=names, calibration=calibration,
-        progress=lambda share: tell(f"fitting and comparing {words}, {share:.0%}", 1 + share),
-    )  # fmt: skip
-
-
-def _slider(rig: RigSettings, system: Path | None) -> Oscillator:
-    """The oscillator as a file has it, or as the options state it."""
-    if system is not None:
-        slider = ss.read_system(system).system
-        if not isinstance(slider, ss.Oscillator):
-            raise ss.ModelError(
-                f"{system}", "a law is fitted to an oscillator of one mass", "give a file of such a one"
-            )
-        stated = {name: getattr(rig, name) for name in ("mass", "stiffness", "damping")}
-        return slider.having(**{name: value for name, value in stated.items() if value is not None})
-    constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
-    if missing := [name for name, value in constants.items() if value is None]:
-        raise ss.ModelError(
-            f"no {' and no '.join(missing)}", "a law is fitted by simulating the oscillator",
-            f"give {' and '.join(f'{name}=' for name in missing)}",
-        )  # fmt: skip
-    drive = ss.HarmonicBase(0.0, frequency=1.0, contact=rig.contact) if rig.contact == "base" else ss.Release()
-    return ss.Oscillator(**constants, damping=rig.damping or 0.0, damper=rig.damper, law=ss.Coulomb(1.0), drive=drive)
+def _oscillator(file: Path | None) -> object:
+    """The system of a file; whether it is of one mass is for the fit to say."""
+    return None if file is None else ss.read_system(file).system
 
 
 def _show(

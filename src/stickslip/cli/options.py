@@ -15,16 +15,6 @@ def pair(text: str, option: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def frequency_range(text: str | None) -> tuple[float, float] | None:
-    if text is None:
-        return None
-    try:
-        low, high = (float(end) for end in text.split(":"))
-    except ValueError as error:
-        raise click.BadParameter(f"'{text}' is not LOW:HIGH in Hz", param_hint="--frequencies") from error
-    return low, high
-
-
 def reading_options(command: Callable[..., None]) -> Callable[..., None]:
     """The options that say how a file is read."""
     options = [

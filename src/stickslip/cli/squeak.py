@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import frequency_range, reading_options, result_options
+from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -20,6 +20,7 @@ from stickslip.cli.records import (
     with_left_out,
 )
 from stickslip.cli.show import show
+from stickslip.units import parse_range
 
 if TYPE_CHECKING:
     from stickslip import Record, SqueakFindings
@@ -60,7 +61,7 @@ def squeak(
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
-    band = frequency_range(frequencies)
+    band = parse_range(frequencies, "Hz")
     folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
 
     def ask(record: Record) -> SqueakFindings:

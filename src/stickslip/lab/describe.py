@@ -44,7 +44,7 @@ def describe(asked: Asked) -> dict[str, Any]:
 def questions(channels: set[str], records: int) -> dict[str, dict[str, Any]]:
     """Of each question: whether the channels allow it, why not, and which constants it needs or takes."""
     forces, moves = bool(channels & FORCES), bool(channels & MOTION)
-    rig = ["mass", "stiffness"]
+    rig, felt = ["mass", "stiffness"], bool(channels & {"friction", "coefficient"})
     measured = "friction" in channels or ("load" in channels and moves) or "force" in channels
     motion = "name the displacement x or the velocity v among the channels"
     return {
@@ -54,8 +54,7 @@ def questions(channels: set[str], records: int) -> dict[str, dict[str, Any]]:
                            may=rig),
         "wavelet": _question(records == 1, "one record is mapped at a time", may=["frequencies", *rig]),
         "squeak": _question(True, may=["frequencies", "normal"]),
-        "fit": _question(moves or "friction" in channels, motion,
-                         needs=[] if "friction" in channels and not moves else rig,
+        "fit": _question(moves or felt, motion, needs=[] if felt and "x" not in channels else rig,
                          may=["damping", "damper", "contact", "laws", "curve"]),
     }  # fmt: skip
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import stickslip as ss
 from stickslip.lab.asked import Asked, on_the_page
 from stickslip.lab.describe import curve, describe
+from stickslip.units import parse_range
 
 if TYPE_CHECKING:
-    from stickslip import Record, RigSettings
+    from stickslip import Record
 
 FOLDER = "results"
 
@@ -97,7 +98,7 @@ def _decay_curves(found: Any) -> Iterator[dict[str, Any]]:
 
 def squeak(asked: Asked) -> dict[str, Any]:
     """When, how loud and at which frequency it squeaks."""
-    band = frequency_range(asked.options.get("frequencies"))
+    band = parse_range(asked.options.get("frequencies"), "Hz")
     told = {name: asked.options.get(name) for name in ("channel", "lever")}
 
     def one(number: int) -> Any:
@@ -112,7 +113,7 @@ def squeak(asked: Asked) -> dict[str, Any]:
 def wavelet(asked: Asked) -> dict[str, Any]:
     """A channel over time and frequency."""
     options = {name: value for name, value in asked.options.items() if value is not None}
-    band = frequency_range(options.pop("frequencies", None))
+    band = parse_range(options.pop("frequencies", None), "Hz")
     asked.say(f"mapping {asked.name(0)}", 0.1)
     found = ss.time_frequency(asked.parts(), frequencies=band, **options)
     return published(asked, [found], [], list)
@@ -120,31 +121,27 @@ def wavelet(asked: Asked) -> dict[str, Any]:
 
 def fit(asked: Asked) -> dict[str, Any]:
     """Which friction law it is, or a curve of friction."""
-    rig, curve_name = asked.rig(), asked.options.get("curve")
+    rig = asked.rig()
     asked.say("reading", 0.0)
     records = [asked.record(number) for number in range(len(asked.records))]
-    if curve_name and len(records) > 1:
-        raise ss.ModelError(f"a curve and {len(records)} records", "a curve is fitted to one", "drop one file alone")
-    if curve_name:
-        friction = with_friction(records[0], rig)
-        found: Any = ss.fit_curve(friction, curve=curve_name, contact=rig.contact)
-        records, curves = [friction], []
-    else:
-        found = ss.compare_laws(
-            records, slider(rig), laws=_listed(asked.options.get("laws")),
-            calibration=asked.options.get("calibration") or 0.01,
-            progress=lambda share: asked.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
-        )  # fmt: skip
-        curves = [
-            curve(asked.name(number), name, records[number].channels[name].unit, traces.time[name], values,
-                  traces.fitted[name])
-            for number, traces in enumerate(found.fit.traces)
-            for name, values in traces.measured.items()
-        ]  # fmt: skip
+    found, records = ss.fit_records(
+        records, rig=rig, curve=asked.options.get("curve"), laws=_listed(asked.options.get("laws")),
+        calibration=asked.options.get("calibration") or 0.01,
+        progress=lambda share: asked.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
+    )  # fmt: skip
     name = asked.name(0) if len(records) == 1 else f"{len(records)} records"
     ss.publish_fit(found, folder=FOLDER, records=records, name=name)
     told = _told(ss.fit_summary(found, records=records, name=name))
+    curves = [*_law_curves(asked, records, found)]
     return {**told, "overlay": curves, "state": fitted_system(Path(FOLDER, "law", "law.toml"))}
+
+
+def _law_curves(asked: Asked, records: Sequence[Record], found: Any) -> Iterator[dict[str, Any]]:
+    """What the best law's sensors would have read, over what was measured; nothing of a curve."""
+    for number, traces in enumerate(found.fit.traces if isinstance(found, ss.LawComparison) else ()):
+        for name, values in traces.measured.items():
+            unit = records[number].channels[name].unit
+            yield curve(asked.name(number), name, unit, traces.time[name], values, traces.fitted[name])
 
 
 def fitted_system(file: Path) -> dict[str, Any] | None:
@@ -160,41 +157,6 @@ def fitted_system(file: Path) -> dict[str, Any] | None:
 
 def _listed(words: str | None) -> list[str] | None:
     return [word.strip() for word in words.split(",") if word.strip()] if words else None
-
-
-def with_friction(record: Record, rig: RigSettings) -> Record:
-    """The record with friction: measured, or what the motion leaves of the forces where the mass is known."""
-    if {"friction", "coefficient"} & set(record):
-        return record
-    return ss.friction_force(
-        record, mass=rig.mass, stiffness=rig.stiffness, damping=rig.damping or 0.0, damper=rig.damper,
-        contact=rig.contact,
-    )  # fmt: skip
-
-
-def slider(rig: RigSettings) -> Any:
-    """The oscillator that the options state; where its base moved is in the record."""
-    constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
-    if missing := [name for name, value in constants.items() if value is None]:
-        raise ss.ModelError(
-            f"no {' and no '.join(missing)}", "a law is fitted by simulating the oscillator",
-            f"give the {' and the '.join(missing)}",
-        )  # fmt: skip
-    drive = ss.HarmonicBase(0.0, frequency=1.0, contact="base") if rig.contact == "base" else ss.Release()
-    return ss.Oscillator(**constants, damping=rig.damping or 0.0, damper=rig.damper, law=ss.Coulomb(1.0), drive=drive)
-
-
-def frequency_range(text: str | None) -> tuple[float, float] | None:
-    """LOW:HIGH in Hz as two numbers."""
-    if not text:
-        return None
-    try:
-        low, high = (float(end) for end in str(text).split(":"))
-    except ValueError as error:
-        raise ss.ModelError(
-            f"frequencies {text}", "a range is written LOW:HIGH in Hz", "write it as in 500:8000"
-        ) from error
-    return low, high
 
 
 QUESTIONS: dict[str, Callable[[Asked], dict[str, Any]]] = {

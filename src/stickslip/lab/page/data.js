@@ -352,6 +352,7 @@ function showFields() {
     const [box, input] = field(id, label, unit, hint, name in stated ? digits(stated[name]) : "");
     input.required = needed;
     input.dataset.option = name;
+    if (needed) input.dataset.needed = name;
     return box;
   };
   const loads = asked.may.includes("normal") ? described.records.map((record, number) => {
@@ -369,6 +370,12 @@ function showFields() {
   parts.form.replaceChildren(
     ...(needs.length ? [make("p", {}, "The record can not tell this:"), ...needs] : []),
     ...(may.length + loads.length ? [more] : []), button);
+  parts.form.querySelector("[data-option=curve]")?.addEventListener("change", (event) => needed(!event.target.value));
+}
+
+// A curve is fitted without mass and spring where friction is measured; the library says where it is not.
+function needed(are) {
+  for (const input of parts.form.querySelectorAll("[data-needed]")) input.required = are;
 }
 
 function options() {
