@@ -166,16 +166,14 @@ def parse_value(text: str | float, expect: str) -> float:
     return value * parse_unit(unit, expect).scale if unit else value
 
 
-def parse_range(text: str | None, expect: str) -> tuple[float, float] | None:
-    """LOW:HIGH as two numbers in SI, each as :func:`parse_value` reads it; None where nothing is said.
+def parse_range(text: str, expect: str) -> tuple[float, float]:
+    """LOW:HIGH as two numbers in SI, each as :func:`parse_value` reads it.
 
     Examples
     --------
     >>> parse_range("500:8 kHz", "Hz")
     (500.0, 8000.0)
     """
-    if not text:
-        return None
     try:
         low, high = (parse_value(end, expect) for end in text.split(":"))
     except (RecordError, ValueError) as error:

@@ -20,7 +20,7 @@ from stickslip.squeak.coupling import Coupling, coupling
 from stickslip.squeak.quality import Impulsiveness, SoundQuality, impulsiveness, sound_quality
 from stickslip.squeak.spectra import BurstSpectra, burst_spectra
 from stickslip.statistics import mean_of_cycles
-from stickslip.units import parse_value
+from stickslip.units import parse_range, parse_value
 
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
@@ -152,8 +152,8 @@ class SqueakFindings(Result):
 
 def analyze_squeaks(
     record: Record, *, name: str | None = None, channel: str | None = None,
-    frequencies: tuple[float, float] | None = None, contact: str | None = None, normal: float | str | None = None,
-    lever: float | str | None = None,
+    frequencies: tuple[float, float] | str | None = None, contact: str | None = None,
+    normal: float | str | None = None, lever: float | str | None = None,
 ) -> SqueakFindings:  # fmt: skip
     """Does it squeak, how does it sound, what moves together then, and how does friction change with speed?
 
@@ -169,8 +169,8 @@ def analyze_squeaks(
         What the record is called, as "wet, 6.13 N"; its file where left out.
     channel : str, optional
         Where to listen, as in :func:`find_squeaks`.
-    frequencies : tuple of float, optional
-        Lowest and highest that are listened to [Hz], as in :func:`find_squeaks`.
+    frequencies : tuple of float or str, optional
+        Lowest and highest that are listened to [Hz], as in :func:`find_squeaks`; or in words, "500:8000".
     contact : {"ground", "base"}, optional
         What the mass slides on, as in :func:`friction_loops`.
     normal : float or str, optional
@@ -195,8 +195,9 @@ def analyze_squeaks(
     >>> found.squeaks.kind, bool(475 < found.frequency.value < 500), found.coefficient.includes(8 / 6.13)
     ('squeak', True, True)
     """
+    band = parse_range(frequencies, "Hz") if isinstance(frequencies, str) else frequencies
     faults = tuple(record.check())
-    squeaks = find_squeaks(record, channel=channel, frequencies=frequencies)
+    squeaks = find_squeaks(record, channel=channel, frequencies=band)
     notes = list(squeaks.notes)
 
     def ask(question: str, answer: Callable[[], Answer]) -> Answer | None:
@@ -207,7 +208,7 @@ def analyze_squeaks(
             return None
 
     others = [each for each in VIBRATING if each in record and each != squeaks.channel]
-    listen = partial(find_squeaks, record, frequencies=frequencies)
+    listen = partial(find_squeaks, record, frequencies=band)
     beside = [ask(f"Bursts in {each}", partial(listen, channel=each)) for each in others]
     loops = None
     if "friction" in record and any(each in record for each in ("x", "v", "theta")):

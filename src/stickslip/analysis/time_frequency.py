@@ -22,6 +22,7 @@ from stickslip.identify.transition import Transition, transition_of
 from stickslip.record.record import Record
 from stickslip.signals.ridges import Ridge, Spike, find_ridges, find_spikes
 from stickslip.signals.wavelet import CENTRE, wavelet_map, wavelet_overview
+from stickslip.units import parse_range
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -111,7 +112,7 @@ def time_frequency(
     source: Record | Iterable[Record],
     *,
     channel: str | None = None,
-    frequencies: ArrayLike | None = None,
+    frequencies: ArrayLike | str | None = None,
     wavelet_frequency: float = CENTRE,
     normalisation: str = "energy",
     mass: float | str | None = None,
@@ -127,8 +128,8 @@ def time_frequency(
         Which channel; the first of a, sound, force, load, friction, v, x, or any other that does not only rise or only
         fall, as times do, when not given. The sticks are
         asked of an acceleration, the ringing after slips begin of a measured friction beside a motion.
-    frequencies : array_like, optional
-        As in :func:`wavelet_map`.
+    frequencies : array_like or str, optional
+        As in :func:`wavelet_map`; or a range in words, "500:8000" or "0.5 kHz:8 kHz".
     wavelet_frequency : float
         As in :func:`wavelet_map`.
     normalisation : {"energy", "amplitude"}
@@ -159,6 +160,8 @@ def time_frequency(
     ('double stick-slip', 'double stick-slip')
     """
     checked_mass(mass, stiffness)
+    if isinstance(frequencies, str):
+        frequencies = parse_range(frequencies, "Hz")
     parts = iter([source] if isinstance(source, Record) else source)
     first, second = next(parts, None), next(parts, None)
     if first is None:

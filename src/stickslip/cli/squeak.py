@@ -20,7 +20,6 @@ from stickslip.cli.records import (
     with_left_out,
 )
 from stickslip.cli.show import show
-from stickslip.units import parse_range
 
 if TYPE_CHECKING:
     from stickslip import Record, SqueakFindings
@@ -61,11 +60,10 @@ def squeak(
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
-    band = parse_range(frequencies, "Hz")
     folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
 
     def ask(record: Record) -> SqueakFindings:
-        found = ss.analyze_squeaks(record, channel=channel, frequencies=band, contact=rig.contact, lever=lever)
+        found = ss.analyze_squeaks(record, channel=channel, frequencies=frequencies, contact=rig.contact, lever=lever)
         loads = (rig.normal_load(part) for part in (*found.name.split(" + "), found.name))
         return replace(found, normal=next((load for load in loads if load is not None), found.normal))
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import stickslip as ss
 from stickslip.lab.asked import Asked, on_the_page
 from stickslip.lab.describe import curve, describe
-from stickslip.units import parse_range
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -98,12 +97,11 @@ def _decay_curves(found: Any) -> Iterator[dict[str, Any]]:
 
 def squeak(asked: Asked) -> dict[str, Any]:
     """When, how loud and at which frequency it squeaks."""
-    band = parse_range(asked.options.get("frequencies"), "Hz")
-    told = {name: asked.options.get(name) for name in ("channel", "lever")}
+    told = {name: asked.options.get(name) for name in ("channel", "frequencies", "lever")}
 
     def one(number: int) -> Any:
         rig = asked.rig(number)
-        found = ss.analyze_squeaks(asked.record(number), frequencies=band, contact=rig.contact, **told)
+        found = ss.analyze_squeaks(asked.record(number), contact=rig.contact, **told)
         load = rig.normal_load(found.name)
         return found if load is None else dataclasses.replace(found, normal=load)
 
@@ -113,9 +111,8 @@ def squeak(asked: Asked) -> dict[str, Any]:
 def wavelet(asked: Asked) -> dict[str, Any]:
     """A channel over time and frequency."""
     options = {name: value for name, value in asked.options.items() if value is not None}
-    band = parse_range(options.pop("frequencies", None), "Hz")
     asked.say(f"mapping {asked.name(0)}", 0.1)
-    found = ss.time_frequency(asked.parts(), frequencies=band, **options)
+    found = ss.time_frequency(asked.parts(), **options)
     return published(asked, [found], [], list)
 
 
