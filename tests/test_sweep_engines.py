@@ -15,7 +15,6 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
-from stickslip.scenarios import forced, grid
 from stickslip.solve.automaton import automaton
 from stickslip.solve.fleet import fleet_of, fleet_tables
 from stickslip.sweeps.block import _alone, run_block
@@ -24,7 +23,6 @@ from stickslip.sweeps.sweep import planned
 from stickslip.sweeps.threads import threads
 
 xarray = pytest.importorskip("xarray")
-CIRCLE = 2 * math.pi
 COUNTED = [measure for measure in MEASURES if measure != LOG]  # what a march counts without keeping the motion
 RIGID = ss.Oscillator(
     mass=2.42, stiffness=2310, damping=0.12, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5)
@@ -99,60 +97,6 @@ def test_threads_give_the_same_bytes(engine: str) -> None:
         assert one[name].values.tobytes() == other[name].values.tobytes(), name
 
 
-@pytest.mark.parametrize("engine", ["serial", "threads", "dask"])
-def test_the_grid_of_stops(engine: str) -> None:
-    """Stops over frequency ratio and friction (Hong and Liu 2000), undamped, from rest."""
-    if engine == "dask":
-        pytest.importorskip("distributed")
-    known = grid("HL-1")
-    values = {"frequency": np.array(known["ratios"]) / CIRCLE, "kinetic": known["loads"]}
-    found = ss.sweep(forced(0.5, 0.5), values, measures=["stops"], settle=4000, cycles=4, engine=engine)
-    assert np.array_equal(found.normal_stops, np.array(known["normal"], float))
-    assert np.array_equal(found.abnormal_stops, np.array(known["abnormal"], float))
-
-
-@pytest.mark.parametrize("resonant", [False, True], ids=["away from resonance", "next to it"])
-def test_den_hartogs_boundary_by_bisection(resonant: bool) -> None:
-    """Where the stops begin, halved down to 1e-8 for all rows together; next to resonance motion settles late."""
-    rows = [row for row in grid("DH-2")["boundary"] if abs(1 / row[0] / 2 - round(1 / row[0] / 2)) > 1e-12]
-    rows = [row for row in rows if (abs(row[0] - 1) < 0.02) == resonant]
-    edge = np.array([row[2] for row in rows])
-    low, high = edge * (1 - 1e-3), edge * (1 + 1e-3)
-    while np.max((high - low) / edge) > 1e-8:
-        middle = (low + high) / 2
-        points = [
-            {"frequency": ratio / CIRCLE, "damping": 2 * damping, "kinetic": force}
-            for (ratio, damping, _), force in zip(rows, middle, strict=True)
-        ]
-        settle = 20_000 if resonant else 4000
-        found = ss.sweep(forced(0.5, 0.5), points, measures=["stops"], settle=settle, cycles=4, start={"x": 2.0})
-        stops = (found.normal_stops + found.abnormal_stops).values > 0
-        low, high = np.where(stops, low, middle), np.where(stops, middle, high)
-    assert np.max(np.abs((low + high) / 2 - edge) / edge) < 1e-8
-
-
-def test_the_exponent_of_chaos() -> None:
-    """Feeny and Moon's load that grows with position: 0.596 +- 0.004 per forcing period."""
-    case = ss.scenarios.get("FM-1")
-    period = 1 / case.system.drive.frequency
-    starts = {"start.x": np.linspace(0.4, 0.6, 8)}
-    found = ss.sweep(case.system, starts, measures=["lyapunov", "period"], settle=200, cycles=20_000)
-    assert float(found.lyapunov.mean()) * period == pytest.approx(0.596, abs=0.004)
-    assert not found.order.any()
-
-
-def test_the_band_in_which_steady_sliding_is_lost() -> None:
-    """ST-1: Stribeck's curve, exponent 2; 0.005013 < V < 0.190840 m/s."""
-    law = ss.Stribeck(kinetic=1.0, static=1.5, speed=0.1, exponent=2.0, viscous=0.2)
-    slider = ss.Oscillator(mass=1, stiffness=1, damping=0.3, law=law, drive=ss.Belt(0.1))
-    points = []
-    for speed in (0.00501 * 0.97, 0.00501 * 1.03, 0.19084 * 0.97, 0.19084 * 1.03):
-        steady = ss.steady_sliding(slider.having(drive=ss.Belt(speed))).state["x"]
-        points.append({"drive.speed": speed, "start.x": steady + 1e-5, "start.v": 0.0})
-    found = ss.sweep(slider, points, measures=["stick_share"], settle=600, cycles=5)
-    assert (found.stick_share > 0).values.tolist() == [False, True, True, False]
-
-
 def test_an_interrupt_keeps_what_is_done() -> None:
     calls: list[int] = []
 
@@ -220,6 +164,8 @@ def test_a_gpu_refuses_what_it_cannot_march(monkeypatch: pytest.MonkeyPatch) -> 
     slider = RIGID.having(law=ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=2e5, damping=20.0))
     with pytest.raises(ModelError, match=r'LuGre.*take engine="threads"'):
         ss.sweep(slider, {"kinetic": [1.0]}, engine="cuda", settle=1, cycles=1)
+    with pytest.raises(ModelError, match=r"'events'.*keeps none.*threads"):
+        ss.sweep(RIGID, {"kinetic": [1.0]}, measures=["events"], engine="cuda", settle=1, cycles=1)
 
 
 def test_the_threads_engine_is_the_default_of_this_machine() -> None:

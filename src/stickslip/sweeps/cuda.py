@@ -9,6 +9,7 @@ from typing import Any
 from stickslip.errors import ModelError, SolveError
 from stickslip.sweeps.block import run_block
 from stickslip.sweeps.crowd import scratch
+from stickslip.sweeps.measures import LOG
 from stickslip.sweeps.plan import Keep, Plan
 
 
@@ -20,7 +21,7 @@ def cuda(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = N
     SolveError
         numba-cuda, a GPU or its driver is not there.
     ModelError
-        The system is not of the kind that marches on a GPU.
+        The system is not of the kind that marches on a GPU, or every event is asked for.
     """
     try:
         from stickslip.solve.gpu import carried, require_gpu
@@ -30,6 +31,11 @@ def cuda(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = N
             "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install "stickslip[gpu]"'
         ) from absent
     require_gpu('engine="threads"')
+    if LOG in plan.measures:
+        raise ModelError(
+            f"measures has '{LOG}'", "a GPU counts events and keeps none",
+            f'take engine="threads", or leave \'{LOG}\' out',
+        )  # fmt: skip
 
     def watch(given: Any, out: Any, size: int, physical: int) -> None:
         written = carried(out)
