@@ -4,8 +4,8 @@ Six laws (rigid, static and kinetic, Stribeck, compliant, state variable, LuGre)
 for each data set, on the thesis's air-track rig at 2.5, 8.7 and 11.1 Hz, 0.8 s of each. The sensors have their noise
 and counts; their gains, their mounts' resonances and their delays are up to 1 % and 20 us away from what is stated;
 the friction fluctuates by 3 % while it slides, within 10 ms. Told are the share of the data sets whose family is named
-rightly, left open or named wrongly; the same of the rigid laws among themselves; how often an answer is wrong that
-was told with more than 95 % confidence; and the time.
+rightly, left open or named wrongly; the same of the rigid laws among themselves; how often the true law is among those
+kept, by the confidence told; how often it is not where more than 95 % was told; and the time.
 
     python benchmarks/laws.py --draws 20 --keep laws.jsonl
 
@@ -15,6 +15,7 @@ With ``--keep FILE`` every data set is written down as it is done, and a second 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import math
 import time
@@ -42,6 +43,7 @@ CORRELATED = 0.01  # s within which the friction fluctuates
 KNOTS = 500.0  # Hz at which the fluctuation is laid out
 SLOWEST = 5e-4  # m/s below which a law without sticks is taken to hold
 SURE = 0.95
+TOLD = (0.0, 0.9, 0.95, 0.98, 0.995, 1.0)  # ends of the confidences that are counted together
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,7 @@ def draw(name: str, condition: str, seed: int, laws: list[str] | None) -> dict[s
     return {
         "truth": name, "condition": condition, "seed": seed, "law": found.law, "family": found.family,
         "kept": list(found.kept), "confidence": found.confidence, "seconds": time.perf_counter() - begun,
+        "limits": [each.name for each in found.candidates if each.standing.limit],
         "true": repr(law), "fitted": repr(found.best.oscillator.law),
         "excess": None if excess is None else [excess.value, *excess.interval],
         "misfits": {each.name: each.standing.misfit for each in found.candidates},
@@ -189,8 +192,21 @@ def told(draws: list[dict[str, Any]]) -> list[str]:
         lines.append(f"family right: {sum(right)} of {len(done)}")
         lines.append(f"wrong with a confidence above {SURE:.0%}: {len(wrong)} of {len(done)}")
         lines += [f"  {each['truth']} {each['seed']}: {each['kept']}, {each['confidence']:.3f}" for each in wrong]
+        lines += _reliability(done)
     refused = [each for each in draws if "error" in each]
     return lines + [f"refused: {each['truth']} {each['seed']}: {each['error']}" for each in refused]
+
+
+def _reliability(done: list[dict[str, Any]]) -> list[str]:
+    """Confidences told, and how often they were right."""
+    lines = []
+    for low, high in itertools.pairwise(TOLD):
+        part = [each for each in done if low < each["confidence"] <= high]
+        if part:
+            mean = float(np.mean([each["confidence"] for each in part]))
+            right = sum(not _wrong(each) for each in part)
+            lines.append(f"  told {mean:.3f} ({low} to {high}): right {right} of {len(part)}")
+    return lines
 
 
 def _wrong(each: dict[str, Any]) -> bool:

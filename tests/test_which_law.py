@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -125,25 +126,35 @@ def kept(*misfits: Misfit, likely: dict[str, float] | None = None) -> tuple[set[
     return {each.name for each in told if each.kept}, confidence
 
 
-def test_a_family_is_rejected_at_twice_the_misfit() -> None:
-    assert kept(misfit("Coulomb", 1, 2.1), misfit("compliant", 3, 1.0))[0] == {"compliant"}
-    assert kept(misfit("Coulomb", 1, 1.9), misfit("compliant", 3, 1.0))[0] == {"Coulomb", "compliant"}
+def test_a_family_is_rejected_by_the_stories_that_tell_against_it() -> None:
+    """The same misfit, told by a few stories and by many."""
+    assert kept(misfit("Coulomb", 1, 1.5), misfit("compliant", 3, 1.0))[0] == {"compliant"}
+    assert kept(misfit("Coulomb", 1, 1.3), misfit("compliant", 3, 1.0))[0] == {"Coulomb", "compliant"}
+    few = Evidence({("x", 0): 9.0, ("load", 0): 9.0}, EVIDENCE.noise)
+    assert all(each.kept for each in standings([misfit("Coulomb", 1, 1.5), misfit("compliant", 3, 1.0)], few)[0])
 
 
 def test_a_family_that_predicts_better_is_not_rejected() -> None:
     ahead = {("x", 0): 0.8e-10, ("load", 0): 0.8e-4}
     best = Misfit("compliant", 3, misfit("", 3, 1.0).squares, {key: 2 * value for key, value in ahead.items()})
     rival = Misfit("Coulomb", 1, misfit("", 1, 3.0).squares, ahead)
-    left, confidence = kept(best, rival)
-    assert left == {"compliant", "Coulomb"}
-    assert confidence < 0.5
+    assert kept(best, rival)[0] == {"compliant", "Coulomb"}
+    assert kept(replace(rival, squares=best.squares), replace(best, squares=rival.squares))[0] == {"Coulomb"}
 
 
 def test_confidence_grows_with_the_misfit_of_the_others() -> None:
-    levels = [kept(misfit("Coulomb", 1, size), misfit("compliant", 3, 1.0))[1] for size in (1.2, 2.1, 4.0, 100.0)]
+    found = [kept(misfit("Coulomb", 1, size), misfit("compliant", 3, 1.0)) for size in (1.5, 1.6, 4.0, 100.0)]
+    assert [left for left, _ in found] == [{"compliant"}] * 4
+    levels = [confidence for _, confidence in found]
     assert levels == sorted(levels)
-    assert levels[0] < 0.7
+    assert 0.95 < levels[0] < 0.99 < levels[2]
     assert levels[-1] <= CERTAIN
+
+
+def test_one_of_two_that_are_left_is_surer_than_either() -> None:
+    left, confidence = kept(misfit("Coulomb", 1, 1.2), misfit("compliant", 3, 1.0))
+    assert left == {"Coulomb", "compliant"}
+    assert confidence == CERTAIN
 
 
 def test_a_misfit_within_the_noise_decides_nothing() -> None:

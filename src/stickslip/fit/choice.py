@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 Key = tuple[str, int]
 """A channel, and the number of its record."""
 
-SEPARATED = 2.0  # times the misfit of the best law, from which on another family is rejected
+SEPARATED = 2.0  # times the misfit of a rigid law, up to which a contact next to rigid says the same
 CALIBRATIONS = 3.0  # times the calibration's error, below which an effect is not to be told from it
 CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
-SHARPNESS = 4.0  # power of the ratio of misfits that the odds between two families follow
-IDLE = 10.0  # of the criterion, by which a richer law that leaves no less is rejected
-UNLIKELY = 0.05  # a law less probable than this within its family is rejected
+BLUNT = 4.0  # of the criterion, by which the odds between families fall e-fold; 2 were the stories Gaussian
+SHARPNESS = 4.0  # power of the ratio of misfits that the odds between rigid laws, and of predictions, follow
+UNLIKELY = 0.05  # odds to the best law, below which another is rejected
 FAMILIES = {"Coulomb": "rigid", "static": "rigid", "Stribeck": "rigid"}
 
 
@@ -117,7 +117,7 @@ def independent(residual: Array) -> float:
 def standings(
     misfits: Sequence[Misfit], evidence: Evidence, *, likely: Mapping[str, float] | None = None
 ) -> tuple[list[Standing], float]:
-    """The laws, the best one first, those kept that the records leave possible; and the confidence in that.
+    """The laws, the best one first, those kept that the records leave possible; and how likely the truth is among them.
 
     `likely` is how probable each rigid law is by the friction around rest.
     """
@@ -129,14 +129,13 @@ def standings(
     order.sort(key=lambda each: each is not best)
     ratios = {each.name: evidence.over(each.squares, best.squares) for each in order}
     forecasts = _forecasts(order, evidence)
-    others = {each.name for each in order if each.family != best.family} - limits
+    odds = _odds([each for each in order if each.name not in limits], best, evidence, forecasts)
+    near = {name for name, each in odds.items() if each > UNLIKELY}
     level = evidence.criterion(best.squares, best.count)
-    idle = _idle([each for each in order if each.name in others], best, evidence, forecasts)
-    near = {name for name in others - set(idle) if ratios[name] <= SEPARATED or forecasts[name] < 1}
     told = []
     for each in order:
-        kept = each.name in (near if each.name in others else inner)
-        words = inner.get(each.name) or ("not rejected" if kept else f"rejected: {_why(ratios[each.name])}")
+        kept = each.name in inner or each.name in near
+        words = inner.get(each.name) or ("not rejected" if kept else f"rejected: {_why(each, best, ratios)}")
         limit = each.name in limits
         if limit:
             words = "so stiff that it is a rigid contact, and explains nothing more"
@@ -144,13 +143,29 @@ def standings(
         told.append(
             Standing(each.name, each.family, ratios[each.name], worse, forecasts[each.name], kept, words, limit)
         )
-    rivals = [each for each in order if each.name not in limits]
-    nearest = {name: min(ratio, forecasts[name]) if forecasts[name] < 1 else ratio for name, ratio in ratios.items()}
-    odds = math.fsum(
-        min(nearest[each.name] ** -SHARPNESS, idle.get(each.name, math.inf))
-        for each in _nearest(rivals, nearest, best.family)
-    )
-    return told, min(CERTAIN, sure / (1 + odds))
+    families = [max(odds[each.name] for each in order if each.family == name and each.name in odds)
+                for name in dict.fromkeys(each.family for each in order if each.name in odds)]  # fmt: skip
+    right = sure + math.fsum(each for each in families if each > UNLIKELY)
+    return told, min(CERTAIN, right / (1 + math.fsum(families)))
+
+
+def _odds(
+    order: Sequence[Misfit], best: Misfit, evidence: Evidence, forecasts: Mapping[str, float]
+) -> dict[str, float]:
+    """Of the laws of other families against the best law's family.
+
+    By the criterion; a law no richer that predicts records left out better is likely for that.
+    """
+    worth = {each.name: evidence.criterion(each.squares, each.count) for each in order}
+    least = min(worth[each.name] for each in order if each.family == best.family)
+    found = {}
+    for each in order:
+        if each.family != best.family:
+            ahead = forecasts[each.name] if each.count <= best.count else math.nan
+            found[each.name] = max(
+                math.exp((least - worth[each.name]) / BLUNT), ahead**-SHARPNESS if ahead < 1 else 0.0
+            )
+    return found
 
 
 def _limits(order: Sequence[Misfit], evidence: Evidence) -> set[str]:
@@ -160,8 +175,9 @@ def _limits(order: Sequence[Misfit], evidence: Evidence) -> set[str]:
             and evidence.over(rigid[0].squares, each.squares) <= SEPARATED}  # fmt: skip
 
 
-def _why(ratio: float) -> str:
-    return f"misfit {times(ratio)}" if ratio > 1.1 else "its further parameters explain nothing more"
+def _why(law: Misfit, best: Misfit, ratios: Mapping[str, float]) -> str:
+    idle = law.count > best.count and ratios[law.name] <= 1.1
+    return "its further parameters explain nothing more" if idle else f"misfit {times(ratios[law.name])}"
 
 
 def times(ratio: float) -> str:
@@ -176,25 +192,6 @@ def _forecasts(order: Sequence[Misfit], evidence: Evidence) -> dict[str, float]:
         each.name: math.nan if each.predicted is None or best is None else evidence.over(each.predicted, best)
         for each in order
     }
-
-
-def _nearest(order: Sequence[Misfit], ratios: Mapping[str, float], best: str) -> list[Misfit]:
-    """The law of least misfit of each other family."""
-    families = {each.family for each in order} - {best}
-    return [min((each for each in order if each.family == family), key=lambda e: ratios[e.name]) for family in families]
-
-
-def _idle(
-    others: Sequence[Misfit], best: Misfit, evidence: Evidence, forecasts: Mapping[str, float]
-) -> dict[str, float]:
-    """Richer laws of other families whose further parameters explain nothing more, and the odds that they hold."""
-    found = {}
-    for each in others:
-        worse = evidence.criterion(each.squares, each.count) - evidence.criterion(best.squares, best.count)
-        explains = evidence.over(each.squares, best.squares) < 1 or forecasts[each.name] < 1
-        if each.count > best.count and not explains and worse > IDLE:
-            found[each.name] = math.exp(-min(worse, 100.0) / 4)
-    return found
 
 
 def _within(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit.choice import CALIBRATIONS, SEPARATED, Misfit, Standing, standings, times, undescribed
+from stickslip.fit.choice import CALIBRATIONS, Misfit, Standing, standings, times, undescribed
 from stickslip.fit.guess import GUESSES, Seen
 from stickslip.fit.law import LawFit, answered
 from stickslip.fit.search import descend
@@ -102,7 +102,7 @@ class LawComparison(Result):
     kept : tuple of str
         The laws that are not rejected.
     confidence : float
-        Probability that what is said of law and family is right, were the truth among the laws tried.
+        Probability that the true law is among those kept, were it among the laws tried.
     verdict : str
         The answer, in a sentence or two for a report.
     fit : LawFit
@@ -190,9 +190,10 @@ def compare_laws(
     .. math:: \sum_c n_c \log S_c + p \log \sum_c n_c
 
     S_c the mean square left of channel c, n_c the number of samples that tell a story of their own, p the number of
-    parameters. Another family is rejected where its misfit is more than twice the best one's and it predicts records
-    that were left out no better; of laws that contain each other the richer one has to earn its parameter, and an
-    effect within three times the calibration's error is not told from it.
+    parameters. The odds between two families are exp(-C/4) where their best laws' criteria differ by C (the exponent
+    would be C/2, did what laws leave over come of chance alone); another family is rejected where they are below 1 in
+    20, unless it has no more parameters and predicts records that were left out better. Rigid laws are told apart by
+    the friction around rest, and an effect within three times the calibration's error is not told from it.
 
     Parameters
     ----------
@@ -483,8 +484,8 @@ def _sentences(
     limits = [each.name for each in told if each.limit]
     if len(families) > 1:
         yield (
-            f"These records can not tell {_either(kept)} apart: none leaves more than {SEPARATED:g} times the misfit "
-            "of the best. A record in which the contact sticks and slips, with a load cell, would tell more."
+            f"These records can not tell {_either(kept)} apart: what they leave over differs too little. "
+            "A record in which the contact sticks and slips, with a load cell, would tell more."
         )
     else:
         yield f"The friction is {SAID.get(best.family, best.family)}" + (
