@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -64,8 +65,8 @@ def resonance(frequency: float, damping: float) -> Response:
     if abs(damping - 1) < CRITICAL:
         damping = 1 + CRITICAL
     w = 2 * math.pi * frequency
-    root = np.emath.sqrt(damping**2 - 1.0)
-    first, second = complex(w * (-damping + root)), complex(w * (-damping - root))
+    root = cmath.sqrt(damping**2 - 1.0)
+    first, second = w * (-damping + root), w * (-damping - root)
     residue = w * w / (first - second)
     return Response((first, second), (residue, -residue), 0.0)
 
@@ -100,70 +101,38 @@ def respond(
     -------
     ndarray (n,)
     """
+    from stickslip.signals.quadrature import follow  # compiled: a response alone does without
+
     after = np.maximum(times, 0.0)
     if not response.poles or len(times) < 2:
         return response.direct * values(after)
-    began = float(values(np.zeros(1))[0])
-    out = began * np.exp(-response.leak * after)
-    if response.direct:
-        out += response.direct * (values(after) - began)
     step = float(times[-1] - times[0]) / (len(times) - 1)
-    ahead = max(0, math.ceil(times[0] / step))
-    grid = times[0] + step * np.arange(-ahead - 1, len(times))
-    kept = [np.zeros(1, dtype=complex) for _ in response.poles]
+    ahead = max(0, math.ceil(times[0] / step)) + 1
+    grid = times[0] + step * np.arange(-ahead, len(times))
+    pieces = max(1, math.ceil(max(abs(pole) for pole in response.poles) * step / TURN))
+    finer = step * np.arange(pieces) / pieces
+    rule, began = gauss(nodes), 0.0
+    states = np.zeros(len(response.poles), dtype=complex)
+    filter_ = np.array(response.poles), np.array(response.residues), states
+    factors, answer = np.empty(nodes, dtype=complex), np.zeros(len(grid))
     for first in range(0, len(grid) - 1, BLOCK):
         part = grid[first : first + BLOCK + 1]
-        written = _convolved(values, began, breaks, part, response, kept, nodes)
-        low, high = max(first, ahead), first + len(written)
-        if low < high:
-            out[low - ahead : high - ahead] += written[low - first :]
+        inside = breaks[(breaks > part[0]) & (breaks < part[-1])]
+        parts = (part[:-1, None] + finer).ravel(), part[-1:], inside, np.zeros(int(part[0] < 0 < part[-1]))
+        edges = np.sort(np.concatenate(parts))
+        at = edges[:-1, None] + np.diff(edges)[:, None] * rule[0]
+        forced = values(np.maximum(at, 0.0).ravel()).reshape(at.shape)
+        began = began if first else float(forced[0, 0])  # the grid starts before 0
+        ends = np.searchsorted(edges, part[1:])
+        follow(filter_, edges, ends, forced - began, rule, factors, answer[first + 1 :])
+    out = answer[ahead:] + began * np.exp(-response.leak * after)
+    if response.direct:
+        out += response.direct * (values(after) - began)
     return out
 
 
 @cache
 def gauss(count: int) -> tuple[Array, Array]:
-    """Nodes and weights of Gauss's quadrature from -1 to 1."""
+    """Nodes and weights of Gauss's quadrature from 0 to 1."""
     roots, weights = np.polynomial.legendre.leggauss(count)
-    return roots, weights
-
-
-def _convolved(
-    values: Callable[[Array], Array],
-    began: float,
-    breaks: Array,
-    grid: Array,
-    response: Response,
-    kept: list[NDArray[np.complex128]],
-    count: int,
-) -> Array:
-    """The poles' part of the response at ``grid[1:]``; `kept` holds their states, and is updated."""
-    from scipy.signal import lfilter
-
-    roots, weights = gauss(count)
-    step = float(grid[1] - grid[0])
-    pieces = max(1, math.ceil(max(abs(pole) for pole in response.poles) * step / TURN))
-    at = (step / pieces) * (np.arange(pieces)[:, None] + (roots + 1) / 2).ravel()
-    nodes = np.maximum(grid[:-1, None] + at, 0.0)
-    changed = (values(nodes.ravel()).reshape(nodes.shape) - began) * np.tile(weights * step / (2 * pieces), pieces)
-    inside = np.append(breaks[(breaks > grid[0]) & (breaks < grid[-1])], np.zeros(int(grid[0] < 0 < grid[-1])))
-    split = np.unique(np.searchsorted(grid, inside, side="right") - 1)
-    changed[split] = 0.0
-    fine = grid[split][:, None] + step * np.arange(pieces) / pieces
-    edges = np.unique(np.concatenate([fine.ravel(), grid[split + 1], inside]))
-    length, middle = np.diff(edges), (edges[:-1] + edges[1:]) / 2
-    into = np.searchsorted(grid, middle) - 1
-    own = np.isin(into, split) & (middle > 0)
-    length, into = length[own], into[own]
-    finer = edges[:-1][own, None] + length[:, None] * (roots + 1) / 2
-    beside = (
-        (values(finer.ravel()).reshape(finer.shape) - began) * (weights / 2) * length[:, None] if len(length) else finer
-    )
-    total = np.zeros(len(grid) - 1)
-    for j, (pole, residue) in enumerate(zip(response.poles, response.residues, strict=True)):
-        if pole.imag < 0:
-            continue  # its conjugate speaks for both
-        driven = changed @ np.exp(pole * (step - at))
-        np.add.at(driven, into, (beside * np.exp(pole * (grid[into + 1][:, None] - finer))).sum(axis=1))
-        state, kept[j] = lfilter([1.0], [1.0, -np.exp(pole * step)], driven, zi=kept[j])
-        total += (1 + (pole.imag > 0)) * (residue * state).real
-    return total
+    return (roots + 1) / 2, weights / 2
