@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 
+from stickslip.analysis.asked import Asked
 from stickslip.analysis.findings import plain, record_name
 from stickslip.decay.answer import DecayFit
 from stickslip.decay.fit_decay import fit_decay
 from stickslip.decay.motions import Restoring
 from stickslip.decay.which_motion import DecayMotion, choose_motion
-from stickslip.errors import EstimateError, ModelError, StickslipError
+from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
 from stickslip.identify.decrement import Decrement, decrement
 from stickslip.identify.envelope import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
@@ -26,7 +27,6 @@ from stickslip.units import parse_value
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
 
-Answer = TypeVar("Answer")
 
 EXTREMES = "extremes alone"
 LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
@@ -37,7 +37,7 @@ OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
     "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, EXTREMES: extreme_decay,
     "Hilbert envelope": hilbert_decay,
 }  # fmt: skip
-FOR_PENDULUMS = {EXTREMES: functools.partial(extreme_decay, restoring="pendulum")}
+FOR_PENDULUMS = {EXTREMES: partial(extreme_decay, restoring="pendulum")}
 
 
 class BothFrictions(Protocol):
@@ -294,57 +294,54 @@ def analyze_decay(
             "choose method = 'waveform', or ask extreme_decay(record)",
         )
     releases = find_releases(record, channel=channel)
-    used = releases.ring_downs[0].channel
+    used, displaced = releases.ring_downs[0].channel, releases.ring_downs[0].order == 0
     faults = tuple(each for each in record.check() if (each.kind, each.channel) != ("drift", used))  # a hold is none
-    units = ("kg m^2", "N m/rad") if used == "theta" else ("kg", "N/m")
-    stated = {"mass": mass, "stiffness": stiffness}
-    constants: dict[str, Any] = {
-        name: parse_value(value, unit)
-        for (name, value), unit in zip(stated.items(), units, strict=True)
-        if value is not None
-    }
-    for name, value in constants.items():
-        if not value > 0:
-            raise ModelError(f"{name} = {value:g}", f"a {name} is positive", f"correct the {name}")
-    refusals: list[StickslipError] = []
-    notes = list(releases.notes)
-
-    def ask(question: str, answer: Callable[[], Answer]) -> Answer | None:
-        try:
-            return answer()
-        except StickslipError as error:
-            refusals.append(error)
-            notes.append(f"{question}: {error}")
-            return None
-
+    constants = _constants(used, mass=mass, stiffness=stiffness)
+    asked = Asked(list(releases.notes))
     waveform = thesis = motion = None
     if method != "thesis":
-        fit = functools.partial(fit_decay, record, channel=used, restoring=restoring, **constants)
-        if releases.ring_downs[0].order == 0:
-            waveform = ask("Which motion", lambda: fit(candidates="all"))
-        waveform = waveform or ask("The whole waveform", fit)
-        if waveform is not None:
-            motion = waveform.motions[0] if waveform.motions else None
-            waveform = ask("The whole waveform", functools.partial(_followed, waveform, restoring))
-            unsure = motion is not None and motion.choice.status != "ok"
-            motion = None if waveform is None and unsure else motion
-        elif releases.ring_downs[0].order == 0:
-            motion = ask("Which motion", lambda: choose_motion(record, channel=used, restoring=restoring))
+        way: dict[str, Any] = {"channel": used, "restoring": restoring}
+        waveform, motion = _by_waveform(record, asked, way, constants, displaced=displaced)
     if method != "waveform" and restoring == "linear":
-        thesis = ask("The decrements", lambda: decrement(record, channel=used))
-    last = refusals[-1:]
-    ways = {} if method != "all" or releases.ring_downs[0].order else OLDER if restoring == "linear" else FOR_PENDULUMS
+        thesis = asked.ask("The decrements", partial(decrement, record, channel=used))
+    last = asked.refusals[-1:]
+    ways = {} if method != "all" or not displaced else OLDER if restoring == "linear" else FOR_PENDULUMS
     older = {
         name: found
         for name, way in ways.items()
-        if (found := ask(name.capitalize(), functools.partial(way, record, channel=used))) is not None
+        if (found := asked.ask(name.capitalize(), partial(way, record, channel=used))) is not None
     }
     if waveform is None and thesis is None and motion is None and (restoring == "linear" or not older):
         raise last[0]
     return DecayFindings(
         record_name(record), record, faults, releases, waveform, thesis, motion, older,
-        tuple(dict.fromkeys(notes)), {"method": method, "channel": used, "restoring": restoring, **constants},
+        tuple(dict.fromkeys(asked.notes)), {"method": method, "channel": used, "restoring": restoring, **constants},
     )  # fmt: skip
+
+
+def _constants(channel: str, **stated: float | str | None) -> dict[str, Any]:
+    """Mass and stiffness where stated, in SI: of an angle a moment of inertia and a torque per angle."""
+    units = {"mass": "kg m^2", "stiffness": "N m/rad"} if channel == "theta" else {"mass": "kg", "stiffness": "N/m"}
+    constants = {name: parse_value(value, units[name]) for name, value in stated.items() if value is not None}
+    for name, value in constants.items():
+        if not value > 0:
+            raise ModelError(f"{name} = {value:g}", f"a {name} is positive", f"correct the {name}")
+    return constants
+
+
+def _by_waveform(
+    record: Record, asked: Asked, way: dict[str, Any], constants: dict[str, Any], *, displaced: bool
+) -> tuple[DecayFit | None, DecayMotion | None]:
+    """The whole waveform, and of a displacement which motion it was; the latter alone where nothing fits the former."""
+    fit = partial(fit_decay, record, **way, **constants)
+    waveform = asked.ask("Which motion", partial(fit, candidates="all")) if displaced else None
+    waveform = waveform or asked.ask("The whole waveform", fit)
+    if waveform is None:
+        return None, asked.ask("Which motion", partial(choose_motion, record, **way)) if displaced else None
+    motion = waveform.motions[0] if waveform.motions else None
+    waveform = asked.ask("The whole waveform", partial(_followed, waveform, way["restoring"]))
+    unsure = motion is not None and motion.choice.status != "ok"
+    return waveform, None if waveform is None and unsure else motion
 
 
 def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
+from stickslip.analysis.asked import Asked
 from stickslip.config import RigSettings
-from stickslip.errors import ModelError, StickslipError
 from stickslip.identify.compare_force import UNLIKE, ForceComparison, compare_force
 from stickslip.identify.force import friction_force
 from stickslip.identify.mass import mass_and_stiffness
@@ -19,8 +18,6 @@ from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
-
-Answer = TypeVar("Answer")
 
 MOTION = ("x", "v", "theta")
 USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
@@ -33,25 +30,6 @@ STRANGE = "differ by more than noise"
 LEFT_OUT = "it may be wrong by some per cent, which the interval leaves out"
 FOUND = " (found in this record)"
 SURE = 3.0  # standard deviations from which a delay is taken out
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What came of the questions so far: notes in words, and the errors behind those that failed."""
-
-    notes: list[str]
-    refusals: list[StickslipError]
-
-    def ask(self, question: str, answer: Callable[[], Answer]) -> Answer | None:
-        """The answer; where the record can not give one, None and a note."""
-        try:
-            return answer()
-        except ModelError:
-            raise
-        except StickslipError as error:
-            self.notes.append(f"{question}: {error}")
-            self.refusals.append(error)
-            return None
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from stickslip.analysis.asked import Asked
 from stickslip.analysis.doubts import doubted
 from stickslip.analysis.findings import Findings, record_name
 from stickslip.analysis.preparation import (
     AT_ONCE,
     CONSTANTS,
     MOTION,
-    Asked,
     described,
     middle,
     normal_load,
@@ -100,7 +100,7 @@ def analyze(
     """
     given = {"mass": mass, "stiffness": stiffness, "damping": damping, "damper": damper, "contact": contact}
     rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
-    asked, name, faults = Asked([], []), record_name(record), tuple(record.check())
+    asked, name, faults = Asked(), record_name(record), tuple(record.check())
     made = ready(record, rig, method, asked)
     whole = made.record
     slid = slid_on(whole, rig.contact if "contact" in rig.model_fields_set else None)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.analysis.asked import Asked
 from stickslip.analysis.findings import plain, record_name
-from stickslip.errors import EstimateError, StickslipError
+from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.identify.loops import Loops, friction_loops
 from stickslip.record.record import Record
@@ -25,7 +26,6 @@ from stickslip.units import parse_range, parse_value
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
 
-Answer = TypeVar("Answer")
 
 UNTOLD = "no slope can be told"  # in the status of a slope that the motion does not tell
 HEARD_AT_ONCE = 5.0  # s
@@ -198,38 +198,34 @@ def analyze_squeaks(
     band = parse_range(frequencies, "Hz") if isinstance(frequencies, str) else frequencies
     faults = tuple(record.check())
     squeaks = find_squeaks(record, channel=channel, frequencies=band)
-    notes = list(squeaks.notes)
-
-    def ask(question: str, answer: Callable[[], Answer]) -> Answer | None:
-        try:
-            return answer()
-        except StickslipError as error:
-            notes.append(f"{question}: {error}")
-            return None
-
+    asked = Asked(list(squeaks.notes))
     others = [each for each in VIBRATING if each in record and each != squeaks.channel]
     listen = partial(find_squeaks, record, frequencies=band)
-    beside = [ask(f"Bursts in {each}", partial(listen, channel=each)) for each in others]
+    beside = [asked.ask(f"Bursts in {each}", partial(listen, channel=each)) for each in others]
     loops = None
     if "friction" in record and any(each in record for each in ("x", "v", "theta")):
-        loops = ask("Friction over the cycle", lambda: friction_loops(record, contact=contact))
+        loops = asked.ask("Friction over the cycle", partial(friction_loops, record, contact=contact))
     else:
-        notes.append("No friction beside a motion is recorded: how it changes with speed can not be told.")
+        asked.notes.append("No friction beside a motion is recorded: how it changes with speed can not be told.")
     if lever is not None and "torsion_velocity" not in record:
-        notes.append("The lever is not used: no torsion is recorded, in a channel torsion_velocity.")
+        asked.notes.append("The lever is not used: no torsion is recorded, in a channel torsion_velocity.")
+    spectra = asked.ask("Spectra", partial(burst_spectra, record, squeaks=squeaks)) if squeaks.bursts else None
+    joined = None
+    if squeaks.squeaking:
+        joined = asked.ask("Coupling", partial(coupling, record, squeaks=squeaks, lever=lever))
     return SqueakFindings(
         name=name or record_name(record),
         record=record,
         faults=faults,
         squeaks=squeaks,
         beside=tuple(each for each in beside if each is not None),
-        spectra=ask("Spectra", lambda: burst_spectra(record, squeaks=squeaks)) if squeaks.bursts else None,
-        coupling=ask("Coupling", lambda: coupling(record, squeaks=squeaks, lever=lever)) if squeaks.squeaking else None,
-        quality=_quality(record, squeaks, ask, notes),
-        impulses=ask("Pulses", partial(impulsiveness, record, channel=squeaks.channel)),
+        spectra=spectra,
+        coupling=joined,
+        quality=_quality(record, squeaks, asked),
+        impulses=asked.ask("Pulses", partial(impulsiveness, record, channel=squeaks.channel)),
         loops=loops,
         normal=_normal(record, normal),
-        notes=tuple(notes),
+        notes=tuple(asked.notes),
         settings={
             "channel": squeaks.channel,
             "frequencies": list(squeaks.band),
@@ -238,10 +234,7 @@ def analyze_squeaks(
     )
 
 
-def _quality(
-    record: Record, squeaks: Squeaks, ask: Callable[[str, Callable[[], SoundQuality]], SoundQuality | None],
-    notes: list[str],
-) -> SoundQuality | None:  # fmt: skip
+def _quality(record: Record, squeaks: Squeaks, asked: Asked) -> SoundQuality | None:
     """Of a calibrated sound; of a long one, about its loudest burst: the method takes as long as the sound."""
     if record.channels[squeaks.channel].unit != "Pa" or not squeaks.bursts:
         return None
@@ -250,8 +243,9 @@ def _quality(
         end = record.start + record.duration
         begin = min(max(record.start, loudest.start - HEARD_AT_ONCE / 2), end - HEARD_AT_ONCE)
         record = record.between(begin, begin + HEARD_AT_ONCE)
-        notes.append(f"Loudness, sharpness and roughness are those of {begin:.4g} to {begin + HEARD_AT_ONCE:.4g} s.")
-    return ask("Loudness, sharpness and roughness", lambda: sound_quality(record, channel=squeaks.channel))
+        part = f"{begin:.4g} to {begin + HEARD_AT_ONCE:.4g} s"
+        asked.notes.append(f"Loudness, sharpness and roughness are those of {part}.")
+    return asked.ask("Loudness, sharpness and roughness", partial(sound_quality, record, channel=squeaks.channel))
 
 
 def trend_of(slope: Estimate | None) -> str:
