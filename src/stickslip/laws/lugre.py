@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from stickslip.errors import ModelError
 from stickslip.laws.base import Row, finite
-from stickslip.laws.curved import CurvedMode, Sliding, either_side, exp, symbol
+from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol
+from stickslip.laws.stribeck import require_static_above, stribeck_curve
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,7 @@ class LuGre(Sliding):
         finite("damping", self.damping, unit="N s/m")
         finite("viscous", self.viscous, unit="N s/m")
         finite("exponent", self.exponent, unit="", positive=True)
-        if self.static < self.kinetic:
-            raise ModelError(
-                f"static = {self.static:.6g} N below kinetic = {self.kinetic:.6g} N",
-                "static friction is at least the kinetic friction",
-                "raise static=",
-            )
+        require_static_above(self)
 
     @property
     def memory(self) -> Mapping[str, Row]:
@@ -85,8 +80,7 @@ class LuGre(Sliding):
         float
             Force [N].
         """
-        force = self.kinetic + (self.static - self.kinetic) * exp(-((symbol("v") / self.speed) ** self.exponent))
-        return force.at(v=speed) + self.viscous * speed
+        return stribeck_curve(self, symbol("v")).at(v=speed) + self.viscous * speed
 
     def rates(self) -> tuple[CurvedMode, ...]:
         """Slip on either side; they meet where the velocity turns."""
@@ -94,8 +88,7 @@ class LuGre(Sliding):
         modes = []
         for name, side, turn in either_side():
             speed = v * float(side)
-            yields = self.kinetic + (self.static - self.kinetic) * exp(-((speed / self.speed) ** self.exponent))
-            rate = v - self.stiffness * (speed * z / yields)
+            rate = v - self.stiffness * (speed * z / stribeck_curve(self, speed))
             force = self.stiffness * z + self.damping * rate + self.viscous * v
             modes.append(CurvedMode(name, "slip", side, force, (turn,), {"bristle": rate}))
         return tuple(modes)

@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Rigid, finite
 from stickslip.laws.coulomb import held_until
 from stickslip.laws.curved import CurvedMode, Expression, exp, symbol
+
+if TYPE_CHECKING:
+    from stickslip.laws.lugre import LuGre
 
 Curve = Callable[[Expression], Expression]
 
@@ -22,6 +26,21 @@ def slips_and_stick(curve: Curve, level: float) -> tuple[CurvedMode, ...]:
         CurvedMode("stuck", "stick", 0, None, held_until(level)),
         CurvedMode("forward", "slip", 1, curve(v), (Exit({"v": -1.0}, "stuck"),)),
     )
+
+
+def stribeck_curve(law: Stribeck | LuGre, speed: Expression) -> Expression:
+    r""":math:`f_k + (f_s - f_k) e^{-(|v|/v_s)^\delta}` at a sliding speed."""
+    return law.kinetic + (law.static - law.kinetic) * exp(-((speed / law.speed) ** law.exponent))
+
+
+def require_static_above(law: Stribeck | LuGre) -> None:
+    """Refuse friction that rises from static to kinetic."""
+    if law.static < law.kinetic:
+        raise ModelError(
+            f"static = {law.static:.6g} N below kinetic = {law.kinetic:.6g} N",
+            "static friction is at least the kinetic friction",
+            "raise static=",
+        )
 
 
 @dataclass(frozen=True)
@@ -66,16 +85,10 @@ class Stribeck(Rigid):
         finite("speed", self.speed, unit="m/s", positive=True)
         finite("exponent", self.exponent, unit="", positive=True)
         finite("viscous", self.viscous, unit="N s/m")
-        if self.static < self.kinetic:
-            raise ModelError(
-                f"static = {self.static:.6g} N below kinetic = {self.kinetic:.6g} N",
-                "static friction is at least the kinetic friction",
-                "raise static=",
-            )
+        require_static_above(self)
 
     def _curve(self, speed: Expression) -> Expression:
-        fall = exp(-((speed / self.speed) ** self.exponent))
-        return self.kinetic + (self.static - self.kinetic) * fall + self.viscous * speed
+        return stribeck_curve(self, speed) + self.viscous * speed
 
     def friction(self, speed: float) -> float:
         """Friction force while sliding at a speed.
