@@ -25,6 +25,7 @@ from stickslip.plot.style import (
     empty_figure,
     legend_above,
     new_figure,
+    plain_decades,
     prefixed,
     spelled,
     styled,
@@ -302,8 +303,6 @@ def plot_dither(found: Dither) -> Figure:
     >>> len(plot_dither(ss.dither(slider, frequency=5.0)).axes)
     2
     """
-    from matplotlib.ticker import NullFormatter
-
     figure = empty_figure(4.8)
     top, bottom = figure.subplots(2, 1)
     factor, unit = prefixed(found.scan[:, 0], found.amplitude.unit)
@@ -317,9 +316,7 @@ def plot_dither(found: Dither) -> Figure:
         label="exact runs",
     )
     for axis in (top.xaxis, top.yaxis):
-        low, high = axis.get_view_interval()
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter("{x:g}" if high < 10 * low else NullFormatter())
+        plain_decades(axis)
     top.axhline(1.0, color=INK, linewidth=0.8)
     top.axvline(factor * found.amplitude.value, color=ORANGE, linestyle="--",
                 label=f"smallest that does it: {factor * found.amplitude.value:.3g} {spelled(unit)}")  # fmt: skip

@@ -6,7 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.plot.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, axis_label, new_figure, prefixed, styled
+from stickslip.plot.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    axis_label,
+    new_figure,
+    plain_decades,
+    prefixed,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,10 +62,7 @@ def plot_plan(plan: ExperimentPlan) -> Figure:
             style = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "markersize": 7 - 1.5 * number}
             panel.plot(rates, factor * errors, label=", ".join(sensors), **style)
         panel.set(xscale="log", yscale="log", ylabel=axis_label("rms error" if plan.draws > 1 else "error", text))
-        panel.yaxis.set_major_formatter("{x:g}")
-        low, high = panel.get_ylim()
-        # less than a decade may hold no power of ten to be labelled
-        panel.yaxis.set_minor_formatter("{x:g}" if high < 10 * low else NullFormatter())
+        plain_decades(panel.yaxis)
         panel.set_title(question, loc="left")
         panel.grid(visible=True, which="minor", color=FAINT, alpha=0.15)
     panel.set_xticks(sorted({setup.fs for setup in plan.setups}))

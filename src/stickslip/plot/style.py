@@ -14,6 +14,7 @@ from stickslip.units import spelled as spelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -70,6 +71,15 @@ def axes_of(ax: Axes | None, *, height: float = 3.8) -> Axes:
 def legend_above(ax: Axes, *, columns: int = 1, **options: Any) -> None:
     """A legend over the axes, where it hides nothing that is drawn."""
     ax.legend(ncols=columns, loc="lower left", bbox_to_anchor=(0, 1), **options)
+
+
+def plain_decades(axis: Axis) -> None:
+    """Plain numbers along a logarithmic axis; between the powers of ten too, where less than a decade may hold none."""
+    from matplotlib.ticker import NullFormatter
+
+    low, high = axis.get_view_interval()
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("{x:g}" if high < 10 * low else NullFormatter())
 
 
 def axis_label(words: str, unit: str, between: str = " ") -> str:
