@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 LOCATIONS = ("fit", "sample")
 NEEDED = {"immune": 4, "plain": 3}  # extremes
+EQUATIONS = {"immune": ("6.13", "6.9"), "plain": ("6.12", "6.6")}  # of the thesis: for beta, and for x_k
 SMEARED = 0.3  # samples by which the instant of an acceleration's jump is not known
 GAINS = -0.002  # damping ratio below which a motion is no free decay
 MOST = 60  # extremes, after which pairs are no longer tried one by one
@@ -201,6 +202,7 @@ def decrement(record: Record, *, channel: str | None = None, form: str = "immune
 
 
 def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
+    """The decrements of one release: its extremes, the pair of differences that tells beta best, then x_k."""
     times, values, sd, errors = _used(ring_down, *ex.locate(ring_down, location))
     if len(values) < NEEDED[form]:
         raise EstimateError(
@@ -220,57 +222,55 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
     times, values, sd, errors, upright = (part[:count] for part in (times, values, sd, errors, upright))
     i, m = _best_pair(upright, errors, form)
     last = _surest_dry(upright, sd, i, m, form)
-
     frequency, notes = _frequency(times, values, ring_down)
+    motion = (ring_down.order, frequency.value)
+    status = "; ".join((*ring_down.notes, *cut, *notes, *_few(len(values)))) or "ok"
 
     def answer(points: Array) -> Array:
         beta = ex.rate(points, i=i, m=m, form=form)
         pull = float(np.mean(ex.dry(points, beta, form=form)[-last:]))
-        return np.array(
-            [
-                beta / math.sqrt(1 + beta**2),
-                _displacement(pull, beta, ring_down.order, frequency.value),
-                ex.offset(points, beta),
-            ]
-        )
+        return np.array([ex.damping_ratio(beta), _displacement(pull, beta, *motion), ex.offset(points, beta)])
 
     found = answer(upright)
     spread = _propagated(answer, upright, sd)
     spread[1] = math.hypot(spread[1], found[1] * _scale_sd(ring_down, frequency))
-    beta = ex.rate(upright, i=i, m=m, form=form)
-    natural = frequency.scaled(1 / math.sqrt(1 - found[0] ** 2), "Hz", "natural frequency")
-    notes = (*ring_down.notes, *cut, *notes, *_few(len(values)))
-    status = "; ".join(notes) or "ok"
-    scatter = _scatter(upright, beta, form, ring_down.order, frequency.value)
-    of_m = f"equation {'6.13' if form == 'immune' else '6.12'} over {m} half cycles"
-    quoted = tuple(_quoted(each) for each in (scatter.damping_ratio, scatter.dry_displacement))
-    length = "rad" if ring_down.unit.startswith("rad") else "m"
+    scatter = _scatter(upright, ex.rate(upright, i=i, m=m, form=form), form, *motion)
+    of_rate, of_dry = EQUATIONS[form]
     damping_ratio = Estimate.normal(
-        "damping ratio", found[0], sd=spread[0], unit="1", method=of_m, status=status, checks=quoted[0]
-    )
+        "damping ratio", found[0], sd=spread[0], unit="1", status=status, checks=_quoted(scatter.damping_ratio),
+        method=f"equation {of_rate} over {m} half cycles",
+    )  # fmt: skip
+    _require_loss(damping_ratio)
+    dry_displacement = Estimate.normal(
+        "dry friction displacement", found[1], sd=spread[1], unit="rad" if ring_down.unit.startswith("rad") else "m",
+        status=status, checks=_quoted(scatter.dry_displacement),
+        method=f"equation {of_dry}, mean of the last {last}",
+    )  # fmt: skip
+    natural = frequency.scaled(1 / math.sqrt(1 - found[0] ** 2), "Hz", "natural frequency")
+    bias = _bias(ring_down, form, centre + side * found[2], spread[2], status)
+    return Decrement(
+        damping_ratio, dry_displacement, natural, bias, ex.frictions_seen(damping_ratio, dry_displacement), times,
+        values, sd, side * ex.differences(upright, form), _bounds(upright, errors, i, motion), scatter, ring_down, (),
+        status,
+    )  # fmt: skip
+
+
+def _require_loss(damping_ratio: Estimate) -> None:
     if damping_ratio.value < GAINS and damping_ratio.interval[1] < 0:
         raise EstimateError(
             f"the damping ratio would be {damping_ratio.value:.2g}",
             "a free decay loses energy",
             "something caught or drove the mass: cut the record with record.between(first, last)",
         )
-    dry_displacement = Estimate.normal(
-        "dry friction displacement", found[1], sd=spread[1], unit=length, status=status, checks=quoted[1],
-        method=f"equation {'6.9' if form == 'immune' else '6.6'}, mean of the last {last}",
-    )  # fmt: skip
-    offset = "rest position" if ring_down.order == 0 else "sensor offset"
+
+
+def _bias(ring_down: RingDown, form: str, value: float, sd: float, status: str) -> Estimate:
+    """Where the extremes are centred; the plain form takes that to be zero."""
+    name, unit = "rest position" if ring_down.order == 0 else "sensor offset", ring_down.unit
     if form == "plain":
-        bias = Estimate.normal(offset, 0.0, sd=0.0, unit=ring_down.unit, method="taken to be zero")
-    else:
-        bias = Estimate.normal(
-            offset, centre + side * found[2], sd=spread[2], unit=ring_down.unit, status=status,
-            method="what alternating extremes have in common",
-        )  # fmt: skip
-    return Decrement(
-        damping_ratio, dry_displacement, natural, bias, _model(damping_ratio, dry_displacement), times, values, sd,
-        side * ex.differences(upright, form), _bounds(upright, errors, i, (ring_down.order, frequency.value)), scatter,
-        ring_down, (), status,
-    )  # fmt: skip
+        return Estimate.normal(name, 0.0, sd=0.0, unit=unit, method="taken to be zero")
+    common = "what alternating extremes have in common"
+    return Estimate.normal(name, value, sd=sd, unit=unit, status=status, method=common)
 
 
 def _used(ring_down: RingDown, times: Array, values: Array, sd: Array, errors: Array) -> tuple[Array, ...]:
@@ -352,7 +352,7 @@ def _displacement(pull: float, beta: float, order: int, frequency: float) -> flo
     """x_k from what stands for it in the recursion of the extremes of x, v or a, `frequency` that of the motion."""
     if order == 0:
         return pull
-    zeta, fade = beta / math.sqrt(1 + beta**2), math.exp(-math.pi * beta)
+    zeta, fade = ex.damping_ratio(beta), math.exp(-math.pi * beta)
     w = 2 * math.pi * frequency / math.sqrt(1 - zeta**2)
     if order == 1:  # V = d w exp(-beta acos zeta), d less by 2 x_k from one half cycle to the next
         return pull * (1 + fade) / (2 * w * math.exp(-beta * math.acos(zeta)))
@@ -433,11 +433,6 @@ def _bounds(x: Array, errors: Array, i: int, motion: tuple[int, float]) -> Bound
     return Bounds(i=i, m=steps.astype(np.intp), error=error, best=best, **dict(zip(names, rest, strict=True)))
 
 
-def _model(damping_ratio: Estimate, dry_displacement: Estimate) -> str:
-    seen = [word for word, each in (("viscous", damping_ratio), ("dry", dry_displacement)) if each.interval[0] > 0]
-    return " and ".join(seen) or "no friction"
-
-
 def _together(parts: Sequence[Decrement], notes: tuple[str, ...], refused: Sequence[EstimateError]) -> Decrement:
     """One answer of several releases: their weighted means, widened where they disagree."""
     notes = (*notes, *(f"a release is left out: {error.value}" for error in refused))
@@ -448,6 +443,6 @@ def _together(parts: Sequence[Decrement], notes: tuple[str, ...], refused: Seque
         for name in ("damping_ratio", "dry_displacement", "frequency", "bias")
     )
     return replace(
-        surest, damping_ratio=ratio, dry_displacement=dry, frequency=frequency, bias=bias, model=_model(ratio, dry),
-        parts=tuple(parts), status=status,
+        surest, damping_ratio=ratio, dry_displacement=dry, frequency=frequency, bias=bias,
+        model=ex.frictions_seen(ratio, dry), parts=tuple(parts), status=status,
     )  # fmt: skip

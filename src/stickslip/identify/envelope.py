@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
+from stickslip.identify.extremes import damping_ratio, frictions_seen
 from stickslip.identify.release import RingDown, find_releases
 from stickslip.record.record import Record
 from stickslip.statistics import least_squares, student
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 
 LEAST = 5  # extremes
 CLEAR = 5.0  # times the noise that an extreme must stand out
+FREE = 4  # what the recursion is fitted by: first swing, beta, x_k, rest
 PERIODS = 6  # of a Hilbert envelope: one is lost at each end
 
 
@@ -53,8 +55,7 @@ class EnvelopeDecay(Result):
     @property
     def model(self) -> str:
         """The frictions that the intervals hold apart from zero, in words."""
-        both = (("viscous", self.damping_ratio), ("dry", self.dry_displacement))
-        return " and ".join(word for word, each in both if each is not None and each.interval[0] > 0) or "no friction"
+        return frictions_seen(self.damping_ratio, self.dry_displacement)
 
 
 def log_decrement(record: Record, *, channel: str | None = None) -> EnvelopeDecay:
@@ -192,42 +193,16 @@ def extreme_decay(
     >>> round(found.dry_displacement.value, 4), abs(found.damping_ratio.value) < 1e-4
     (0.005, True)
     """
-    from scipy.optimize import least_squares as search
-
     ring_down, sizes, numbers = _extremes(record, channel)
     signs = math.copysign(1.0, ring_down.amplitude) * (-1.0) ** numbers
-    heights = signs * sizes
-
-    def model(free: Array) -> Array:
-        swings = [float(free[0])]
-        for _ in range(int(numbers[-1])):
-            swings.append(_next_swing(swings[-1], float(free[1]), float(free[2]), restoring))
-        return np.asarray(free[3] + signs * np.array(swings)[numbers.astype(int)])
-
-    dry = _dry(sizes, numbers)
-    scale = np.array([sizes[0], 1e-2, max(dry, 1e-3 * sizes[0]), 1e-2 * sizes[0]])
-
-    def left_by(free: Array) -> Array:
-        return np.asarray(heights - model(free))
-
-    fitted = search(left_by, [sizes[0], 1e-3, dry, 0.0], x_scale=scale, method="lm")
-    _, fall, dry, _ = fitted.x
-    freedom = max(1, len(sizes) - 4)
-    slopes, left = np.asarray(fitted.jac, dtype=float), np.asarray(fitted.fun, dtype=float)
-    covariance = np.linalg.pinv(slopes.T @ slopes) * float(left @ left) / freedom
-    method = f"least squares over {len(sizes)} extremes"
-    quantile = student(freedom)
-    slope = 1 / (1 + fall**2) ** 1.5
-    damping = Estimate.normal(
-        "damping ratio", fall / math.sqrt(1 + fall**2), sd=slope * math.sqrt(covariance[1, 1]), unit="1",
-        method=method, quantile=quantile,
-    )  # fmt: skip
-    found = Estimate.normal(
-        "dry friction displacement", dry, sd=math.sqrt(covariance[2, 2]), unit=ring_down.unit, method=method,
-        quantile=quantile,
-    )  # fmt: skip
+    (beta, dry), (beta_sd, dry_sd) = _fitted_swings(sizes, numbers, signs, restoring)
+    told: dict[str, Any] = {
+        "method": f"least squares over {len(sizes)} extremes", "quantile": student(max(1, len(sizes) - FREE)),
+    }  # fmt: skip
+    damping = Estimate.normal("damping ratio", damping_ratio(beta), sd=beta_sd / (1 + beta**2) ** 1.5, unit="1", **told)
+    displacement = Estimate.normal("dry friction displacement", dry, sd=dry_sd, unit=ring_down.unit, **told)
     return EnvelopeDecay(
-        damping, found, _frequency(ring_down, damping.value, method), method,
+        damping, displacement, _frequency(ring_down, damping.value, told["method"]), told["method"],
         "noise lengthens every extreme, and a sample seldom falls on one: some times less sure than the whole waveform",
         "ok" if len(sizes) >= 8 else f"only {len(sizes)} extremes: the interval is crude",
     )  # fmt: skip
@@ -301,8 +276,27 @@ def _analytic(values: Array) -> NDArray[np.complex128]:
     return np.fft.ifft(np.fft.fft(values) * weights)
 
 
+def _fitted_swings(sizes: Array, numbers: Array, signs: Array, restoring: str) -> tuple[Array, Array]:
+    """beta and x_k for which the recursion leaves least of the extremes, and their standard deviations."""
+    from scipy.optimize import least_squares as search
+
+    def left_by(free: Array) -> Array:
+        first, beta, dry, rest = map(float, free)
+        swings = [first]
+        for _ in range(int(numbers[-1])):
+            swings.append(_next_swing(swings[-1], beta, dry, restoring))
+        return np.asarray(signs * sizes - (rest + signs * np.array(swings)[numbers.astype(int)]))
+
+    dry = _dry(sizes, numbers)
+    scale = np.array([sizes[0], 1e-2, max(dry, 1e-3 * sizes[0]), 1e-2 * sizes[0]])
+    fitted = search(left_by, [sizes[0], 1e-3, dry, 0.0], x_scale=scale, method="lm")
+    slopes, left = np.asarray(fitted.jac, dtype=float), np.asarray(fitted.fun, dtype=float)
+    covariance = np.linalg.pinv(slopes.T @ slopes) * float(left @ left) / max(1, len(sizes) - FREE)
+    return np.asarray(fitted.x[1:3]), np.sqrt(np.diag(covariance)[1:3])
+
+
 def _next_swing(swing: float, fall: float, dry: float, restoring: str) -> float:
-    """The next extreme's distance from rest; `fall` is zeta / sqrt(1 - zeta^2)."""
+    """The next extreme's distance from rest; `fall` is beta."""
     from scipy.special import ellipe, ellipk
 
     if restoring == "linear":

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
 from stickslip.identify.release import RingDown
 
 Array = NDArray[np.float64]
@@ -39,6 +40,17 @@ def differences(extremes: ArrayLike, form: str = "immune") -> Array:
     """
     x = np.asarray(extremes, dtype=float)
     return np.asarray(x[2:] - x[:-2] if form == "immune" else x[1:] + x[:-1])
+
+
+def damping_ratio(beta: float) -> float:
+    """The damping ratio zeta of the viscous rate ``beta = zeta / sqrt(1 - zeta^2)``."""
+    return beta / math.sqrt(1 + beta**2)
+
+
+def frictions_seen(damping: Estimate | None, dry_friction: Estimate | None) -> str:
+    """The frictions that the intervals hold apart from zero, in words."""
+    both = (("viscous", damping), ("dry", dry_friction))
+    return " and ".join(word for word, each in both if each is not None and each.interval[0] > 0) or "no friction"
 
 
 def rate(extremes: ArrayLike, *, i: int, m: int, form: str = "immune") -> float:
