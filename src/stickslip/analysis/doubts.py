@@ -11,8 +11,8 @@ import numpy as np
 from stickslip.errors import StickslipError
 from stickslip.estimate import Estimate
 from stickslip.identify.consistency import Consistency
-from stickslip.identify.force import ALONE
 from stickslip.identify.likely_contact import STRAYING
+from stickslip.identify.load_cell import ALONE
 from stickslip.identify.loops import DRIVES
 from stickslip.identify.mixups import ONE_SLIP
 from stickslip.record.record import Record

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import EstimateError
-from stickslip.identify.force import told_rig
-from stickslip.identify.fusion import Balance, fuse
+from stickslip.identify.balance import Balance, told_rig
+from stickslip.identify.fusion import fuse
 from stickslip.identify.motion import is_measured
 from stickslip.identify.sensor_delay import SensorDelay, sensor_delay
 from stickslip.record.record import Record, Step

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
-from stickslip.identify.force import ALONE, FUSIONS
-from stickslip.identify.fusion import Balance
+from stickslip.identify.balance import Balance
+from stickslip.identify.force import FUSIONS
+from stickslip.identify.load_cell import ALONE
 from stickslip.identify.motion import is_measured
 from stickslip.identify.slip_ringing import ringing_of
 from stickslip.identify.strokes import FAST, Stroke, Strokes, find_strokes

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
-from stickslip.identify.force import friction_force, told_rig
+from stickslip.identify.balance import told_rig
+from stickslip.identify.force import friction_force
 from stickslip.identify.lines import Complex, Lines, find_lines
 from stickslip.identify.mounts import Resonance, find_mounts
 from stickslip.record.flaws import saturated

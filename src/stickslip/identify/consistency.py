@@ -8,8 +8,8 @@ from typing import Any
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Result
+from stickslip.identify.balance import told_rig
 from stickslip.identify.checks import FAILS, Check
-from stickslip.identify.force import told_rig
 from stickslip.identify.forced_checks import (
     Seen,
     acceleration_check,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,20 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Estimate
-from stickslip.identify.fusion import Balance, fuse
+from stickslip.identify.balance import (
+    FRICTION,
+    Rig,
+    as_measured,
+    averaged_gain,
+    paths,
+    stretch,
+    with_friction,
+    with_motion,
+)
+from stickslip.identify.fusion import fuse
+from stickslip.identify.load_cell import felt
 from stickslip.identify.mass import mass_and_stiffness, stiffness_per_mass
-from stickslip.identify.motion import is_measured, require_change, require_fit
+from stickslip.identify.motion import require_change, require_fit
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.signals.differentiate import (
@@ -28,23 +39,17 @@ from stickslip.signals.differentiate import (
     noise_along,
     total_sd,
 )
-from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
-QUESTION = "the friction force"
-ENDS = ("ground", "base")
 FUSIONS = {"fusion": ("x", "v", "a", "load"), "motion": ("x", "v", "a"), "load": ("x", "load")}
 """Methods that know how the sensors lie, and the channels that each uses, where they are there."""
 THESIS = ("F", "F1", "F2")
-ALONE = "load cell alone"
 INSTEAD = {"load": "motion", "F2": "F1"}  # what answers where there is no load cell
 LOST = {
     "a": "without an accelerometer: reversals are seen through the displacement alone",
     "load": "without a load cell: the friction is only what is left of the motion",
 }
-BEYOND = 2.0  # times its mount's frequency up to which a load cell's reading is followed
-SPAN = 24  # samples from an end within which averages and differences feel it
 
 
 def friction_force(
@@ -139,14 +144,14 @@ def friction_force(
     if method not in (*METHODS, *FUSIONS, *THESIS):
         methods = ", ".join((*METHODS, *FUSIONS, *THESIS))
         raise EstimateError(f"method = '{method}'", f"the friction is found by one of {methods}", "choose one of them")
-    record = _as_measured(record)
+    record = as_measured(record)
     asked, method = method, method if "load" in record else INSTEAD.get(method, method)
-    require_change(record, "v", "a", "load", question=QUESTION)
+    require_change(record, "v", "a", "load", question=FRICTION)
     unknown = [name for name, value in (("mass", mass), ("stiffness", stiffness)) if value is None]
     constants = {"mass": mass, "stiffness": stiffness, "damping": damping, **dict.fromkeys(unknown, 1.0)}
-    rig = _Rig.stated(constants, damper, contact)
+    rig = Rig.stated(constants, damper, contact)
     if method == "F2" or (method == "load" and len(unknown) == 2):
-        return _felt(record, {**asdict(rig), **dict.fromkeys(unknown)}, method)
+        return felt(record, {**asdict(rig), **dict.fromkeys(unknown)}, method)
     if method == "fusion" and len(unknown) == 2 and {"z", "load"} <= set(record):
         return _weighed(record, rig)
     if unknown:
@@ -155,10 +160,12 @@ def friction_force(
         return _fused(record, rig, method, asked)
     if method in THESIS:
         return _balanced(record, rig, method, asked)
-    used = ["x", *(name for name in ("z", "v", "a", "force") if name in record)]
-    record.require_clean(*used, question=QUESTION, samples=LEAST)
-    require_fit(record, *({"force"} & set(record)), length="m", question=QUESTION)
-    record = without_delays(record, *used, question=QUESTION, samples=LEAST)
+    return _smoothed(record, rig, method, bandwidth)
+
+
+def _smoothed(record: Record, rig: Rig, method: str, bandwidth: float | str | None) -> Record:
+    """The balance with derivatives by the smoother, or by differences and five-point averages."""
+    record = _punctual(record)
     known = "a" in record
     if bandwidth is not None:
         width = checked_bandwidth(bandwidth, record.fs, len(record))
@@ -168,7 +175,7 @@ def friction_force(
     one_filter = method == "smoother" and (bandwidth is not None or not known)
 
     force, variance, change = np.zeros(len(record)), np.zeros(len(record)), 0.0
-    for name, through, terms in _paths(rig.balance(record), derive, one_filter):
+    for name, through, terms in paths(rig.terms(record), derive, one_filter):
         noise = noise_along(record[name], record.fs, record.channels[name].noise)
         force += through.apply(record[name], terms)
         variance += (through.noise_gain(len(record), terms) * noise) ** 2
@@ -181,83 +188,34 @@ def friction_force(
         {**asdict(rig), "method": method, "bandwidth": width if method == "smoother" else None},
         "; ".join(rig.words(record, method, width, one_filter)),
     )
-    return _with_friction(_with_motion(record, derive), force, sd, step)
+    return with_friction(with_motion(record, derive), force, sd, step)
 
 
-def _balanced(record: Record, rig: _Rig, method: str, asked: str) -> Record:
-    """The thesis's F, or F1: the balance of the forces as read, or its five-point average."""
+def _punctual(record: Record) -> Record:
+    """The record, fit for a balance of forces, with the stated delays of what enters it taken out."""
     used = ["x", *(name for name in ("z", "v", "a", "force") if name in record)]
-    record.require_clean(*used, question=QUESTION, samples=LEAST)
-    require_fit(record, *({"force"} & set(record)), length="m", question=QUESTION)
-    record = without_delays(record, *used, question=QUESTION, samples=LEAST)
+    record.require_clean(*used, question=FRICTION, samples=LEAST)
+    require_fit(record, *({"force"} & set(record)), length="m", question=FRICTION)
+    return without_delays(record, *used, question=FRICTION, samples=LEAST)
+
+
+def _balanced(record: Record, rig: Rig, method: str, asked: str) -> Record:
+    """The thesis's F, or F1: the balance of the forces as read, or its five-point average."""
+    record = _punctual(record)
     derive = Filter("five-point", record.fs, 0.0)
     last = five_point_average if method == "F1" else np.asarray
     force, variance = np.zeros(len(record)), np.zeros(len(record))
-    for name, terms in rig.balance(record).items():
+    for name, terms in rig.terms(record).items():
         noise = noise_along(record[name], record.fs, record.channels[name].noise)
         force += last(derive.apply(record[name], terms))
-        variance += (_gain(len(record), derive, terms, last) * noise) ** 2
+        variance += (averaged_gain(len(record), derive, terms, last) * noise) ** 2
     words = [
         *_lacking(record, asked, ("a", "load") if asked != method else ("a",)),
         *rig.words(record, "five-point", 0.0, False),
         "averaged over five points" if method == "F1" else "as read",
     ]
     step = Step("friction_force", {**asdict(rig), "method": method}, "; ".join(words))
-    return _with_friction(_with_motion(record, derive), force, np.sqrt(variance), step)
-
-
-def _felt(record: Record, arguments: Mapping[str, Any], method: str) -> Record:
-    """What the load cell feels, less the inertia of its flange: the thesis's F2, or through its mount's inverse."""
-    cell = record.channels["load"]
-    source = next((name for name in ("a", "v", "x") if name in record), "") if cell.inertia else ""
-    used = ["load", *([source] if source else [])]
-    record.require_clean(*used, question=QUESTION, samples=LEAST)
-    record = without_delays(record, *used, question=QUESTION, samples=LEAST)
-    terms = {"load": {0: 1.0}, **({source: {"avx".index(source): -cell.inertia}} if source else {})}
-    if method == "F2":
-        derive = dict.fromkeys(terms, Filter("five-point", record.fs, 0.0))
-        words = ["the load cell, averaged over five points"]
-    else:
-        derive, words = _unmounted(record, terms)
-    force, variance = np.zeros(len(record)), np.zeros(len(record))
-    for name, orders in terms.items():
-        noise = noise_along(record[name], record.fs, record.channels[name].noise)
-        part = derive[name].apply(record[name], orders)
-        if method == "F2":
-            force += five_point_average(part)
-            variance += (_gain(len(record), derive[name], orders, five_point_average) * noise) ** 2
-        else:
-            force += part
-            variance += (derive[name].noise_gain(len(record), orders) * noise) ** 2
-    if source:
-        words.append(f"less {cell.inertia:g} kg times the acceleration from {source}")
-    elif cell.inertia:
-        words.append(f"no motion: the inertia of {cell.inertia:g} kg of its flange is left in")
-    if cell.discharge is not None:
-        words.append(f"its discharge of {cell.discharge:g} s is left in")
-    name = ALONE if method == "load" else method  # no balance of forces stands behind it
-    step = Step("friction_force", {**arguments, "method": name}, "; ".join(words))
-    return _with_friction(record, force, np.sqrt(variance), step)
-
-
-def _unmounted(record: Record, terms: dict[str, dict[int, float]]) -> tuple[dict[str, Filter], list[str]]:
-    """The filters of a load cell alone and of what its flange does; its mount's inverse is added to its terms."""
-    mount = record.channels["load"].mount
-    width = {name: best_bandwidth(record[name], record.fs) for name in terms}
-    if mount is not None:
-        angular = 2 * math.pi * mount[0]
-        terms["load"] |= {1: 2 * mount[1] / angular, 2: angular**-2}
-        width["load"] = checked_bandwidth(min(BEYOND * mount[0], 0.4 * record.fs), record.fs, len(record))
-    words = [f"the load cell alone, smoothed to {width['load']:.4g} Hz (-3 dB)"]
-    if mount is not None:
-        words.append(f"less what its mount of {mount[0]:g} Hz adds")
-    return {name: Filter("smoother", record.fs, each) for name, each in width.items()}, words
-
-
-def _gain(size: int, derive: Filter, terms: Mapping[int, float], last: Callable[[Array], Array]) -> Array:
-    """Standard deviation of each of `size` values for white noise of unit standard deviation."""
-    rows = np.linalg.norm(last(derive.apply(np.eye(min(size, 2 * SPAN)), terms)), axis=1)
-    return rows if size <= len(rows) else np.insert(rows, SPAN, np.full(size - len(rows), rows[SPAN]))
+    return with_friction(with_motion(record, derive), force, np.sqrt(variance), step)
 
 
 def _lacking(record: Record, asked: str, wanted: Sequence[str]) -> list[str]:
@@ -265,26 +223,20 @@ def _lacking(record: Record, asked: str, wanted: Sequence[str]) -> list[str]:
     return [f"{LOST[name]} ({asked} asked for)" for name in wanted if name in LOST and name not in record]
 
 
-def _with_friction(record: Record, force: Array, sd: Array, step: Step) -> Record:
-    made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
-    noise = float(np.median(sd))
-    return made.with_channel("friction", force, unit="N", source="friction_force", noise=noise, step=step)
-
-
-def _weighed(record: Record, rig: _Rig) -> Record:
+def _weighed(record: Record, rig: Rig) -> Record:
     """The friction force by all sensors, with mass and stiffness from what the load cell feels."""
     ends = {"damper": rig.damper, "contact": rig.contact}
     mass, stiffness = mass_and_stiffness(record, damping=rig.damping, **ends)
     made = friction_force(
         record, mass=mass.value, stiffness=stiffness.value, damping=rig.damping, method="fusion", **ends
     )
-    sd = np.sqrt(made["friction_sd"] ** 2 + (mass.sd * made["a"]) ** 2 + (stiffness.sd * _stretch(made)) ** 2)
+    sd = np.sqrt(made["friction_sd"] ** 2 + (mass.sd * made["a"]) ** 2 + (stiffness.sd * stretch(made)) ** 2)
     words = f"m = {mass.value:.5g} kg and k = {stiffness.value:.5g} N/m from what the load cell feels"
     step = replace(made.history[-1], outcome=f"{words}; {made.history[-1].outcome}")
-    return replace(_with_friction(made, made["friction"], sd, step), history=(*made.history[:-1], step))
+    return replace(with_friction(made, made["friction"], sd, step), history=(*made.history[:-1], step))
 
 
-def _completed(record: Record, rig: _Rig, unknown: Sequence[str], method: str, bandwidth: float | str | None) -> Record:
+def _completed(record: Record, rig: Rig, unknown: Sequence[str], method: str, bandwidth: float | str | None) -> Record:
     """The friction force with the mass or the stiffness from the record; per mass, with neither."""
     others = [*(["damping"] if rig.damping else []), *(["an applied force"] if "force" in record else [])]
     if others and len(unknown) == 2:
@@ -296,12 +248,12 @@ def _completed(record: Record, rig: _Rig, unknown: Sequence[str], method: str, b
     if "mass" in unknown and rig.stiffness == 0:
         raise ModelError("stiffness = 0 and no mass", "the mass is found from how a spring moves it", "give the mass")
     used = ["x", *(name for name in ("z", "a", "force") if name in record)]
-    record.require_clean(*used, question=QUESTION)
-    require_fit(record, *({"force"} & set(record)), length="m", question=QUESTION)
-    punctual = without_delays(record, question=QUESTION, samples=LEAST)
+    record.require_clean(*used, question=FRICTION)
+    require_fit(record, *({"force"} & set(record)), length="m", question=FRICTION)
+    punctual = without_delays(record, question=FRICTION, samples=LEAST)
     known = punctual["force"] if "force" in record else np.zeros(len(punctual))
     if rig.damping:
-        across = -_stretch(punctual) if rig.damper == "base" else punctual["x"]
+        across = -stretch(punctual) if rig.damper == "base" else punctual["x"]
         known = known - rig.damping * differentiate(across, record.fs).values
     over = {"stretched": known / rig.stiffness} if "mass" in unknown else {"resisting": -known / rig.mass}
     found = stiffness_per_mass(punctual, contact=rig.contact, **(over if others else {}))
@@ -319,10 +271,10 @@ def _completed(record: Record, rig: _Rig, unknown: Sequence[str], method: str, b
         record, mass=moving, stiffness=found.value * moving, damping=rig.damping, method=method, bandwidth=bandwidth,
         **ends,
     )  # fmt: skip
-    unsure = made["a"] if "mass" in unknown else found.value * _stretch(made)
+    unsure = made["a"] if "mass" in unknown else found.value * stretch(made)
     sd = np.hypot(made["friction_sd"], moving * found.sd / found.value * np.abs(unsure))
     step = replace(made.history[-1], outcome=f"{_ratio(found)}; {made.history[-1].outcome}")
-    return replace(_with_friction(made, made["friction"], sd, step), history=(*made.history[:-1], step))
+    return replace(with_friction(made, made["friction"], sd, step), history=(*made.history[:-1], step))
 
 
 def _per_mass(record: Record, found: Estimate, *, method: str, **rig: Any) -> Record:
@@ -336,32 +288,27 @@ def _per_mass(record: Record, found: Estimate, *, method: str, **rig: Any) -> Re
         {**last.arguments, "mass": None, "stiffness": None},
         f"{words}; {_ratio(found)}; {last.outcome}",
     )
-    sd = np.hypot(made["friction_sd"], found.sd * np.abs(_stretch(made)))
+    sd = np.hypot(made["friction_sd"], found.sd * np.abs(stretch(made)))
     kept = {name: made[name] for name in made if name not in ("friction", "friction_sd")}
     bare = replace(made, samples=kept, channels={name: made.channels[name] for name in kept}, history=made.history[:-1])
     bare = bare.with_channel("friction_per_mass_sd", sd, unit="m/s^2", source="friction_force")
     return bare.with_channel("friction_per_mass", made["friction"], unit="m/s^2", source="friction_force", step=step)
 
 
-def _stretch(record: Record) -> Array:
-    """Of the spring between mass and base [m]."""
-    return record["z"] - record["x"] if "z" in record else -record["x"]
-
-
 def _ratio(found: Estimate) -> str:
     return f"k/m = {found.value:.5g} +- {NORMAL_95 * found.sd:.2g} 1/s^2 from how it slides"
 
 
-def _fused(record: Record, rig: _Rig, method: str, asked: str) -> Record:
+def _fused(record: Record, rig: Rig, method: str, asked: str) -> Record:
     """The friction force by a smoother that knows the sensors."""
-    record.require("x", question=QUESTION)
+    record.require("x", question=FRICTION)
     sensors = [name for name in FUSIONS[method] if name in record]
     used = [*sensors, *(name for name in ("z", "force") if name in record)]
     whole = [name for name in used if name not in ("a", "load")]  # where these are silent the others speak
-    record.require_clean(*whole, question=QUESTION, samples=LEAST)
-    require_fit(record, *({"force", "load"} & set(used)), length="m", question=QUESTION)
-    record = without_delays(record, *used, question=QUESTION, samples=LEAST)
-    found = fuse(record, Balance(rig.mass, rig.stiffness, rig.damping, rig.damper), sensors)
+    record.require_clean(*whole, question=FRICTION, samples=LEAST)
+    require_fit(record, *({"force", "load"} & set(used)), length="m", question=FRICTION)
+    record = without_delays(record, *used, question=FRICTION, samples=LEAST)
+    found = fuse(record, rig, sensors)
     swinging = [f"{name} on a mount of {mount[0]:g} Hz" for name in sensors if (mount := record.channels[name].mount)]
     words = [
         *_lacking(record, asked, FUSIONS[asked]),
@@ -378,107 +325,4 @@ def _fused(record: Record, rig: _Rig, method: str, asked: str) -> Record:
         made = made.with_channel("v", found.velocity, unit="m/s", source="friction_force", noise=noise)
     if "a" not in record:
         made = made.with_channel("a", found.acceleration, unit="m/s^2", source="friction_force")
-    return _with_friction(made, found.friction, found.friction_sd, step)
-
-
-@dataclass(frozen=True)
-class _Rig:
-    mass: float
-    stiffness: float
-    damping: float
-    damper: str
-    contact: str
-
-    @classmethod
-    def stated(cls, constants: Mapping[str, Any], damper: str, contact: str) -> _Rig:
-        units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
-        values = {name: parse_value(constants[name], unit) for name, unit in units.items()}
-        for name, value in values.items():
-            if value < 0 or (name == "mass" and value == 0):
-                raise ModelError(
-                    f"{name} = {constants[name]}",
-                    "a mass is positive, a stiffness or damping not negative",
-                    f"state the rig's {name} in {units[name]}",
-                )
-        for word, end in (("damper", damper), ("contact", contact)):
-            if end not in ENDS:
-                raise ModelError(f"{word} = '{end}'", f"a {word} goes to the {' or the '.join(ENDS)}", "choose one")
-        return cls(damper=damper, contact=contact, **values)
-
-    def balance(self, record: Record) -> dict[str, dict[int, float]]:
-        """Per channel, the coefficient of each order of its derivative in the friction force."""
-        velocity = ("v", 0) if "v" in record else ("x", 1)
-        acceleration = ("a", 0) if "a" in record else (velocity[0], velocity[1] + 1)
-        terms: dict[str, dict[int, float]] = {"x": {0: -self.stiffness}}
-        for (name, order), constant in ((velocity, self.damping), (acceleration, self.mass)):
-            terms.setdefault(name, {})[order] = -constant
-        if "z" in record:
-            terms["z"] = {0: self.stiffness, 1: self.damping if self.damper == "base" else 0.0}
-        if "force" in record:
-            terms["force"] = {0: 1.0}
-        return terms
-
-    def words(self, record: Record, method: str, width: float, one_filter: bool) -> list[str]:
-        """What was assumed and how derivatives were taken, for the history."""
-        said = [
-            "f = k z - k x - c v - m a"
-            if "z" in record
-            else "no channel z: the base is taken to be fixed, f = - k x - c v - m a"
-        ]
-        if "force" in record:
-            said.append("the applied force is added")
-        measured = [name for name in ("v", "a") if name in record]
-        if measured:
-            said.append(f"{' and '.join(measured)} as measured")
-        if one_filter:
-            said.append(f"all channels smoothed to {width:.4g} Hz (-3 dB)")
-        elif method == "smoother" and len(measured) < 2:
-            said.append(f"the velocity smoothed to {width:.4g} Hz (-3 dB)")
-        elif method == "five-point":
-            said.append("derivatives by central differences and five-point averages")
-        said.append(f"contact against the {self.contact}")
-        return said
-
-
-def _paths(
-    balance: Mapping[str, Mapping[int, float]], derive: Filter, one_filter: bool
-) -> Iterator[tuple[str, Filter, dict[int, float]]]:
-    """Which channel goes through which filter, with which coefficients."""
-    as_measured = replace(derive, method="five-point")  # passes order 0 unchanged
-    for name, terms in balance.items():
-        if one_filter or derive.method == "five-point":
-            yield name, derive, dict(terms)
-            continue
-        # Apart, for the smoother would smooth order 0 too; odd derivatives do not correlate with the sample itself.
-        yield name, as_measured, {0: terms.get(0, 0.0)}
-        if any(terms.get(order) for order in (1, 2)):
-            yield name, derive, {order: c for order, c in terms.items() if order}
-
-
-def _as_measured(record: Record) -> Record:
-    """The record without what an earlier balance made, which would be taken for measured."""
-    measured = {name: record[name] for name in record if is_measured(record, name)}
-    return replace(record, samples=measured) if measured else record
-
-
-def _with_motion(record: Record, derive: Filter) -> Record:
-    """The record with v and a, each differentiated where it was not measured."""
-    source, order = ("v", 0) if "v" in record else ("x", 1)
-    wanted = {"v": (source, order), "a": (source, order + 1)}
-    made = record
-    for (name, (origin, times)), unit in zip(wanted.items(), ("m/s", "m/s^2"), strict=True):
-        if name not in record:
-            noise = noise_along(record[origin], record.fs, record.channels[origin].noise)
-            level = derive.inner_gain({times: 1.0}) * float(np.sqrt(np.mean(noise**2)))
-            values = derive.apply(record[origin], {times: 1.0})
-            made = made.with_channel(name, values, unit=unit, source="friction_force", noise=level)
-    return made
-
-
-def told_rig(record: Record, **given: Any) -> dict[str, Any]:
-    """The rig's constants for :func:`friction_force`: as given, or as the record's last balance was told."""
-    last = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
-    names = ("mass", "stiffness", "damping", "damper", "contact")
-    told = {name: step.get(name) for step in last for name in names}
-    known = {**told, **{name: value for name, value in given.items() if value is not None}}
-    return {name: value for name, value in known.items() if value is not None}
+    return with_friction(made, found.friction, found.friction_sd, step)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.identify.balance import Balance
 from stickslip.record.channels import Channel
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
-from stickslip.signals.differentiate import LEAST, Filter, best_bandwidth, differentiate, noise_along
+from stickslip.signals.differentiate import LEAST, Filter, best_bandwidth, noise_along
 from stickslip.signals.kalman import Motion, Seen, Smoothed, log_likelihood, smooth_motion, surprises
 from stickslip.signals.noise import local_noise
 
@@ -45,30 +45,6 @@ class _Search:
 
 
 WITH_LOAD, WITHOUT = _Search(4, 0.63, 0.25), _Search(6, 0.70, 0.0)
-
-
-@dataclass(frozen=True)
-class Balance:
-    """m a = k (z - x) - c (v - dz/dt or 0) + P - f."""
-
-    mass: float
-    stiffness: float
-    damping: float
-    damper: str
-
-    @classmethod
-    def told(cls, rig: Mapping[str, Any]) -> Balance:
-        """As the arguments of friction_force say."""
-        return cls(rig["mass"], rig["stiffness"], rig["damping"], rig["damper"])
-
-    def pull(self, record: Record) -> Array:
-        """What spring, applied force and a damper to the base do to the mass [N]; not what its own velocity does."""
-        pull = np.array(record["force"]) if "force" in record else np.zeros(len(record))
-        if "z" in record:
-            pull += self.stiffness * record["z"]
-            if self.damper == "base" and self.damping:
-                pull += self.damping * differentiate(record["z"], record.fs).values
-        return np.asarray(pull - self.stiffness * record["x"])
 
 
 @dataclass(frozen=True, eq=False)

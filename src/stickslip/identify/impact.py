@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
-from stickslip.identify.force import told_rig
+from stickslip.identify.balance import told_rig
 from stickslip.identify.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.identify.balance import Balance
 from stickslip.identify.force import FUSIONS
-from stickslip.identify.fusion import Balance, Held, fuse
+from stickslip.identify.fusion import Held, fuse
 from stickslip.identify.motion import is_measured, stretches
 from stickslip.record.record import Record
 

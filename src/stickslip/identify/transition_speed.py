@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.identify.balance import Balance
 from stickslip.identify.contact import contact_stiffness
-from stickslip.identify.fusion import Balance
 from stickslip.identify.likely_contact import HELD, LEAST, LikelyContact, held_steps, likely_contact
 from stickslip.identify.loops import Loops, friction_loops
 from stickslip.identify.motion import is_measured
