@@ -20,7 +20,8 @@ from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
 from stickslip.identify.decrement import Decrement, decrement
 from stickslip.identify.envelope import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
-from stickslip.identify.release import SEEN, Releases, find_releases
+from stickslip.identify.release import Releases, find_releases
+from stickslip.identify.swings import SEEN
 from stickslip.record.record import Record
 from stickslip.units import parse_value
 
