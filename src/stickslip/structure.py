@@ -212,31 +212,16 @@ class Structure:
     rotations: Sequence[int] = ()
 
     def __post_init__(self) -> None:
-        mass = _matrix("mass", self.mass)
-        size = len(mass)
-        object.__setattr__(self, "mass", mass)
-        for name in ("damping", "stiffness"):
+        size = len(_matrix("mass", self.mass))
+        for name in ("mass", "damping", "stiffness"):
             object.__setattr__(self, name, _matrix(name, getattr(self, name), size))
-        if not np.array_equal(mass, mass.T) or not _positive(mass):
-            raise ModelError(
-                f"mass = {mass.tolist()} kg",
-                "a mass matrix is symmetric and positive definite",
-                "correct mass=: every degree of freedom needs a mass",
-            )
+        _require_mass(np.asarray(self.mass))
         _require_symmetric(np.asarray(self.stiffness))
         if isinstance(self.contacts, Contact) or not all(isinstance(contact, Contact) for contact in self.contacts):
             raise ModelError(f"contacts = {self.contacts!r}", "contacts are a list of Contact", "give contacts=[...]")
         object.__setattr__(self, "contacts", tuple(self.contacts))
         require_drive(self.drive)
-        for contact in self.contacts:
-            for name in ("tangent", "normal"):
-                row = getattr(contact, name)
-                if row is not None and len(row) != size:
-                    raise ModelError(
-                        f"{name} of {len(row)} numbers in a structure of {size} degrees of freedom",
-                        "a direction has a number for each degree of freedom",
-                        f"correct {name}= of the contact",
-                    )
+        _require_directions(self.contacts, size)
         share = np.ones(size) if self.acts_on is None else _direction("acts_on", self.acts_on)
         if share.shape != (size,):
             raise ModelError(f"acts_on of {len(share)} numbers", f"it has {size}", "correct acts_on=")
@@ -245,21 +230,8 @@ class Structure:
             raise ModelError(
                 f"damper = '{self.damper}'", "the dampers are fixed to the 'ground' or the 'base'", "choose one"
             )
-        angles = np.atleast_1d(np.asarray(self.rotations, dtype=object)).tolist()
-        if not all(isinstance(angle, int) and 1 <= angle <= size for angle in angles):
-            raise ModelError(
-                f"rotations = {self.rotations!r}",
-                f"they are numbers of degrees of freedom, from 1 to {size}",
-                "correct rotations=",
-            )
-        object.__setattr__(self, "rotations", tuple(angles))
-        rigid = [contact.tangent for contact in self.contacts if any(m.friction is None for m in contact.modes())]
-        if rigid and np.linalg.matrix_rank(np.array(rigid)) < len(rigid):
-            raise ModelError(
-                f"{len(rigid)} rigid contacts whose directions of sliding depend on each other",
-                "the forces that hold them would be undetermined",
-                "give one of them a tangential stiffness (CompliantContact)",
-            )
+        object.__setattr__(self, "rotations", _angles(self.rotations, size))
+        _require_determined(self.contacts)
 
     @property
     def size(self) -> int:
@@ -299,6 +271,50 @@ def _of_speed(quantity: Row) -> Row:
     if "v" not in quantity:
         return quantity
     return {"always" if name == "1" else name: share for name, share in quantity.items()}
+
+
+def _require_directions(contacts: Sequence[Contact], size: int) -> None:
+    for contact in contacts:
+        for name in ("tangent", "normal"):
+            row = getattr(contact, name)
+            if row is not None and len(row) != size:
+                raise ModelError(
+                    f"{name} of {len(row)} numbers in a structure of {size} degrees of freedom",
+                    "a direction has a number for each degree of freedom",
+                    f"correct {name}= of the contact",
+                )
+
+
+def _require_determined(contacts: Sequence[Contact]) -> None:
+    """Refuse rigid contacts that hold one motion twice: how they share its force is not told."""
+    rigid = [contact.tangent for contact in contacts if any(m.friction is None for m in contact.modes())]
+    if rigid and np.linalg.matrix_rank(np.array(rigid)) < len(rigid):
+        raise ModelError(
+            f"{len(rigid)} rigid contacts whose directions of sliding depend on each other",
+            "the forces that hold them would be undetermined",
+            "give one of them a tangential stiffness (CompliantContact)",
+        )
+
+
+def _angles(rotations: Sequence[int], size: int) -> tuple[int, ...]:
+    """The degrees of freedom that turn, counted from 1."""
+    angles = np.atleast_1d(np.asarray(rotations, dtype=object)).tolist()
+    if not all(isinstance(angle, int) and 1 <= angle <= size for angle in angles):
+        raise ModelError(
+            f"rotations = {rotations!r}",
+            f"they are numbers of degrees of freedom, from 1 to {size}",
+            "correct rotations=",
+        )
+    return tuple(angles)
+
+
+def _require_mass(mass: Array) -> None:
+    if not np.array_equal(mass, mass.T) or not _positive(mass):
+        raise ModelError(
+            f"mass = {mass.tolist()} kg",
+            "a mass matrix is symmetric and positive definite",
+            "correct mass=: every degree of freedom needs a mass",
+        )
 
 
 def _require_symmetric(stiffness: Array) -> None:
