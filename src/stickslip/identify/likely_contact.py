@@ -76,6 +76,48 @@ def likely_contact(record: Record) -> LikelyContact:
 
 def _likeliest(record: Record) -> LikelyContact:
     balance, sensors, fused = _told(record)
+    seen = _looked_through(record, balance, sensors, fused=fused)
+    sticks, search = seen.sticks, _Search.of(seen.parts, balance, record.fs)
+    best, covariance = search.peak(max(balance.stiffness, seen.slope))
+    misfit = np.mean([part.misfit(math.exp(best[0]), best[1]) for part in seen.parts], axis=0)
+    stray, scale = _stray(misfit, sensors), max(1.0, float(misfit.max()))
+    _require_spring(best, balance)
+    words = []
+    if scale > STRAYS:  # what a sensor misreads it misreads alike all through a stick
+        words.append(stray)
+        scale *= float(np.median(sticks))
+    words += _unsure(best, balance, record.fs, sticks)
+    # a damping below zero shows how far off the sensors put the contact
+    below = max(1.0, -best[1] / (NORMAL_95 * math.sqrt(scale * covariance[1, 1])))
+    if below > 1 or (best[1] < 0 and scale > STRAYS):
+        words.append(f"{NEGATIVE} ({best[1]:.3g} N s/m)")
+        scale *= below**2
+    if sensors == ["x"]:
+        words.append("from the displacement alone, which blurs where sticks begin and end")
+    told: dict[str, Any] = {
+        "method": METHOD,
+        "status": "; ".join(words) or "ok",
+        "checks": (
+            f"{len(sticks)} sticks, in which the friction is below {HELD:g} of {seen.level:.3g} N",
+            f"from {', '.join(sensors)}; a common error of gains, lags or mounts is not in the interval",
+            f"at most, {stray}",
+        ),
+    }
+    estimates = replace(search, scale=scale).estimates(best, scale * covariance, told)
+    return LikelyContact(*estimates, scale * covariance, seen.level, balance)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """The stretches of a record in which the contact holds."""
+
+    parts: list[Held]
+    sticks: list[int]  # samples of each
+    level: float  # of the sliding friction [N]
+    slope: float  # of friction against displacement while it holds [N/m]
+
+
+def _looked_through(record: Record, balance: Balance, sensors: Sequence[str], *, fused: bool) -> _Seen:
     parts, levels, sticks, guesses = [], [], [], []
     for rows in _looked_at(len(record)):
         part = record.rows(rows.start, rows.stop)
@@ -94,36 +136,8 @@ def _likeliest(record: Record) -> LikelyContact:
             f"{FEW} are needed: a contact that holds for less is rigid, or can not be told from a rigid one",
             "sample faster, or longer",
         )
-    search = _Search.of(parts, balance, record.fs)
     across, along = np.sum(guesses, axis=0)
-    best, covariance = search.peak(max(balance.stiffness, across / along))
-    misfit = np.mean([part.misfit(math.exp(best[0]), best[1]) for part in parts], axis=0)
-    stray, scale = _stray(misfit, sensors), max(1.0, float(misfit.max()))
-    _require_spring(best, balance)
-    words = []
-    if scale > STRAYS:  # what a sensor misreads it misreads alike all through a stick
-        words.append(stray)
-        scale *= float(np.median(sticks))
-    words += _unsure(best, balance, record.fs, sticks)
-    # a damping below zero shows how far off the sensors put the contact
-    below = max(1.0, -best[1] / (NORMAL_95 * math.sqrt(scale * covariance[1, 1])))
-    if below > 1 or (best[1] < 0 and scale > STRAYS):
-        words.append(f"{NEGATIVE} ({best[1]:.3g} N s/m)")
-        scale *= below**2
-    if sensors == ["x"]:
-        words.append("from the displacement alone, which blurs where sticks begin and end")
-    level = float(np.mean(levels))
-    told: dict[str, Any] = {
-        "method": METHOD,
-        "status": "; ".join(words) or "ok",
-        "checks": (
-            f"{len(sticks)} sticks, in which the friction is below {HELD:g} of {level:.3g} N",
-            f"from {', '.join(sensors)}; a common error of gains, lags or mounts is not in the interval",
-            f"at most, {stray}",
-        ),
-    }
-    estimates = replace(search, scale=scale).estimates(best, scale * covariance, told)
-    return LikelyContact(*estimates, scale * covariance, level, balance)
+    return _Seen(parts, sticks, float(np.mean(levels)), across / along)
 
 
 def _stray(misfit: Array, sensors: Sequence[str]) -> str:
