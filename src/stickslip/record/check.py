@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.record import flaws
-from stickslip.record.clock import BRIDGED, Stamps, fit_line, inspect, is_uniform
+from stickslip.record.clock import BRIDGED, fit_line, inspect, is_uniform
 from stickslip.record.flaws import Runs
 
 if TYPE_CHECKING:
@@ -136,69 +136,59 @@ def _short(record: Record) -> list[Fault]:
 
 
 def _clock_faults(stamps: Array) -> list[Fault]:
-    clock = inspect(stamps)
+    clock, mended = inspect(stamps), "repair_clock(record)"
+    usual = f"{1e3 * clock.step:.4g} ms"
+    with np.errstate(invalid="ignore"):  # between stamps that are no numbers
+        intervals = np.diff(stamps)
     faults: list[Fault] = []
     if len(clock.missing):
-        runs = _pairs(clock.missing, 0)
-        faults.append(
-            _clock_fault(
-                "missing",
-                runs,
-                _several(len(clock.missing), "time stamp is not a number", "time stamps are not numbers"),
-                "repair_clock(record)",
-                "error",
-            )
-        )
+        what = _several(len(clock.missing), "time stamp is not a number", "time stamps are not numbers")
+        faults.append(_clock_fault("missing", _pairs(clock.missing, 0), what, mended))
     if clock.held:
-        faults.append(_held(stamps, clock))
+        what = _standing_still(stamps)
+        faults.append(_clock_fault("clock", _pairs(clock.repeated), what, mended, verb="relabel them"))
     elif len(clock.repeated):
-        runs = _pairs(clock.repeated)
         what = _several(len(clock.repeated), "time stamp repeats", "time stamps repeat") + " the one before"
-        faults.append(_clock_fault("repeated stamps", runs, what, "repair_clock(record)", "error"))
+        faults.append(_clock_fault("repeated stamps", _pairs(clock.repeated), what, mended))
     if len(clock.backward):
-        back = float(np.min(np.diff(stamps)[clock.backward]))
+        back = float(np.min(intervals[clock.backward]))
         what = f"the time goes back {_several(len(clock.backward), 'time', 'times')}, by up to {-back:.4g} s"
-        faults.append(_clock_fault("backwards", _pairs(clock.backward), what, "repair_clock(record)", "error"))
+        faults.append(_clock_fault("backwards", _pairs(clock.backward), what, mended))
     if len(clock.slower):
-        slow = float(np.median(np.diff(stamps)[clock.slower]))
-        what = (
-            f"{len(clock.slower)} intervals of {1e3 * slow:.4g} ms where the others are {1e3 * clock.step:.4g} ms long"
-        )
-        cure = f"fill_gaps(record, longest={2 * slow:.2g}), or cut them off with record.rows()"
-        faults.append(_clock_fault("rate", _pairs(clock.slower), what, cure, "error"))
+        slow = float(np.median(intervals[clock.slower]))
+        what = f"{len(clock.slower)} intervals of {1e3 * slow:.4g} ms where the others are {usual} long"
+        filled = f"fill_gaps(record, longest={2 * slow:.2g}), or cut them off with record.rows()"
+        faults.append(_clock_fault("rate", _pairs(clock.slower), what, filled))
     if len(clock.gaps):
-        lengths = np.diff(stamps)[clock.gaps]
+        lengths = intervals[clock.gaps]
         lost = int(np.sum(np.maximum(1, np.round(lengths / clock.step) - 1)))
         what = (
             f"{_several(len(clock.gaps), 'gap', 'gaps')} of up to {1e3 * np.max(lengths):.4g} ms "
-            f"where samples come every {1e3 * clock.step:.4g} ms, about {_several(lost, 'sample', 'samples')} lost"
+            f"where samples come every {usual}, about {_several(lost, 'sample', 'samples')} lost"
         )
-        faults.append(_clock_fault("gap", _pairs(clock.gaps), what, "fill_gaps(record)", "error"))
+        faults.append(_clock_fault("gap", _pairs(clock.gaps), what, "fill_gaps(record)"))
     if len(clock.uneven):
-        off = np.abs(np.diff(stamps)[clock.uneven] / clock.step - 1)
-        usual = f"{1e3 * clock.step:.4g} ms"
+        off = 100 * np.max(np.abs(intervals[clock.uneven] / clock.step - 1))
         many = _several(len(clock.uneven), "interval is uneven", "intervals are uneven")
-        what = f"{many}, off by up to {100 * np.max(off):.2g} % of {usual}"
-        cure = "fill_gaps(record)" if len(clock.gaps) else "repair_clock(record)"
-        faults.append(_clock_fault("jitter", _pairs(clock.uneven), what, cure, "error"))
+        what = f"{many}, off by up to {off:.2g} % of {usual}"
+        filled = "fill_gaps(record)" if len(clock.gaps) else mended
+        faults.append(_clock_fault("jitter", _pairs(clock.uneven), what, filled))
     return faults
 
 
-def _held(stamps: Array, clock: Stamps) -> Fault:
+def _standing_still(stamps: Array) -> str:
     jumps = np.flatnonzero(np.diff(stamps) > 0)
     block = np.diff(jumps)
     low, high = np.percentile(block, [10, 90]) if len(block) else (len(stamps), len(stamps))
     line = fit_line(stamps)
-    what = (
+    return (
         f"the time stamps stand still for {low:.0f} to {high:.0f} rows and then jump by "
         f"{1e3 * float(np.median(np.diff(stamps)[jumps])):.3g} ms; the true rate is about {line.fs:.4g} Hz"
     )
-    return _clock_fault("clock", _pairs(clock.repeated), what, "repair_clock(record)", "error")
 
 
-def _clock_fault(kind: str, runs: Runs, what: str, cure: str, severity: str) -> Fault:
-    verb = "relabel them" if kind == "clock" else "mend the clock"
-    return Fault(kind, None, runs, f"{what} ({in_words(runs)}); {verb} with {cure}.", severity)
+def _clock_fault(kind: str, runs: Runs, what: str, cure: str, *, verb: str = "mend the clock") -> Fault:
+    return Fault(kind, None, runs, f"{what} ({in_words(runs)}); {verb} with {cure}.", "error")
 
 
 def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
