@@ -370,19 +370,8 @@ def _received(
     headers = {name: re.fullmatch(r"(.*?)\s*\[([^\]]*)\]\s*", name) for name in arrays}
     names = {name: _identifier(match[1] if match else name) for name, match in headers.items()}
     chosen = {name: match[2] for name, match in headers.items() if match} | dict(stated) | dict(units)
-    if len(set(names.values())) < len(names):
-        raise RecordError(
-            f"columns {', '.join(arrays)} give channels {', '.join(names.values())}",
-            "channels have different names of letters, digits and _",
-            "rename the columns",
-        )
-    lengths = {len(values) for values in arrays.values()} | ({len(axis)} if axis is not None else set())
-    if len(lengths) > 1:
-        raise RecordError(
-            f"columns and time axis have {', '.join(map(str, sorted(lengths)))} values",
-            "one record has one clock",
-            "cut them to the same rows",
-        )
+    _require_distinct(names)
+    _require_one_length(arrays, axis)
     clock = _clock(axis, fs)
     record = Record.of(
         {names[column]: values for column, values in arrays.items()},
@@ -403,6 +392,25 @@ def _received(
         stamps=clock.stamps,
         history=(*before, Step(step.action, step.arguments, outcome)),
     )
+
+
+def _require_distinct(names: Mapping[str, str]) -> None:
+    if len(set(names.values())) < len(names):
+        raise RecordError(
+            f"columns {', '.join(names)} give channels {', '.join(names.values())}",
+            "channels have different names of letters, digits and _",
+            "rename the columns",
+        )
+
+
+def _require_one_length(arrays: Mapping[str, Array], axis: Array | None) -> None:
+    lengths = {len(values) for values in arrays.values()} | ({len(axis)} if axis is not None else set())
+    if len(lengths) > 1:
+        raise RecordError(
+            f"columns and time axis have {', '.join(map(str, sorted(lengths)))} values",
+            "one record has one clock",
+            "cut them to the same rows",
+        )
 
 
 def _unchanged(
