@@ -121,16 +121,10 @@ def continue_orbit(orbit: SteadyState, parameter: str, *, to: float, step: float
     >>> branch.status, round(float(branch.amplitudes[-1]), 6)
     ('complete', 2.626105)
     """
-    if orbit.order < 1 or orbit.status == "rest" or not math.isfinite(orbit.orbit.table.motion.period):
-        raise ModelError(
-            f"the orbit is '{orbit.status}'", "a branch starts at an orbit with the period of a drive", "find one"
-        )
-    first = _value(orbit.orbit.system, parameter)
-    if not (math.isfinite(to) and to != first):
-        raise ModelError(f"to = {to}", f"the far value is finite and not the first one, {first}", "give another")
+    first = _start(orbit, parameter, to)
     if not (0 < step <= 1 and most > 1):
         raise ModelError(f"step = {step}, most = {most}", "0 < step <= 1 and at least 2 orbits", "correct them")
-    orbit.orbit.system.having(**{parameter: to})
+    orbit.orbit.system.having(**{parameter: to})  # refuses a value without meaning
     map_ = _family(orbit, parameter, first, to - first)
     begin = _correct(map_, np.append(_scaled(orbit), 0.0), int(orbit.orbit.modes[0]), _along(orbit))
     if begin is None:
@@ -175,6 +169,18 @@ def continue_orbit(orbit: SteadyState, parameter: str, *, to: float, step: float
         tuple(j for j in range(1, len(found)) if cycles[j] != cycles[j - 1]),
         status,
     )
+
+
+def _start(orbit: SteadyState, parameter: str, to: float) -> float:
+    """The parameter's value where the branch starts."""
+    if orbit.order < 1 or orbit.status == "rest" or not math.isfinite(orbit.orbit.table.motion.period):
+        raise ModelError(
+            f"the orbit is '{orbit.status}'", "a branch starts at an orbit with the period of a drive", "find one"
+        )
+    first = _value(orbit.orbit.system, parameter)
+    if not (math.isfinite(to) and to != first):
+        raise ModelError(f"to = {to}", f"the far value is finite and not the first one, {first}", "give another")
+    return first
 
 
 def _value(system: System, parameter: str) -> float:
