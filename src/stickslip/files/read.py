@@ -363,16 +363,6 @@ def _open(
     if fs is not None and not (np.isfinite(fs) and fs > 0):
         raise RecordError(f"fs = {fs} Hz", "a sampling rate is positive and finite", "pass fs= in Hz")
     sources = tuple(_source(one, options) for one in paths)
-    said = {
-        "channels": dict(channels) if channels is not None else None,
-        "fs": fs,
-        "units": dict(units) if units else None,
-        "time": time,
-        "rows": list(rows) if rows is not None else None,
-        "delimiter": options.delimiter,
-        "decimal": options.decimal,
-    }
-    arguments = {name: value for name, value in said.items() if value is not None}
     columns = Columns(sources)
     times = columns.time(time, units or {}) if fs is None or time is not None else {}
     notes = [note for source in sources for note in source.table.notes]
@@ -390,6 +380,16 @@ def _open(
             "a record needs one channel at least",
             "check the file, or name columns in channels=",
         )
+    said = {
+        "channels": dict(channels) if channels is not None else None,
+        "fs": fs,
+        "units": dict(units) if units else None,
+        "time": time,
+        "rows": list(rows) if rows is not None else None,
+        "delimiter": options.delimiter,
+        "decimal": options.decimal,
+    }
+    arguments = {name: value for name, value in said.items() if value is not None}
     return _Reading(sources, tuple(wanted), times, fs, rows or (None, None), arguments, tuple(notes))
 
 

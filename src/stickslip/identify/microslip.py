@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -134,17 +135,7 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
         for piece in window.glides:
             begin, end = _edges(window, piece, ringing.pole / ringing.fs)
             events.append(MicroSlip(ringing.time(window, begin), (end - begin) / ringing.fs, number))
-    share = sum(count > 0 for count in counts) / len(counts)
     astray = not_one_mode(ringing)
-    kind = (
-        UNTOLD
-        if astray
-        else "double stick-slip"
-        if share > 0.5
-        else "some sticks slip"
-        if share > 0
-        else "no micro-slips"
-    )
     per_stick = mean_of_cycles(
         "micro-slips per stick", [float(count) for count in counts], unit="1",
         method="cuts between rings of one mode, by dynamic programming",
@@ -155,7 +146,13 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
     per_stick = replace(
         per_stick, interval=(max(low, 0.0), high), status=per_stick.status if status == "ok" else status
     )
-    return MicroSlips(per_stick, tuple(events), counts, kind, status)
+    return MicroSlips(per_stick, tuple(events), counts, UNTOLD if astray else _kind(counts), status)
+
+
+def _kind(counts: Sequence[int]) -> str:
+    """What sticks that hold so many micro-slips each are called."""
+    share = sum(count > 0 for count in counts) / len(counts)
+    return "double stick-slip" if share > 0.5 else "some sticks slip" if share > 0 else "no micro-slips"
 
 
 def _edges(window: Window, glide: Piece, pole: complex) -> tuple[float, float]:

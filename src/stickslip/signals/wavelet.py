@@ -503,6 +503,15 @@ def _grid(
         wanted = np.array([lowest / LONGEST, HIGHEST * fs])
     else:
         wanted = np.atleast_1d(np.asarray(frequencies, dtype=float))
+    _require_frequencies(wanted, lowest, fs, duration)
+    if len(wanted) == 2:
+        count = max(2, round(voices * math.log2(wanted[1] / wanted[0])) + 1)
+        wanted = np.geomspace(wanted[0], wanted[1], count)
+    return _Grid(wanted, float(centre), normalisation, corrected)
+
+
+def _require_frequencies(wanted: Array, lowest: float, fs: float, duration: float) -> None:
+    """Refuse frequencies of which the record holds nothing; both its ends are felt at twice `lowest`."""
     if (
         wanted.ndim != 1
         or not wanted.size
@@ -525,10 +534,6 @@ def _grid(
             f"the lowest frequency that it allows is {2 * lowest:.4g} Hz",
             "give a longer record or ask for higher frequencies",
         )
-    if len(wanted) == 2:
-        count = max(2, round(voices * math.log2(wanted[1] / wanted[0])) + 1)
-        wanted = np.geomspace(wanted[0], wanted[1], count)
-    return _Grid(wanted, float(centre), normalisation, corrected)
 
 
 def _checked_centre(centre: float) -> None:
