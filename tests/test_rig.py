@@ -11,7 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.errors import ModelError
 from stickslip.record.channels import VOCABULARY
-from stickslip.rig import SENSED, Digitiser, Mount, Noise, Sensor
+from stickslip.rig.sensor import SENSED, Digitiser, Mount, Noise, Sensor
 
 
 @cache

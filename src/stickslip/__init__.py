@@ -197,11 +197,11 @@ if TYPE_CHECKING:
     from stickslip.laws.time_delay import TimeDelay as TimeDelay
     from stickslip.oscillator import Oscillator as Oscillator
     from stickslip.plot.animation import animate as animate
-    from stickslip.rig import (
+    from stickslip.rig.rig import Rig as Rig
+    from stickslip.rig.sensor import (
         Digitiser as Digitiser,
         Mount as Mount,
         Noise as Noise,
-        Rig as Rig,
         Sensor as Sensor,
     )
     from stickslip.reports.simulation import (
@@ -363,7 +363,7 @@ _ROOMS = {
     "dither": "regimes.dither", "Dither": "regimes.dither", "dithered_friction": "regimes.dither",
     "plot_bifurcation": "plot.bifurcation", "plot_basins": "plot.bifurcation", "plot_boundary": "plot.bifurcation",
     "plot_dither": "plot.bifurcation",
-    "Rig": "rig", "Sensor": "rig", "Mount": "rig", "Noise": "rig", "Digitiser": "rig",
+    "Rig": "rig.rig", "Sensor": "rig.sensor", "Mount": "rig.sensor", "Noise": "rig.sensor", "Digitiser": "rig.sensor",
     "scenarios": "scenarios", "export_system": "system_export",
     "read_system": "system_file", "scenario_case": "system_file", "Case": "system_file",
     "outcome": "reports.simulation", "Outcome": "reports.simulation", "publish_run": "reports.simulation",

@@ -19,7 +19,7 @@ from stickslip.identify.sensor_delay import sensor_delay
 from stickslip.laws.base import finite
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
-from stickslip.rig import Rig
+from stickslip.rig.rig import Rig
 from stickslip.solve.trajectory import Trajectory
 from stickslip.units import parse_value, prefixed
 

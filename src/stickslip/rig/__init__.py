@@ -1,0 +1,1 @@
+"""The virtual rig: what real sensors would have written of a simulated motion."""
