@@ -138,6 +138,7 @@ if TYPE_CHECKING:
         resample as resample,
         restore_clipped as restore_clipped,
     )
+    from stickslip.signals.stft import stft_map as stft_map
     from stickslip.signals.synchronise import (
         clock_offset as clock_offset,
         clock_rate as clock_rate,
@@ -147,7 +148,6 @@ if TYPE_CHECKING:
         cone_of_influence as cone_of_influence,
         dyadic_map as dyadic_map,
         inverse_wavelet as inverse_wavelet,
-        stft_map as stft_map,
         wavelet_blocks as wavelet_blocks,
         wavelet_map as wavelet_map,
         wavelet_overview as wavelet_overview,
@@ -277,7 +277,7 @@ _ROOMS = {
     "synchronise": "signals.synchronise", "clock_offset": "signals.synchronise", "clock_rate": "signals.synchronise",
     "differentiate": "signals.differentiate", "smooth": "signals.differentiate",
     "wavelet_map": "signals.wavelet", "wavelet_blocks": "signals.wavelet", "wavelet_overview": "signals.wavelet",
-    "dyadic_map": "signals.wavelet", "stft_map": "signals.wavelet", "cone_of_influence": "signals.wavelet",
+    "dyadic_map": "signals.wavelet", "stft_map": "signals.stft", "cone_of_influence": "signals.wavelet",
     "find_ridges": "signals.ridges", "local_maxima": "signals.ridges", "find_spikes": "signals.ridges",
     "Ridge": "signals.ridges", "LocalMaximum": "signals.ridges", "Spike": "signals.ridges",
     "slip_ringing": "identify.slip_ringing", "SlipRinging": "identify.slip_ringing",

@@ -21,7 +21,8 @@ from stickslip.identify.slip_ringing import SlipRinging, slip_ringing
 from stickslip.identify.transition import Transition, transition_of
 from stickslip.record.record import Record
 from stickslip.signals.ridges import Ridge, Spike, find_ridges, find_spikes
-from stickslip.signals.wavelet import CENTRE, wavelet_map, wavelet_overview
+from stickslip.signals.wavelet import wavelet_map, wavelet_overview
+from stickslip.signals.wavelet_grid import CENTRE
 from stickslip.units import parse_range
 
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ from stickslip.identify.mechanism import not_one_mode
 from stickslip.identify.ringing import Ringing, Window, checked_mass, find_ringing
 from stickslip.record.record import Record
 from stickslip.signals.morlet import ridge_centre
-from stickslip.signals.wavelet import CENTRE, wavelet_map
+from stickslip.signals.wavelet import wavelet_map
+from stickslip.signals.wavelet_grid import CENTRE
 from stickslip.statistics import correlation_time, least_squares, mean_of_cycles, student
 
 Array = NDArray[np.float64]

@@ -24,7 +24,8 @@ from stickslip.plot.style import (
     styled,
 )
 from stickslip.signals.pieces import RING
-from stickslip.signals.wavelet import CENTRE, ends, wavelet_map
+from stickslip.signals.wavelet import ends, wavelet_map
+from stickslip.signals.wavelet_grid import CENTRE
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,8 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,39 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import RecordError
 from stickslip.record.exchange import labelled_arrays
 from stickslip.record.record import Record
-from stickslip.signals.morlet import REACH, normalised_gain, ridge_centre, transform
+from stickslip.signals.morlet import REACH, normalised_gain, transform
+from stickslip.signals.wavelet_grid import CENTRE, LEAST, QUESTION, Grid, attributes_of, check_centre, grid_of, labelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Array = NDArray[np.float64]
 
-QUESTION = "a wavelet map"
-CENTRE = 4.5  # the thesis's wavelet: e-folding after 0.7 of a cycle
 VOICES = 16
-LEAST = 16  # samples
-HIGHEST = 0.25  # of the rate, for the default range: above, the wavelet's spectrum is cut at half the rate
-LONGEST = 0.25  # of the record on either side may be near an end, at the lowest frequency of the default range
 LARGEST = 4 << 30  # bytes of a map
 BLOCK_BYTES = 256 << 20  # of a map of one block
 COVERED = (1e-3, 0.4)  # of the highest sum of the Gaussians: frequencies below are not in the map, those above wholly
-NORMALISATIONS = ("energy", "amplitude")
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """The wavelet, and the frequencies it is asked for."""
-
-    frequencies: Array
-    centre: float
-    normalisation: str
-    corrected: bool
-
-    @property
-    def scales(self) -> Array:
-        """Dilation [s] of each frequency."""
-        told = ridge_centre(self.centre, self.normalisation) if self.corrected else self.centre
-        return np.asarray(told / (2 * np.pi * self.frequencies))
 
 
 def wavelet_map(
@@ -118,7 +96,7 @@ def wavelet_map(
     (47.0, 0.3)
     """
     record.require_clean(channel, question=QUESTION, samples=LEAST)
-    grid = _grid(frequencies, voices, wavelet_frequency, normalisation, corrected, record.fs, record.duration)
+    grid = grid_of(frequencies, voices, wavelet_frequency, normalisation, corrected, record.fs, record.duration)
     if precision not in REACH:
         raise RecordError(f"precision = '{precision}'", f"there are {', '.join(REACH)}", "choose one of them")
     size = (16 if precision == "double" else 8) * len(record) * len(grid.frequencies)
@@ -133,7 +111,7 @@ def wavelet_map(
         record[channel] - mean, record.fs, grid.scales, centre=grid.centre, normalisation=normalisation,
         precision=precision,
     )  # fmt: skip
-    return _labelled(values, record.time, grid, record, channel, mean)
+    return labelled(values, record.time, grid, record, channel, mean)
 
 
 def wavelet_blocks(
@@ -185,7 +163,7 @@ def wavelet_blocks(
     if first is None:
         raise RecordError("no block at all", f"{QUESTION} needs one at least", "check the file")
     first.require_clean(channel, question=QUESTION, samples=LEAST)
-    grid = _grid(frequencies, voices, wavelet_frequency, normalisation, corrected, first.fs, first.duration)
+    grid = grid_of(frequencies, voices, wavelet_frequency, normalisation, corrected, first.fs, first.duration)
     mean = float(first[channel].mean())
     margin = math.ceil(REACH["double"] * float(grid.scales.max()) * first.fs)
     if size is None:
@@ -196,7 +174,7 @@ def wavelet_blocks(
     for kept, offset, last in _windows(first, parts, channel, size, margin):
         rows = size if not last else len(kept) - (begin - offset)
         wanted = _inner(kept - mean, begin - offset, rows, first.fs, grid)
-        yield _labelled(wanted, first.start + (begin + np.arange(rows)) / first.fs, grid, first, channel, mean)
+        yield labelled(wanted, first.start + (begin + np.arange(rows)) / first.fs, grid, first, channel, mean)
         begin += rows
 
 
@@ -301,7 +279,7 @@ def dyadic_map(record: Record, channel: str, *, wavelet_frequency: float = CENTR
     [1, 2, 3, 4, 5, 6, 7, 8]
     """
     record.require_clean(channel, question=QUESTION, samples=LEAST)
-    _checked_centre(wavelet_frequency)
+    check_centre(wavelet_frequency)
     deepest = int(math.log2(len(record) / (2 * math.sqrt(2)))) if len(record) > 2 * math.sqrt(2) else 0
     levels = [m for m in range(deepest + 1) if wavelet_frequency / (2 * math.pi * 2**m) < 0.5]
     scales = np.array([2.0**m for m in levels]) / record.fs
@@ -309,7 +287,7 @@ def dyadic_map(record: Record, channel: str, *, wavelet_frequency: float = CENTR
     values = transform(record[channel] - mean, record.fs, scales, centre=wavelet_frequency, normalisation="energy")
     picked = [row[:: 2**m] for m, row in zip(levels, values, strict=True)]
     counts = [len(row) for row in picked]
-    grid = _Grid(wavelet_frequency / (2 * np.pi * scales), wavelet_frequency, "energy", corrected=False)
+    grid = Grid(wavelet_frequency / (2 * np.pi * scales), wavelet_frequency, "energy", corrected=False)
     places = np.concatenate([np.arange(count) for count in counts])
     scale = np.repeat(scales, counts)
     along = {
@@ -320,68 +298,8 @@ def dyadic_map(record: Record, channel: str, *, wavelet_frequency: float = CENTR
         "n": ("point", places),
     }
     xarray = labelled_arrays("wavelet maps")
-    attributes = _attributes(grid, record, channel, mean)
+    attributes = attributes_of(grid, record, channel, mean)
     result: xr.DataArray = xarray.DataArray(np.concatenate(picked), dims="point", coords=along, attrs=attributes)
-    return result
-
-
-def stft_map(record: Record, channel: str, *, nperseg: int | None = None, window: str = "hann") -> xr.DataArray:
-    """The short-time Fourier transform, for comparison: one window length for all frequencies.
-
-    Parameters
-    ----------
-    record : Record
-        At one rate.
-    channel : str
-        Which channel; its mean is taken off.
-    nperseg : int, optional
-        Samples of a window; the power of two next to a tenth of a second, or an eighth of the record.
-    window : str
-        As scipy.signal.get_window names it.
-
-    Returns
-    -------
-    xarray.DataArray
-        Complex, ``(frequency, time)``; the modulus of a tone is its amplitude.
-
-    Raises
-    ------
-    RecordError
-        A channel that is missing or not finite, a broken clock, a window longer than the record.
-
-    Examples
-    --------
-    >>> record = Record.of({"a": 0.3 * np.sin(2 * np.pi * 50 * np.arange(4000) / 1000)}, fs=1000)
-    >>> found = abs(stft_map(record, "a", nperseg=200))
-    >>> round(float(found.sel(frequency=50.0, time=2.0)), 3)
-    0.3
-    """
-    from scipy.signal import ShortTimeFFT
-
-    record.require_clean(channel, question="a short-time Fourier transform", samples=LEAST)
-    count = len(record)
-    if nperseg is None:
-        nperseg = max(8, min(1 << round(math.log2(max(8, 0.1 * record.fs))), count // 8))
-    if not 4 <= nperseg <= count:
-        raise RecordError(
-            f"nperseg = {nperseg} of {count} samples", "a window has 4 samples at least, and fits into the record",
-            "choose it between",
-        )  # fmt: skip
-    hop = max(1, nperseg // 8)
-    short = ShortTimeFFT.from_window(
-        window, record.fs, nperseg, nperseg - hop, scale_to="magnitude", phase_shift=None, fft_mode="onesided2X"
-    )
-    mean = float(record[channel].mean())
-    values = short.stft(record[channel] - mean)
-    times = record.start + short.t(count)
-    inside = (times >= record.start) & (times < record.start + record.duration)
-    xarray = labelled_arrays("wavelet maps")
-    result: xr.DataArray = xarray.DataArray(
-        values[:, inside], dims=("frequency", "time"),
-        coords={"frequency": ("frequency", short.f, {"units": "Hz"}), "time": ("time", times[inside], {"units": "s"})},
-        attrs={"units": record.channels[channel].unit, "channel": channel, "fs": record.fs, "nperseg": nperseg,
-               "window": window, "normalisation": "amplitude", "mean": mean},
-    )  # fmt: skip
     return result
 
 
@@ -487,105 +405,7 @@ def _smooth_step(values: Array) -> Array:
     return np.asarray(inside**3 * (10 - 15 * inside + 6 * inside**2))
 
 
-def _grid(
-    frequencies: ArrayLike | None, voices: int, centre: float, normalisation: str, corrected: bool,
-    fs: float, duration: float,
-) -> _Grid:  # fmt: skip
-    """The frequencies asked for, checked against the rate and the length of the record."""
-    _checked_centre(centre)
-    if normalisation not in NORMALISATIONS:
-        raise RecordError(f"normalisation = '{normalisation}'", f"there are {', '.join(NORMALISATIONS)}", "choose one")
-    if isinstance(voices, bool) or not isinstance(voices, (int, np.integer)) or not 1 <= voices <= 512:
-        raise RecordError(f"voices = {voices}", "an octave has 1 to 512 frequencies, a whole number", "choose one")
-    told = ridge_centre(centre, normalisation) if corrected else centre
-    lowest = told * math.sqrt(2) / (2 * math.pi * duration)  # where the cones of both ends meet at half of it
-    if frequencies is None:
-        wanted = np.array([lowest / LONGEST, HIGHEST * fs])
-    else:
-        wanted = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    _require_frequencies(wanted, lowest, fs, duration)
-    if len(wanted) == 2:
-        count = max(2, round(voices * math.log2(wanted[1] / wanted[0])) + 1)
-        wanted = np.geomspace(wanted[0], wanted[1], count)
-    return _Grid(wanted, float(centre), normalisation, corrected)
-
-
-def _require_frequencies(wanted: Array, lowest: float, fs: float, duration: float) -> None:
-    """Refuse frequencies of which the record holds nothing; both its ends are felt at twice `lowest`."""
-    if (
-        wanted.ndim != 1
-        or not wanted.size
-        or not np.isfinite(wanted).all()
-        or (wanted <= 0).any()
-        or (np.diff(wanted) <= 0).any()
-    ):
-        raise RecordError(
-            f"frequencies = {_shortly(wanted)}", "they are positive and rise", "give the lowest and the highest in Hz"
-        )
-    if wanted[-1] > fs / 2:
-        raise RecordError(
-            f"a frequency of {wanted[-1]:.6g} Hz at a rate of {fs:g} Hz",
-            f"nothing is known above half the rate, {fs / 2:g} Hz",
-            "ask for lower frequencies",
-        )
-    if wanted[0] < 2 * lowest:
-        raise RecordError(
-            f"a wavelet of {wanted[0]:.4g} Hz feels an end of the record, {duration:.4g} s long, wherever it stands",
-            f"the lowest frequency that it allows is {2 * lowest:.4g} Hz",
-            "give a longer record or ask for higher frequencies",
-        )
-
-
-def _checked_centre(centre: float) -> None:
-    if not 3 <= centre <= 100:
-        raise RecordError(
-            f"wavelet_frequency = {centre}",
-            "it is 3 to 100: below, a wavelet sees the mean; above, it is longer than what it is to tell apart",
-            "leave it at 4.5",
-        )
-
-
-def _shortly(values: Array) -> str:
-    return np.array2string(values, threshold=6, precision=4)
-
-
-def _labelled(
-    values: NDArray[np.complexfloating], time: Array, grid: _Grid, record: Record, channel: str, mean: float
-) -> xr.DataArray:
-    xarray = labelled_arrays("wavelet maps")
-    scales = grid.scales
-    along = {
-        "frequency": ("frequency", grid.frequencies, {"units": "Hz"}),
-        "time": ("time", time, {"units": "s"}),
-        "scale": ("frequency", scales, {"units": "s"}),
-        "bandwidth": ("frequency", math.sqrt(math.log(2)) / (math.pi * scales), {"units": "Hz"}),
-        "cone": ("frequency", math.sqrt(2) * scales, {"units": "s"}),
-    }
-    result: xr.DataArray = xarray.DataArray(
-        values, dims=("frequency", "time"), coords=along, name=f"wavelets of {channel}",
-        attrs=_attributes(grid, record, channel, mean),
-    )  # fmt: skip
-    return result
-
-
-def _attributes(grid: _Grid, record: Record, channel: str, mean: float) -> dict[str, Any]:
-    unit = record.channels[channel].unit
-    return {
-        "units": unit if grid.normalisation == "amplitude" else f"{unit} s^0.5",
-        "channel": channel,
-        "wavelet": "Morlet",
-        "wavelet_frequency": grid.centre,
-        "normalisation": grid.normalisation,
-        "corrected": grid.corrected,
-        "mean": mean,
-        "fs": record.fs,
-        "start": record.start,
-        "end": record.start + (len(record) - 1) / record.fs,
-        "history": [str(step) for step in record.history],
-    }
-
-
-def _inner(values: Array, begin: int, count: int, fs: float, grid: _Grid) -> NDArray[np.complexfloating]:
+def _inner(values: Array, begin: int, count: int, fs: float, grid: Grid) -> NDArray[np.complexfloating]:
     """The map of some samples amid others: a few rows at once, each with as much around as its wavelet reaches."""
     found = np.empty((len(grid.scales), count), dtype=complex)
     row = 0
