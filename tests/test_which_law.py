@@ -253,6 +253,20 @@ def test_a_base_that_was_not_recorded_is_asked_for() -> None:
     assert ss.compare_laws(alone, driven, laws=["Coulomb"]).status == "ok"
 
 
+def test_fewer_strokes_than_parameters_are_told() -> None:
+    short = record("LuGre").rows(0, int(FS / 8.7))
+    found = ss.fit_law(short, slider().having(law=TRUE["LuGre"]), free=["kinetic", "static", "speed"], intervals=False)
+    assert "for 3 parameters: give a record of more cycles" in found.status
+
+
+def test_forces_are_no_surer_than_the_bases_calibration() -> None:
+    """All motion scales with it: a base that reads 1 % too much makes the friction 1 % too large."""
+    found = ss.compare_laws(record("Coulomb"), slider(), laws=["Coulomb"], calibration=0.02)
+    level = found.fit.parameters["kinetic"]
+    assert level.sd == pytest.approx(0.02 * level.value, rel=0.05)
+    assert found.fit.parameters["x.gain"].sd < 0.01
+
+
 def test_one_way_without_a_stop_is_refused() -> None:
     time = np.arange(4 * FS) / FS
     steady = ss.Record.of({"v": 5e-3 + 3e-3 * np.sin(40 * time)}, fs=FS)

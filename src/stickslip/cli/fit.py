@@ -63,8 +63,9 @@ def fit(
     """Find which friction law it is, with its parameters.
 
     FILES are records of one rig, best at several excitations: displacement or velocity of the mass, the base's motion
-    z, and what else was measured (acceleration, load cell). Each law is simulated exactly and fitted to all records at
-    once; told is which laws the records leave possible, how sure that is, and the best law's parameters.
+    z, and what else was measured (acceleration, load cell). Files that belong to one record are joined with +, as in
+    x.mat+z.mat. Each law is simulated exactly and fitted to all records at once; told is which laws the records leave
+    possible, how sure that is, and the best law's parameters.
 
     Results go into a folder: report.html to open in a browser, results.json, and the figures.
 

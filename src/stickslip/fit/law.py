@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
-from stickslip.fit.search import Knob, Point, Problem, descend
+from stickslip.fit.search import TRUSTED, Knob, Point, Problem, descend
 from stickslip.fit.start import (
     Shown,
     best_start,
@@ -21,6 +21,7 @@ from stickslip.fit.start import (
     knob,
     seen_profile,
     thinned_out,
+    too_few,
     value_of,
 )
 from stickslip.fit.stretch import channels_of
@@ -275,14 +276,14 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
         system = system.having(kinetic=level.value)
     checks = tuple(f"{name} is left with {residual[name] / noise[name]:.3g} times its noise" for name in residual)
     worst = max(residual, key=lambda name: residual[name] / noise[name])
-    status = "ok"
+    worries = [too_few(shown, sum(knob.kind not in TRUSTED for knob in problem.knobs))]
     if residual[worst] > MISFIT * noise[worst]:
         times = residual[worst] / noise[worst]
-        status = f"{worst} is left with {times:.3g} times its noise: the law is not the whole of it"
+        worries.append(f"{worst} is left with {times:.3g} times its noise: the law is not the whole of it")
     return LawFit(
         replace(system, drive=problem.oscillator.drive), parameters, _between(problem, sure), noise, residual,
         point.chi2, sum(counts.values()), len(problem.knobs), tuple(traces), "rough" if problem.profile else "even",
-        status, checks,
+        "; ".join(filter(None, worries)) or "ok", checks,
     )  # fmt: skip
 
 

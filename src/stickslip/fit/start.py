@@ -135,6 +135,15 @@ class Shown:
         return max(found, FINEST * float(np.ptp(values)), 1e-300)
 
 
+def too_few(shown: Sequence[Shown], count: int) -> str:
+    """What to say where a law has more parameters than the records have strokes; nothing where it has not."""
+    strokes = sum(len(each.turns) + 1 for each in shown)
+    if strokes >= count:
+        return ""
+    many = f"{strokes} stroke{'s' * (strokes > 1)} from one reversal to the next"
+    return f"{many} for {count} parameters: give a record of more cycles"
+
+
 def _turns(velocity: Array, fastest: float) -> NDArray[np.intp]:
     moving = np.flatnonzero(np.abs(velocity) > TURNED * fastest)
     return np.asarray(moving[1:][np.diff(np.sign(velocity[moving])) != 0])

@@ -181,6 +181,12 @@ def from_simpler(name: str, trials: Mapping[str, Trial]) -> list[Any]:
         stiffness = stiffest(rigid, trials["Coulomb"].problem.stretches, STIFFEST)
         damping = 0.2 * math.sqrt(stiffness * rigid.mass)
         return [CompliantContact(rigid.law.kinetic, stiffness=stiffness, damping=damping)]
+    if name == "LuGre" and "Stribeck" in laws and "compliant" in laws and trials["compliant"].stiff:
+        curve: Any = laws["Stribeck"]
+        smallest = min(float(each.scales[0]) for each in trials["Stribeck"].problem.stretches)
+        stiffness = 2 * curve.kinetic / (RIGID * smallest)
+        damping = 0.2 * math.sqrt(stiffness * trials["Stribeck"].system.mass)
+        return [LuGre(curve.kinetic, curve.static, speed=curve.speed, stiffness=stiffness, damping=damping)]
     if name == "LuGre" and "compliant" in laws and not trials["compliant"].stiff:
         held: Any = laws["compliant"]
         fastest = max(float(each.scales[1]) for each in trials["compliant"].problem.stretches)

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.fit.choice import CALIBRATIONS, Misfit, Standing, standings, times, undescribed
 from stickslip.fit.guess import GUESSES, Seen
 from stickslip.fit.law import LawFit, answered
 from stickslip.fit.search import descend
-from stickslip.fit.start import Shown
+from stickslip.fit.start import Shown, too_few
 from stickslip.fit.stretch import Stretch, channels_of
 from stickslip.fit.surety import surety
 from stickslip.fit.trials import (
@@ -60,6 +60,7 @@ BAD = 0.3  # of a channel's own size: a law that leaves more beyond the noise de
 LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
 RETUNED = 8  # times that mounts and law are found in turn
 LEFT = 0.05  # of it: so much comes of more than the chance that an interval knows
+SCALED = ("kinetic", "static", "speed", "rate", "steepness")  # parameters in proportion to the motion, or against it
 OFF = 0.05  # of a gain, beyond which it is no calibration's error
 
 
@@ -302,13 +303,19 @@ def compare_laws(
         told, confidence = undescribed(told), 0.0
     if told[0].name == "Stribeck":
         rigid = _excess(fit)
+    fit = _calibrated(fit, records, calibration)
     if progress:
         progress(1.0)
     candidates = tuple(
         Candidate(each, fit.oscillator if each is told[0] else trials[each.name].system, _left(trials[each.name]))
         for each in told
     )
-    return _answer(candidates, confidence, fit, rigid, calibration, records, doubt, silent)
+    worries = [
+        f"{name} is left out: the best law leaves {share:.0%} of it, and no mount or delay of its sensor is stated"
+        for name, share in silent.items()
+    ]
+    worries += filter(None, [too_few(shown, best.count)])
+    return _answer(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
 
 
 def _excess(fit: LawFit) -> Estimate:
@@ -356,10 +363,28 @@ def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tel
     )
     name, share = _worst(fit, noise)
     if share > LEFT:
-        words = f"its interval leaves out why the law leaves {share:.0%} of {name}"
+        words = f"its interval knows nothing of why the law misses {share:.0%} of {name}"
         told = {key: replace(one, status=words) if one.status == "ok" else one for key, one in fit.parameters.items()}
         fit = replace(fit, parameters=told)
     return replace(fit, noise=noise, checks=checks)
+
+
+def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> LawFit:
+    """The fit whose forces and speeds are no surer than the measured base is calibrated, by which all motion scales."""
+    if not any(name in record for record in records for name in ("z", "force")):
+        return fit
+    told = {key: _widened(one, calibration) if key in SCALED else one for key, one in fit.parameters.items()}
+    return replace(fit, parameters=told)
+
+
+def _widened(estimate: Estimate, share: float) -> Estimate:
+    """The estimate, unsure by a share of its value besides."""
+    more, (low, high) = share * abs(estimate.value), estimate.interval
+    ends = (estimate.value - low, high - estimate.value)
+    below, above = (math.hypot(end, NORMAL_95 * more) for end in ends)
+    return replace(
+        estimate, interval=(estimate.value - below, estimate.value + above), sd=math.hypot(estimate.sd, more)
+    )
 
 
 def _worst(fit: LawFit, noise: Mapping[str, float]) -> tuple[str, float]:
@@ -429,7 +454,7 @@ def _answer(
     calibration: float,
     records: Sequence[Record],
     doubt: str,
-    silent: Mapping[str, float],
+    worries: Sequence[str],
 ) -> LawComparison:
     told = [each.standing for each in candidates]
     kept = [each for each in told if each.kept]
@@ -439,10 +464,6 @@ def _answer(
         f"{each.name}: misfit {times(each.misfit)} the best one's"
         + (f", of records left out {times(each.prediction)}" if math.isfinite(each.prediction) else "")
         for each in told
-    )
-    left_out = "; ".join(
-        f"{name} is left out: the best law leaves {share:.0%} of it, and no mount or delay of its sensor is stated"
-        for name, share in silent.items()
     )
     step = Step(
         "compare_laws", {"laws": [each.name for each in candidates], "calibration": calibration},
@@ -454,7 +475,7 @@ def _answer(
         tuple(each.name for each in kept), confidence,
         f"None of the laws tried describes these records: {doubt}." if doubt
         else " ".join(_sentences(told, families, excess_, calibration, confidence)),
-        fit, excess_, doubt or left_out or "ok", checks,
+        fit, excess_, doubt or "; ".join(worries) or "ok", checks,
         (*records[0].history, step),
     )  # fmt: skip
 
@@ -475,27 +496,30 @@ def _doubt(fit: LawFit, calibration: float) -> str:
 
 
 def _sentences(
-    told: Sequence[Standing], families: Sequence[str], excess_: Estimate | None, calibration: float, confidence: float
+    laws: Sequence[Standing], families: Sequence[str], excess_: Estimate | None, calibration: float, confidence: float
 ) -> Iterator[str]:
     """The verdict, to be pasted into a report."""
-    best = told[0]
-    kept = [each.name for each in told if each.kept]
-    rivals = [each for each in told if each.family != best.family and not each.limit]
-    limits = [each.name for each in told if each.limit]
+    best = laws[0]
+    kept = [each.name for each in laws if each.kept]
+    rivals = [each for each in laws if each.family != best.family and not each.limit]
+    limits = [each.name for each in laws if each.limit]
     if len(families) > 1:
         yield (
             f"These records can not tell {_either(kept)} apart: what they leave over differs too little. "
             "A record in which the contact sticks and slips, with a load cell, would tell more."
         )
     else:
-        yield f"The friction is {SAID.get(best.family, best.family)}" + (
-            f": the misfit of any other family tried is at least {times(min(each.misfit for each in rivals))} as large."
-            if rivals else f"; {_either(limits)} would have to be as stiff as that." if limits
-            else "; no law of another family was tried."
-        )  # fmt: skip
+        said = []
+        if rivals:
+            least = times(min(each.misfit for each in rivals))
+            said.append(f"the misfit of any other family tried is at least {least} as large")
+        if limits:
+            said.append(f"{_either(limits)} would have to be so stiff that it says the same")
+        told = "; ".join(said) or "no law of another family was tried"
+        yield f"The friction is {SAID.get(best.family, best.family)}: {told}."
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:
         low, high = excess_.interval
-        said = (
+        exceeds = (
             f"by {excess_.value:.1%} (95 %: {low:.1%} to {high:.1%})"
             if math.isfinite(high)
             else f"by {low:.1%} or more"
@@ -504,14 +528,14 @@ def _sentences(
         )
         if len(kept) > 1:
             yield (
-                f"Within it {_either(kept)} can not be told apart: static friction exceeds the kinetic {said}, where "
-                f"calibrations within {calibration:.0%} hide {CALIBRATIONS * calibration:.0%}."
+                f"Within it {_either(kept)} can not be told apart: static friction exceeds the kinetic {exceeds}, "
+                f"where calibrations within {calibration:.0%} hide {CALIBRATIONS * calibration:.0%}."
             )
         elif best.name == "Coulomb" or kept == ["Coulomb"]:
             yield f"One level of friction explains it: static friction exceeds the kinetic by {high:.1%} at most."
         else:
             falls = "at once" if kept == ["static"] else "with the speed, along a Stribeck curve"
-            yield f"Static friction exceeds the kinetic {said} and falls {falls}."
+            yield f"Static friction exceeds the kinetic {exceeds} and falls {falls}."
     if len(kept) == 1:
         yield f"Confidence {confidence:.1%}."
 

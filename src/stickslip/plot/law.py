@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stickslip.curves.fit_curve import CurveFit
-from stickslip.fit.choice import SEPARATED
 from stickslip.fit.which_law import LawComparison
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import (
@@ -41,7 +40,7 @@ SHOWN = 0.4  # s of a record that are drawn: more can not be told apart on a pag
 
 @styled
 def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
-    """The misfit of each law over that of the best one, and from where on a family is rejected.
+    """The misfit of each law over that of the best one, and which laws are rejected.
 
     Parameters
     ----------
@@ -65,7 +64,6 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
     forecast = [(each.prediction, j) for j, each in enumerate(told) if np.isfinite(each.prediction)]
     if forecast:
         ax.plot(*zip(*forecast, strict=True), "D", color=ORANGE, markersize=4, label="of records left out")
-    ax.axvline(SEPARATED, color=GREEN, linewidth=1.0, linestyle=":", label="families are told apart from here")
     ax.set_xscale("log")
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.xaxis.set_minor_formatter(NullFormatter())
@@ -109,7 +107,7 @@ def plot_fit(comparison: LawComparison, *, record: int = 0) -> Figure:
     axes[0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
     below.axhline(0, color=FAINT, linewidth=0.8)
     below.set(xlabel="time [s]", ylabel="left over,\ntimes the noise")
-    below.legend(ncols=len(names), loc="upper right")
+    below.legend(ncols=len(names), loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0.1)
     figure.align_ylabels(list(axes))
     return figure
 

@@ -16,7 +16,8 @@ from stickslip.reports.summary import Line, Summary
 from stickslip.reports.words import doubts, interval_of, number, value_of
 
 LOUD = 0.3  # of the friction, that a curve leaves for noise
-UNITS = {"kinetic": "N", "static": "N", "speed": "m/s", "stiffness": "N/m", "damping": "N s/m", "steepness": "s/m"}
+UNITS = {"kinetic": "N", "static": "N", "speed": "m/s", "stiffness": "N/m", "damping": "N s/m", "steepness": "s/m",
+         "rate": "1/(N s)", "viscous": "N s/m"}  # fmt: skip
 
 
 def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], name: str) -> Summary:
