@@ -167,13 +167,15 @@ def test_a_misfit_within_the_noise_decides_nothing() -> None:
 
 
 def test_rigid_laws_are_told_apart_by_the_friction_around_rest() -> None:
-    """And by their misfit: a motion that one of them explains far better rejects the others."""
+    """And by their misfit only where it is far larger: a rough surface triples that of the true law."""
     plain, rich = misfit("Coulomb", 1, 1.0), misfit("static", 2, 0.95)
     assert kept(plain, rich, likely={"Coulomb": 0.001, "static": 0.999})[0] == {"static"}
     assert kept(plain, rich, likely={"Coulomb": 0.99, "static": 0.01})[0] == {"Coulomb"}
     assert kept(plain, rich, likely={"Coulomb": 0.6, "static": 0.4})[0] == {"Coulomb", "static"}
     assert kept(plain, rich)[0] == {"Coulomb", "static"}
-    assert kept(plain, misfit("static", 2, 0.4))[0] == {"static"}
+    rough = {"Coulomb": 0.77, "Stribeck": 0.23}
+    assert kept(misfit("Coulomb", 1, 3.35), misfit("Stribeck", 3, 1.0), likely=rough)[0] == {"Coulomb", "Stribeck"}
+    assert kept(plain, misfit("static", 2, 0.04))[0] == {"static"}
 
 
 def test_further_parameters_that_explain_nothing_more_are_rejected() -> None:

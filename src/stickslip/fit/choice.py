@@ -24,7 +24,8 @@ SEPARATED = 2.0  # times the misfit of a rigid law, up to which a contact next t
 CALIBRATIONS = 3.0  # times the calibration's error, below which an effect is not to be told from it
 CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
 BLUNT = 4.0  # of the criterion, by which the odds between families fall e-fold; 2 were the stories Gaussian
-SHARPNESS = 4.0  # power of the ratio of misfits that the odds between rigid laws, and of predictions, follow
+SHARPNESS = 4.0  # power of the ratio of predictions' misfits that the odds between families follow
+FEIGNED = 1.0  # the same of rigid laws' misfits: on a rough surface the true one's may be three times another's
 UNLIKELY = 0.05  # odds to the best law, below which another is rejected
 FAMILIES = {"Coulomb": "rigid", "static": "rigid", "Stribeck": "rigid"}
 
@@ -203,7 +204,7 @@ def _within(
     """
     least = min(family, key=lambda each: evidence.criterion(each.squares, each.count))
     worth = {
-        each.name: (likely or {}).get(each.name, 1.0) * evidence.over(each.squares, least.squares) ** -SHARPNESS
+        each.name: (likely or {}).get(each.name, 1.0) * evidence.over(each.squares, least.squares) ** -FEIGNED
         for each in family
     }
     total = math.fsum(worth.values()) or 1.0
