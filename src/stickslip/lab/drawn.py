@@ -24,6 +24,7 @@ A_PIECE, FEW_PIECES, EDGES = 5, 400, 6000
 SPECTRUM, OF_SPECTRUM = 4096, 20  # instants and cycles of a spectrum
 MAP, COLUMNS, SPAN = 16_384, 400, 60.0  # samples, columns and dB of a wavelet map
 HEARD, LASTS, PITCH = 22_050, 3.0, 110.0  # Hz and s of a sound; Hz at which a cycle is heard
+EMPTY = 1e-9  # of the largest entry of a matrix: what is smaller is none
 MICROSLIP = 0.1  # of the longest slip: a shorter one is a micro-slip
 GROUPS = {"x": "displacement", "v": "velocity", "a": "acceleration", "friction": "friction"}
 KINDS = ("slip", "microstick", "stick", "flight")
@@ -56,7 +57,7 @@ def run(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     marks, micro = _marks(run, first, last)
     frequency, amplitude = _spectrum(run, last, cycle)
     header = {
-        "status": run.status, "cycle": cycle, "first": first, "last": last, "series": series,
+        "springs": _springs(run.system), "status": run.status, "cycle": cycle, "first": first, "last": last, "series": series,
         "belt": run.table.motion.face.get("way", 0.0), "spectrum": f"acceleration {run.labels('a')[0]}",
     }  # fmt: skip
     arrays = {"time": times, **values, **marks, "microslips": micro, "frequency": frequency, "amplitude": amplitude}
@@ -65,8 +66,10 @@ def run(request: Mapping[str, Any], go_on: GoOn) -> Answer:
 
 def tell(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """What the library says of the motion, in words and in numbers as it prints them."""
-    found = ss.outcome(read_case(request["state"]), progress=go_on)
-    return {"status": found.run.status, "sentences": found.sentences, "rows": found.rows}, {}
+    case = read_case(request["state"])
+    found = ss.outcome(case, progress=go_on)
+    told = {"status": found.run.status, "sentences": found.sentences, "rows": found.rows}
+    return {**told, **_state(case)}, {}  # in SI, whatever units it was asked in
 
 
 def wavelet(request: Mapping[str, Any], go_on: GoOn) -> Answer:
@@ -199,6 +202,16 @@ def _marks(run: ss.Trajectory, first: float, last: float) -> tuple[dict[str, Any
     seen &= np.cumsum(seen[::-1])[::-1] <= EDGES
     marks = {"begins": run.starts[seen], "ends": ends[seen], "kinds": kinds[seen].astype(np.int32)}
     return marks, middles[(middles > first) & (middles < last)][-EDGES:]
+
+
+def _springs(system: ss.Oscillator | ss.Structure) -> list[list[int]]:
+    """Between which masses springs are, -1 for what does not move with them: of several by their matrix."""
+    if not isinstance(system, ss.Structure):
+        return [[-1, 0]]
+    matrix = np.atleast_2d(np.asarray(system.stiffness, dtype=float))
+    least = EMPTY * np.abs(matrix).max(initial=0.0)
+    own = [[-1, j] for j in range(len(matrix)) if abs(matrix[j].sum()) > least]
+    return own + [[i, j] for i in range(len(matrix)) for j in range(i + 1, len(matrix)) if abs(matrix[i, j]) > least]
 
 
 def _spectrum(run: ss.Trajectory, last: float, cycle: float) -> tuple[Array, Array]:

@@ -1,4 +1,7 @@
-"""What a map asks of a system, part by part: a grid of its parameters, or one cell on finer and finer grids."""
+"""What a map asks of a system, part by part: a grid of its parameters, or one cell on finer and finer grids.
+
+A sweep asks nobody whether to go on: the worker interrupts it where no one waits any more.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,9 @@ from typing import Any
 import numpy as np
 
 import stickslip as ss
+from stickslip.lab import drawn
 from stickslip.lab.drawn import read_case
-from stickslip.lab.forms import Answer
+from stickslip.lab.forms import Answer, first_state
 
 GoOn = Callable[[float], None]
 
@@ -36,7 +40,18 @@ def refine(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     return _values(found, request["measure"])
 
 
-ANSWERS: dict[str, Callable[[Mapping[str, Any], GoOn], Answer]] = {"sweep": sweep, "refine": refine}
+def warm(request: Mapping[str, Any], go_on: GoOn) -> Answer:
+    """Load what a first map needs, or compile it: the smallest one of what plays when the page opens."""
+    state = first_state()
+    drawn.run({"state": state}, go_on)
+    kinetic = float(state["law"]["kinetic"])
+    grid = {"drive.frequency": [2.5, 2.6], "law.kinetic": [kinetic, 1.1 * kinetic]}
+    asked = {"state": state, "measure": "stops", "grid": grid, "halvings": 1}
+    sweep(asked, go_on)
+    return refine(asked, go_on)
+
+
+ANSWERS: dict[str, Callable[[Mapping[str, Any], GoOn], Answer]] = {"sweep": sweep, "refine": refine, "warm": warm}
 
 
 def _read(request: Mapping[str, Any]) -> tuple[Any, dict[str, list[float]], dict[str, Any]]:

@@ -48,7 +48,7 @@ def _presets() -> list[dict[str, Any]]:
     """The scenarios, those together that are told alike."""
     cases = [ss.scenario_case(name) for name in ss.scenarios.names()]
     alike = itertools.groupby(cases, key=lambda case: (case.about, case.parts))
-    return [{"about": about, "parts": parts, "names": [case.name for case in each]} for (about, parts), each in alike]
+    return [{"about": about, "names": [case.name for case in each]} for (about, _), each in alike]
 
 
 def _part(make: Any) -> dict[str, Any]:

@@ -13,8 +13,7 @@ from starlette.routing import BaseRoute, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from stickslip.lab.frames import frame, unframed
-from stickslip.lab.play import asked, conversation, readable
-from stickslip.lab.workers import Workers
+from stickslip.lab.play import asked, conversation, readable, telling
 
 WANTED = ("map", "cancel")
 COUNTED = ("stops", "micro_slips", "period")  # where an answer jumps, its border is refined
@@ -40,7 +39,7 @@ async def _map(socket: WebSocket) -> None:
     async def drawn(request: dict[str, Any]) -> None:
         told = {"id": request["id"], "want": "map"}
         try:
-            async for header, arrays in _parts(socket.app.state.workers, request):
+            async for header, arrays in _parts(socket, request):
                 await socket.send_bytes(frame({**told, "kind": "part", **header}, arrays))
             await socket.send_bytes(frame({**told, "kind": "done"}))
         except Unanswered as error:
@@ -65,7 +64,7 @@ async def _map(socket: WebSocket) -> None:
 
 
 async def _parts(
-    workers: Workers, request: Mapping[str, Any]
+    socket: WebSocket, request: Mapping[str, Any]
 ) -> AsyncIterator[tuple[dict[str, Any], dict[str, NDArray[np.float64]]]]:
     """Values on rectangles of the map, with the share that is done."""
     names, (xs, ys) = _axes(request)
@@ -73,14 +72,14 @@ async def _parts(
     coarse = range(0, len(xs), STRIP)
     for number, begin in enumerate(coarse, start=1):
         part = xs[begin : begin + STRIP]
-        values[begin : begin + STRIP] = await _asked(workers, request, names, part, ys, want="sweep")
+        values[begin : begin + STRIP] = await _asked(socket, request, names, part, ys, want="sweep")
         yield {"level": "coarse", "done": number, "of": len(coarse)}, {
             "x": part, "y": ys, "values": values[begin : begin + STRIP].ravel(),
         }  # fmt: skip
     strips = _changing(values) if request["measure"] in COUNTED else []
     for number, (i, begin, end) in enumerate(strips, start=1):
         x, y = xs[i : i + 2], ys[begin:end]
-        found = await _asked(workers, request, names, x, y, want="refine")
+        found = await _asked(socket, request, names, x, y, want="refine")
         yield {"level": "fine", "done": number, "of": len(strips)}, {
             "x": _finer(x), "y": _finer(y), "values": found.ravel(),
         }  # fmt: skip
@@ -114,12 +113,12 @@ def _axes(request: Mapping[str, Any]) -> tuple[list[str], list[NDArray[np.float6
 
 
 async def _asked(
-    workers: Workers, request: Mapping[str, Any], names: list[str], x: Any, y: Any, *, want: str
+    socket: WebSocket, request: Mapping[str, Any], names: list[str], x: Any, y: Any, *, want: str
 ) -> NDArray[np.float64]:
     grid = {names[0]: x.tolist(), names[1]: y.tolist()}
     asking = {"id": request["id"], "want": want, "state": request.get("state"), "measure": request["measure"],
               "grid": grid, "halvings": HALVINGS}  # fmt: skip
-    header, arrays = unframed(await asked(workers, asking))
+    header, arrays = unframed(await asked(socket.app.state.workers, asking, tell=telling(socket)))
     if header["kind"] != want:
         raise Unanswered(header.get("error", "The map was given up; draw it again."))
     found: NDArray[np.float64] = arrays["values"].reshape(header["shape"])

@@ -16,9 +16,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from stickslip.lab.frames import frame, unframed
 from stickslip.lab.openapi import described
-from stickslip.lab.workers import Worker, Workers
+from stickslip.lab.workers import Tell, Worker, Workers
 
-QUICK, SLOW = ("run", "tell"), ("sound", "wavelet", "sweep", "refine")
+QUICK, SLOW = ("run", "tell"), ("sound", "wavelet", "sweep", "refine", "warm")
+WARMED_AFTER = 2.0  # s after a page was opened: it is drawn by then
 AFRESH = 1.5  # s: a run of another law does not wait longer for one that no one wants any more
 WANTED = (*QUICK, "sound", "wavelet")  # of the page, in the order in which they are answered
 STATE = {
@@ -32,16 +33,29 @@ STATE = {
 }  # fmt: skip
 
 
-async def asked(workers: Workers, request: Mapping[str, Any], *, lent: list[Worker] | None = None) -> bytes:
-    """A worker's answer; what befell the worker is told in one sentence to who asked."""
+async def asked(
+    workers: Workers, request: Mapping[str, Any], *, lent: list[Worker] | None = None, tell: Tell | None = None
+) -> bytes:
+    """A worker's answer, or in one sentence what befell the worker; that it compiles is told to `tell`."""
     told = {"id": request.get("id"), "want": request.get("want"), "kind": "error"}
+    slow = request["want"] in SLOW
     try:
-        async with workers.slow if request["want"] in SLOW else contextlib.nullcontext():
-            return await workers.ask(json.dumps(request).encode(), lent=lent)
+        if tell is not None and slow and workers.slow.locked() and workers.compiling:
+            await tell(frame({**told, "kind": "compiling"}))
+        async with workers.slow if slow else contextlib.nullcontext():
+            asking = json.dumps(request).encode()
+            return await workers.ask(asking, lent=lent, tell=tell, rested=request["want"] == "warm")
     except TimeoutError:
         return frame({**told, "error": "This takes longer than the page waits; ask for less."})
     except EOFError:
         return frame({**told, "error": "The computation ended without an answer; change what was changed last."})
+
+
+async def warmed(workers: Workers, opened: asyncio.Event) -> None:
+    """Beside a page that was opened, load or compile what its first map needs."""
+    await opened.wait()
+    await asyncio.sleep(WARMED_AFTER)
+    await asked(workers, {"id": None, "want": "warm"})
 
 
 def readable(message: Mapping[str, Any], wanted: tuple[str, ...]) -> dict[str, Any]:
@@ -89,6 +103,16 @@ async def conversation(
             _require_gone(failed)
 
 
+def telling(socket: WebSocket) -> Tell:
+    """What sends word to a page, if it is still there."""
+
+    async def tell(words: bytes) -> None:
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            await socket.send_bytes(words)
+
+    return tell
+
+
 def _require_gone(error: BaseException) -> None:
     """Work may end because the page went; anything else is raised."""
     inner = error.exceptions if isinstance(error, BaseExceptionGroup) else (error,)
@@ -101,11 +125,16 @@ async def _play(socket: WebSocket) -> None:
     quick, slow = _Line(socket), _Line(socket)
 
     def heard(message: Mapping[str, Any]) -> None:
-        request = readable(message, WANTED)
-        (quick if request["want"] in QUICK else slow).put(request)
-        if request["want"] == "run":
+        request = readable(message, (*WANTED, "cancel"))
+        cancelled = request["want"] == "cancel"
+        if cancelled:
+            quick.waiting.clear()
+            slow.waiting.clear()
+        else:
+            (quick if request["want"] in QUICK else slow).put(request)
+        if cancelled or request["want"] == "run":
             for worker in (*quick.lent, *slow.lent):
-                worker.interrupt(within=AFRESH if request.get("afresh") else None)
+                worker.interrupt(within=AFRESH if cancelled or request.get("afresh") else None)
 
     async def work() -> None:
         async with asyncio.TaskGroup() as both:
@@ -134,7 +163,8 @@ class _Line:
             self.come.clear()
             while self.waiting:
                 request = self.waiting.pop(min(self.waiting, key=WANTED.index))
-                answer = await asked(self.socket.app.state.workers, request, lent=self.lent)
+                tell = telling(self.socket)
+                answer = await asked(self.socket.app.state.workers, request, lent=self.lent, tell=tell)
                 await self.socket.send_bytes(answer)
 
 
@@ -154,6 +184,7 @@ async def _body(request: Request) -> Any:
 
 @described("All laws, drives and scenarios, with their parameters", answer={"type": "object"})
 async def _catalog(request: Request) -> Response:
+    request.app.state.opened.set()
     return await _answer(request, {"want": "catalog"})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
@@ -61,8 +62,12 @@ def _routes() -> list[BaseRoute]:
 async def _lifespan(app: Starlette) -> AsyncIterator[None]:
     async with AsyncExitStack() as stack:
         app.state.workers = await stack.enter_async_context(Workers(WORKERS))
+        app.state.opened = asyncio.Event()
         await stack.enter_async_context(data.lifespan(app))
+        warming = asyncio.create_task(play.warmed(app.state.workers, app.state.opened))
         yield
+        warming.cancel()
+        await asyncio.gather(warming, return_exceptions=True)
 
 
 async def _openapi(request: Request) -> Response:

@@ -9,19 +9,21 @@ import signal
 import sys
 import time
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from typing import Any, BinaryIO
 
 import stickslip as ss
 from stickslip.lab import drawn, explored, forms
 from stickslip.lab.frames import frame
-from stickslip.lab.workers import HEAD
+from stickslip.lab.workers import ANSWER, HEAD
 
 MEMORY = 4 * 2**30  # bytes of data
 PATIENCE = 30.0  # s of one run
 ANSWERS = {**drawn.ANSWERS, **explored.ANSWERS}
 
 
-class Overtaken(Exception):
+class Overtaken(BaseException):
     """No one waits for this answer any more."""
 
 
@@ -30,14 +32,27 @@ class Patience:
 
     def __init__(self) -> None:
         self.overtaken, self.until = False, math.inf
+        self.unasked, self.compiling = False, 0
         signal.signal(signal.SIGINT, self._interrupted)
 
     def _interrupted(self, *_: object) -> None:
         self.overtaken = True
+        if self.unasked and not self.compiling:  # numba is not left in the middle: it ends, or its process is ended
+            raise Overtaken
+
+    @contextmanager
+    def interrupting(self) -> Iterator[None]:
+        """What does not ask whether to go on is interrupted as by Ctrl-C."""
+        self.unasked = True
+        try:
+            self()
+            yield
+        finally:
+            self.unasked = False
 
     def begin(self) -> None:
         """A new request; its time runs from its first question, when all is compiled."""
-        self.overtaken, self.until = False, math.inf
+        self.overtaken, self.until, self.compiling = False, math.inf, 0
 
     def __call__(self, share: float = 0.0) -> None:
         """Go on, or raise."""
@@ -54,7 +69,8 @@ def answered(request: dict[str, Any], patience: Patience) -> bytes:
     told = {"id": request.get("id"), "want": request.get("want")}
     patience.begin()
     try:
-        header, arrays = ANSWERS[request["want"]](request, patience)
+        with patience.interrupting() if request["want"] in explored.ANSWERS else nullcontext():
+            header, arrays = ANSWERS[request["want"]](request, patience)
         return frame({**told, "kind": request["want"], **header}, arrays)
     except Overtaken:
         return frame({**told, "kind": "overtaken"})
@@ -67,16 +83,55 @@ def answered(request: dict[str, Any], patience: Patience) -> bytes:
         return frame({**told, "kind": "error", "error": sentence})
 
 
+def listen(patience: Patience, say: Callable[[], None]) -> None:
+    """Have it said whenever numba begins to compile, which it does not for what it finds on disk."""
+    from numba.core import event
+
+    class Listener(event.Listener):  # type: ignore[misc]  # numba tells no types
+        def on_start(self, event: Any) -> None:
+            patience.compiling += 1
+            say()
+
+        def on_end(self, event: Any) -> None:
+            patience.compiling -= 1
+
+    event.register("numba:compile", Listener())
+
+
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
-    """Answer one request after the other until there are no more."""
+    """Answer one request after the other until there are no more; say of each once that it compiles, where it does."""
     patience = Patience()
+    under_way: dict[str, Any] = {}
+
+    def write(answer: bytes, *, last: bool) -> None:
+        answers.write(ANSWER.pack(last, len(answer)) + answer)
+        answers.flush()
+
+    def compiling() -> None:
+        if under_way:
+            write(frame({**under_way, "kind": "compiling"}), last=False)
+            under_way.clear()
+
+    def answer(request: dict[str, Any]) -> bytes:
+        under_way.update(id=request.get("id"), want=request.get("want"))
+        try:
+            return answered(request, patience)
+        finally:
+            under_way.clear()
+
+    listening = False
     while len(head := requests.read(HEAD.size)) == HEAD.size:
         request = json.loads(requests.read(HEAD.unpack(head)[0]))
-        answer = answered(request, patience)
-        answers.write(HEAD.pack(len(answer)) + answer)
-        answers.flush()
-        if request.get("want") == "catalog":  # while the page draws its form, the kernels are loaded
-            answered({"want": "run", "state": forms.first_state()}, patience)
+        catalog = request.get("want") == "catalog"  # which needs no kernel, and comes first
+        if catalog:
+            write(answer(request), last=True)
+        if not listening:
+            listen(patience, compiling)
+            listening = True
+        if catalog:  # while the page draws its form, the kernels are loaded
+            answer({"want": "run", "state": forms.first_state()})
+        else:
+            write(answer(request), last=True)
 
 
 def main() -> None:

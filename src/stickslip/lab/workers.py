@@ -8,11 +8,14 @@ import os
 import signal
 import struct
 import sys
+from collections.abc import Awaitable, Callable
 from types import TracebackType
 
 LONGEST = 180.0  # s of one answer, the first compilation of a law included
 ABANDONED = 5.0  # s that a worker may go on with what no one waits for: a compilation that ends by then is kept
-HEAD = struct.Struct("<I")
+HEAD = struct.Struct("<I")  # of a request: its length
+ANSWER = struct.Struct("<?I")  # of what comes back: whether it is the answer, or word on the way; its length
+Tell = Callable[[bytes], Awaitable[None]]
 INTERRUPTIBLE = os.name == "posix"
 
 
@@ -22,9 +25,13 @@ class Worker:
     def __init__(self) -> None:
         self.process: asyncio.subprocess.Process | None = None
         self.answers, self.ready = 0, False  # ready: it has answered, and listens to an interrupt
+        self.word: bytes | None = None  # what it said last on the way to its answer: that it compiles
 
-    async def answer(self, request: bytes) -> bytes:
-        """The answer to a request; the process is started where it does not run, and ended where it takes too long."""
+    async def answer(self, request: bytes, tell: Tell | None = None) -> bytes:
+        """The answer to a request; the process is started where it does not run, and ended where it takes too long.
+
+        What it says on the way is passed on to `tell`.
+        """
         process = await self.started()
         assert process.stdin is not None
         assert process.stdout is not None
@@ -32,8 +39,13 @@ class Worker:
             process.stdin.write(HEAD.pack(len(request)) + request)
             await process.stdin.drain()
             async with asyncio.timeout(LONGEST):
-                (length,) = HEAD.unpack(await process.stdout.readexactly(HEAD.size))
-                answer = await process.stdout.readexactly(length)
+                last = False
+                while not last:
+                    last, length = ANSWER.unpack(await process.stdout.readexactly(ANSWER.size))
+                    answer = await process.stdout.readexactly(length)
+                    self.word = None if last else answer
+                    if tell is not None and not last:
+                        await tell(answer)
                 self.answers, self.ready = self.answers + 1, True
                 return answer
         except BaseException:
@@ -73,7 +85,7 @@ class Worker:
     async def end(self) -> None:
         """End the process."""
         self._signal(signal.SIGKILL if INTERRUPTIBLE else signal.SIGTERM)
-        process, self.process = self.process, None
+        process, self.process, self.word = self.process, None, None
         if process is not None:
             await process.wait()
 
@@ -102,8 +114,19 @@ class Workers:
         for worker in self.all:
             await worker.end()
 
-    async def ask(self, request: bytes, *, lent: list[Worker] | None = None) -> bytes:
+    @property
+    def compiling(self) -> bool:
+        """Whether one of them compiles."""
+        return any(worker.word is not None for worker in self.all)
+
+    async def ask(
+        self, request: bytes, *, lent: list[Worker] | None = None, tell: Tell | None = None, rested: bool = False
+    ) -> bytes:
         """The answer of the first that is free; while it works it stands in `lent`, where it can be interrupted.
+
+        Of several that are free it is the one that worked last, or with `rested` the one that did not.
+
+        That it compiles is passed on to `tell`.
 
         Raises
         ------
@@ -112,10 +135,10 @@ class Workers:
         EOFError
             The process ended over it.
         """
-        worker = await self.free.get()
+        worker = self._rested() if rested and not self.free.empty() else await self.free.get()
         lent = [] if lent is None else lent
         lent.append(worker)
-        answer = asyncio.create_task(worker.answer(request))
+        answer = asyncio.create_task(worker.answer(request, tell))
         answer.add_done_callback(lambda done: self._freed(worker, done))
         try:
             return await asyncio.shield(answer)
@@ -126,6 +149,13 @@ class Workers:
             raise EOFError("the process ended") from error
         finally:
             lent.remove(worker)
+
+    def _rested(self) -> Worker:
+        """Of those that are free, the one that has worked least lately."""
+        free = [self.free.get_nowait() for _ in range(self.free.qsize())]
+        for worker in reversed(free[:-1]):
+            self.free.put_nowait(worker)
+        return free[-1]
 
     def _freed(self, worker: Worker, answer: asyncio.Task[bytes]) -> None:
         if not answer.cancelled():

@@ -29,7 +29,10 @@ const LETTERS = { G: 1e9, M: 1e6, k: 1e3, m: 1e-3, "µ": 1e-6, u: 1e-6, n: 1e-9 
 const THOUSANDS = /^\s*[-+]?\d{1,3}(,\d{3})+(?!\d)/; // or a decimal comma: no one can tell
 // A number in SI where the text is one, with or without a prefixed unit; other units are left to the library.
 export function written(text, unit) {
-  if (THOUSANDS.test(text)) throw new Error(`${text.trim()} may be read in two ways; write ${text.trim().replace(/,/g, "")}, or a decimal point.`);
+  if (THOUSANDS.test(text)) {
+    const [seen, plain] = [text.trim(), text.trim().replace(/,/g, "")];
+    throw new Error(`${seen} may be read in two ways; write ${plain}, or a decimal point.`);
+  }
   const found = /^\s*([-+]?[\d.]+(?:e[-+]?\d+)?)\s*(.*?)\s*$/i.exec(text.replace(",", "."));
   if (!found || !Number.isFinite(Number(found[1]))) return text.trim() || undefined;
   const given = found[2].replaceAll("·", " ").replace("²", "^2"), number = Number(found[1]);
@@ -45,6 +48,7 @@ export class Controls {
     this.state = state;
     this.root.replaceChildren();
     this.knobs = new Map();
+    this.followers = new Map();
     const several = Array.isArray(state.contacts);
     if (several) state.contacts.forEach((contact, j) => this.contact(contact, j));
     else this.part("Friction law", "laws", ["law"]);
@@ -148,7 +152,15 @@ export class Controls {
       if (typeof now === "number") { slide.value = scale.place(now); text.value = readable(now, each.unit); told(now); }
       this.set(place, now, event.timeStamp);
     });
+    this.followers.set(place.join("."), (now) => { slide.value = scale.place(now); told(now); });
     if (unit && typeof value !== "number") text.title = `in ${unit}`;
+  }
+  // Sliders go to values that were typed in units which only the library reads.
+  follow(state) {
+    for (const [dotted, move] of this.followers) {
+      const path = dotted.split("."), now = at(state, path);
+      if (typeof at(this.state, path) === "string" && typeof now === "number") move(now);
+    }
   }
   // Positive values on a logarithmic scale, a decade to either side; those that are zero or signed on a linear one.
   scale(each, place, value) {

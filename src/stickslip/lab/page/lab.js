@@ -12,8 +12,23 @@ const LEADS = {
 const onTheme = [];
 
 export function say(words, wrong = false) {
+  clearInterval(ticking);
+  $("waiting").hidden = true;
   $("status").textContent = words;
   $("status").classList.toggle("wrong", wrong);
+}
+
+// Work that takes long: what it is, for how many seconds, and a way to end it, until something else is said.
+let ticking = 0;
+const COMPILES = "Compiling for this kind of motion: once after an installation, up to a minute. It is kept.";
+function busy(words, since, cancel) {
+  say(words);
+  const tell = () => { $("elapsed").textContent = `${Math.round((performance.now() - since) / 1000)} s`; };
+  ticking = setInterval(tell, 500);
+  tell();
+  $("waiting").hidden = false;
+  $("waiting-cancel").hidden = !cancel;
+  $("waiting-cancel").onclick = cancel;
 }
 
 export async function ask(path, options = {}) {
@@ -27,7 +42,7 @@ export async function ask(path, options = {}) {
 
 export function colours() {
   const style = getComputedStyle(document.documentElement);
-  const names = ["paper", "card", "ink", "soft", "faint", "line", "blue", "orange", "green", "purple", "sky", "stick", "microstick", "flight", "accent"];
+  const names = "paper card ink soft faint line blue orange green purple sky stick microstick flight accent".split(" ");
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
@@ -50,29 +65,36 @@ export function show(name) {
 }
 
 const opened = {
-  map: () => { opened.map = null; ready.then(() => import("./map.js")).then((page) => page.start($("map"), lab)); },
+  map: () => {
+    opened.map = null;
+    ready.then(() => import("./map.js")).then((page) => page.start($("map"), lab));
+  },
   data: () => {
     opened.data = null;
-    import("./data.js").then((page) => page.start($("data"), lab), () => say("Data is not part of this lab yet.", true));
+    import("./data.js").then((page) => page.start($("data"), lab));
   },
 };
 
 // A chart over time for any tab: {title, unit, time, series: [{label, values, colour, dash}]}.
 function plot(element, { title, unit, time, series }) {
   const palette = colours();
-  const axis = { stroke: palette.soft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line }, values: (chart, splits) => splits.map(tick) };
+  const axis = {
+    stroke: palette.soft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line },
+    values: (chart, splits) => splits.map(tick),
+  };
   const inks = ["blue", "orange", "green", "purple", "sky", "ink"];
+  const lines = series.map(({ label, colour, dash }, j) =>
+    ({ label, stroke: colour ?? palette[inks[j % 6]], width: 1.4, dash, points: { show: false } }));
   const chart = new uPlot({
     width: element.clientWidth || 600, height: 220, title, legend: { show: true }, scales: { x: { time: false } },
-    axes: [{ ...axis, label: "time [s]" }, { ...axis, label: unit, size: 70 }],
-    series: [{ label: "time" }, ...series.map((line, j) => ({ label: line.label, stroke: line.colour ?? palette[inks[j % 6]], width: 1.4, dash: line.dash, points: { show: false } }))],
+    axes: [{ ...axis, label: "time [s]" }, { ...axis, label: unit, size: 70 }], series: [{ label: "time" }, ...lines],
   }, [time, ...series.map((line) => line.values)], element);
   new ResizeObserver(() => chart.setSize({ width: element.clientWidth, height: 220 })).observe(element);
   return chart;
 }
 
 export const lab = {
-  ask, say, colours, show, plot,
+  ask, say, busy, COMPILES, colours, show, plot,
   onTheme: (then) => onTheme.push(then),
   openInPlay: null, // by play.js
   onShow: {}, // by tab: what it does when it is shown again

@@ -5,12 +5,15 @@ import { Stage } from "./stage.js";
 import { axes, cividis, line, prefixed, range, shortly, tick } from "./canvas.js";
 
 const $ = (id) => document.getElementById(id);
-const PANELS = [["x", "displacement"], ["x", "angle", true], ["v", "velocity"], ["v", "angular velocity", true], ["a", "acceleration"], ["friction", "friction"]];
+const PANELS = [["x", "displacement"], ["x", "angle", true], ["v", "velocity"], ["v", "angular velocity", true],
+  ["a", "acceleration"], ["friction", "friction"]];
 const INKS = { x: "blue", v: "green", a: "purple", friction: "orange" };
 const MORE_INKS = ["blue", "orange", "green", "purple", "sky", "ink"];
 const HEIGHT = 118, REST = 90, IDLE = 350; // pixels of a trace; ms without a change until numbers, and until the rest
 const KINDS = ["slip", "microstick", "stick", "flight"];
-const PACES = [["one cycle in 2 s", null], ["true time", 1], ["2 × slower", 0.5], ["5 × slower", 0.2], ["10 × slower", 0.1], ["100 × slower", 0.01], ["1000 × slower", 0.001], ["10 × faster", 10]];
+const SLOWER = [2, 5, 10, 100, 1000].map((times) => [`${times} × slower`, 1 / times]);
+const PACES = [["one cycle in 2 s", null], ["true time", 1], ...SLOWER, ["10 × faster", 10]];
+const FONT = "12px system-ui, sans-serif";
 
 const newest = {}; // number of the last request of each kind
 let lab, state, controls, stage, conversation, run, charts = [], plans = {}, number = 0, flying = null, next = null;
@@ -20,7 +23,8 @@ export async function start(given) {
   lab = given;
   lab.openInPlay = (opened) => { own(); use(opened); lab.show("play"); };
   stage = new Stage($("stage"), moved);
-  conversation = new Conversation("/play", heard, () => lab.say("The lab does not answer; is 'stickslip lab' still running?", true));
+  const lost = () => lab.say("The lab does not answer; is 'stickslip lab' still running?", true);
+  conversation = new Conversation("/play", heard, lost);
   conversation.again = () => { if (state) ask(performance.now(), true); };
   for (const [words, pace] of PACES) $("pace").add(new Option(words, pace ?? ""));
   buttons();
@@ -30,13 +34,24 @@ export async function start(given) {
   clearTimeout(slow);
   if (!catalog) return;
   lab.boundary = catalog.boundary;
-  const plain = { unit: "", words: "", default: null, optional: false, choices: [], part: false };
-  for (const part of [...Object.values(catalog.laws), ...Object.values(catalog.drives), catalog.system, catalog.contact]) part.parameters = part.parameters.map((each) => ({ ...plain, ...each }));
-  controls = new Controls($("parts"), catalog, (path, since, afresh = false) => { changedLast = path; own(); ask(since, afresh); });
+  whole(catalog);
+  controls = new Controls($("parts"), catalog, (path, since, afresh = false) => {
+    changedLast = path;
+    own();
+    ask(since, afresh);
+  });
   presets(catalog.presets, shared ? "" : catalog.first.name);
   use(shared ?? catalog.first.state);
   addEventListener("hashchange", () => { const link = fromLink(); if (link) { own(); use(link); } });
   lab.onTheme(() => { if (run) { build(); drawTraces(); drawViews(); stage.show(run, lab.colours()); } });
+}
+
+// What the catalog leaves out of a parameter, because it is as most are.
+function whole({ laws, drives, system, contact }) {
+  const plain = { unit: "", words: "", default: null, optional: false, choices: [], part: false };
+  for (const part of [...Object.values(laws), ...Object.values(drives), system, contact]) {
+    part.parameters = part.parameters.map((each) => ({ ...plain, ...each }));
+  }
 }
 
 function use(given) {
@@ -66,16 +81,36 @@ function presets(offered, chosen) {
   for (const [key, members] of groups) {
     const group = document.createElement("optgroup");
     group.label = key;
-    for (const name of members.flatMap((each) => each.names)) group.append(new Option(name, name, false, name === chosen));
+    for (const name of members.flatMap((each) => each.names)) {
+      group.append(new Option(`${plainly(name, key)} (${name})`, name, false, name === chosen));
+    }
     $("preset").append(group);
   }
-  const told = () => { $("about").textContent = about.get($("preset").value)?.about ?? "A system of your own, or from a link or file."; };
+  const other = "A system of your own, or from a link or file.";
+  const told = () => { $("about").textContent = about.get($("preset").value)?.about ?? other; };
   told();
   $("preset").addEventListener("change", async () => {
     told();
-    if (!$("preset").value) return;
-    try { use((await lab.ask(`/scenarios/${encodeURIComponent($("preset").value)}`)).state); } catch (error) { lab.say(error.message, true); }
+    const name = $("preset").value;
+    if (name) await lab.ask(`/scenarios/${encodeURIComponent(name)}`).then(({ state }) => use(state), failed);
   });
+}
+const failed = (error) => lab.say(error.message, true);
+
+// A scenario's code in words: what its letters stand for, and what its group is about where it has none.
+const SIGNS = [
+  [/\bfk=([\d.]+)/, "friction $1 N"], [/\bKy=(\d+)000\b/, "contact $1 kN/m"], [/\bc=0\b/, "no contact damping"],
+  [/\bz(?:=|(?=\.))([\d.]+)(\(.*?\))?/, "damping ratio $1$2"], [/([\d.]+) ?Hz\b/, "$1 Hz"],
+  [/\bb=([\d.]+)/, "frequency ratio $1"], [/\br=([\d.]+)/, "friction ratio $1"], [/\bV=([\d.]+)/, "belt at $1"],
+  [/\bv=([\d.]+)/, "speed $1"], [/\bX=(\d+)um/, "amplitude $1 µm"], [/\bXm=(\d+)/, "mass ratio $1"],
+  [/\brate=(\d+)/, "$1 N/s"], [/\bt=(\d+)ms/, "after $1 ms"], [/\bd=(\d)/, "exponent $1"],
+  [/\beta=([\d.,]+)/, "damping $1"],
+];
+function plainly(name, about) {
+  const words = SIGNS.filter(([sign]) => sign.test(name)).map(([sign, to]) => sign.exec(name)[0].replace(sign, to));
+  const kind = /\b(rigid|compliant|state variable|low|high|below|aging|slip|as printed|rate.*gamma|wet|dry)\b.*?/g;
+  const told = [...(name.match(kind) ?? []), ...words];
+  return told.length ? told.join(", ") : about.split(/[:(;]/)[0].trim();
 }
 
 // One run is under way at a time, and the newest state waits; one that takes long is overtaken.
@@ -92,7 +127,21 @@ function send() {
   Object.assign(newest, { run: flying.id, tell: null, wavelet: null });
   conversation.send({ id: flying.id, want: "run", state: flying.state, afresh: flying.afresh });
   clearTimeout(patience);
-  patience = setTimeout(() => { stale(true); lab.say("Computing … what is shown is the motion before. The first run of a law is compiled, which takes a while."); }, 600);
+  patience = setTimeout(() => waiting("Computing … what is shown is the motion before."), 600);
+}
+function waiting(words) {
+  if (flying === null) return;
+  clearTimeout(patience);
+  stale(true);
+  lab.busy(words, flying.sent, cancel);
+}
+// What is under way is given up, and what waits.
+function cancel() {
+  conversation.send({ id: ++number, want: "cancel" });
+  clearTimeout(patience);
+  Object.assign(newest, { run: null, tell: null, wavelet: null });
+  flying = next = null;
+  lab.say("Cancelled: what is shown is the motion before. Change anything to compute again.");
 }
 
 function more(want) {
@@ -102,7 +151,8 @@ function more(want) {
 
 function heard(answer) {
   if (answer.id !== null && answer.id !== newest[answer.want]) return; // no one waits for it any more
-  if (answer.want === "run" || answer.kind === "error") arrived(answer);
+  if (answer.kind === "compiling") { if (answer.want === "run") waiting(lab.COMPILES); }
+  else if (answer.want === "run" || answer.kind === "error") arrived(answer);
   else if (answer.kind === "tell") told(answer);
   else if (answer.kind === "wavelet") { plans.map = answer; drawWavelet(); }
   else if (answer.kind === "sound") sounded(answer);
@@ -118,21 +168,7 @@ function arrived(answer) {
     controls.fault(null);
     lab.say("");
     stale(false);
-    $("told").classList.add("stale");
-    run = answer;
-    run.kinds = kinds(run.arrays);
-    drawTraces();
-    const since = flying.since;
-    queueMicrotask(() => {
-      const drawn = performance.now();
-      document.dispatchEvent(new CustomEvent("traces-drawn", { detail: { id: answer.id, took: drawn - since } }));
-      requestAnimationFrame(() => setTimeout(() => { // the traces are seen first
-        if (run !== answer) return;
-        drawViews();
-        stage.show(run, lab.colours());
-        pace();
-      }));
-    });
+    shown(answer, flying.since);
   }
   if (answer.want !== "run") return;
   flying = null;
@@ -142,6 +178,24 @@ function arrived(answer) {
     if (answer.kind === "run") more("wavelet");
     history.replaceState(null, "", link());
   }, IDLE);
+}
+
+// The traces first; the other pictures when those are seen.
+function shown(answer, since) {
+  $("told").classList.add("stale");
+  run = answer;
+  run.kinds = kinds(run.arrays);
+  drawTraces();
+  queueMicrotask(() => {
+    const detail = { id: answer.id, took: performance.now() - since };
+    document.dispatchEvent(new CustomEvent("traces-drawn", { detail }));
+    requestAnimationFrame(() => setTimeout(() => {
+      if (run !== answer) return;
+      drawViews();
+      stage.show(run, lab.colours());
+      pace();
+    }));
+  });
 }
 
 // What the contact does at each instant.
@@ -164,48 +218,76 @@ function build() {
   for (const chart of charts) chart.destroy();
   $("traces").replaceChildren();
   charts = [];
-  const palette = lab.colours();
   for (const [group, words, turns = false] of PANELS) {
     const lines = run.series.filter((each) => each.group === group && each.unit.startsWith("rad") === turns);
-    if (!lines.length) continue;
-    const box = $("traces").appendChild(document.createElement("div")), caption = box.appendChild(document.createElement("div"));
-    box.className = "trace";
-    caption.className = "caption";
-    box.setAttribute("role", "img");
-    box.setAttribute("aria-label", `${words} over time`);
-    const last = group === "friction", several = lines.filter((each) => each.name !== "z").length > 1;
-    const ink = (each, j) => (each.name === "z" ? palette.faint : palette[several ? MORE_INKS[j % 6] : INKS[group]]);
-    const title = caption.appendChild(document.createElement("span"));
-    lines.forEach((each, j) => {
-      if (!several && each.name !== "z") return;
-      const key = caption.appendChild(document.createElement("span"));
-      key.textContent = each.name === "z" ? " ┄ spring's end" : ` — ${each.name}`;
-      key.style.color = each.name === "z" ? palette.soft : ink(each, j);
-    });
-    const axis = { stroke: palette.soft, font: "12px system-ui, sans-serif", grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line, width: 1, size: 4 } };
-    const chart = new uPlot({
-      width: $("traces").clientWidth - 26, height: tall() + (last ? 42 : 0), padding: [6, 8, last ? 0 : 4, 0], legend: { show: false }, scales: { x: { time: false } },
-      cursor: { sync: { key: "play" }, points: { show: false }, drag: { x: true, y: false } },
-      axes: [{ ...axis, show: true, size: last ? 24 : 0, values: (plot, splits) => (last ? splits.map(tick) : []), label: last ? "time [s]" : undefined, labelSize: 18, labelFont: "12px system-ui, sans-serif", gap: 2 },
-        { ...axis, size: 60, values: (plot, splits) => splits.map((value) => tick(value * plot.factor)), space: 24 }],
-      series: [{}, ...lines.map((each, j) => ({ stroke: ink(each, j), width: 1.4, dash: each.name === "z" ? [5, 4] : undefined, points: { show: false } }))],
-      hooks: { drawClear: [(plot) => shade(plot, group)], setScale: [(plot, key) => { if (key === "x") zoom(plot); }] },
-    }, null, box);
-    Object.assign(chart, { lines, words, title, group, unit: lines[0].unit, factor: 1 });
-    chart.now = chart.over.appendChild(document.createElement("div"));
-    chart.now.className = "now";
-    charts.push(chart);
+    if (lines.length) charts.push(panel(group, words, inked(lines, group)));
   }
   Object.assign(charts, { shape: shape(), tall: tall() });
 }
 
+// The lines of a panel with their colours: of several each has its own, and the spring's end is faint.
+function inked(lines, group) {
+  const palette = lab.colours(), several = lines.filter((each) => each.name !== "z").length > 1;
+  return lines.map((each, j) => {
+    const base = each.name === "z", ink = base ? palette.faint : palette[several ? MORE_INKS[j % 6] : INKS[group]];
+    return { ...each, ink, key: base ? " ┄ spring's end" : several ? ` — ${each.name}` : "" };
+  });
+}
+
+function panel(group, words, lines) {
+  const box = $("traces").appendChild(document.createElement("div"));
+  box.className = "trace";
+  box.setAttribute("role", "img");
+  box.setAttribute("aria-label", `${words} over time`);
+  const title = caption(box, lines), last = group === "friction";
+  const chart = new uPlot({
+    width: $("traces").clientWidth - 26, height: tall() + (last ? 42 : 0), padding: [6, 8, last ? 0 : 4, 0],
+    legend: { show: false }, scales: { x: { time: false } },
+    cursor: { sync: { key: "play" }, points: { show: false }, drag: { x: true, y: false } },
+    axes: scales(last),
+    series: [{}, ...lines.map(({ ink, name }) =>
+      ({ stroke: ink, width: 1.4, dash: name === "z" ? [5, 4] : undefined, points: { show: false } }))],
+    hooks: {
+      drawClear: [(plot) => shade(plot, group)],
+      setScale: [(plot, key) => { if (key === "x") zoom(plot); }],
+    },
+  }, null, box);
+  Object.assign(chart, { lines, words, title, group, unit: lines[0].unit, factor: 1 });
+  chart.now = chart.over.appendChild(document.createElement("div"));
+  chart.now.className = "now";
+  return chart;
+}
+// The panel's title, to be told its unit, and the keys to its lines.
+function caption(box, lines) {
+  const above = box.appendChild(document.createElement("div")), palette = lab.colours();
+  above.className = "caption";
+  const title = above.appendChild(document.createElement("span"));
+  for (const { key, ink, name } of lines.filter((each) => each.key)) {
+    const told = above.appendChild(document.createElement("span"));
+    told.textContent = key;
+    told.style.color = name === "z" ? palette.soft : ink;
+  }
+  return title;
+}
+function scales(last) {
+  const { soft, line } = lab.colours();
+  const thin = { stroke: line, width: 1 };
+  const axis = { stroke: soft, font: FONT, grid: thin, ticks: { ...thin, size: 4 } };
+  return [
+    { ...axis, size: last ? 24 : 0, values: (plot, splits) => (last ? splits.map(tick) : []),
+      label: last ? "time [s]" : undefined, labelSize: 18, labelFont: FONT, gap: 2 },
+    { ...axis, size: 60, values: (plot, splits) => splits.map((value) => tick(value * plot.factor)), space: 24 },
+  ];
+}
+
 function drawTraces() {
   if (charts.shape !== shape()) build();
-  const { arrays } = run, whole = charts[0].scales.x, kept = charts.zoomed && whole.min >= run.first && whole.max <= run.last;
+  const { arrays, first, last } = run, { min, max } = charts[0].scales.x;
+  const kept = charts.zoomed && min >= first && max <= last;
   for (const chart of charts) {
     const rows = chart.lines.map((each) => arrays[each.name]);
     let most = 0;
-    for (const row of rows) for (let k = 0; k < row.length; k++) { const size = Math.abs(row[k]); if (size > most) most = size; }
+    for (const row of rows) for (let k = 0; k < row.length; k++) if (Math.abs(row[k]) > most) most = Math.abs(row[k]);
     const [factor, unit] = prefixed(most, chart.unit);
     chart.factor = factor;
     chart.title.textContent = `${chart.words}${unit ? ` [${unit}]` : ""}`;
@@ -222,7 +304,10 @@ function zoom(plot) {
   const { min, max } = plot.scales.x;
   charts.zoomed = max - min < 0.999 * (run.last - run.first);
   charts.quiet = true;
-  for (const chart of charts) if (chart !== plot && (chart.scales.x.min !== min || chart.scales.x.max !== max)) chart.setScale("x", { min, max });
+  for (const chart of charts) {
+    const { x } = chart.scales;
+    if (chart !== plot && (x.min !== min || x.max !== max)) chart.setScale("x", { min, max });
+  }
   queueMicrotask(() => { charts.quiet = false; });
 }
 
@@ -249,7 +334,9 @@ function shade(plot, group) {
       const x = plot.valToPos(time, "x", true);
       if (x - before < size) continue;
       before = x;
-      pen.beginPath(); pen.moveTo(x - size, top); pen.lineTo(x + size, top); pen.lineTo(x, top + 1.6 * size); pen.fill();
+      pen.beginPath();
+      pen.moveTo(x - size, top); pen.lineTo(x + size, top); pen.lineTo(x, top + 1.6 * size);
+      pen.fill();
     }
   }
   pen.restore();
@@ -263,21 +350,25 @@ function drawViews() {
   const palette = lab.colours(), friction = one("friction");
   plans.loopX = portrait("loop-x", ["way", "m", "displacement"], [friction, "N", "friction"], palette);
   plans.loopV = portrait("loop-v", ["slip", unitOf("slip"), "sliding velocity"], [friction, "N", "friction"], palette);
-  plans.phase = portrait("phase", [one("x"), unitOf("x"), "displacement"], [one("v"), unitOf("v"), "velocity"], palette);
+  const [x, v] = [one("x"), one("v")];
+  plans.phase = portrait("phase", [x, unitOf("x"), "displacement"], [v, unitOf("v"), "velocity"], palette);
   spectrum(palette);
 }
 
 function portrait(id, [x, xUnit, xWords], [y, yUnit, yWords], palette) {
   const { time } = run.arrays, xs = run.arrays[x], ys = run.arrays[y];
   const [xLow, xHigh] = range(xs), [yLow, yHigh] = range(ys);
-  const plan = axes($(id), { low: xLow, high: xHigh, label: xWords, unit: xUnit }, { low: yLow, high: yHigh, label: yWords, unit: yUnit }, palette);
-  const split = run.status === "at rest" ? 0 : Math.max(0, time.findIndex((each) => each >= run.last - run.cycle * (1 + 1e-9)));
+  const across = { low: xLow, high: xHigh, label: xWords, unit: xUnit };
+  const plan = axes($(id), across, { low: yLow, high: yHigh, label: yWords, unit: yUnit }, palette);
+  const cycle = run.last - run.cycle * (1 + 1e-9);
+  const split = run.status === "at rest" ? 0 : Math.max(0, time.findIndex((each) => each >= cycle));
   if (split) line(plan, xs, ys, { to: split + 1, colour: palette.faint, width: 0.7 });
   const inks = [palette.orange, palette.sky, palette.blue, palette.purple];
   for (let from = split; from < xs.length - 1;) {
     let to = from + 1;
     while (to < xs.length && run.kinds[to] === run.kinds[from]) to++;
-    line(plan, xs, ys, { from, to: Math.min(to + 1, xs.length), colour: inks[run.kinds[from]], width: run.kinds[from] ? 2.6 : 1.8 });
+    const kind = run.kinds[from];
+    line(plan, xs, ys, { from, to: Math.min(to + 1, xs.length), colour: inks[kind], width: kind ? 2.6 : 1.8 });
     from = to;
   }
   return { ...plan, xs, ys, canvas: $(id), dot: dotOf($(id)) };
@@ -289,11 +380,14 @@ function dotOf(canvas) {
 }
 
 function spectrum(palette) {
-  const { frequency, amplitude } = run.arrays, most = amplitude.reduce((high, value) => Math.max(high, value), 1e-300);
+  const { frequency, amplitude } = run.arrays;
+  const most = amplitude.reduce((high, value) => Math.max(high, value), 1e-300);
   let end = Math.min(frequency.length, frequency.findIndex((each) => each > 60 / run.cycle) >>> 0);
   end = Math.max(end, Math.min(frequency.length, 60));
   const low = most * 1e-4;
-  const plan = axes($("spectrum"), { low: 0, high: frequency[end - 1], label: "frequency", unit: "Hz" }, { low, high: most * 1.6, label: "amplitude [m/s²]", factor: 1, unit: "", log: true }, palette);
+  const across = { low: 0, high: frequency[end - 1], label: "frequency", unit: "Hz" };
+  const upwards = { low, high: most * 1.6, label: "amplitude [m/s²]", factor: 1, unit: "", log: true };
+  const plan = axes($("spectrum"), across, upwards, palette);
   line(plan, frequency, amplitude.map((value) => Math.max(value, low)), { to: end, colour: palette.purple });
 }
 
@@ -312,7 +406,9 @@ function drawWavelet() {
   const picture = new OffscreenCanvas(columns, map.rows);
   picture.getContext("2d").putImageData(image, 0, 0);
   const low = Math.min(frequency[0], frequency.at(-1)), high = Math.max(frequency[0], frequency.at(-1));
-  const plan = axes($("wavelet"), { low: time[0], high: time.at(-1), label: "time", unit: "s" }, { low, high, label: "frequency [Hz]", factor: 1, unit: "", log: true }, lab.colours());
+  const across = { low: time[0], high: time.at(-1), label: "time", unit: "s" };
+  const upwards = { low, high, label: "frequency [Hz]", factor: 1, unit: "", log: true };
+  const plan = axes($("wavelet"), across, upwards, lab.colours());
   const { left, right, top, bottom } = plan.box;
   plan.pen.drawImage(picture, left, top, right - left, bottom - top);
 }
@@ -322,14 +418,16 @@ function stale(is) {
   for (const card of document.querySelectorAll("#shown .card")) card.classList.toggle("stale", is);
 }
 
-function told({ sentences, rows }) {
+function told({ sentences, rows, state: found }) {
+  controls.follow(found);
   $("told").classList.remove("stale");
   $("happened").textContent = sentences[0] ?? "";
   const body = $("rows");
-  $("sentences").replaceChildren(...sentences.map((each) => Object.assign(document.createElement("p"), { textContent: each })));
-  body.replaceChildren(...rows.map(([name, value]) => {
+  const make = (tag, textContent) => Object.assign(document.createElement(tag), { textContent });
+  $("sentences").replaceChildren(...sentences.map((each) => make("p", each)));
+  body.replaceChildren(...rows.map((cells) => {
     const row = document.createElement("tr");
-    row.append(...[name, value].map((each) => Object.assign(document.createElement("td"), { textContent: each })));
+    row.append(...cells.map((each) => make("td", each)));
     return row;
   }));
 }
@@ -343,70 +441,92 @@ function moved(time, index) {
   }
   for (const plan of [plans.loopX, plans.loopV, plans.phase]) {
     if (!plan || index >= plan.xs.length) continue;
-    plan.dot.style.transform = `translate(${plan.canvas.offsetLeft + plan.x(plan.xs[index])}px, ${plan.canvas.offsetTop + plan.y(plan.ys[index])}px)`;
+    const x = plan.canvas.offsetLeft + plan.x(plan.xs[index]), y = plan.canvas.offsetTop + plan.y(plan.ys[index]);
+    plan.dot.style.transform = `translate(${x}px, ${y}px)`;
   }
 }
 function pace() {
   const chosen = $("pace").value;
   stage.pace = chosen ? Number(chosen) : run.cycle / 2;
-  const slower = 1 / stage.pace;
-  $("stage-note").textContent = Math.abs(slower - 1) < 0.04 ? "in true time" : slower > 1 ? `${shortly(+slower.toPrecision(2))} times slower than it is` : `${shortly(+(1 / slower).toPrecision(2))} times faster than it is`;
+  const slower = 1 / stage.pace, times = shortly(+Math.max(slower, 1 / slower).toPrecision(2));
+  $("stage-note").textContent =
+    Math.abs(slower - 1) < 0.04 ? "in true time" : `${times} times ${slower > 1 ? "slower" : "faster"} than it is`;
 }
 
 /* ---------- buttons ---------- */
 function buttons() {
-  const still = () => { $("pause").textContent = stage.playing ? "Pause" : "Run"; $("pause").setAttribute("aria-pressed", !stage.playing); };
+  motionButtons();
+  textButtons();
+  $("file").addEventListener("change", openFile);
+  new ResizeObserver(resized).observe($("traces"));
+}
+function motionButtons() {
+  const still = () => {
+    $("pause").textContent = stage.playing ? "Pause" : "Run";
+    $("pause").setAttribute("aria-pressed", !stage.playing);
+  };
   still();
   $("pause").addEventListener("click", () => { stage.playing = !stage.playing; still(); });
   $("pace").addEventListener("change", pace);
-  $("hear").addEventListener("click", () => {
-    if (player) { silence(); return; }
-    more("sound");
-  });
+  $("hear").addEventListener("click", () => { if (player) silence(); else more("sound"); });
+}
+function textButtons() {
   $("share").addEventListener("click", async () => {
     history.replaceState(null, "", link());
-    await copied(location.origin + location.pathname + link(), "The link is copied: it opens this very system in any lab at this address.");
+    const words = "The link is copied: it opens this very system in any lab at this address.";
+    await copied(location.origin + location.pathname + link(), words);
   });
   $("python").addEventListener("click", () => texts("python", "The Python that does this", "lab.py"));
   $("toml").addEventListener("click", () => texts("toml", "The system's file", "system.toml"));
   $("text-close").addEventListener("click", () => $("text").close());
   $("text-copy").addEventListener("click", () => copied($("text-body").textContent, "Copied."));
   $("text-save").addEventListener("click", () => saved($("text-body").textContent, $("text").dataset.file));
-  $("file").addEventListener("change", async () => {
-    const [file] = $("file").files;
-    $("file").value = "";
-    if (!file) return;
-    try { use((await lab.ask("/open", { method: "POST", body: await file.text(), headers: { "content-type": "text/plain" } })).state); $("preset").value = ""; lab.say(`${file.name} is open.`); } catch (error) { lab.say(error.message, true); }
-  });
-  new ResizeObserver(() => {
-    if (!run || !$("traces").clientWidth) return;
-    if (charts.tall !== tall()) { build(); drawTraces(); }
-    for (const chart of charts) chart.setSize({ width: $("traces").clientWidth - 26, height: chart.height });
-    drawViews();
-    drawWavelet();
-    if (stage.run) stage.draw();
-  }).observe($("traces"));
+}
+async function openFile() {
+  const [file] = $("file").files;
+  $("file").value = "";
+  if (!file) return;
+  const headers = { "content-type": "text/plain" };
+  try {
+    use((await lab.ask("/open", { method: "POST", body: await file.text(), headers })).state);
+    $("preset").value = "";
+    lab.say(`${file.name} is open.`);
+  } catch (error) { failed(error); }
+}
+function resized() {
+  if (!run || !$("traces").clientWidth) return;
+  if (charts.tall !== tall()) { build(); drawTraces(); }
+  for (const chart of charts) chart.setSize({ width: $("traces").clientWidth - 26, height: chart.height });
+  drawViews();
+  drawWavelet();
+  if (stage.run) stage.draw();
 }
 
 async function texts(form, title, file) {
   try {
-    const held = await lab.ask("/export", { method: "POST", body: JSON.stringify(state), headers: { "content-type": "application/json" } });
+    const headers = { "content-type": "application/json" };
+    const held = await lab.ask("/export", { method: "POST", body: JSON.stringify(state), headers });
     $("text-title").textContent = title;
     $("text-body").textContent = held[form];
     $("text").dataset.file = file;
     $("text").showModal();
-  } catch (error) { lab.say(error.message, true); }
+  } catch (error) { failed(error); }
 }
 function saved(text, name) {
-  const anchor = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob([text], { type: "text/plain" })), download: name });
+  const href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+  const anchor = Object.assign(document.createElement("a"), { href, download: name });
   anchor.click();
   setTimeout(() => URL.revokeObjectURL(anchor.href), 1000);
 }
 async function copied(text, words) {
-  try { await navigator.clipboard.writeText(text); lab.say(words); } catch { lab.say("The browser does not let the page copy; the address bar holds the link.", true); }
+  const refused = () => lab.say("The browser does not let the page copy; the address bar holds the link.", true);
+  await Promise.resolve().then(() => navigator.clipboard.writeText(text)).then(() => lab.say(words), refused);
 }
 
-const link = () => `#${btoa(String.fromCharCode(...new TextEncoder().encode(JSON.stringify(state)))).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "")}`;
+function link() {
+  const text = btoa(String.fromCharCode(...new TextEncoder().encode(JSON.stringify(state))));
+  return `#${text.replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "")}`;
+}
 function fromLink() {
   if (location.hash.length < 2) return null;
   try {
@@ -421,11 +541,13 @@ function fromLink() {
 /* ---------- sound ---------- */
 function sounded({ fs, words, arrays }) {
   silence();
-  const context = new AudioContext(), buffer = context.createBuffer(1, arrays.sound.length, fs);
+  const context = new AudioContext();
+  const buffer = context.createBuffer(1, arrays.sound.length, fs);
   const fade = Math.min(400, arrays.sound.length >> 2), values = Float32Array.from(arrays.sound);
   for (let k = 0; k < fade; k++) { values[k] *= k / fade; values[values.length - 1 - k] *= k / fade; }
   buffer.copyToChannel(values, 0);
-  const source = new AudioBufferSourceNode(context, { buffer, loop: true }), quieter = new GainNode(context, { gain: 0.5 });
+  const source = new AudioBufferSourceNode(context, { buffer, loop: true });
+  const quieter = new GainNode(context, { gain: 0.5 });
   source.connect(quieter).connect(context.destination);
   source.start();
   player = { context, source };

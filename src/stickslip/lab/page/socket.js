@@ -21,7 +21,12 @@ export class Conversation {
   open() {
     this.socket = new WebSocket(`ws://${location.host}${this.path}`);
     this.socket.binaryType = "arraybuffer";
-    this.socket.onopen = () => { for (const text of this.waiting.values()) this.socket.send(text); this.waiting.clear(); if (this.before) this.again?.(); this.before = true; };
+    this.socket.onopen = () => {
+      for (const text of this.waiting.values()) this.socket.send(text);
+      this.waiting.clear();
+      if (this.before) this.again?.();
+      this.before = true;
+    };
     this.socket.onmessage = (event) => this.heard(unframed(event.data));
     this.socket.onclose = () => { this.lost?.(); setTimeout(() => this.open(), 1500); };
   }
