@@ -8,8 +8,9 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -32,12 +33,23 @@ class Lab:
     def headers(self) -> dict[str, str]:
         return {"Authorization": f"Bearer {self.token}"}
 
+    def workers(self) -> list[int]:
+        """The processes that compute for it."""
+        found = []
+        for place in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                parent = int((place / "stat").read_text().rpartition(")")[2].split()[1])
+                if parent == self.process.pid and b"stickslip.lab.worker" in (place / "cmdline").read_bytes():
+                    found.append(int(place.name))
+        return found
+
 
 @contextmanager
-def running_lab() -> Iterator[Lab]:
-    """A lab on a port of its own, ended at the end."""
-    command = [sys.executable, "-u", "-m", "stickslip", "lab", "--port", "0", "--no-browser"]
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+def running_lab(browser: Path | None = None) -> Iterator[Lab]:
+    """A lab on a port of its own, ended at the end; it opens a browser only if one is given."""
+    command = [sys.executable, "-u", "-m", "stickslip", "lab", "--port", "0"]
+    command += [] if browser else ["--no-browser"]
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1", **({"BROWSER": str(browser)} if browser else {})}
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment, start_new_session=True
     )

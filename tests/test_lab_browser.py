@@ -5,7 +5,10 @@ from __future__ import annotations
 import base64
 import io
 import json
+import os
+import re
 import shutil
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -126,6 +129,69 @@ def test_a_slider_moves_the_motion_and_the_link_holds_it(page: Page, lab: Lab) -
     other.wait_for_function(SHOWN, arg=rows)
     assert state_of(other) == moved
     other.close()
+
+
+def moved(page: Page) -> None:
+    page.locator(KINETIC).focus()
+    page.keyboard.press("ArrowRight")
+
+
+def signalled(lab: Lab, number: signal.Signals) -> None:
+    for process in lab.workers():
+        os.kill(process, number)
+
+
+def test_a_run_that_takes_long_says_for_how_long_and_can_be_cancelled(page: Page, lab: Lab) -> None:
+    show(page, lab)
+    signalled(lab, signal.SIGSTOP)
+    moved(page)
+    expect(page.locator("#status")).to_contain_text("Computing")
+    expect(page.locator("#elapsed")).to_contain_text(" s")
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.locator("#status")).to_contain_text("Cancelled")
+    expect(page.get_by_role("button", name="Cancel")).to_have_count(0)
+    moved(page)
+    page.wait_for_function("() => document.querySelector('#status').textContent === ''", timeout=PATIENCE)
+    page.wait_for_function(SHOWN, arg=printed(state_of(page)), timeout=PATIENCE)
+    signalled(lab, signal.SIGCONT)
+
+
+def test_a_worker_that_is_killed_is_one_sentence_and_the_page_goes_on(page: Page, lab: Lab) -> None:
+    show(page, lab)
+    signalled(lab, signal.SIGSTOP)
+    moved(page)
+    expect(page.locator("#status")).to_contain_text("Computing")
+    signalled(lab, signal.SIGKILL)
+    expect(page.locator(".fault")).to_contain_text("ended without an answer")
+    before = page.evaluate("location.hash")
+    moved(page)
+    page.wait_for_function("(before) => location.hash !== before", arg=before, timeout=PATIENCE)
+    page.wait_for_function(SHOWN, arg=printed(state_of(page)), timeout=PATIENCE)
+    expect(page.locator("#parts .fault")).to_have_count(0)
+
+
+def test_a_slider_follows_a_value_in_another_unit(page: Page, lab: Lab) -> None:
+    show(page, lab)
+    slider, number = page.locator(KINETIC), page.locator("#law-kinetic")
+    number.fill("0.25 lbf")
+    number.press("Tab")
+    place = 500 + 500 * np.log10(0.25 * 4.4482216152605 / 1.1)
+    page.wait_for_function("([knob, place]) => Math.abs(document.querySelector(knob).value - place) < 1",
+                           arg=[KINETIC, place], timeout=PATIENCE)  # fmt: skip
+    assert slider.get_attribute("aria-valuetext") == "1.11206 N"
+    frequency = page.locator("#drive-frequency")
+    frequency.fill("180 rpm")
+    frequency.press("Tab")
+    told = page.locator("#drive-frequency ~ input[type=range]")
+    expect(told).to_have_attribute("aria-valuetext", "3 Hz", timeout=PATIENCE)
+
+
+def test_scenarios_are_named_in_words_beside_their_codes(page: Page) -> None:
+    names = page.locator("#preset option").all_inner_texts()
+    assert "frequency ratio 0.6 (DH-1 b=0.6)" in names
+    assert "wet (SQUEAK wet 6.13 N)" in names
+    bare = [name for name in names[1:] if not re.search(r"^.{3,} \(.+\)$", name)]
+    assert bare == []
 
 
 def test_a_curve_is_asked_without_mass_and_spring_where_friction_is_measured(page: Page, rubbing: Path) -> None:

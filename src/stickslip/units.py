@@ -79,9 +79,10 @@ _TABLE: dict[str, tuple[float, str]] = {
 # What a bare symbol means depends on what is measured: pint reads "g" as gram, "G" as gauss, "lb" as mass.
 _BY_QUANTITY = {
     ("g", "m/s^2"): "g0", ("lb", "N"): "lbf", ("lbs", "N"): "lbf", ("kg", "N"): "kgf", ("lb", "kg"): "lbm",
-    ("mg", "m/s^2"): "mg0",
+    ("mg", "m/s^2"): "mg0", ("rpm", "Hz"): "rpm_turns", ("rev/min", "Hz"): "rpm_turns",
 }  # fmt: skip
 _TABLE["mg0"] = (GRAVITY / 1000, "m/s^2")
+_TABLE["rpm_turns"] = (1 / 60, "Hz")  # of a frequency, turns are counted; of a rate of rotation, radians
 
 
 def _normal(text: str) -> str:
@@ -154,8 +155,8 @@ def parse_value(text: str | float, expect: str) -> float:
 
     Examples
     --------
-    >>> parse_value("250 g", "kg"), parse_value("1.2 N/mm", "N/m"), parse_value(3, "kg")
-    (0.25, 1200.0, 3.0)
+    >>> parse_value("250 g", "kg"), parse_value("1.2 N/mm", "N/m"), parse_value(3, "kg"), parse_value("150 rpm", "Hz")
+    (0.25, 1200.0, 3.0, 2.5)
     """
     match = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", str(text))
     if match is None or not math.isfinite(float(match[1])):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 import webbrowser
+from pathlib import Path
 
 import click
 
@@ -25,15 +26,15 @@ def lab(port: int, no_browser: bool) -> None:
     stickslip lab
     stickslip lab --port 9000 --no-browser
     """
-    from stickslip.lab.serving import listening, serve  # the server is imported where it is wanted
+    from stickslip.lab.serving import doorway, listening, serve  # the server is imported where it is wanted
 
     with listening(port) as door:
         token = secrets.token_urlsafe(24)
         address = f"http://127.0.0.1:{door.getsockname()[1]}/?token={token}"
 
-        def opened() -> None:
+        def opened(folder: Path) -> None:
             click.echo(f"The lab is open at {address}\nCtrl-C ends it.")
             if not no_browser:
-                webbrowser.open(address)
+                webbrowser.open(doorway(folder, address).as_uri())
 
         serve(door, token=token, opened=opened)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import shutil
+import stat
 import tempfile
 import time
 from collections.abc import AsyncIterator
@@ -25,6 +27,7 @@ from stickslip.lab.jobs import Job, Jobs, Limits
 from stickslip.lab.openapi import described
 from stickslip.lab.uploads import UNUSED, Uploads
 
+PREFIX = "stickslip-lab-"  # of a run's folder; its process comes next
 LONGEST_ASK = 1 << 18  # bytes
 SWEPT_EVERY = 60.0  # seconds
 # A report is a page of its own: it runs nothing and asks nothing of anyone.
@@ -166,8 +169,9 @@ STATUS = object_of(state="string", words="string", share="number", message="stri
 
 @dataclass(frozen=True)
 class Data:
-    """The files and the analyses of this run of the lab."""
+    """The files and the analyses of this run of the lab, in a folder of its own."""
 
+    folder: Path
     uploads: Uploads
     jobs: Jobs
 
@@ -175,11 +179,12 @@ class Data:
 @asynccontextmanager
 async def open_data(limits: Limits | None = None, **sizes: int) -> AsyncIterator[Data]:
     """The files and analyses of one run; all of it is stopped and removed at the end."""
-    with tempfile.TemporaryDirectory(prefix=f"stickslip-lab-{os.getpid()}-", ignore_cleanup_errors=True) as place:
+    remove_left()
+    with tempfile.TemporaryDirectory(prefix=f"{PREFIX}{os.getpid()}-", ignore_cleanup_errors=True) as place:
         folders = Path(place, "files"), Path(place, "analyses")
         for folder in folders:
             folder.mkdir(mode=0o700)
-        data = Data(Uploads(folders[0], **sizes), Jobs(folders[1], limits))
+        data = Data(Path(place), Uploads(folders[0], **sizes), Jobs(folders[1], limits))
         sweeping = asyncio.create_task(_sweep(data))
         try:
             yield data
@@ -187,6 +192,28 @@ async def open_data(limits: Limits | None = None, **sizes: int) -> AsyncIterator
             sweeping.cancel()
             await asyncio.gather(sweeping, return_exceptions=True)
             await data.jobs.close()
+
+
+def remove_left() -> None:
+    """Remove the folders of labs that were killed: those of ours whose process is gone."""
+    if os.name != "posix":  # where asking whether a process is there would end it
+        return
+    for place in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
+        number = place.name.removeprefix(PREFIX).partition("-")[0]
+        with suppress(OSError):
+            state = place.lstat()
+            if number.isdigit() and stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and _gone(int(number)):
+                shutil.rmtree(place)
+
+
+def _gone(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    except (PermissionError, OverflowError):
+        return False
+    return False
 
 
 @asynccontextmanager
@@ -334,17 +361,6 @@ async def folder(request: Request) -> Response:
     return FileResponse(_kept(_job(request), Path("results.zip")), media_type="application/zip", filename="results.zip")
 
 
-@described("A figure of an analysis, by its number in the answer's list", gives="image/svg+xml")
-async def figure(request: Request) -> Response:
-    """One figure of an analysis, by its number in the answer's list."""
-    job, number = _job(request), request.path_params["number"]
-    names = (job.answer or {}).get("figures", [])
-    if number >= len(names):
-        raise HTTPException(404, "The analysis has no such figure; see its list.")
-    path = _kept(job, Path("results", "figures", Path(names[number]).name))
-    return FileResponse(path, media_type="image/svg+xml", headers=REPORT_HEADERS)
-
-
 def _job(request: Request) -> Job:
     return _of(request).jobs.get(request.path_params["key"])
 
@@ -368,7 +384,6 @@ routes: list[BaseRoute] = [
     Route("/jobs/{key}", cancel, methods=["DELETE"]),
     Route("/jobs/{key}/events", events, methods=["GET"]),
     Route("/jobs/{key}/results.zip", folder, methods=["GET"]),
-    Route("/jobs/{key}/figures/{number:int}", figure, methods=["GET"]),
     Route("/jobs/{key}/results.json", results, methods=["GET"]),
     Route("/jobs/{key}/report", report, methods=["GET"]),
 ]

@@ -57,8 +57,9 @@ def run(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     marks, micro = _marks(run, first, last)
     frequency, amplitude = _spectrum(run, last, cycle)
     header = {
-        "springs": _springs(run.system), "status": run.status, "cycle": cycle, "first": first, "last": last, "series": series,
-        "belt": run.table.motion.face.get("way", 0.0), "spectrum": f"acceleration {run.labels('a')[0]}",
+        "status": run.status, "cycle": cycle, "first": first, "last": last, "series": series,
+        "springs": _springs(run.system), "belt": run.table.motion.face.get("way", 0.0),
+        "spectrum": f"acceleration {run.labels('a')[0]}",
     }  # fmt: skip
     arrays = {"time": times, **values, **marks, "microslips": micro, "frequency": frequency, "amplitude": amplitude}
     return header, arrays

@@ -49,14 +49,12 @@ def published(
 def _told(summary: Any) -> dict[str, Any]:
     """What the lab shows: the same words as the report and the command line. Also packs the folder."""
     shutil.make_archive(FOLDER, "zip", FOLDER)
-    figures = sorted(path.name for path in Path(FOLDER, "figures").glob("*.svg"))
     return {
         "title": summary.title,
         "headline": [on_the_page(each) for each in summary.headline],
         "cautions": [on_the_page(each) for each in summary.cautions],
         "lines": [[line.name, line.value, line.interval, line.status] for line in summary.lines],
         "notes": [on_the_page(each) for each in summary.notes],
-        "figures": figures,
         "overlay": [],
     }
 

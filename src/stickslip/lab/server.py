@@ -20,6 +20,7 @@ import stickslip as ss
 from stickslip.lab import data, maps, play
 from stickslip.lab.openapi import described, document
 from stickslip.lab.security import Guard
+from stickslip.lab.serving import DOORWAY
 from stickslip.lab.workers import Workers
 
 PAGE = Path(__file__).parent / "page"
@@ -64,10 +65,20 @@ async def _lifespan(app: Starlette) -> AsyncIterator[None]:
         app.state.workers = await stack.enter_async_context(Workers(WORKERS))
         app.state.opened = asyncio.Event()
         await stack.enter_async_context(data.lifespan(app))
-        warming = asyncio.create_task(play.warmed(app.state.workers, app.state.opened))
+        beside = [
+            asyncio.create_task(play.warmed(app.state.workers, app.state.opened)),
+            asyncio.create_task(_shut(app.state.data.folder / DOORWAY, app.state.opened)),
+        ]
         yield
-        warming.cancel()
-        await asyncio.gather(warming, return_exceptions=True)
+        for task in beside:
+            task.cancel()
+        await asyncio.gather(*beside, return_exceptions=True)
+
+
+async def _shut(doorway: Path, opened: asyncio.Event) -> None:
+    """Remove the file that led a browser here, once it is here."""
+    await opened.wait()
+    doorway.unlink(missing_ok=True)
 
 
 async def _openapi(request: Request) -> Response:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 from collections.abc import Callable
+from pathlib import Path
 
 import stickslip as ss
 
 LARGEST_MESSAGE = 2**20  # bytes on a socket
 HOST = "127.0.0.1"
+DOORWAY = "open.html"  # in the folder of a run, until a page is open
 
 
 def listening(port: int) -> socket.socket:
@@ -18,12 +21,19 @@ def listening(port: int) -> socket.socket:
     Raises
     ------
     ModelError
-        Another program has it.
+        Another program has it, or it is for the administrator alone.
     """
     door = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         door.bind((HOST, port))
+    except PermissionError as error:
+        door.close()
+        raise ss.ModelError(
+            f"port {port} may not be used",
+            "the lowest ports are for the administrator",
+            "choose one above 1023 with --port",
+        ) from error
     except OSError as error:
         door.close()
         raise ss.ModelError(
@@ -32,8 +42,16 @@ def listening(port: int) -> socket.socket:
     return door
 
 
-def serve(door: socket.socket, *, token: str, opened: Callable[[], None]) -> None:
-    """Answer at the door until Ctrl-C; `opened` is called when it does.
+def doorway(folder: Path, address: str) -> Path:
+    """A file for this user's eyes that leads a browser to the address: arguments of a program are seen by all."""
+    page = folder / DOORWAY
+    with os.fdopen(os.open(page, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
+        file.write(f'<!doctype html><title>stickslip lab</title><meta http-equiv="refresh" content="0; url={address}">')
+    return page
+
+
+def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) -> None:
+    """Answer at the door until Ctrl-C; `opened` is called with the folder of this run when it does.
 
     Raises
     ------
@@ -52,7 +70,8 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[], None]) -> Non
     class Server(uvicorn.Server):
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
-            opened()
+            if self.started:
+                opened(app.state.data.folder)
 
     app = lab_app(token=token, port=door.getsockname()[1])
     settings = uvicorn.Config(
