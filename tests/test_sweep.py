@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import ModelError
+from stickslip.errors import ModelError, SolveError
+from stickslip.laws.base import Exit, Mode, Rigid
 
 pytest.importorskip("xarray")
 CIRCLE = 2 * math.pi
@@ -117,6 +119,31 @@ def test_a_point_without_meaning_is_marked_and_the_rest_stands() -> None:
     words = dict(zip(found.status.flag_values, found.status.flag_meanings.split(), strict=True))
     assert [words[int(code)] for code in found.status] == ["moving", "no_such_system"]
     assert math.isnan(found.amplitude[1])
+
+
+@dataclass(frozen=True)
+class Undecided(Rigid):
+    """A law with a mistake: sliding forward and holding each end at once in the other."""
+
+    level: float
+
+    def modes(self) -> tuple[Mode, ...]:
+        at_once = {"1": 1.0}
+        return (
+            Mode("back", "slip", -1, {"1": -self.level}, (Exit({"v": 1.0}, "stuck"),)),
+            Mode("stuck", "stick", 0, None, (Exit(at_once, "forward"),)),
+            Mode("forward", "slip", 1, {"1": self.level}, (Exit(at_once, "stuck"),)),
+        )
+
+
+@pytest.mark.parametrize("measure", ["stops", "events"])
+def test_a_law_that_changes_for_ever_is_refused(measure: str, tmp_path: Path) -> None:
+    """Motions marched together and alone; what grows without bound is no mistake and has its place on the map."""
+    with pytest.raises(SolveError, match=r"transitions without time between them.*with level = 0\.5.*the law's exits"):
+        ss.sweep(UNIT.having(law=Undecided(1.0)), {"level": [0.5]}, measures=[measure], store=tmp_path / "map.zarr")
+    assert not list(tmp_path.iterdir())
+    growing = ss.sweep(UNIT, {"damping": [-1e4, 0.1]}, measures=[measure], settle=2, cycles=40)
+    assert growing.status.values.tolist() == [2, 0]
 
 
 def test_the_answer_says_what_made_it() -> None:

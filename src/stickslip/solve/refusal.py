@@ -15,9 +15,13 @@ def named(names: Sequence[str], state: Array) -> str:
     return ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, state, strict=False))
 
 
-def chatter(place: str) -> SolveError:
+class Endless(SolveError):
+    """A law's modes follow one another without end while no time passes: what fails is the law, not a motion."""
+
+
+def chatter(place: str) -> Endless:
     """Modes that follow one another without end while no time passes."""
-    return SolveError(
+    return Endless(
         f"transitions without time between them, {place}",
         "a law leaves every state in one direction",
         "check the law's exits there",

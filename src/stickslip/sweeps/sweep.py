@@ -12,18 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import ModelError
+from stickslip.errors import ModelError, SolveError
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import System
 from stickslip.solve.lyapunov import BATCHES
 from stickslip.solve.poincare import tables
-from stickslip.solve.simulate import opening
+from stickslip.solve.refusal import Endless
+from stickslip.solve.simulate import opening, simulate
 from stickslip.structure import Structure
 from stickslip.sweeps.engines import read_engine
 from stickslip.sweeps.grid import Grid, apart, read_grid
-from stickslip.sweeps.measures import EVENTS, Measure, read_measures, variables
-from stickslip.sweeps.plan import Arrays, Plan, assemble, blank, chunked, required
+from stickslip.sweeps.measures import EVENTS, FAILED, Measure, read_measures, variables
+from stickslip.sweeps.plan import Arrays, Keep, Plan, assemble, blank, chunked, required
 from stickslip.sweeps.progress import told
 from stickslip.sweeps.store import Store
 
@@ -83,7 +84,8 @@ def sweep(
         The grid is empty or names a parameter that the system does not have; a measure or an engine is unknown; the
         map fits neither memory nor disk; the store holds something else.
     SolveError
-        The store can not be written or another process writes there; no scheduler answers.
+        The store can not be written or another process writes there; no scheduler answers; the law changes its mode
+        for ever while no time passes.
 
     Examples
     --------
@@ -101,7 +103,7 @@ def sweep(
     with nullcontext(Memory(plan)) if store is None else Store(store, plan) as kept:
         before, status = len(kept.missing), "complete"
         try:
-            with told(kept.keep, len(plan.blocks) - before, len(plan.blocks)) as keep:
+            with told(sensible(kept.keep, plan), len(plan.blocks) - before, len(plan.blocks)) as keep:
                 run(plan, kept.missing, keep, address)
         except KeyboardInterrupt:
             if len(kept.missing) == before:
@@ -143,6 +145,38 @@ def planned(
             "measure with a function of the Trajectory",
         )
     return plan
+
+
+def sensible(keep: Keep, plan: Plan) -> Keep:
+    """`keep`, which refuses a law whose modes change for ever without time: the first motion that failed tells."""
+    asked = False
+
+    def kept(number: int, arrays: Arrays, events: Arrays | None) -> None:
+        nonlocal asked
+        failed = np.flatnonzero(arrays["status"] == FAILED)
+        if len(failed) and not asked:
+            asked = True
+            require_end(plan, plan.points(number)[failed[0]])
+        keep(number, arrays, events)
+
+    return kept
+
+
+def require_end(plan: Plan, steps: tuple[int, ...]) -> None:
+    """Refuse a point where modes follow one another without end."""
+    system, start = plan.at(steps)
+    try:
+        simulate(system, cycles=plan.settle + plan.cycles, start=start)
+    except Endless as endless:
+        value, rule, step = endless.args
+        place = ", ".join(
+            f"{name} = {axis.values[j][k]}"
+            for axis, j in zip(plan.axes, steps, strict=True)
+            for k, name in enumerate(axis.names)
+        )
+        raise SolveError(f"{value}, with {place}", rule, step) from endless
+    except SolveError:
+        return  # a motion that grows without bound or chatters in time has its place on a map
 
 
 def require_room(plan: Plan, store: str | Path | None) -> None:
