@@ -119,6 +119,8 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(ModelError, match="is not a map of ours"):
         sweep(SLIDER, GRID, store=tmp_path, **SETTINGS)
+    with pytest.raises(ModelError, match="is not a map of ours"):
+        sweep(SLIDER, GRID, store=tmp_path / "notes.txt", **SETTINGS)
     assert files(tmp_path) == {"notes.txt": b"mine"}
 
 
@@ -173,7 +175,7 @@ def test_every_event_is_kept_beside_the_map(tmp_path: Path) -> None:
 def test_a_sweep_that_can_not_begin_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     numba_cuda = pytest.importorskip("numba.cuda")
     monkeypatch.setattr(numba_cuda, "is_available", lambda: False)
-    with pytest.raises(SolveError, match="finds no NVIDIA GPU"):
+    with pytest.raises(ModelError, match="finds no NVIDIA GPU"):
         sweep(SLIDER, GRID, store=tmp_path / "map.zarr", **{**SETTINGS, "engine": "cuda"})
     assert not list(tmp_path.iterdir())
 
@@ -190,5 +192,5 @@ def test_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch: pytest.Mo
     from stickslip.sweeps import cluster
 
     monkeypatch.setattr(cluster, "PATIENCE", 1)
-    with pytest.raises(SolveError, match=r"no Dask scheduler answers at 127\.0\.0\.1:9"):
+    with pytest.raises(ModelError, match=r"no Dask scheduler answers at 127\.0\.0\.1:9"):
         sweep(SLIDER, GRID, **{**SETTINGS, "engine": "dask://127.0.0.1:9"})

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import builtins
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ import pytest
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Exit, Mode, Rigid
+from stickslip.sweeps import progress
 
 pytest.importorskip("xarray")
 CIRCLE = 2 * math.pi
@@ -93,6 +97,8 @@ def test_a_grid_without_meaning_is_refused(grid: object, words: str) -> None:
         ({"measures": []}, "no measures"),
         ({"measures": ["stops", "stops"]}, "two measures"),
         ({"engine": "thread"}, "no engine is called 'thread'"),
+        ({"engine": "threads://two"}, "threads://two.*threads://4"),
+        ({"engine": "serial://4"}, "serial has no address"),
         ({"cycles": 0}, "cycles = 0"),
         ({"settle": -1}, "settle = -1"),
     ],
@@ -198,3 +204,27 @@ def test_a_map_that_does_not_fit_is_refused_before_it_starts(tmp_path: Path) -> 
     with pytest.raises(ModelError, match=r"125000000000000 points.*disk"):
         ss.sweep(UNIT, grid, store=tmp_path / "map.zarr")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_notebook_shows_one_line_that_is_written_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[str] = []
+
+    class Line:
+        def update(self, data: dict[str, str], *, raw: bool) -> None:
+            shown.append(data["text/plain"])
+
+    def display(data: dict[str, str], *, raw: bool, display_id: bool) -> Line:
+        assert not shown
+        Line().update(data, raw=raw)
+        return Line()
+
+    class ZMQInteractiveShell: ...
+
+    monkeypatch.setattr(builtins, "get_ipython", ZMQInteractiveShell, raising=False)
+    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=display))  # type: ignore[arg-type]
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    ss.sweep(UNIT, {"kinetic": [0.1, 0.2, 0.3, 0.4]}, settle=0, cycles=1, engine="serial")
+    assert [line.partition("blocks")[0][-4:-1] for line in shown[:-1]] == ["1/4", "2/4", "3/4", "4/4"]
+    assert shown[1].startswith("mapping " + 15 * "━" + 15 * "─")
+    assert "left 0:00:00" in shown[3]
+    assert shown[-1] == ""

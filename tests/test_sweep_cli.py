@@ -66,6 +66,7 @@ def test_a_file_has_laws_and_what_changes_together(file: Path) -> None:
     ("old", "new", "words"),
     [
         ("points = 8", "points = 0", "line 7.*points = 0"),
+        ("points = 8", "points = 1000000000", "line 7.*points = 1000000000.*10000000"),
         ('"2 Hz"', '"2 mm"', "line 7.*mm"),
         ("[0", '["', "TOML|TOML file"),
         ("kinetic =", "kinetc =", "no parameter is called 'kinetc'"),
@@ -79,6 +80,12 @@ def test_a_mistake_in_the_file_is_named(file: Path, old: str, new: str, words: s
     if old == "[0":
         file.write_text(GRID + '\nbroken = "')
     with pytest.raises(ModelError, match=words):
+        ss.read_sweep(file)
+
+
+def test_a_file_with_an_empty_grid_is_refused(file: Path) -> None:
+    file.write_text(GRID.partition("frequency")[0])
+    with pytest.raises(ModelError, match=r"grid.toml, line 6, has an empty grid.*kinetic = "):
         ss.read_sweep(file)
 
 

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -122,7 +123,7 @@ def test_a_failed_point_does_not_stop_the_threads() -> None:
 def test_no_gpu_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     numba_cuda = pytest.importorskip("numba.cuda")
     monkeypatch.setattr(numba_cuda, "is_available", lambda: False)
-    with pytest.raises(SolveError, match=r"finds no NVIDIA GPU.*threads"):
+    with pytest.raises(ModelError, match=r"finds no NVIDIA GPU.*threads"):
         ss.sweep(RIGID, {"kinetic": [0.5]}, engine="cuda", settle=1, cycles=1)
 
 
@@ -158,9 +159,25 @@ def test_a_gpu_gives_the_same(name: str, simulated: dict[str, Any]) -> None:
         assert np.allclose(values, other, rtol=1e-12, atol=1e-16, equal_nan=True), key
 
 
+def test_a_gpu_without_double_precision_or_a_driver_that_fits_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    numba_cuda = pytest.importorskip("numba.cuda")
+    monkeypatch.setattr(numba_cuda, "is_available", lambda: True)
+    monkeypatch.setattr(numba_cuda, "get_current_device", lambda: SimpleNamespace(compute_capability=(1, 1)))
+    with pytest.raises(ModelError, match=r"compute capability 1\.1; .*double precision.*engine=\"threads\""):
+        ss.sweep(RIGID, {"kinetic": [0.5]}, engine="cuda", settle=1, cycles=1)
+
+    def too_old() -> None:
+        raise ImportError("CUDA driver version is insufficient")
+
+    monkeypatch.setattr(numba_cuda, "get_current_device", too_old)
+    with pytest.raises(SolveError, match=r"driver refuses: CUDA driver version is insufficient;.*up to date"):
+        ss.sweep(RIGID, {"kinetic": [0.5]}, engine="cuda", settle=1, cycles=1)
+
+
 def test_a_gpu_refuses_what_it_cannot_march(monkeypatch: pytest.MonkeyPatch) -> None:
     numba_cuda = pytest.importorskip("numba.cuda")
     monkeypatch.setattr(numba_cuda, "is_available", lambda: True)
+    monkeypatch.setattr(numba_cuda, "get_current_device", lambda: SimpleNamespace(compute_capability=(9, 0)))
     slider = RIGID.having(law=ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=2e5, damping=20.0))
     with pytest.raises(ModelError, match=r'LuGre.*take engine="threads"'):
         ss.sweep(slider, {"kinetic": [1.0]}, engine="cuda", settle=1, cycles=1)

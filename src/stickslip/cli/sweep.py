@@ -10,6 +10,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.show import table
+from stickslip.cli.simulate import INTERRUPTED
 
 
 @click.command()
@@ -34,10 +35,10 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     found = ss.sweep(asked.case.system, asked.grid, measures=asked.measures, cycles=asked.cycles, settle=asked.settle,
                      start=asked.case.start, engine=engine, store=place)  # fmt: skip
     written = _drawn(found, asked, output) if output is not None else []
-    told = _told(found)
+    told, whole = _told(found), found.attrs["status"] == "complete"
     if as_json:
         click.echo(json.dumps({**found.attrs, "store": str(place), "variables": told}, indent=2, allow_nan=False))
-        return
+        raise SystemExit(0 if whole else INTERRUPTED)
     from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=False)
@@ -48,6 +49,9 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     click.echo(f"Map: {place}")
     for path in written:
         click.echo(f"Figure: {path}")
+    if not whole:
+        click.echo("Call again to go on.")
+        raise SystemExit(INTERRUPTED)
 
 
 def _told(found: Any) -> dict[str, dict[str, Any]]:

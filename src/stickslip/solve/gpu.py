@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from numba import cuda
+from numba.cuda.cudadrv.driver import CudaAPIError
 
-from stickslip.errors import SolveError
+from stickslip.errors import ModelError, SolveError
 from stickslip.solve.batch import march_one
 
 THREADS = 64  # of a block
+FLOAT64 = (1, 3)  # compute capability with which NVIDIA's GPUs have it
 
 
 @cuda.jit
@@ -35,7 +39,27 @@ def carried(values: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(carried(v) if isinstance(v, tuple) else cuda.to_device(v) for v in values)
 
 
+@contextmanager
+def driven(instead: str) -> Iterator[None]:
+    """What a driver refuses (too old, without its libraries, no memory left) in one sentence."""
+    try:
+        yield
+    except (CudaAPIError, ImportError) as refusal:
+        raise SolveError(
+            f"the GPU's driver refuses: {refusal}",
+            "a GPU is driven by a driver as new as numba-cuda",
+            f"bring the driver up to date, or take {instead}",
+        ) from refusal
+
+
 def require_gpu(instead: str) -> None:
     """Refuse to go on where numba finds no GPU that it can drive; `instead` is what to take."""
     if not cuda.is_available():
-        raise SolveError("numba finds no NVIDIA GPU", "this needs one and its driver", f"take {instead}")
+        raise ModelError("numba finds no NVIDIA GPU", "this needs one and its driver", f"take {instead}")
+    with driven(instead):
+        capability = cuda.get_current_device().compute_capability
+    if capability < FLOAT64:
+        raise ModelError(
+            f"the GPU has compute capability {'.'.join(map(str, capability))}",
+            "motions are marched in double precision, which begins at 1.3", f"take {instead}",
+        )  # fmt: skip

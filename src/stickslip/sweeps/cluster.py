@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from logging import CRITICAL
 from typing import TYPE_CHECKING, Any
 
-from stickslip.errors import SolveError
+from stickslip.errors import ModelError
 from stickslip.sweeps.block import run_block
 from stickslip.sweeps.plan import Keep, Plan, required
 
@@ -43,6 +44,11 @@ def _run(plan: Plan, number: int) -> tuple[int, Any, Any]:
     return (number, *run_block(plan, number))
 
 
+def _unheard() -> None:
+    """Leave Ctrl-C, which a terminal sends to every process, to the one that asks: it ends its workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 @contextmanager
 def _client(where: str | None) -> Iterator[Client]:
     """A cluster of one's own, or the one that stands at an address."""
@@ -53,12 +59,13 @@ def _client(where: str | None) -> Iterator[Client]:
             distributed.LocalCluster(threads_per_worker=1, dashboard_address=None, silence_logs=CRITICAL) as cluster,
             distributed.Client(cluster) as client,
         ):
+            client.run(_unheard)
             yield client
         return
     try:
         client = distributed.Client(f"tcp://{where}", timeout=PATIENCE)
     except (OSError, TimeoutError, ValueError) as error:
-        raise SolveError(
+        raise ModelError(
             f"no Dask scheduler answers at {where}",
             f"it is asked for {PATIENCE} s",
             "start one there with `dask scheduler`, or leave the address for a cluster of this machine",

@@ -6,11 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from stickslip.errors import ModelError, SolveError
+from stickslip.errors import ModelError
 from stickslip.sweeps.block import run_block
 from stickslip.sweeps.crowd import scratch
 from stickslip.sweeps.measures import LOG
 from stickslip.sweeps.plan import Keep, Plan
+
+INSTEAD = 'engine="threads"'
 
 
 def cuda(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = None) -> None:
@@ -18,19 +20,20 @@ def cuda(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = N
 
     Raises
     ------
-    SolveError
-        numba-cuda, a GPU or its driver is not there.
     ModelError
-        The system is not of the kind that marches on a GPU, or every event is asked for.
+        numba-cuda, a GPU with double precision or its driver is not there; the system is not of the kind that marches
+        on a GPU, or every event is asked for.
+    SolveError
+        The driver refuses the work.
     """
     try:
-        from stickslip.solve.gpu import carried, require_gpu
+        from stickslip.solve.gpu import carried, driven, require_gpu
         from stickslip.sweeps.watch_gpu import THREADS, each
     except ImportError as absent:
-        raise SolveError(
+        raise ModelError(
             "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install "stickslip[gpu]"'
         ) from absent
-    require_gpu('engine="threads"')
+    require_gpu(INSTEAD)
     if LOG in plan.measures:
         raise ModelError(
             f"measures has '{LOG}'", "a GPU counts events and keeps none",
@@ -38,12 +41,13 @@ def cuda(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = N
         )  # fmt: skip
 
     def watch(given: Any, out: Any, size: int, physical: int) -> None:
-        written = carried(out)
-        each[math.ceil(len(given[0]) / THREADS), THREADS](
-            carried(given), written, carried(scratch(len(given[0]), size, physical))
-        )
-        for array, found in zip(out, written, strict=True):
-            array[...] = found.copy_to_host()
+        with driven(INSTEAD):
+            written = carried(out)
+            each[math.ceil(len(given[0]) / THREADS), THREADS](
+                carried(given), written, carried(scratch(len(given[0]), size, physical))
+            )
+            for array, found in zip(out, written, strict=True):
+                array[...] = found.copy_to_host()
 
     for number in numbers:
         keep(number, *run_block(plan, number, watch, alone=_refused))

@@ -13,6 +13,7 @@ from stickslip.errors import ModelError
 from stickslip.parameters import UNITS, changed, find, places
 from stickslip.solve.automaton import System
 
+MOST = 10_000_000  # values along an axis; more fit no memory
 START = "start."  # before the name of an entry of the start: "start.x", "start.mode"
 Grid = Mapping[Any, Any] | Sequence[Mapping[str, Any]]
 
@@ -94,6 +95,9 @@ def _axis(key: Any, values: Any) -> Axis:
                          'write it as "kinetic"')  # fmt: skip
     if isinstance(values, str) or not hasattr(values, "__len__"):
         raise ModelError(f"{key} = {values!r}", "along an axis stand several values", f"give a list, as [{values!r}]")
+    if len(values) > MOST:
+        raise ModelError(f"{key} has {len(values)} values", f"along an axis stand {MOST} at most",
+                         "take fewer, or several axes")  # fmt: skip
     if len(values) == 0:
         raise ModelError(f"{key} has no values", "an empty grid has no map", "give at least one value")
     rows = tuple((value,) for value in values) if len(names) == 1 else tuple(tuple(row) for row in values)

@@ -12,11 +12,9 @@ from pydantic import BaseModel, Field
 from stickslip.errors import ModelError, RecordError
 from stickslip.settings import STRICT, checked, line_of, read_toml
 from stickslip.solve.automaton import System
-from stickslip.sweeps.grid import unit
+from stickslip.sweeps.grid import MOST, unit
 from stickslip.system_file import Case, read_system, scenario_case
 from stickslip.units import parse_value
-
-MOST = 100_000_000  # points along an axis; more fit no disk
 
 
 class _File(BaseModel):
@@ -99,6 +97,11 @@ def read_sweep(path: str | Path) -> SweepFile:
     whole = checked(_File, values, source=path.name, lines=lines)
     beside = path.parent / whole.system
     case = read_system(beside) if whole.system.endswith(".toml") else scenario_case(whole.system)
+    if not whole.grid:
+        raise ModelError(
+            f"{path.name}{line_of(['grid'], lines)} has an empty grid", "a sweep changes one parameter at least",
+            "add one, as kinetic = [1.0, 1.1]",
+        )  # fmt: skip
     grid = dict(_axis(case.system, name, column, path.name, lines) for name, column in whole.grid.items())
     return SweepFile(case, grid, tuple(whole.measures), whole.cycles, whole.settle)
 

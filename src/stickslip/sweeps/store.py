@@ -124,7 +124,7 @@ class Store(AbstractContextManager["Store"]):
         try:
             group = self._zarr.open_group(self.path, mode="r+")
             found = group.attrs["checksum"]
-        except (FileNotFoundError, KeyError, NotADirectoryError) as error:
+        except (FileNotFoundError, FileExistsError, KeyError, NotADirectoryError) as error:
             raise ModelError(
                 f"{self.path} is not a map of ours", "a store is a folder that sweep() has made", "name another path"
             ) from error

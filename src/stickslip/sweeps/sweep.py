@@ -82,10 +82,10 @@ def sweep(
     ------
     ModelError
         The grid is empty or names a parameter that the system does not have; a measure or an engine is unknown; the
-        map fits neither memory nor disk; the store holds something else.
+        map fits neither memory nor disk; the store holds something else; no scheduler answers; there is no GPU.
     SolveError
-        The store can not be written or another process writes there; no scheduler answers; the law changes its mode
-        for ever while no time passes.
+        The store can not be written or another process writes there; the law changes its mode for ever while no
+        time passes.
 
     Examples
     --------
