@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -10,18 +9,12 @@ from types import ModuleType
 import pytest
 
 import stickslip as ss
-
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks" / "run.py"
+from scripts import loaded
 
 
 @pytest.fixture(scope="module")
 def benchmarks() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("benchmarks_run", BENCHMARKS)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return loaded("benchmarks/run.py")
 
 
 @pytest.mark.alone

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 
+from scripts import loaded
 from stickslip import analyze, datasets
-
-MAKER = Path(__file__).resolve().parents[1] / "tools" / "make_demo_record.py"
 
 
 @pytest.fixture(scope="module")
 def maker() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_demo_record", MAKER)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return loaded("tools/make_demo_record.py")
 
 
 def test_the_shipped_record_is_what_the_script_makes(maker) -> None:

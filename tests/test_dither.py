@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from scripts import loaded
 from stickslip.regimes.dither import averaged_friction, longest_stick
 
 BELT = ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb(1.0, static=1.5), drive=ss.Belt(0.5), damping=0.02)
@@ -138,13 +137,7 @@ def test_the_figure_shows_law_and_runs(found: ss.Dither) -> None:
 
 def test_random_systems_lose_their_sticks(tmp_path: Path) -> None:
     """The short form of benchmarks/dither.py, stopped and begun again."""
-    place = Path(__file__).parents[1] / "benchmarks" / "dither.py"
-    spec = importlib.util.spec_from_file_location("bench_dither", place)
-    assert spec is not None
-    assert spec.loader is not None
-    bench = importlib.util.module_from_spec(spec)
-    sys.modules["bench_dither"] = bench
-    spec.loader.exec_module(bench)
+    bench = loaded("benchmarks/dither.py")
     first = bench.measured(2, tmp_path)
     lines = bench.measured(3, tmp_path)
     assert lines[:2] == first

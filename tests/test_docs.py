@@ -57,6 +57,14 @@ def test_the_symbols_are_of_names_that_exist() -> None:
         assert hasattr(there, name) or name in {field.name for field in dataclasses.fields(there)}, f"{owner}.{name}"
 
 
+def test_each_symbol_stands_for_one_thing() -> None:
+    page = (DOCS / "symbols.md").read_text("utf-8")
+    rows = re.findall(r"^\| (\$.*?) \|", page, flags=re.MULTILINE)
+    letters = [letter for row in rows for letter in re.findall(r"\$(.*?)\$", row)]
+    assert len(letters) > 40
+    assert [letter for letter in set(letters) if letters.count(letter) > 1] == []
+
+
 @pytest.mark.parametrize("page", sorted(DOCS.glob("extending/*.md")), ids=lambda page: page.name)
 def test_every_extension_point_has_an_example_and_a_place(page: Path) -> None:
     listed = (DOCS / "extending" / "index.md").read_text("utf-8")

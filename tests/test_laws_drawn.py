@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-BENCHMARK = Path(__file__).resolve().parents[1] / "benchmarks" / "laws.py"
+from scripts import loaded
 
 
 @pytest.fixture(scope="module")
 def laws() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("benchmarks_laws", BENCHMARK)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return loaded("benchmarks/laws.py")
 
 
 @pytest.mark.parametrize(

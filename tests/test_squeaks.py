@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -13,8 +11,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from scripts import loaded
 
-BENCHMARK = Path(__file__).resolve().parents[1] / "benchmarks" / "squeak.py"
 Heard = Callable[[str], ss.Squeaks]
 FS = 10_000.0
 REAL = {
@@ -37,13 +35,7 @@ def heard(dataset: Callable[[str], Path]) -> Heard:
 
 @pytest.fixture(scope="module")
 def benchmark() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("benchmarks_squeak", BENCHMARK)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where its dataclass looks for itself
-    spec.loader.exec_module(module)
-    return module
+    return loaded("benchmarks/squeak.py")
 
 
 def burst(frequency: float = 500.0, *, begin: float = 0.4, growth: float = 0.02, fs: float = FS) -> np.ndarray:

@@ -243,7 +243,7 @@ def _fetched(source: Source, files: list[str]) -> tuple[Path, list[Path]]:
         import pooch
     except ImportError as error:
         raise RecordError(
-            f"fetching {source.name} needs pooch", "it comes with the extra [io]", 'pip install "stickslip[io]"'
+            f"fetching {source.name} needs pooch", "it comes with the extra [io]", 'pip install ".[io]" in the checkout'
         ) from error
     folder = Path(pooch.os_cache("stickslip")) / source.name
     registry = {file: f"sha256:{source.files[file].sha256}" for file in files}

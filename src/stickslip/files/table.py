@@ -144,5 +144,5 @@ def optional(module: str) -> ModuleType:
         raise FormatError(
             f"the package {module} is not installed",
             "it reads and writes this format",
-            'install it with: pip install "stickslip[io]"',
+            'install it with: pip install ".[io]" in the checkout',
         ) from error

@@ -64,7 +64,9 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) ->
         from stickslip.lab.server import lab_app
     except ImportError as error:
         raise ss.ModelError(
-            f"the lab needs the package {error.name}", "it comes with the extra [lab]", "pip install 'stickslip[lab]'"
+            f"the lab needs the package {error.name}",
+            "it comes with the extra [lab]",
+            'pip install ".[lab]" in the checkout',
         ) from error
 
     class Server(uvicorn.Server):

@@ -487,7 +487,7 @@ def labelled_arrays(asker: str = "to_xarray and from_xarray") -> Any:
         raise FormatError(
             "the package xarray is not installed",
             f"{asker} need it",
-            'install it with: pip install "stickslip[io]"',
+            'install it with: pip install ".[io]" in the checkout',
         ) from error
     return xarray
 

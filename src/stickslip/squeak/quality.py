@@ -245,6 +245,6 @@ def _mosqito() -> ModuleType:
         raise FormatError(
             "the package mosqito is not installed",
             "it computes loudness, sharpness and roughness",
-            'install it with: pip install "stickslip[sound]"',
+            'install it with: pip install ".[sound]" in the checkout',
         ) from error
     return cast(ModuleType, sq_metrics)
