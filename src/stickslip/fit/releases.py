@@ -90,7 +90,7 @@ class Rests:
             return None
         value, sd = _middle(self.falls, self.strays)
         sd = float(np.hypot(sd, ROUNDED))
-        ends = (max(0.0, value - NORMAL_95 * sd), max(0.0, value + NORMAL_95 * sd))
+        ends = (max(0.0, value - NORMAL_95 * sd), max(0.0, value) + NORMAL_95 * sd)
         words = f"fall of the friction as the contact lets go, median of {len(self.falls)} releases"
         return Estimate("excess of static friction", max(0.0, value), ends, sd, "1", words)
 
