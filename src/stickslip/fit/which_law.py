@@ -363,7 +363,7 @@ def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tel
     )
     name, share = _worst(fit, noise)
     if share > LEFT:
-        words = f"its interval knows nothing of why the law misses {share:.0%} of {name}"
+        words = f"the interval does not count that the law misses {share:.0%} of {name}"
         told = {key: replace(one, status=words) if one.status == "ok" else one for key, one in fit.parameters.items()}
         fit = replace(fit, parameters=told)
     return replace(fit, noise=noise, checks=checks)
