@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Key = tuple[str, int]
 """A channel, and the number of its record."""
 
-SEPARATED = 2.0  # times the misfit of a rigid law, up to which a contact next to rigid says the same
+SEPARATED = 10.0  # times what a contact next to rigid leaves, up to which a rigid law on a rough surface says the same
 CALIBRATIONS = 3.0  # times the calibration's error, below which an effect is not to be told from it
 CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
 BLUNT = 4.0  # of the criterion, by which the odds between families fall e-fold; 2 were the stories Gaussian
