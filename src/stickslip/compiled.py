@@ -33,7 +33,7 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return _keeping(njit, options)
 
 
-def pointer(signature: str, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+def pointer(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """As :func:`compiled`, at once and for one signature: a function that compiled code takes as an argument."""
     return _keeping(lambda **more: cfunc(signature, **more), options)
 

@@ -110,11 +110,11 @@ def degree(rtol: float) -> int:
 
 
 class Code(NamedTuple):
-    """Compiled code of a system: Taylor coefficients with their numbers, rates alone, and the method of the leaps."""
+    """Code of a system, by address: Taylor coefficients with their numbers, rates alone; and the leaps' method."""
 
-    series: Any
+    series: int
     numbers: Array
-    rates: Any
+    rates: int
     scheme: tuple[Array, Array, Array]
 
 
@@ -126,7 +126,7 @@ def code(table: Tape, order: int) -> Code:
 
 
 @lru_cache(maxsize=32)
-def _viewed(table: Tape, order: int) -> tuple[Any, Array, Any, Array]:
+def _viewed(table: Tape, order: int) -> tuple[int, Array, int, Array]:
     """The code that values between the steps need, and that of the outputs."""
     return *expansion(table.nodes, table.kept, order), *expansion(table.watched, table.shown, 0)
 

@@ -167,6 +167,7 @@ def _recall(
 
     The polynomial of a step that was cut short may hold over the steps that follow it.
     """
+    series = taylor.coded(series)
     laps, offsets, lengths, modes, states, _, _ = steps
     width, size = order + 1, len(state)
     j = cursor[0]

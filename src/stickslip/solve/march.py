@@ -11,6 +11,7 @@ from stickslip.solve.taylor import (
     EXACT,
     advance,
     awake,
+    coded,
     length,
     resolved,
     rise,
@@ -119,6 +120,7 @@ def march(
     steps since the last event or failed leap, and how many of them call for the next.
     """
     laps, offsets, lengths, modes, states, ends, leaps = steps
+    series, rates = coded(series), coded(rates)
     s, c, noise = work
     node, target, _, held, _, face, _ = exits
     size, room, written, chain, leapt, width = len(state), len(laps), 0, 0, 0, order + 1
@@ -208,6 +210,7 @@ def march(
 @compiled(**EXACT)
 def rests(series, numbers, mode, state, order, s):
     """Whether nothing moves."""
+    series = coded(series)
     series(numbers, mode, state, 1.0, s)
     most = 0.0
     for i in range(len(state)):
@@ -236,6 +239,7 @@ def sample(
     work,
 ):
     """Values of nodes (by mode) at increasing times, from the step each one falls in."""
+    series, outputs = coded(series), coded(outputs)
     s, state, values = work
     j, known, width = 0, -1, order + 1
     for t in range(len(times)):

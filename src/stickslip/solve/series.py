@@ -22,10 +22,10 @@ Number = tuple[int, ...]
 HEAD = '''"""Taylor coefficients of one kind of system; written by `stickslip.solve.series`."""
 
 from stickslip.compiled import pointer
-from stickslip.solve.taylor import STILL, value
+from stickslip.solve.taylor import CODE, STILL, value
 
 
-@pointer("void(float64[::1], int64, float64[::1], float64, float64[::1])", error_model="numpy", fastmath={"contract"})
+@pointer(CODE, error_model="numpy", fastmath={"contract"})
 def series(q, mode, y, h, s):
 '''
 
@@ -43,8 +43,8 @@ class Structure(NamedTuple):
     kept: tuple[Number, ...]
 
 
-def expansion(nodes: tuple[NDArray[Any], ...], kept: tuple[Number, ...], order: int) -> tuple[Any, NDArray[np.float64]]:
-    """Compiled code that fills a work array with coefficients 0 .. `order`, and its numbers.
+def expansion(nodes: tuple[NDArray[Any], ...], kept: tuple[Number, ...], order: int) -> tuple[int, NDArray[np.float64]]:
+    """Address of compiled code that fills a work array with coefficients 0 .. `order`, and its numbers.
 
     It takes the numbers, the mode, the state, the unit of time and the work array; coefficient k of node j stands at
     j (order + 1) + k. The state's are complete, other nodes lack the last (but have that of order 0).
@@ -63,8 +63,8 @@ def expansion(nodes: tuple[NDArray[Any], ...], kept: tuple[Number, ...], order: 
 
 
 @cache
-def _compiled(structure: Structure, order: int, stride: int) -> Any:
-    return generated(source(structure, order, stride)).series
+def _compiled(structure: Structure, order: int, stride: int) -> int:
+    return int(generated(source(structure, order, stride)).series.address)
 
 
 def source(structure: Structure, order: int, stride: int) -> str:

@@ -10,6 +10,11 @@ two crossings within one step are two.
 from __future__ import annotations
 
 import math
+from typing import Any
+
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from stickslip.compiled import compiled
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise
@@ -20,6 +25,23 @@ EXACT = {"error_model": "numpy"}
 LINEAR, PRODUCT, SQUARE, QUOTIENT, POWER, EXP, TANH, SLOPE, LOG, ASINH = range(10)
 GROWTH = 6.0  # longest step in units of the one before
 STILL = 1e-10  # a power's base below this is zero: there the power is not analytic
+
+ROW = types.float64[::1]
+CODE = types.void(ROW, types.int64, ROW, types.float64, ROW)  # what fills in coefficients, see `series.expansion`
+
+
+@intrinsic
+def coded(_context: Any, address: Any) -> Any:
+    """The function of the kind `CODE` at an address: a number is passed in no time, a function's type is not."""
+    kind = types.FunctionType(CODE)
+
+    def made(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        function = cgutils.create_struct_proxy(kind)(context, builder)
+        function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
+        function.py_addr = function.jit_addr = cgutils.voidptr_t(None)
+        return function._getvalue()
+
+    return kind(address), made
 
 
 @compiled(**OPTIONS)
@@ -132,7 +154,7 @@ def woken(kind, s, a, order, u, asleep, c, noise):
     return u if at == NONE else u * at
 
 
-@compiled(**EXACT)
+@compiled(**OPTIONS)
 def advance(s, width, size, order, u, state):
     """The state at u by Horner's rule."""
     for i in range(size):
