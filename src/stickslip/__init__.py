@@ -241,9 +241,11 @@ if TYPE_CHECKING:
     from stickslip.squeak.stability import (
         SlidingMode as SlidingMode,
         Stability as Stability,
+        stability as stability,
+    )
+    from stickslip.squeak.threshold import (
         Threshold as Threshold,
         critical_value as critical_value,
-        stability as stability,
         stability_map as stability_map,
     )
     from stickslip.squeak.bifurcation import CycleBranches as CycleBranches, limit_cycles as limit_cycles
@@ -342,7 +344,7 @@ _ROOMS = {
     "Condition": "analysis.squeak_comparison",
     "coupling": "squeak.coupling", "Coupling": "squeak.coupling", "Pair": "squeak.coupling",
     "stability": "squeak.stability", "Stability": "squeak.stability", "SlidingMode": "squeak.stability",
-    "critical_value": "squeak.stability", "Threshold": "squeak.stability", "stability_map": "squeak.stability",
+    "critical_value": "squeak.threshold", "Threshold": "squeak.threshold", "stability_map": "squeak.threshold",
     "limit_cycle": "squeak.limit_cycle", "LimitCycle": "squeak.limit_cycle",
     "limit_cycles": "squeak.bifurcation", "CycleBranches": "squeak.bifurcation",
     "plot_limit_cycles": "plot.limit_cycle", "plot_stability": "plot.limit_cycle",

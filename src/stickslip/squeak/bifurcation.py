@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.drives import Belt
 from stickslip.errors import ModelError
 from stickslip.squeak.limit_cycle import LimitCycle, limit_cycle, separating_cycle
-from stickslip.squeak.stability import System, Threshold, critical_value, numbers, stability
+from stickslip.squeak.sliding import System
+from stickslip.squeak.stability import stability
+from stickslip.squeak.threshold import Threshold, critical_value, numbers
 
 Array = NDArray[np.float64]
 

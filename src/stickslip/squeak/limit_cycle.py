@@ -19,7 +19,8 @@ from stickslip.solve.energy import EnergyFlow, energy_flow
 from stickslip.solve.poincare import Table, end_of, stretch, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.trajectory import Trajectory
-from stickslip.squeak.stability import Stability, System, stability
+from stickslip.squeak.sliding import System
+from stickslip.squeak.stability import Stability, stability
 from stickslip.structure import Structure
 
 Array = NDArray[np.float64]
