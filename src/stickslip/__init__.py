@@ -214,11 +214,8 @@ if TYPE_CHECKING:
     from stickslip.solve.continuation import Branch as Branch, continue_orbit as continue_orbit
     from stickslip.solve.energy import EnergyFlow as EnergyFlow, energy as energy, energy_flow as energy_flow
     from stickslip.solve.lyapunov import lyapunov as lyapunov
-    from stickslip.solve.periodic import (
-        SteadyState as SteadyState,
-        attractors as attractors,
-        steady_state as steady_state,
-    )
+    from stickslip.solve.orbit import SteadyState as SteadyState
+    from stickslip.solve.periodic import attractors as attractors, steady_state as steady_state
     from stickslip.solve.simulate import simulate as simulate
     from stickslip.solve.trajectory import Trajectory as Trajectory
     from stickslip.squeak.bursts import Squeak as Squeak, Squeaks as Squeaks, find_squeaks as find_squeaks
@@ -356,7 +353,7 @@ _ROOMS = {
     "SpeedProfile": "drives",
     "Oscillator": "oscillator", "Structure": "structure", "Contact": "structure",
     "simulate": "solve.simulate", "Trajectory": "solve.trajectory",
-    "steady_state": "solve.periodic", "SteadyState": "solve.periodic", "lyapunov": "solve.lyapunov",
+    "steady_state": "solve.periodic", "SteadyState": "solve.orbit", "lyapunov": "solve.lyapunov",
     "energy": "solve.energy", "attractors": "solve.periodic",
     "continue_orbit": "solve.continuation", "Branch": "solve.continuation",
     "bifurcation": "regimes.bifurcation", "Bifurcation": "regimes.bifurcation", "Change": "regimes.bifurcation",

@@ -43,7 +43,8 @@ from stickslip.laws.tabulated import Tabulated
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.automaton import System, automaton
-from stickslip.solve.periodic import SteadyState, steady_state
+from stickslip.solve.orbit import SteadyState
+from stickslip.solve.periodic import steady_state
 from stickslip.solve.simulate import simulate
 from stickslip.solve.sliding import steady_sliding
 from stickslip.solve.trajectory import Trajectory

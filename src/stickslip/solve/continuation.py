@@ -11,7 +11,8 @@ import numpy as np
 from stickslip.errors import ModelError
 from stickslip.parameters import find, places
 from stickslip.solve.automaton import Array, System
-from stickslip.solve.periodic import SteadyState, cycle_of, judged
+from stickslip.solve.orbit import SteadyState, cycle_of
+from stickslip.solve.periodic import judged
 from stickslip.solve.poincare import closes, derivative, end_of, extent, lap, tables
 from stickslip.solve.simulate import opening
 
