@@ -102,11 +102,20 @@ def figures(
 
 
 def _of_findings(findings: Findings) -> list[Plate]:
-    plates, near = [], close_up(findings)
     events = findings.sticks.events if findings.sticks is not None else ()
     sticks = [event for event in events if event.kind == "stick"]
-    stuck = " Grey: the contact sticks." if sticks else ""
-    shaded = stuck if len(sticks) <= MOST_SHADES else ""
+    plates = [*_of_friction(findings), *_over_time(findings, sticks=len(sticks)), *_of_contact(findings)]
+    if sticks:
+        plates.append(
+            plate("sticks", plot_sticks(findings), "How long it sticks and slips",
+                   "Each mark is one stretch of sticking or slipping; the bars count how often each duration occurred.")
+        )  # fmt: skip
+    return plates
+
+
+def _of_friction(findings: Findings) -> list[Plate]:
+    """Friction over the cycle, and the force that the regression explains."""
+    plates = []
     if findings.loops is not None:
         plates += [
             plate(
@@ -130,9 +139,15 @@ def _of_findings(findings: Findings) -> list[Plate]:
                 "what is left over; a pattern there is friction that the model does not hold.",
             )
         )  # fmt: skip
-    plates.append(
-        plate("record", plot_traces(findings), "The record", f"Every channel used, over the whole time.{shaded}")
-    )
+    return plates
+
+
+def _over_time(findings: Findings, *, sticks: int) -> list[Plate]:
+    """The record as a whole, some cycles of it, and the force balance in them."""
+    near = close_up(findings)
+    stuck = " Grey: the contact sticks." if sticks else ""
+    shaded = stuck if sticks <= MOST_SHADES else ""
+    plates = [plate("record", plot_traces(findings), "The record", f"Every channel used, over the whole time.{shaded}")]
     if near is not None:
         plates.append(
             plate("close-up", plot_traces(findings, record=near), "A closer look",
@@ -142,12 +157,6 @@ def _of_findings(findings: Findings) -> list[Plate]:
         plates.append(
             plate("force-balance", plot_force_balance(findings, record=near), "Where the friction force comes from",
                    f"{_how_it_adds_up(findings)}{stuck}")
-        )  # fmt: skip
-    plates += _of_contact(findings)
-    if sticks:
-        plates.append(
-            plate("sticks", plot_sticks(findings), "How long it sticks and slips",
-                   "Each mark is one stretch of sticking or slipping; the bars count how often each duration occurred.")
         )  # fmt: skip
     return plates
 
