@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.analysis.asked import Asked
 from stickslip.analysis.findings import plain, record_name
-from stickslip.decay.answer import DecayFit
+from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.fit_decay import fit_decay
 from stickslip.decay.motions import Restoring
 from stickslip.decay.which_motion import DecayMotion, choose_motion
@@ -321,8 +321,8 @@ def analyze_decay(
 
 
 def _constants(channel: str, **stated: float | str | None) -> dict[str, Any]:
-    """Mass and stiffness where stated, in SI: of an angle a moment of inertia and a torque per angle."""
-    units = {"mass": "kg m^2", "stiffness": "N m/rad"} if channel == "theta" else {"mass": "kg", "stiffness": "N/m"}
+    """Mass and stiffness where stated, in SI."""
+    units = rig_units(channel)
     constants = {name: parse_value(value, units[name]) for name, value in stated.items() if value is not None}
     for name, value in constants.items():
         if not value > 0:

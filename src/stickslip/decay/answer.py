@@ -108,11 +108,15 @@ def beginning(released: bool) -> tuple[str, str]:
     return ("release time", "amplitude at release") if released else ("time of the first turn", "first amplitude")
 
 
+def rig_units(channel: str) -> dict[str, str]:
+    """Units of mass and stiffness: of an angle those of a moment of inertia, and of a torque over the angle."""
+    return {"mass": "kg m^2", "stiffness": "N m/rad"} if channel == "theta" else {"mass": "kg", "stiffness": "N/m"}
+
+
 def constants(mass: float | str | None, stiffness: float | str | None, name: str) -> tuple[float | None, float | None]:
     """Mass and stiffness as numbers, in the units of the channel."""
-    units = ("kg m^2", "N m/rad") if name == "theta" else ("kg", "N/m")
     values = []
-    for word, given, unit in zip(("mass", "stiffness"), (mass, stiffness), units, strict=True):
+    for (word, unit), given in zip(rig_units(name).items(), (mass, stiffness), strict=True):
         value = None if given is None else parse_value(given, unit)
         if value is not None and not (math.isfinite(value) and value > 0):
             raise EstimateError(f"{word} = {given}", f"a {word} is positive", f"correct {word}=, or leave it out")

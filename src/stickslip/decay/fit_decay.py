@@ -20,6 +20,7 @@ from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
 
 if TYPE_CHECKING:
+    from stickslip.decay.choice import Choice
     from stickslip.decay.joint import Release
     from stickslip.decay.motions import Restoring
     from stickslip.decay.search import Blocks
@@ -271,14 +272,10 @@ def _answer(
     length, unit = ("rad" if name == "theta" else "m"), ring_downs[0].unit
     half_cycles, likelihood = motion.candidates[0]
     fitted = [_fitted(each.blocks, n, p) for each, n, p in zip(releases, half_cycles, motion.motions[0], strict=True)]
-    cut = (CLIPPED,) if any(CLIPPED in each.notes or not each.sound.all() for each in ring_downs) else ()
-    lost = (LOST,) if any(LOST in each.notes for each in ring_downs) else ()
     choices = [each.choice for each in motions]
-    other = next((each.seen_beside("both", "static") for each in choices if each.seen_beside("both", "static")), "")
     unlike = f"the releases do not share one friction and frequency (p = {motion.alike:.1g}): fit each alone"
     doubts = (unlike,) if motion.alike < APART else _misfit(releases, fitted)
-    worries = (*cut, *lost, *doubts, *filter(None, [other]))
-    status = "; ".join(worries) or "ok"
+    status = "; ".join([*_left_out(ring_downs), *doubts, *_seen_beside(choices)]) or "ok"
     many = ", ".join(map(str, half_cycles))
     checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)
     noise = "; ".join(dict.fromkeys(each.noise.words for each in releases))
@@ -321,6 +318,18 @@ def _answer(
         history=(*history, step),
         motions=motions,
     )
+
+
+def _left_out(ring_downs: list[RingDown]) -> list[str]:
+    """What of the releases is not fitted, in words."""
+    cut = any(CLIPPED in each.notes or not each.sound.all() for each in ring_downs)
+    lost = any(LOST in each.notes for each in ring_downs)
+    return [words for words, told in ((CLIPPED, cut), (LOST, lost)) if told]
+
+
+def _seen_beside(choices: list[Choice]) -> list[str]:
+    """Of the first release that shows another motion than viscous and dry friction, which one, in words."""
+    return [words for each in choices if (words := each.seen_beside("both", "static"))][:1]
 
 
 def _fitted(blocks: Blocks, n: int, p: Array) -> Array:

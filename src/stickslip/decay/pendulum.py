@@ -54,13 +54,7 @@ def fit_pendulum(
     EstimateError
         Several releases, a noise that is asked for, or what :func:`choice_of` refuses.
     """
-    if len(ring_downs) > 1:
-        raise EstimateError(
-            f"{len(ring_downs)} releases", "a pendulum's are fitted one at a time", "cut one out: record.between(a, b)"
-        )
-    if noise is not None:
-        raise EstimateError(f"noise = '{noise}'", "a pendulum's is told from its residual", "leave noise= out")
-    ring_down = ring_downs[0]
+    ring_down = _only(ring_downs, noise)
     choice, zero = choice_of(ring_down, restoring=restoring, candidates=PLAIN)
     chosen = choice.chosen
     later = zero > ring_down.release
@@ -111,6 +105,17 @@ def fit_pendulum(
         history=(*history, Step("fit_decay", {"channel": ring_down.channel, "restoring": restoring}, done)),
         motions=motions,
     )
+
+
+def _only(ring_downs: list[RingDown], noise: str | None) -> RingDown:
+    """The one release that is fitted."""
+    if len(ring_downs) > 1:
+        raise EstimateError(
+            f"{len(ring_downs)} releases", "a pendulum's are fitted one at a time", "cut one out: record.between(a, b)"
+        )
+    if noise is not None:
+        raise EstimateError(f"noise = '{noise}'", "a pendulum's is told from its residual", "leave noise= out")
+    return ring_downs[0]
 
 
 def _level(candidate: Candidate) -> float:

@@ -82,7 +82,7 @@ class Rig(Balance):
             terms["force"] = {0: 1.0}
         return terms
 
-    def words(self, record: Record, method: str, width: float, one_filter: bool) -> list[str]:
+    def words(self, record: Record, method: str, width: float, *, one_filter: bool) -> list[str]:
         """What was assumed and how derivatives were taken, for the history."""
         said = [
             "f = k z - k x - c v - m a"
@@ -114,7 +114,7 @@ def told_rig(record: Record, **given: Any) -> dict[str, Any]:
 
 
 def paths(
-    terms: Mapping[str, Mapping[int, float]], derive: Filter, one_filter: bool
+    terms: Mapping[str, Mapping[int, float]], derive: Filter, *, one_filter: bool
 ) -> Iterator[tuple[str, Filter, dict[int, float]]]:
     """Which channel goes through which filter, with which coefficients."""
     unchanged = replace(derive, method="five-point")  # passes order 0 unchanged

@@ -320,7 +320,7 @@ def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
     spread = float(np.std(fit.force[fit.inside]))
     is_late = not lag.includes(0.0) and (1.0 if against else WORSE) * left[3] < left[2]
     is_soft = give.value > fit.least and give.interval[0] > 0 and WORSE * left[3] < left[1]
-    cause = _named(is_late, is_soft, left, spread, against is not None)
+    cause = _named(left, spread, is_late=is_late, is_soft=is_soft, held=against is not None)
     contact = _likely(record) if cause == "contact compliance" else None
     stiffness = contact.stiffness if contact else _stiffness(fit.level(*best[:2]), give) if is_soft else None
     give = _give_of(contact) if contact else give
@@ -339,7 +339,7 @@ def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
     )
 
 
-def _named(is_late: bool, is_soft: bool, left: tuple[float, float, float, float], spread: float, held: bool) -> str:
+def _named(left: tuple[float, float, float, float], spread: float, *, is_late: bool, is_soft: bool, held: bool) -> str:
     """The cause, or that it can not be told: from what each leaves; `held` is a lag that the accelerometer tells."""
     neither, lagging, _, both = left
     good = math.sqrt(EXPLAINED) * spread

@@ -175,7 +175,7 @@ def _smoothed(record: Record, rig: Rig, method: str, bandwidth: float | str | No
     one_filter = method == "smoother" and (bandwidth is not None or not known)
 
     force, variance, change = np.zeros(len(record)), np.zeros(len(record)), 0.0
-    for name, through, terms in paths(rig.terms(record), derive, one_filter):
+    for name, through, terms in paths(rig.terms(record), derive, one_filter=one_filter):
         noise = noise_along(record[name], record.fs, record.channels[name].noise)
         force += through.apply(record[name], terms)
         variance += (through.noise_gain(len(record), terms) * noise) ** 2
@@ -186,7 +186,7 @@ def _smoothed(record: Record, rig: Rig, method: str, bandwidth: float | str | No
     step = Step(
         "friction_force",
         {**asdict(rig), "method": method, "bandwidth": width if method == "smoother" else None},
-        "; ".join(rig.words(record, method, width, one_filter)),
+        "; ".join(rig.words(record, method, width, one_filter=one_filter)),
     )
     return with_friction(with_motion(record, derive), force, sd, step)
 
@@ -211,7 +211,7 @@ def _balanced(record: Record, rig: Rig, method: str, asked: str) -> Record:
         variance += (averaged_gain(len(record), derive, terms, last) * noise) ** 2
     words = [
         *_lacking(record, asked, ("a", "load") if asked != method else ("a",)),
-        *rig.words(record, "five-point", 0.0, False),
+        *rig.words(record, "five-point", 0.0, one_filter=False),
         "averaged over five points" if method == "F1" else "as read",
     ]
     step = Step("friction_force", {**asdict(rig), "method": method}, "; ".join(words))

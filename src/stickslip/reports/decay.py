@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.analysis.decay_comparison import DecayComparison
 from stickslip.analysis.decays import CLEAR, DecayFindings
-from stickslip.decay.answer import beginning
+from stickslip.decay.answer import beginning, rig_units
 from stickslip.decay.choice import SIZE
 from stickslip.estimate import Estimate
 from stickslip.identify.release import CAUGHT
@@ -29,9 +29,7 @@ def headline(result: DecayFindings | DecayComparison) -> list[str]:
 
 def settings(findings: DecayFindings) -> dict[str, str]:
     """Choices and constants, as text."""
-    units = {"mass": "kg", "stiffness": "N/m"}
-    if findings.settings["channel"] == "theta":
-        units = {"mass": "kg m^2", "stiffness": "N m/rad"}
+    units = rig_units(findings.settings["channel"])
     told = {key: number(value, 0.0, units[key]) for key, value in findings.settings.items() if key in units}
     record = findings.record
     return {
