@@ -93,6 +93,11 @@ def _check_finite(**values: float) -> None:
         _require(_finite(value), f"{name} = {value}", f"{name} is a finite number", f"correct {name}=")
 
 
+def _check_speed(speed: float, *, rule: str) -> None:
+    _check_finite(speed=speed)
+    _require(speed != 0, "speed = 0 m/s", rule, "give its speed=, or use Release() for a mass at rest")
+
+
 def _check_contact(contact: str) -> None:
     _require(
         contact in ("ground", "base"),
@@ -270,10 +275,7 @@ class Belt:
     speed: float
 
     def __post_init__(self) -> None:
-        _check_finite(speed=self.speed)
-        _require(
-            self.speed != 0, "speed = 0 m/s", "a belt runs", "give its speed=, or use Release() for a mass at rest"
-        )
+        _check_speed(self.speed, rule="a belt runs")
 
     def motion(self) -> Motion:
         """The time that has passed, as the belt's way."""
@@ -298,10 +300,7 @@ class Ramp:
     speed: float
 
     def __post_init__(self) -> None:
-        _check_finite(speed=self.speed)
-        _require(
-            self.speed != 0, "speed = 0 m/s", "a ramp moves", "give its speed=, or use Release() for a mass at rest"
-        )
+        _check_speed(self.speed, rule="a ramp moves")
 
     def motion(self) -> Motion:
         """The time that has passed, as the ramp's way."""
