@@ -61,33 +61,38 @@ def _sentences(findings: DecayFindings) -> Iterator[str]:
 
 def _frictions(findings: DecayFindings) -> Iterator[str]:
     """What makes it die away, and what the record says against that."""
-    ratio, dry = findings.best.damping_ratio, findings.best.dry_displacement
-    viscous, rubs = ratio.interval[0] > 0, dry.interval[0] > 0
-    shown, swings = _both(ratio, dry), findings.releases.ring_downs
-    curved = findings.best is findings.thesis and not swings[0].isochronous
-    if findings.motion is not None and findings.best is findings.motion:
-        words = findings.motion.choice.chosen.fitted.motion.words
-        yield f"The motion dies away by {words}: {_listed([_told(each) for each in findings.motion.terms])}."
-    elif findings.against < CLEAR or dry.interval[1] < 0 or curved:
-        yield f"Read as viscous and dry friction, which the record speaks against, it shows {shown}."
-    elif viscous and rubs:
-        model = findings.best.model
-        yield f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
-    elif viscous:
-        yield f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(dry, 'dry friction')}"
-    elif rubs:
-        yield f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
-    else:
-        yield "Neither viscous nor dry friction can be told from zero."
+    yield _dying(findings)
     if CLEAR <= findings.against < SIZE:
         yield (
             f"The motions tried speak against viscous and dry friction, but weakly (p = {findings.against:.1g}): of "
             "true ones too one in twenty does so."
         )
+    swings = findings.releases.ring_downs
     far = max(abs(each.amplitude) for each in swings)
     straight = findings.settings["channel"] == "theta" and findings.settings["restoring"] == "linear"
     if straight and far > FAR and (findings.against < CLEAR or not swings[0].isochronous):
         yield f'A swing of {far:.2g} rad is far for a straight spring: of a pendulum ask with restoring="pendulum".'
+
+
+def _dying(findings: DecayFindings) -> str:
+    """By which frictions it dies away, and how large they are."""
+    ratio, dry = findings.best.damping_ratio, findings.best.dry_displacement
+    viscous, rubs = ratio.interval[0] > 0, dry.interval[0] > 0
+    shown = _both(ratio, dry)
+    curved = findings.best is findings.thesis and not findings.releases.ring_downs[0].isochronous
+    if findings.motion is not None and findings.best is findings.motion:
+        words = findings.motion.choice.chosen.fitted.motion.words
+        return f"The motion dies away by {words}: {_listed([_told(each) for each in findings.motion.terms])}."
+    if findings.against < CLEAR or dry.interval[1] < 0 or curved:
+        return f"Read as viscous and dry friction, which the record speaks against, it shows {shown}."
+    if viscous and rubs:
+        model = findings.best.model
+        return f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
+    if viscous:
+        return f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(dry, 'dry friction')}"
+    if rubs:
+        return f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
+    return "Neither viscous nor dry friction can be told from zero."
 
 
 def _listed(parts: list[str]) -> str:

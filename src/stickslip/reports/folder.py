@@ -63,7 +63,6 @@ def publish(
     sections = sections_of(results)
     with results_folder(folder, results.to_dict()) as draft:
         (draft / "report.html").write_text(render(sections), encoding="utf-8")
-        (draft / "figures").mkdir()
         for number, section in enumerate(sections):
             prefix = f"{number}-{_fit_for_a_file(section.words.title)}-" if len(sections) > 1 else ""
             write_figures(draft / "figures", prefix, section.plates)
@@ -144,7 +143,8 @@ def _whole_folder(folder: Path) -> Iterator[Path]:
 
 
 def write_figures(folder: Path, prefix: str, plates: Sequence[Plate]) -> None:
-    """Each figure as SVG and PNG."""
+    """Each figure as SVG and PNG, in a folder that is made."""
+    folder.mkdir(exist_ok=True)
     for plate in plates:
         (folder / f"{prefix}{plate.name}.svg").write_text(plate.svg(), encoding="utf-8")
         (folder / f"{prefix}{plate.name}.png").write_bytes(plate.png())

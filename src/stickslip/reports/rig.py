@@ -57,7 +57,6 @@ def publish_rig(results: Record | ExperimentPlan, *, folder: str | Path, form: s
             write_record(results, draft / f"record.{form}")
         return Path(folder)
     with results_folder(Path(folder), results.to_dict()) as draft:
-        (draft / "figures").mkdir()
         caption = "Root-mean-square error against the sampling rate, for each choice of sensors."
         write_figures(draft / "figures", "", [plate("plan", plot_plan(results), "What each setup tells", caption)])
     return Path(folder)

@@ -208,7 +208,6 @@ def publish_run(
         write_record(run.record(fs=rate), draft / f"record.{form}")
         _write_events(run, draft / "events.csv")
         tell("drawing the figures", 2)
-        (draft / "figures").mkdir()
         write_figures(draft / "figures", "", figures(run))
         if animation is not None:
             from stickslip.plot.animation import animate
