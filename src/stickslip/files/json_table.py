@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -61,27 +62,27 @@ def read(path: Path, options: Options) -> Table:
 def _columns(contents: Any, about: Mapping[str, Any]) -> dict[str, Array]:
     """Arrays by name, whatever way round they stand."""
     if isinstance(contents, Mapping):
-        arrays = {str(key): array for key, value in contents.items() if (array := _numbers(value)) is not None}
+        arrays = _arrays({str(key): value for key, value in contents.items()})
         inner = contents.get("data")
         return arrays if arrays or inner is None or isinstance(inner, str) else _columns(inner, about)
     if not isinstance(contents, Sequence) or isinstance(contents, str) or not contents:
         return {}
     if all(isinstance(row, Mapping) for row in contents):
         keys = dict.fromkeys(str(key) for row in contents for key in row)
-        found = {key: _numbers([row.get(key) for row in contents]) for key in keys}
-        return {key: array for key, array in found.items() if array is not None}
+        return _arrays({key: [row.get(key) for row in contents] for key in keys})
     if all(isinstance(row, list) for row in contents):
-        width = max(len(row) for row in contents)
+        columns = list(zip_longest(*contents))
         titles = about.get("columns") or about.get("names") or about.get("channels")
-        if not isinstance(titles, list) or len(titles) != width:
-            titles = [f"c{index + 1}" for index in range(width)]
-        padded = [[*row, *[None] * (width - len(row))] for row in contents]
-        found = {
-            title: _numbers([row[index] for row in padded])
-            for index, title in enumerate(unique([str(title) for title in titles]))
-        }
-        return {key: array for key, array in found.items() if array is not None}
+        if not isinstance(titles, list) or len(titles) != len(columns):
+            titles = [f"c{index + 1}" for index in range(len(columns))]
+        names = unique([str(title) for title in titles])
+        return _arrays({name: list(column) for name, column in zip(names, columns, strict=True)})
     return {}
+
+
+def _arrays(columns: Mapping[str, Any]) -> dict[str, Array]:
+    """Those columns that are numbers."""
+    return {name: array for name, values in columns.items() if (array := _numbers(values)) is not None}
 
 
 def _numbers(value: Any) -> Array | None:
