@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from stickslip.analysis.asked import Asked
 from stickslip.analysis.decays import DecayFindings
 from stickslip.analysis.findings import plain
 from stickslip.decay.answer import DecayFit
 from stickslip.decay.fit_decay import fit_decay
 from stickslip.decay.which_motion import whichever
-from stickslip.errors import EstimateError, StickslipError
+from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.statistics import disagreement, weighted_mean
 
@@ -110,29 +111,27 @@ def compare_decays(findings: Sequence[DecayFindings]) -> DecayComparison:
     """
     if len(findings) < 2:
         raise EstimateError(f"{len(findings)} record", "a comparison needs two or more", "give several files")
-    apart, notes = _apart(findings), []
+    apart, asked = _apart(findings), Asked()
     ways = {key: [each.settings.get(key) for each in findings] for key in ASKED}
     mixed = [key for key, values in ways.items() if len(set(values)) > 1]
-    asked: dict[str, Any] = {key: values[0] for key, values in ways.items()}
     joint = None
     if mixed:
         said = "; ".join(f"{key} is {' and '.join(map(str, dict.fromkeys(ways[key])))}" for key in mixed)
-        notes.append(f"The records are not fitted together: {said}.")
+        asked.notes.append(f"The records are not fitted together: {said}.")
     elif not apart and all(each.best is each.waveform for each in findings):
-        try:
-            joint = _whichever(fit_decay([each.record for each in findings], **asked), findings)
-        except StickslipError as error:
-            notes.append(f"All records at once: {error}")
+        way = {key: values[0] for key, values in ways.items()}
+        joint = asked.ask("All records at once", lambda: _jointly(findings, way))
     status = f"the records differ in {' and '.join(apart)}" if apart else "ok"
     means = tuple(weighted_mean(each, of="records", status=status) for each in _shared(findings))
     dry = next((each for each in means if each.name == "dry friction displacement"), None)
     force = None if mixed or dry is None else findings[0].as_force(dry, "dry friction force")
     force = force if joint is None or joint.dry_force is None else replace(joint.dry_force, name="dry friction force")
-    return DecayComparison(tuple(findings), joint, apart, means, force, tuple(notes))
+    return DecayComparison(tuple(findings), joint, apart, means, force, tuple(asked.notes))
 
 
-def _whichever(joint: DecayFit, findings: Sequence[DecayFindings]) -> DecayFit:
-    """The joint fit with the intervals that hold whichever motion no record speaks against."""
+def _jointly(findings: Sequence[DecayFindings], way: dict[str, Any]) -> DecayFit:
+    """All releases at once, with the intervals that hold whichever motion no record speaks against."""
+    joint = fit_decay([each.record for each in findings], **way)
     motions = [() if each.waveform is None else each.waveform.motions for each in findings]
     if not all(motions):
         return joint

@@ -14,7 +14,7 @@ from stickslip.decay.answer import DecayFit, beginning, constants, spring_of
 from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
+from stickslip.identify.release import CLIPPED, LOST, Releases, RingDown, find_releases
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
@@ -120,17 +120,8 @@ def fit_decay(
     if noise is not None and noise not in KINDS:
         raise EstimateError(f"noise = '{noise}'", f"it is one of {', '.join(KINDS)}", "choose one, or leave it out")
     records = [record] if isinstance(record, Record) else list(record)
-    if not records:
-        raise EstimateError("no record", "a decay is fitted to one record at least", "pass a record, or several")
-    found = [find_releases(each, channel=channel) for each in records]
+    found = _releases_of(records, channel)
     ring_downs = [ring_down for each in found for ring_down in each.ring_downs]
-    names = {each.channel for each in ring_downs}
-    if len(names) > 1:
-        raise EstimateError(
-            f"channels {', '.join(sorted(names))}",
-            "releases are fitted together by one channel",
-            "choose channel=",
-        )
     others = named(candidates)
     motions = tuple(motion_of(each, restoring=restoring, candidates=others) for each in ring_downs) if others else ()
     known = constants(mass, stiffness, ring_downs[0].channel)
@@ -147,6 +138,21 @@ def fit_decay(
     releases = [_release(each, noise) for each in ring_downs]
     motion = _alone(releases[0]) if len(releases) == 1 and releases[0].noise.kind == "white" else _together(releases)
     return _answer(ring_downs, releases, motion, motions, known, notes, history)
+
+
+def _releases_of(records: list[Record], channel: str | None) -> list[Releases]:
+    """The releases of each record, all of one channel."""
+    if not records:
+        raise EstimateError("no record", "a decay is fitted to one record at least", "pass a record, or several")
+    found = [find_releases(each, channel=channel) for each in records]
+    names = {ring_down.channel for each in found for ring_down in each.ring_downs}
+    if len(names) > 1:
+        raise EstimateError(
+            f"channels {', '.join(sorted(names))}",
+            "releases are fitted together by one channel",
+            "choose channel=",
+        )
+    return found
 
 
 def _described(ring_down: RingDown, record: Record) -> RingDown:
