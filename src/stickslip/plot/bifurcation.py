@@ -79,24 +79,9 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
     factor, unit = prefixed(
         np.concatenate([each.points[:, 0] for each in (*found.up, *found.down)]), motion.units("x")[0]
     )
-    looks = (("down", ORANGE, "o", 5.0, "none"), ("up", BLUE, ".", 4.0, BLUE))
     crowded = max(len(each.points) for each in (*found.up, *found.down)) > 20
-    for name, colour, marker, size, face in looks:
-        way = getattr(found, name)
-        places = np.repeat(found.values, [len(each.points) for each in way])
-        heights = factor * np.concatenate([each.points[:, 0] for each in way])
-        style = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
-        top.plot(places, heights, markersize=1.2 if crowded else size, markeredgewidth=0.7,
-                 label=f"followed {name}", zorder=3 if name == "up" else 2, **style)  # fmt: skip
-        bottom.plot(found.values, [_largest(each) for each in way], markersize=size, markeredgewidth=0.7, **style)
-    for number, (value, each) in enumerate(_beside(found)):
-        top.plot([value] * len(each.points), factor * each.points[:, 0], "x", color=GREEN, markersize=5,
-                 label="beside, from another start" if not number else None)  # fmt: skip
-    for number, branch in enumerate(found.branches):
-        unstable = np.array([orbit.status == "unstable" for orbit in branch.orbits])
-        heights = factor * np.array([orbit.orbit.states[0, 0] for orbit in branch.orbits])
-        top.plot(branch.values, np.where(unstable, heights, np.nan), "--", color=INK, linewidth=1.0,
-                 label="unstable" if not number else None)  # fmt: skip
+    _follow(top, bottom, found, factor, dot=1.2 if crowded else None)
+    _beside(top, found, factor)
     for change in found.changes:
         colour = BLUE if change.direction == "up" else ORANGE
         for ax in (top, bottom):
@@ -111,13 +96,35 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
     return figure
 
 
+def _follow(top: Axes, bottom: Axes, found: Bifurcation, factor: float, *, dot: float | None) -> None:
+    """The motion followed down and up: displacements, as dots of one size where they are crowded, and multipliers."""
+    looks = (("down", ORANGE, "o", 5.0, "none"), ("up", BLUE, ".", 4.0, BLUE))
+    for name, colour, marker, size, face in looks:
+        way = getattr(found, name)
+        places = np.repeat(found.values, [len(each.points) for each in way])
+        heights = factor * np.concatenate([each.points[:, 0] for each in way])
+        style: dict[str, Any] = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
+        top.plot(places, heights, markersize=size if dot is None else dot, markeredgewidth=0.7,
+                 label=f"followed {name}", zorder=3 if name == "up" else 2, **style)  # fmt: skip
+        bottom.plot(found.values, [_largest(each) for each in way], markersize=size, markeredgewidth=0.7, **style)
+
+
+def _beside(top: Axes, found: Bifurcation, factor: float) -> None:
+    """Motions from other starts, and branches that lose their stability."""
+    others = [(float(v), each) for v, others in zip(found.values, found.beside, strict=True) for each in others]
+    for number, (value, each) in enumerate(others):
+        top.plot([value] * len(each.points), factor * each.points[:, 0], "x", color=GREEN, markersize=5,
+                 label="beside, from another start" if not number else None)  # fmt: skip
+    for number, branch in enumerate(found.branches):
+        unstable = np.array([orbit.status == "unstable" for orbit in branch.orbits])
+        heights = factor * np.array([orbit.orbit.states[0, 0] for orbit in branch.orbits])
+        top.plot(branch.values, np.where(unstable, heights, np.nan), "--", color=INK, linewidth=1.0,
+                 label="unstable" if not number else None)  # fmt: skip
+
+
 def _largest(attractor: Attractor) -> float:
     """The largest multiplier's modulus; a motion that never repeats has none."""
     return math.nan if attractor.orbit.order < 1 else float(np.max(np.abs(attractor.orbit.multipliers)))
-
-
-def _beside(found: Bifurcation) -> list[tuple[float, Attractor]]:
-    return [(float(v), each) for v, others in zip(found.values, found.beside, strict=True) for each in others]
 
 
 def _name_regimes(ax: Axes, found: Bifurcation) -> None:
