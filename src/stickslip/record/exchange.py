@@ -367,9 +367,17 @@ def _received(
         record = _unchanged(metadata, arrays, stated, axis)
         if record is not None:
             return record
+    return _anew(arrays, axis, fs, {**stated, **units}, metadata, step)
+
+
+def _anew(
+    arrays: Mapping[str, Array], axis: Array | None, fs: float | None, units: Mapping[str, str],
+    metadata: Mapping[str, Any], step: Step,
+) -> Record:  # fmt: skip
+    """A new record of columns; `units` by column go before what their headers say ("x [mm]")."""
     headers = {name: re.fullmatch(r"(.*?)\s*\[([^\]]*)\]\s*", name) for name in arrays}
     names = {name: _identifier(match[1] if match else name) for name, match in headers.items()}
-    chosen = {name: match[2] for name, match in headers.items() if match} | dict(stated) | dict(units)
+    chosen = {name: match[2] for name, match in headers.items() if match} | dict(units)
     _require_distinct(names)
     _require_one_length(arrays, axis)
     clock = _clock(axis, fs)
