@@ -41,7 +41,7 @@ def test_the_command_answers_and_leaves_a_page(release, method):
     assert ("by decrements" in answer.output) == (method == "all")
     folder = release.parent / "out"
     page = (folder / "report.html").read_text("utf-8")
-    assert "Measured and identified" in page
+    assert "Recorded and identified" in page
     told = json.loads((folder / "results.json").read_text("utf-8"))
     estimates = {each["name"]: each for each in told["estimates"]}
     low, high = estimates["damping ratio"]["interval"]

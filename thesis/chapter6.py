@@ -256,7 +256,7 @@ def _of_errors(given: Given, number: str, kind: str) -> Plate:
     for ax in (whole, detail):
         ax.plot(fine, x, color=BLUE, linewidth=1.2, label="exact")
         ax.plot(times, measured, color=ORANGE, linewidth=0.9, marker="." if sampled else None, label=words)
-        ax.set(xlabel="time", ylabel="displacement")
+        ax.set(xlabel="time [s]", ylabel="displacement [m]")
     turn, span, height = {"sampling": (4, 0.5, 0.1), "random": (2, 0.12, 0.012), "quantisation": (2, 0.06, 0.004)}[kind]
     middle, top = float(run.starts[turn]), float(run.states[turn, 0])
     detail.set(xlim=(middle - span, middle + span), ylim=(top - height, top + height))

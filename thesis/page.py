@@ -16,6 +16,7 @@ from stickslip.reports.folder import check_folder, results_folder, write_figures
 from stickslip.reports.page import templates
 from thesis.drawing import printed_caption
 from thesis.printed import CHANGED, CORRECTED, NOT_REPRODUCIBLE, SAME, Given, Number, Ours, Table, given, judged, tables
+from thesis.starting import starts
 
 CHAPTERS = {
     "2": "chapter2",
@@ -122,7 +123,7 @@ def render(chapters: Sequence[Chapter]) -> str:
     """The page as text."""
     environment = templates(Path(__file__).parent)
     environment.filters.update(printed_caption=printed_caption)
-    environment.globals.update(digits_of=digits_of, reasons=reasons)
+    environment.globals.update(digits_of=digits_of, reasons=reasons, starts=starts)
     total = sum((chapter.counts for chapter in chapters), Counter())
     return environment.get_template(TEMPLATE).render(
         chapters=chapters, total=total, verdicts=VERDICTS, version=__version__

@@ -201,7 +201,6 @@ def system_i(given: Given) -> Any:
     _wall(ax, (0.4, 1.6), 10.2)
     ax.text(1.9, 1.15, "air track", fontsize=8, ha="center")
     _block(ax, (3.8, 1.7), 2.2, 1.5, f"m = {told['mass']:g} kg")
-    _arrow(ax, (4.4, 3.5), (5.4, 3.5), "x(t)")
     _damper(ax, (6.0, 2.7), (9.9, 2.7), "")
     _wall(ax, (9.9, 1.6), 1.8, upright=True, side=1)
     ax.plot([6.0, 8.4], [2.0, 2.0], color=INK, linewidth=3)
@@ -212,8 +211,14 @@ def system_i(given: Given) -> Any:
           + " or ".join(f"{each['damping_ratio']:g}" for each in cases))  # fmt: skip
     _told(ax, (7.45, 1.75), (7.6, 0.5), "paper, switched on: f_k = "
           + " or ".join(f"{told['stiffness'] * each['dry']:.3f} N" for each in cases), colour=ORANGE)  # fmt: skip
-    _told(ax, (4.6, 3.2), (2.6, 4.4), f"LVDT, {1e6 * told['resolution']:g} µm a count")
+    _moves(ax, (4.4, 3.5), 1.0, (2.6, 4.4), told["resolution"])
     return drawn
+
+
+def _moves(ax: Axes, start: Place, length: float, words: Place, resolution: float) -> None:
+    """The motion of a mass over its face, and the LVDT that feels it."""
+    _arrow(ax, start, (start[0] + length, start[1]), "x(t)")
+    _told(ax, (start[0] + 0.2, start[1] - 0.3), words, f"LVDT, {1e6 * resolution:g} µm a count")
 
 
 @styled
@@ -232,10 +237,9 @@ def system_ii(given: Given) -> Any:
         _spring(ax, (0.8, y), (3.9, y), "", coils=9)
     _wall(ax, (0.8, 1.75), 1.4, upright=True)
     ax.text(2.5, 3.3, f"three springs, k = {_kilo(told['stiffness'])} together", fontsize=8, ha="center")
-    _arrow(ax, (5.2, 3.2), (6.3, 3.2), "x(t)")
     friction = f"ζ = {told['damping_ratio']:g}, f_k = {told['kinetic']:g} N"
     _told(ax, (6.75, 1.65), (8.0, 0.6), f"two linear bearings: {friction}", colour=ORANGE)
-    _told(ax, (7.2, 2.95), (8.8, 3.9), f"LVDT, {1e6 * given['paper']['resolution']:g} µm a count")
+    _moves(ax, (5.2, 3.25), 1.1, (8.0, 3.9), given["paper"]["resolution"])
     return drawn
 
 

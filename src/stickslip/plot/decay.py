@@ -64,7 +64,7 @@ def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = N
     ax, ring = axes_of(ax), findings.releases.ring_downs[release]
     factor, unit = prefixed(ring.samples - ring.rest, ring.unit)
     rows = _shown(ring)
-    ax.plot(*envelope(ring.time[rows], factor * ring.samples[rows]), color=INK, linewidth=1.0, label="measured")
+    ax.plot(*envelope(ring.time[rows], factor * ring.samples[rows]), color=INK, linewidth=1.0, label="recorded")
     rest = findings.rest
     time, viscous, dry = _envelopes(findings, ring)
     alone = ((viscous, BLUE, "viscous friction alone"), (dry, ORANGE, "dry friction alone"))
@@ -81,7 +81,7 @@ def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = N
 
 @styled
 def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
-    """Measured and identified response over each other, and what is left between them (thesis, Figure 6.10).
+    """Recorded and identified response over each other, and what is left between them (thesis, Figure 6.10).
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
     ring = findings.releases.ring_downs[release]
     factor, unit = prefixed(measured - findings.rest, ring.unit)
     figure, (above, below) = new_figure(2, height=4.6, heights=[2, 1])
-    above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="measured")
+    above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="recorded")
     above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=words)
     above.set_ylabel(axis_label(WORDS[ring.channel], unit))
     legend_above(above, columns=2)
@@ -260,8 +260,8 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
     ]  # fmt: skip
     if findings.waveform is not None or (ring.order == 0 and findings.best in (findings.motion, thesis)):
         plates.append(
-            plate("identified", plot_identified(findings), "Measured and identified",
-                  "Top: the motion that the identified friction gives, over the measured one. Bottom: what is left "
+            plate("identified", plot_identified(findings), "Recorded and identified",
+                  "Top: the motion that the identified friction gives, over the recorded one. Bottom: what is left "
                   "between them; a pattern there is friction of another kind.")
         )  # fmt: skip
     for release in range(1, several):
@@ -272,7 +272,7 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
             plates.append(plate(f"decay-{release + 1}", swings, words, envelopes.strip()))
         else:
             drawn = plot_identified(findings, release=release)
-            plates.append(plate(f"identified-{release + 1}", drawn, words, "Measured, identified and what is left."))
+            plates.append(plate(f"identified-{release + 1}", drawn, words, "Recorded, identified and what is left."))
     if thesis is not None:
         plates.append(
             plate("differences", plot_differences(thesis), "Amplitude differences",
@@ -319,7 +319,7 @@ def _envelopes(findings: DecayFindings, ring: RingDown) -> tuple[Array, Array, A
 
 
 def _identified(findings: DecayFindings, release: int = 0) -> tuple[Array, Array, Array, str]:
-    """Time, measured, identified, and by which method."""
+    """Time, recorded, identified, and by which method."""
     if findings.best is findings.motion and release == 0:
         chosen = findings.motion.choice.chosen.fitted
         fitted, _, _ = chosen.blocks.motion(chosen.parameters, half_cycles=chosen.half_cycles)
