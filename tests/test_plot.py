@@ -213,3 +213,18 @@ def test_thinning_keeps_both_ends(count: int, limit: int) -> None:
 )  # fmt: skip
 def test_units_are_chosen_to_be_read(peak: float, unit: str, shown: str) -> None:
     assert prefixed(peak, unit)[1] == shown
+
+
+def test_a_result_without_figures_is_refused_in_a_sentence() -> None:
+    wave = np.sin(2 * np.pi * 500 * np.arange(4000) / 8000)
+    heard = ss.find_squeaks(ss.Record.of({"sound": wave}, fs=8000))
+    with pytest.raises(ss.ModelError, match=r"figures of a Squeaks; .* analyze_squeaks, "):
+        ss.figures(heard)
+
+
+def test_a_name_that_is_unknown_is_answered_with_the_nearest() -> None:
+    with pytest.raises(AttributeError, match="the nearest are .*friction_loops") as caught:
+        _ = ss.friction_loop
+    assert len(str(caught.value)) < 200
+    with pytest.raises(AttributeError, match=r"dir\(stickslip\) lists"):
+        _ = ss.qqqqqqqq

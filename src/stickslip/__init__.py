@@ -377,7 +377,11 @@ __all__ = [*_ROOMS, "__version__"]
 
 def __getattr__(name: str) -> Any:
     if name not in _ROOMS:
-        raise AttributeError(f"module 'stickslip' has no attribute '{name}'; it has {', '.join(_ROOMS)}")
+        import difflib
+
+        near = difflib.get_close_matches(name, _ROOMS, n=3, cutoff=0.5)
+        told = f"the nearest are {', '.join(near)}" if near else "dir(stickslip) lists what it has"
+        raise AttributeError(f"module 'stickslip' has no attribute '{name}'; {told}")
     room = importlib.import_module(f"stickslip.{_ROOMS[name]}")
     return room if _ROOMS[name] == name and not hasattr(room, name) else getattr(room, name)
 

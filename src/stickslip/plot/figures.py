@@ -11,6 +11,7 @@ from stickslip.analysis.findings import Findings
 from stickslip.analysis.squeak_comparison import SqueakComparison
 from stickslip.analysis.squeaks import SqueakFindings
 from stickslip.analysis.time_frequency import TimeFrequency
+from stickslip.errors import ModelError
 from stickslip.identify.compare_force import UNLIKE
 from stickslip.identify.force import FUSIONS
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
@@ -70,6 +71,11 @@ def figures(
     tuple of Plate
         Each with ``.figure`` (matplotlib), ``.title``, ``.caption``, ``.svg()`` and ``.png()``.
 
+    Raises
+    ------
+    ModelError
+        A result of another kind.
+
     Examples
     --------
     >>> import stickslip as ss
@@ -94,11 +100,30 @@ def figures(
         from stickslip.plot.wavelet import plates_of as plates_of_map
 
         return tuple(plates_of_map(result))
-    from stickslip.plot.bifurcation import plates_of as plates_of_attractors
-    from stickslip.plot.trajectory import plates_of
     from stickslip.solve.trajectory import Trajectory
 
-    return plates_of(result) if isinstance(result, Trajectory) else plates_of_attractors(result)
+    if isinstance(result, Trajectory):
+        from stickslip.plot.trajectory import plates_of
+
+        return plates_of(result)
+    return _of_regimes(result)
+
+
+def _of_regimes(result: Bifurcation | Basins | Boundary | Dither) -> tuple[Plate, ...]:
+    from stickslip.plot.bifurcation import plates_of
+    from stickslip.regimes.basins import Basins
+    from stickslip.regimes.bifurcation import Bifurcation
+    from stickslip.regimes.boundary import Boundary
+    from stickslip.regimes.dither import Dither
+
+    if isinstance(result, Bifurcation | Basins | Boundary | Dither):
+        return plates_of(result)
+    raise ModelError(
+        f"figures of a {type(result).__name__}",
+        "figures are of what analyze, compare, analyze_decay, compare_decays, time_frequency, analyze_squeaks, "
+        "compare_squeaks, simulate, bifurcation, basins, boundary or dither returned",
+        "ask one of these, or a plot_ function of the result",
+    )
 
 
 def _of_findings(findings: Findings) -> list[Plate]:
