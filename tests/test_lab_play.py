@@ -26,7 +26,8 @@ COMPLIANT = ss.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+K
 STATE = json.loads(ss.export_system(COMPLIANT, format="json"))
 HOME, BEARER = "http://127.0.0.1:8723", {"authorization": "Bearer t"}
 RIGID = {**STATE, "law": {"name": "Coulomb", "kinetic": 1.1}}
-PLAYED = ["FD-4", "BS-1", "THESIS rigid 2.5Hz fk=1.1", "FM-1", "MC-1", "SQUEAK wet 6.13 N", "DI-1 v=0.1"]
+PLAYED = ["FD-4", "BS-1", "THESIS rigid 2.5Hz fk=1.1", "FM-1", "MC-1", "SQUEAK wet 6.13 N", "DI-1 v=0.1",
+          "RS-1"]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

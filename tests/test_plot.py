@@ -223,7 +223,7 @@ def test_a_result_without_figures_is_refused_in_a_sentence() -> None:
 
 
 def test_a_name_that_is_unknown_is_answered_with_the_nearest() -> None:
-    with pytest.raises(AttributeError, match="the nearest are .*friction_loops") as caught:
+    with pytest.raises(AttributeError, match=r"the nearest are .*friction_loops") as caught:
         _ = ss.friction_loop
     assert len(str(caught.value)) < 200
     with pytest.raises(AttributeError, match=r"dir\(stickslip\) lists"):
