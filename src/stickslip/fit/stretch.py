@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,11 +101,15 @@ class Sensor:
             values, _ = run(at)
             return values[source] + inertia * values["a"] if inertia else values[source]
 
-        response = _response(self.channel)
-        if response.poles:
-            return respond(sensed, breaks=run.breaks, times=self.time - late, response=response, nodes=NODES), None
         at = self.time - late
+        if self.response.poles:
+            return respond(sensed, breaks=run.breaks, times=at, response=self.response, nodes=NODES), None
         return sensed(at), run(at)[1] if source in JUMPS else None
+
+    @cached_property
+    def response(self) -> Response:
+        """Of its mount and its discharge."""
+        return _response(self.channel)
 
     def freed(self, values: Array) -> Array:
         """Values in units of the noise, less what is known; columns where there are several."""

@@ -117,7 +117,7 @@ def respond(
     factors, answer = np.empty(nodes, dtype=complex), np.zeros(len(grid))
     for first in range(0, len(grid) - 1, BLOCK):
         part = grid[first : first + BLOCK + 1]
-        inside = breaks[(breaks > part[0]) & (breaks < part[-1])]
+        inside = breaks[slice(*np.searchsorted(breaks, part[[0, -1]]))]
         parts = (part[:-1, None] + finer).ravel(), part[-1:], inside, np.zeros(int(part[0] < 0 < part[-1]))
         edges = np.sort(np.concatenate(parts))
         at = edges[:-1, None] + np.diff(edges)[:, None] * rule[0]

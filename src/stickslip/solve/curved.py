@@ -128,7 +128,8 @@ def code(table: Tape, order: int) -> Code:
 @lru_cache(maxsize=32)
 def _viewed(table: Tape, order: int) -> tuple[int, Array, int, Array]:
     """The code that values between the steps need, and that of the outputs."""
-    return *expansion(table.nodes, table.kept, order), *expansion(table.watched, table.shown, 0)
+    series, numbers, *_ = code(table, order)
+    return series, numbers, *expansion(table.watched, table.shown, 0)
 
 
 def _march(table: Tape, order: int) -> March:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -352,25 +353,16 @@ class _Builder:
 
 def _flat(modes: list[_Nodes]) -> tuple[NDArray[Any], ...]:
     """The nodes of all modes, one after the other."""
-    kinds, left, right, power, constant, low, first = [], [], [], [], [], [0], [0]
-    weights: list[float] = []
-    index: list[int] = []
-    none: Form = ({}, 0.0)
-    for mode in modes:
-        blank = [(taylor.LINEAR, 0, 0, 0.0, none)] * mode.size
-        for kind, a, b, exponent, form in [*blank, *mode.rows]:
-            kinds.append(kind)
-            left.append(a)
-            right.append(b)
-            power.append(exponent)
-            weights.extend(form[0].values())
-            index.extend(form[0])
-            low.append(len(weights))
-            constant.append(form[1])
-        first.append(len(kinds))
+    blank: tuple[int, int, int, float, Form] = (taylor.LINEAR, 0, 0, 0.0, ({}, 0.0))
+    kinds, left, right, power, forms = zip(*(row for m in modes for row in [blank] * m.size + m.rows), strict=True)
+    weights = np.array([weight for form, _ in forms for weight in form.values()], dtype=np.float64)
+    low = [0, *itertools.accumulate(len(form) for form, _ in forms)]
+    index = [node for form, _ in forms for node in form]
+    first = [0, *itertools.accumulate(m.size + len(m.rows) for m in modes)]
     whole = (np.array(column, dtype=np.int64) for column in (kinds, left, right, low, index, first))
     kinds_, left_, right_, low_, index_, first_ = whole
-    return kinds_, left_, right_, np.array(power), low_, np.array(weights), index_, np.array(constant), first_
+    constant = np.array([value for _, value in forms])
+    return kinds_, left_, right_, np.array(power), low_, weights, index_, constant, first_
 
 
 def _guards(modes: list[_Nodes]) -> tuple[NDArray[Any], ...]:
