@@ -20,12 +20,11 @@ Array = NDArray[np.float64]
 Key = tuple[str, int]
 """A channel, and the number of its record."""
 
-SEPARATED = 10.0  # times what a contact next to rigid leaves, up to which a rigid law on a rough surface says the same
+FEIGNED = 1.5  # times, geometric mean over the stories, that a rough surface may make a rigid law leave more
 CALIBRATIONS = 3.0  # times the calibration's error, below which an effect is not to be told from it
 CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
 BLUNT = 4.0  # of the criterion, by which the odds between families fall e-fold; 2 were the stories Gaussian
 SHARPNESS = 4.0  # power of the ratio of predictions' misfits that the odds between families follow
-FEIGNED = 1.0  # the same of rigid laws' misfits: on a rough surface the true one's may be three times another's
 UNLIKELY = 0.05  # odds to the best law, below which another is rejected
 FAMILIES = {"Coulomb": "rigid", "static": "rigid", "Stribeck": "rigid"}
 
@@ -104,6 +103,11 @@ class Evidence:
         likely = math.fsum(n * math.log(max(squares[name], self.noise[name] ** 2)) for name, n in self.counts.items())
         return likely + count * math.log(max(2.0, math.fsum(self.counts.values())))
 
+    @property
+    def allowance(self) -> float:
+        """Of the criterion, by which a rigid law may be worse and yet true: rough surfaces end strokes elsewhere."""
+        return math.log(FEIGNED) * math.fsum(self.counts.values())
+
     def over(self, squares: Mapping[Key, float], best: Mapping[Key, float]) -> float:
         """What is left over what the best law leaves, the mean over channels and records."""
         floors = {name: noise**2 for name, noise in self.noise.items()}
@@ -162,18 +166,17 @@ def _odds(
     found = {}
     for each in order:
         if each.family != best.family:
+            worse = max(0.0, worth[each.name] - least - (evidence.allowance if each.family == "rigid" else 0.0))
             ahead = forecasts[each.name] if each.count <= best.count else math.nan
-            found[each.name] = max(
-                math.exp((least - worth[each.name]) / BLUNT), ahead**-SHARPNESS if ahead < 1 else 0.0
-            )
+            found[each.name] = max(math.exp(-worse / BLUNT), ahead**-SHARPNESS if ahead < 1 else 0.0)
     return found
 
 
 def _limits(order: Sequence[Misfit], evidence: Evidence) -> set[str]:
     """Laws whose contact is next to rigid, where a rigid law leaves as little: what they say is said by that."""
-    rigid = [each for each in order if each.family == "rigid"]
-    return {each.name for each in order if rigid and each.stiff
-            and evidence.over(rigid[0].squares, each.squares) <= SEPARATED}  # fmt: skip
+    worth = {each.name: evidence.criterion(each.squares, each.count) for each in order}
+    rigid = min((worth[each.name] for each in order if each.family == "rigid"), default=math.inf)
+    return {each.name for each in order if each.stiff and rigid - worth[each.name] <= evidence.allowance}
 
 
 def _why(law: Misfit, best: Misfit, ratios: Mapping[str, float]) -> str:
@@ -200,12 +203,12 @@ def _within(
 ) -> tuple[dict[str, str], float]:
     """The laws of one family that are not rejected, the likeliest first, with words; and how likely they are together.
 
-    How likely each is by what else was seen, and by its misfit over the least one's.
+    How likely each is by what else was seen; its misfit counts where it is larger than a rough surface makes it.
     """
-    least = min(family, key=lambda each: evidence.criterion(each.squares, each.count))
+    worse = {each.name: evidence.criterion(each.squares, each.count) for each in family}
+    beyond = min(worse.values()) + evidence.allowance
     worth = {
-        each.name: (likely or {}).get(each.name, 1.0) * evidence.over(each.squares, least.squares) ** -FEIGNED
-        for each in family
+        name: (likely or {}).get(name, 1.0) * math.exp(-max(0.0, each - beyond) / BLUNT) for name, each in worse.items()
     }
     total = math.fsum(worth.values()) or 1.0
     order = sorted(worth, key=lambda name: -worth[name])
