@@ -360,7 +360,7 @@ class _Listener:
         sliding = self.motion.sliding(part.first, part.last)
         slides = sliding > MOSTLY
         if not part.tonal:
-            return self._broad(part, rate, slides)
+            return self._broad(part, rate, slides=slides)
         if self.motion.velocity is not None and not slides:
             much = (
                 f"the contact slides (faster than {1e3 * self.motion.slowest:.2g} mm/s) for {100 * sliding:.0f} % of it"
@@ -377,6 +377,12 @@ class _Listener:
             return "tonal", "no", f"it is there after {part.growth:.1f} cycles and dies away: it is struck, not fed"
         if self.motion.velocity is not None:
             return kind, "likely", f"it grows for {part.growth:.0f} cycles while the contact slides"
+        return self._by_overtones(part, duration, harmonics)
+
+    def _by_overtones(
+        self, part: Span, duration: float, harmonics: tuple[tuple[float, float], ...]
+    ) -> tuple[str, str, str]:
+        """Of a tone that is heard alone: a rubbing contact repeats, so that its overtones stand in whole ratios."""
         locked, cycles = sum(strength > WEAK for _, strength in harmonics), duration * part.line
         if cycles < TOLD:
             short = (
@@ -406,7 +412,7 @@ class _Listener:
         between = f"more than beneath a free ringing, {FREE:.0%}, and less than beneath a squeak, {FED:.0%}"
         return "tonal", "not told", f"{words}: {between}; near the threshold it can not be told"
 
-    def _broad(self, part: Span, rate: float, slides: bool) -> tuple[str, str, str]:
+    def _broad(self, part: Span, rate: float, *, slides: bool) -> tuple[str, str, str]:
         if not math.isnan(rate) and self.name in TANGENTIAL and self._at_reversals(rate):
             return "noise", "no", f"its {rate:.3g} jumps in a second are the reversals of the motion"
         if not math.isnan(rate):
