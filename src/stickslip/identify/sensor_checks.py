@@ -125,14 +125,7 @@ def cycle_checks(record: Record, seen: Seen) -> list[Check]:
     if len(edges) < FEW_CYCLES:
         return [untold("channels are of the same cycle", f"fewer than {FEW_CYCLES} cycles")]
     smooth = Filter("smoother", record.fs, min(SMOOTHED / float(np.diff(edges).mean()), 0.2) * record.fs)
-    moved = smooth.apply(record["x"], {2: 1.0})
-    expected = {"a": moved}
-    if seen.knows:
-        damped = record["x"] - record["z"] if seen.damper == "base" and "z" in record else record["x"]
-        pull = -seen.rig["stiffness"] * record["x"] - seen.damping * np.gradient(damped, 1 / record.fs)
-        for name, factor in (("z", seen.rig["stiffness"]), ("force", 1.0)):
-            pull = pull + factor * record[name] if name in record else pull
-        expected["load"] = smooth.apply(pull, {0: 1.0}) - seen.rig["mass"] * moved
+    expected = _foretold(record, seen, smooth)
     for name in (each for each in expected if each in seen.channels):
         title = f"{name} is of the same cycle as x"
         left = _left_over(smooth.apply(record[name], {0: 1.0}), expected[name], edges)
@@ -153,6 +146,18 @@ def cycle_checks(record: Record, seen: Seen) -> list[Check]:
         unit = record.channels[name].unit
         checks.append(judged(title, here, left[best], apart, unit=unit, holds=what, fails=late))
     return checks
+
+
+def _foretold(record: Record, seen: Seen, smooth: Filter) -> dict[str, Array]:
+    """What the displacement, smoothed, foretells of the acceleration, and of the load cell where the rig is known."""
+    moved = smooth.apply(record["x"], {2: 1.0})
+    if not seen.knows:
+        return {"a": moved}
+    damped = record["x"] - record["z"] if seen.damper == "base" and "z" in record else record["x"]
+    pull = -seen.rig["stiffness"] * record["x"] - seen.damping * np.gradient(damped, 1 / record.fs)
+    for name, factor in (("z", seen.rig["stiffness"]), ("force", 1.0)):
+        pull = pull + factor * record[name] if name in record else pull
+    return {"a": moved, "load": smooth.apply(pull, {0: 1.0}) - seen.rig["mass"] * moved}
 
 
 def _left_over(read: Array, expected: Array, edges: Array) -> dict[int, float]:
