@@ -254,6 +254,17 @@ def test_a_dropped_record_is_answered_with_the_librarys_own_digits(page: Page, r
     expect(inside).to_contain_text(words.lines[0].value)
 
 
+def test_a_caution_that_many_rows_share_is_said_once_above_them(page: Page) -> None:
+    open_data(page)
+    page.get_by_role("button", name="Try the example record").click()
+    page.locator("#data-run").click(timeout=PATIENCE)
+    page.locator("#data-results").wait_for(timeout=2 * PATIENCE)
+    shared = "the mount of a and the mount of load are not stated"
+    assert page.locator("#data-results td", has_text=shared).count() == 0
+    assert page.locator(".data-caution", has_text=shared).count() == 1
+    assert page.locator("#data-results td", has_text="as said above (1)").count() > 5
+
+
 def test_a_real_record_of_two_files_is_asked_for_what_they_do_not_tell(
     page: Page, dataset: Callable[[str], Path], tmp_path: Path
 ) -> None:

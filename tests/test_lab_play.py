@@ -208,3 +208,31 @@ def test_a_motion_can_be_heard(client: TestClient, name: str, words: str) -> Non
     assert words in header["words"]
     assert np.abs(arrays["sound"]).max() == pytest.approx(1.0)
     assert len(arrays["sound"]) <= 3 * header["fs"]
+
+
+@pytest.mark.parametrize(
+    ("name", "springs"),
+    [
+        ("FD-4", [[-1, 0]]),
+        ("MC-1", [[-1, 0], [-1, 1], [0, 1]]),  # an oblique spring joins the two
+        ("MC-2 eta=0.02,0.02", [[-1, 0], [-1, 1]]),  # those of its contacts
+    ],
+)
+def test_the_springs_of_a_system_are_those_of_its_stiffness(client: TestClient, name: str, springs: Any) -> None:
+    header, _ = asked(client, "run", state_of(client, name))
+    assert header["springs"] == springs
+
+
+def test_word_that_a_worker_compiles_is_passed_on_to_the_page(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def ask(request: bytes, *, tell: Any, **more: Any) -> bytes:
+        told = json.loads(request)
+        await tell(frame({"id": told["id"], "want": told["want"], "kind": "compiling"}))
+        return frame({"id": told["id"], "want": told["want"], "kind": "run"})
+
+    monkeypatch.setattr(client.app.state.workers, "ask", ask)
+    with client.websocket_connect("ws://127.0.0.1:8723/play", headers=BEARER) as socket:
+        socket.send_text(json.dumps({"id": 3, "want": "run", "state": STATE}))
+        kinds = [unframed(socket.receive_bytes())[0] for _ in range(2)]
+    assert [(each["id"], each["kind"]) for each in kinds] == [(3, "compiling"), (3, "run")]

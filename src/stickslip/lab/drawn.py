@@ -206,10 +206,17 @@ def _marks(run: ss.Trajectory, first: float, last: float) -> tuple[dict[str, Any
 
 
 def _springs(system: ss.Oscillator | ss.Structure) -> list[list[int]]:
-    """Between which masses springs are, -1 for what does not move with them: of several by their matrix."""
+    """Between which masses springs are, -1 for what does not move with them: of several by their matrix.
+
+    Contacts that are pressed on are springs across them.
+    """
     if not isinstance(system, ss.Structure):
         return [[-1, 0]]
-    matrix = np.atleast_2d(np.asarray(system.stiffness, dtype=float))
+    matrix: Array = np.array(system.stiffness, dtype=float)
+    for contact in system.contacts:
+        if contact.normal is not None:
+            across = np.asarray(contact.normal, dtype=float)
+            matrix += contact.stiffness * np.outer(across, across)
     least = EMPTY * np.abs(matrix).max(initial=0.0)
     own = [[-1, j] for j in range(len(matrix)) if abs(matrix[j].sum()) > least]
     return own + [[i, j] for i in range(len(matrix)) for j in range(i + 1, len(matrix)) if abs(matrix[i, j]) > least]

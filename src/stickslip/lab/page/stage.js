@@ -92,7 +92,7 @@ export class Stage {
     pen.save();
     pen.translate(x, 4);
     pen.rotate(Math.PI / 2);
-    this.spring(pen, 0, top - 4, 0, 4);
+    this.spring(pen, 0, top - 4, 0, 4, 4);
     pen.restore();
     pen.fillStyle = this.palette.soft;
     pen.fillRect(x - 14, 0, 28, 4);
@@ -129,13 +129,13 @@ export class Stage {
     }
     pen.stroke();
   }
-  spring(pen, from, to, y, side = 8) {
+  spring(pen, from, to, y, side = 8, coils = COILS) {
     pen.strokeStyle = this.palette.ink;
     pen.lineWidth = 1.6;
     pen.beginPath();
     pen.moveTo(from, y);
-    const step = (to - from) / (COILS * 2 + 2);
-    for (let k = 1; k <= COILS * 2; k++) pen.lineTo(from + step * (k + 0.5), y + (k % 2 ? -side : side));
+    const step = (to - from) / (coils * 2 + 2);
+    for (let k = 1; k <= coils * 2; k++) pen.lineTo(from + step * (k + 0.5), y + (k % 2 ? -side : side));
     pen.lineTo(to, y);
     pen.stroke();
   }
