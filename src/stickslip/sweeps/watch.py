@@ -20,10 +20,11 @@ ROOM = 16  # pieces written before they are counted
 LAP = 64  # pieces remembered for the fast path, a power of two
 BUDGET = 10_000  # events in a period; more is taken for chatter
 TIRELESS = 2**62
-PARTS = 256  # of a run, of four laps each where it is short: what moves less than STILL in such a part is steady,
+PARTS = 256  # steps of a run, a lap each where it is short: what moves less than STILL in a step or more is steady,
 STILL = 4e-15  # and would not move by more than PARTS times as much, some 1e-12, in the rest
-NEXT, BEGUN, AGAIN, SPAN, PLACE = range(5)  # of a mark: lap from which on the next is made, lap of this one (-1: none),
-MARK = 5  # whether the motion is there again, laps between two marks, and time within the lap; then mode and state
+STEPS = 4  # after which a mark is made anew
+NEXT, BEGUN, SPAN, STEP, PLACE = range(5)  # of a mark: lap from which on the next look is due, lap of the mark (-1: none),
+MARK = 5  # laps after which the motion was there again (0: not yet), of a step, and time within the lap; mode and state
 CONSTANT, VARIES = 1, 2  # what friction does in a mode, beside none (0)
 # Gauss-Legendre points and weights on (0, 1)
 POINTS = (
@@ -54,7 +55,7 @@ def watch_one(i, s, given, out, scratch):
     for k in range(n):
         tangent[0, k] = (1.0 - 0.5 * k / max(1, physical - 1)) / weights[i, k] if k < physical else 0.0
     growths[i] = 0.0
-    _unmarked(marks[s], 4.0 * math.ceil(total / PARTS) if driven and not each else 0.0)
+    _unmarked(marks[s], math.ceil(total / PARTS) if driven and not each else 0.0)
     lap, last, lasted = 0, 0, 0.0
     while lap < total and mode >= 0:
         until = total - max(0, rows - 1)
@@ -108,7 +109,7 @@ def _to(i, lap, until, motion, mode, settled, look, each, leaps, tangent, sums):
         if count > 0:
             last, lasted = pieces[2][count - 1], pieces[3][count - 1] if pieces[5][count - 1] < 0 else 0.0
         _count(i, count, motion, settled, look, sums)
-        if marks[0, AGAIN] == 1.0 and outcome == FULL:
+        if marks[0, SPAN] > 0.0 and outcome == FULL:
             _skip(clock, marks, settled, until, sums)
         if each:
             _carry(i, count, motion, mode, leaps, tangent)
@@ -221,7 +222,7 @@ def _count(i, count, motion, settled, look, sums):
     for p in range(count):
         m, length = modes[p], durations[p]
         if laps[p] >= marks[0, NEXT]:
-            _mark(laps[p], offsets[p] / period, m, states[p], tones, sums, marks)
+            _mark(laps[p], offsets[p] / period, m, states[p], tones, settled, sums, marks)
         begin = (laps[p] - settled) * period + offsets[p] if math.isfinite(period) else offsets[p] - settled * unit
         last = p == count - 1
         x = state[0] if last else states[p + 1, 0]
@@ -248,46 +249,50 @@ def _count(i, count, motion, settled, look, sums):
 
 
 @compiled(**OPTIONS)
-def _unmarked(marks, span):
-    """Forget the motion before; without a span, no marks are made."""
-    marks[0, NEXT], marks[0, BEGUN], marks[0, AGAIN], marks[0, SPAN] = 0.0 if span else math.inf, -1.0, 0.0, span
+def _unmarked(marks, step):
+    """Forget the motion before; without a step, none is looked for."""
+    marks[0, NEXT], marks[0, BEGUN], marks[0, SPAN], marks[0, STEP] = 0.0 if step else math.inf, -1.0, 0.0, step
     for k in range(marks.shape[1]):
         marks[1, k] = 0.0
 
 
 @compiled(**OPTIONS)
-def _mark(lap, place, mode, state, tones, sums, marks):
-    """Remember the motion at its first event of a lap, and tell whether it is again where the last mark was."""
+def _mark(lap, place, mode, state, tones, settled, sums, marks):
+    """Tell at the first event of a lap whether the motion is where it was at the mark; make another one now and then."""
     here, size, before, gains = marks[0], marks[1], marks[2], marks[3]
-    again = here[BEGUN] >= 0.0 and lap == here[BEGUN] + here[SPAN] and mode == here[MARK]
-    again = again and abs(place - here[PLACE]) <= STILL
+    fresh = here[BEGUN] < 0.0 or here[BEGUN] < settled <= lap
+    again = not fresh and mode == here[MARK] and abs(place - here[PLACE]) <= STILL
+    fresh = fresh or lap >= here[BEGUN] + STEPS * here[STEP]
     for k in range(state.shape[0]):
         turns = tones.shape[0] == 1 and (k == int(tones[0, 0]) or k == int(tones[0, 1]))
         size[k] = max(size[k], abs(state[k]))
         if not turns:
             again = again and abs(state[k] - here[MARK + 1 + k]) <= STILL * size[k]
-            here[MARK + 1 + k] = state[k]
-    for k in range(ENTRIES):
-        gains[k] = sums[k] - before[k]
-        before[k] = sums[k]
-    here[AGAIN] = 1.0 if again else 0.0
-    here[PLACE], here[MARK], here[BEGUN], here[NEXT] = place, mode, lap, lap + here[SPAN]
+            if fresh:
+                here[MARK + 1 + k] = state[k]
+    here[NEXT] = lap + here[STEP]
+    if again:
+        here[SPAN], here[NEXT] = lap - here[BEGUN], math.inf
+        for k in range(ENTRIES):
+            gains[k] = sums[k] - before[k]
+    elif fresh:
+        here[PLACE], here[MARK], here[BEGUN] = place, mode, lap
+        for k in range(ENTRIES):
+            before[k] = sums[k]
 
 
 @compiled(**OPTIONS)
 def _skip(clock, marks, settled, until, sums):
     """Leave out the laps in which a motion repeats: all but the last that is not measured, or the last."""
     here, gains = marks[0], marks[3]
-    span, measured = here[SPAN], here[BEGUN] - here[SPAN] >= settled
-    times = math.floor(((until if measured else min(settled, until)) - 1.0 - clock[0]) / span)
-    here[AGAIN] = 0.0
-    if times < 1.0:
-        return
+    span, measured = here[SPAN], here[BEGUN] >= settled
+    end = until if measured else min(settled, until)
+    times = max(0.0, math.floor((end - 1.0 - clock[0]) / span))
     if measured:
         for k in (NORMAL, ABNORMAL, HELD, SHORT, WORK):
             sums[k] += times * gains[k]
     clock[0] += times * span
-    here[BEGUN], here[NEXT] = -1.0, until if measured else settled
+    here[BEGUN], here[NEXT], here[SPAN] = -1.0, end, 0.0
 
 
 @compiled(**OPTIONS)
