@@ -17,14 +17,12 @@ from numpy.typing import NDArray
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.drives import Drive
 from stickslip.laws.base import Law, Mode
-from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import CANCELLED, DEGREE, Array, halved
-from stickslip.solve.phasors import Phasors, phasors
+from stickslip.solve.automaton import CANCELLED, DEGREE, SETTLED, Array, halved
+from stickslip.solve.phasors import Phasors, distinct, phasors
 
 Index = NDArray[np.int64]
 TERMS = 26  # of a Taylor series whose flow turns half a radian at most: the rest is below the last digit
-NEAR = 256  # different rows among which an equal one is looked for
 PART = 4  # a cell turns one radian; its exponential is summed over a fourth of it, and squared twice
 
 
@@ -100,10 +98,11 @@ class Tables:
 
 def kind_of_law(law: Any) -> Any:
     """What laws of one fleet have in common; None for a law without linear modes."""
-    if isinstance(law, CurvedLaw) or not hasattr(law, "modes"):
+    if hasattr(law, "rates") or not hasattr(law, "modes"):
         return None
-    exits = [tuple((e.to, e.crossing, set(e.quantity) == {"v"}, *e.reset) for e in mode.exits) for mode in law.modes()]
-    parts = [(mode.name, mode.kind, mode.side, mode.friction is None) for mode in law.modes()]
+    modes = law.modes()
+    exits = [tuple((e.to, e.crossing, set(e.quantity) == {"v"}, *e.reset) for e in mode.exits) for mode in modes]
+    parts = [(mode.name, mode.kind, mode.side, mode.friction is None) for mode in modes]
     return tuple(parts), tuple(exits), tuple(law.memory), tuple(law.places), law.entry
 
 
@@ -295,7 +294,7 @@ def _cells(flow: Array, constant: int) -> tuple[Array, Array]:
     core = whole.copy()
     core[:, :, constant] = 0.0
     where, which = np.empty((2, len(core)), np.int64)
-    found = _distinct(core.reshape(len(core), -1), where, which)
+    found = distinct(core.reshape(len(core), -1), where, which)
     where = where[:found]
     core, rate = core[where], np.zeros(found)
     for mode in range(modes):
@@ -303,30 +302,10 @@ def _cells(flow: Array, constant: int) -> tuple[Array, Array]:
         rate[own] = _fastest(core[own])
     cell = np.divide(1.0, rate, out=np.full(found, np.inf), where=rate > 0)
     turned, integral = _exponentials(core, np.where(np.isfinite(cell), cell, 0.0))
-    hop = np.moveaxis(halved(turned), 0, 1)[which]
+    hop = np.ascontiguousarray(np.moveaxis(halved(turned), 0, 1))[which]
     pushed = np.einsum("bij,bj->bi", integral[which], whole[:, :, constant].astype(np.longdouble))
-    hop[:, :, :, constant] = np.moveaxis(halved(turned[which, :, constant] + pushed), 0, 1)
+    hop[:, :, :, constant] = np.moveaxis(halved(turned[:, :, constant][which] + pushed), 0, 1)
     return cell[which].reshape(count, modes), hop.reshape(count, modes, 3, size, size)
-
-
-@compiled(**OPTIONS)
-def _distinct(rows, where, which):
-    """Where each different row stands first, and which of them each row is; how many there are. Rows that are far apart
-    may count as different though they are equal."""
-    count, width = 0, rows.shape[1]
-    for r in range(rows.shape[0]):
-        which[r] = -1
-        for u in range(count - 1, max(-1, count - 1 - NEAR), -1):
-            j = 0
-            while j < width and rows[where[u], j] == rows[r, j]:
-                j += 1
-            if j == width:
-                which[r] = u
-                break
-        if which[r] < 0:
-            where[count], which[r] = r, count
-            count += 1
-    return count
 
 
 def _fastest(flow: Array) -> Array:
@@ -352,8 +331,11 @@ def _exponentials(flow: Array, time: Array) -> tuple[Any, Any]:
     term, turned, integral = unit, unit.copy(), unit.copy()
     for k in range(1, TERMS):
         term = term @ step / k
+        before = turned.copy()
         turned += term
         integral += term / (k + 1)
+        if k >= SETTLED and np.array_equal(turned, before):
+            break
     integral *= part
     for _ in range(int(math.log2(PART))):
         integral = integral + turned @ integral

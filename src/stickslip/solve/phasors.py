@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.compiled import FAST, compiled
+from stickslip.compiled import FAST, OPTIONS, compiled
 from stickslip.solve.automaton import Array, Automaton
 from stickslip.solve.roots import NOISE
 
@@ -29,6 +29,7 @@ LONGEST = 8192  # nodes of one table
 HISTORY = 4096  # pieces remembered; the guess is one lap old
 SLIDING, HELD = 1.0, 0.0
 SPLITS = 64
+NEAR = 256  # different rows among which an equal one is looked for
 LOOK = 0.4  # rad between two looks for an exit of which the lap before tells nothing
 
 
@@ -159,11 +160,12 @@ def _without(count: int) -> Phasors:
 def _all_nodes(turns: NDArray[np.complex128], able: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array, Array]:
     """Nodes of all that turns, the drive first: where each system's lie in the table, and in them first node and number
     of each of its turning parts. Systems that turn alike share theirs."""
-    keys, which = np.unique(turns, axis=0, return_inverse=True)
+    where, which = np.empty((2, len(turns)), np.int64)
+    keys = turns[where[: distinct(turns.view(np.float64), where, which)]]
     spans, offsets = np.zeros((len(keys), 2), np.int64), np.zeros((*keys.shape, 2))
     parts, length = [np.zeros((0, 3))], 0
     wanted = np.zeros(len(keys), dtype=bool)
-    wanted[which.reshape(-1)[able]] = True
+    wanted[which[able]] = True
     for j in np.flatnonzero(wanted):
         period = 2 * math.pi / keys[j, 0].imag
         grids = [_nodes(complex(rate), period) for rate in keys[j]]
@@ -174,9 +176,29 @@ def _all_nodes(turns: NDArray[np.complex128], able: NDArray[np.bool_]) -> tuple[
         spans[j] = length, length + ends[-1]
         length += ends[-1]
         parts += [grid for grid in grids if grid is not None]
-    spans = spans[which.reshape(-1)]
+    spans = spans[which]
     spans[~able] = 0
-    return spans, offsets[which.reshape(-1)], np.ascontiguousarray(np.concatenate(parts))
+    return spans, offsets[which], np.ascontiguousarray(np.concatenate(parts))
+
+
+@compiled(**OPTIONS)
+def distinct(rows, where, which):
+    """Where each different row stands first, and which of them each row is; how many there are. Rows that are far apart
+    may count as different though they are equal."""
+    count, width = 0, rows.shape[1]
+    for r in range(rows.shape[0]):
+        which[r] = -1
+        for u in range(count - 1, max(-1, count - 1 - NEAR), -1):
+            j = 0
+            while j < width and rows[where[u], j] == rows[r, j]:
+                j += 1
+            if j == width:
+                which[r] = u
+                break
+        if which[r] < 0:
+            where[count], which[r] = r, count
+            count += 1
+    return count
 
 
 def blank_past() -> tuple[NDArray[Any], ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,12 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
-from stickslip.solve.automaton import DEGREE, Array, leaps_between
+from stickslip.solve.automaton import DEGREE, Array, by_value, leaps_between
 from stickslip.solve.fleet import Fleet, Tables, fleet_tables, kind_of_drive, kind_of_law, opened
 from stickslip.sweeps import tally as log
 from stickslip.sweeps.grid import START
 from stickslip.sweeps.measures import FAILED, LOG, NO_SYSTEM, ORDERS
-from stickslip.sweeps.plan import Arrays, Plan
+from stickslip.sweeps.plan import BLOCK, Arrays, Plan
 from stickslip.sweeps.watch import CONSTANT, LAP, MARK, ROOM, VARIES, repeats, watch_all
 
 Index = NDArray[np.int64]
@@ -35,7 +36,8 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[
     named = {f"{START}{name}" for name in plan.start} | {name for axis in plan.axes for name in axis.names}
     if not isinstance(plan.system, Oscillator) or f"{START}mode" in named or LOG in plan.measures:
         return
-    steps = np.array(plan.points(number), dtype=np.int64).reshape(-1, len(plan.axes))
+    tile = plan.slices(number)
+    steps = np.stack(np.mgrid[tile], axis=-1).reshape(-1, len(tile))
     (laws, law), (drives, drive), (owners, own) = (_different(plan, steps, part) for part in (*PARTS, ""))
     real = np.array([s is not None for s in laws])[law] & np.array([s is not None for s in drives])[drive]
     real &= np.array([s is not None for s in owners])[own]
@@ -70,16 +72,31 @@ def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Any], Index]:
         for axis in plan.axes
     ]
     columns = [number for number, names in enumerate(own) if names]
-    keys, which = np.unique(steps[:, columns], axis=0, return_inverse=True)
-    found: list[Any] = []
-    for key in keys:
+    shape = [plan.shape[number] for number in columns]
+    keys, which = np.unique(_flat(steps[:, columns], shape), return_inverse=True)
+    found = []
+    for key in np.stack(np.unravel_index(keys, shape), axis=-1) if shape else [()]:
         axes = [(plan.axes[number], own[number], step) for number, step in zip(columns, key, strict=True)]
-        changes = {axis.names[j]: axis.values[step][j] for axis, names, step in axes for j in names}
-        try:
-            found.append(changed(plan.system, changes) if changes else plan.system)
-        except ModelError:
-            found.append(None)
-    return found, which.reshape(-1)
+        changes = tuple((axis.names[j], axis.values[step][j]) for axis, names, step in axes for j in names)
+        plain = by_value(plan.system) and all(isinstance(value, int | float | str) for _, value in changes)
+        found.append((_known if plain else _made)(plan.system, changes))
+    return found, which
+
+
+def _flat(steps: Index, shape: Sequence[int]) -> Index:
+    """One number for the steps along some axes."""
+    return np.ravel_multi_index(tuple(steps.T), tuple(shape)) if shape else np.zeros(len(steps), np.int64)
+
+
+def _made(system: Oscillator, changes: tuple[tuple[str, Any], ...]) -> Oscillator | None:
+    """The system with other values; None where there is no such system."""
+    try:
+        return changed(system, dict(changes))
+    except ModelError:
+        return None
+
+
+_known = lru_cache(maxsize=BLOCK)(_made)  # the blocks of a map share most of theirs
 
 
 def _part(plan: Plan, name: str) -> str:
