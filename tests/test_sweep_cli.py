@@ -126,5 +126,9 @@ def test_the_map_is_drawn_over_its_parameters() -> None:
     assert len(ss.plot_map(atlas, variable="multiplier").collections) == 1
     curve = ss.plot_map(atlas.isel(kinetic=3), variable="amplitude")
     assert np.allclose(curve.lines[0].get_xdata(), values["frequency"])
+    stops = ss.plot_map(atlas.isel(frequency=3))
+    assert all(tick == int(tick) for tick in stops.get_yticks())
+    status = ss.plot_map(atlas, variable="status").figure.axes[1]
+    assert [tick.get_text() for tick in status.get_yticklabels()] == ["moving", "at rest"]
     with pytest.raises(ModelError, match="has no 'stick'"):
         ss.plot_map(atlas, variable="stick")

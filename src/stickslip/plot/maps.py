@@ -65,13 +65,21 @@ def plot_map(atlas: Any, *, variable: str | None = None, system: System | None =
     ax = axes_of(ax, height=4.2)
     across, scale, label = _axis(atlas, values.dims[0])
     factor, spelled = prefixed(values.values[np.isfinite(values.values)], unit)
+    named = _outcomes(values)
     if values.ndim == 1:
-        ax.plot(across, factor * values.values, ".-", color=BLUE)
+        from matplotlib.ticker import MaxNLocator
+
+        counted = len(_steps(values.values)) > 0
+        ax.plot(across, factor * values.values, ".-", color=BLUE, drawstyle="steps-mid" if counted else "default")
+        if counted:
+            ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+        if named:
+            ax.set_yticks(list(named), list(named.values()))
         ax.set_xlabel(label)
         ax.set_ylabel(axis_label(words, spelled))
         return ax
     up, lift, upward = _axis(atlas, values.dims[1])
-    _colour(ax, across, up, factor * values.values.T, axis_label(words, spelled))
+    _colour(ax, across, up, factor * values.values.T, axis_label(words, spelled), named)
     curve = None if system is None else den_hartog(system, values.dims, across / scale)
     if curve is not None:
         ax.plot(across, lift * curve, color=ORANGE, linewidth=1.8, label="Den Hartog (1931): no stops below")
@@ -86,7 +94,7 @@ def _shown(atlas: Any, variable: str | None) -> tuple[Any, str, str]:
     """The values, what they are, and their unit."""
     if variable is None and {"normal_stops", "abnormal_stops"} <= set(atlas.data_vars):
         return atlas.normal_stops + atlas.abnormal_stops, "stops per period", "1"
-    name = variable if variable is not None else next(iter(set(atlas.data_vars) - {"status"}), "status")
+    name = variable if variable is not None else next((n for n in atlas.data_vars if n != "status"), "status")
     if name not in atlas.data_vars:
         raise ModelError(
             f"the map has no '{name}'", f"it has {', '.join(map(str, atlas.data_vars))}", "name one of them"
@@ -104,15 +112,30 @@ def _axis(atlas: Any, dim: str) -> tuple[Array, float, str]:
     return factor * known.values, factor, axis_label(dim.replace(".", " ").replace("_", " "), unit)
 
 
-def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str) -> None:
-    """The map in colour; a count of few values in steps."""
+def _outcomes(values: Any) -> dict[int, str]:
+    """What the numbers of a status mean, of those that are there; nothing for other variables."""
+    codes, words = values.attrs.get("flag_values", ()), values.attrs.get("flag_meanings", "").split()
+    named = {int(code): word.replace("_", " ") for code, word in zip(codes, words, strict=True)}
+    return {code: named[code] for code in np.unique(values.values).tolist() if code in named}
+
+
+def _steps(values: Array) -> Array:
+    """The different numbers of a count of few values; none of what is no count."""
+    known = values[np.isfinite(values)]
+    whole = np.unique(np.round(known))
+    counted = 0 < len(whole) <= FEW and np.mean(known == np.round(known)) > MOSTLY
+    return whole if counted else whole[:0]
+
+
+def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str, named: dict[int, str]) -> None:
+    """The map in colour; a count of few values in steps, which may have names."""
     import matplotlib as mpl
     from matplotlib.colors import BoundaryNorm, LogNorm
 
     known = values[np.isfinite(values)]
-    whole = np.unique(np.round(known))
+    whole = _steps(values)
     options: dict[str, Any] = {"cmap": RISING}
-    if 0 < len(whole) <= FEW and np.mean(known == np.round(known)) > MOSTLY:
+    if len(whole):
         edges = np.append(whole - 0.5, whole[-1] + 0.5)
         options = {"cmap": mpl.colormaps[RISING].resampled(len(whole)), "norm": BoundaryNorm(edges, len(whole))}
     elif len(known) and np.min(known) > 0 and np.max(known) > WIDE * np.min(known):
@@ -124,7 +147,7 @@ def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str) -> No
     bar = ax.figure.colorbar(drawn, ax=ax, label=words)
     if isinstance(options.get("norm"), BoundaryNorm):
         bar.set_ticks([(low + high) / 2 for low, high in pairwise(edges)])
-        bar.set_ticklabels([f"{count:g}" for count in whole])
+        bar.set_ticklabels([named.get(int(count), f"{count:g}") for count in whole])
     bar.outline.set_edgecolor(INK)
 
 

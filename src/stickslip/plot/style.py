@@ -75,11 +75,13 @@ def legend_above(ax: Axes, *, columns: int = 1, **options: Any) -> None:
 
 def plain_decades(axis: Axis) -> None:
     """Plain numbers along a logarithmic axis; between the powers of ten too, where less than a decade may hold none."""
-    from matplotlib.ticker import NullFormatter
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()
+    if 2 * low < high < 10 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
     axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter("{x:g}" if high < 10 * low else NullFormatter())
+    axis.set_minor_formatter("{x:g}" if high <= 2 * low else NullFormatter())
 
 
 def axis_label(words: str, unit: str, between: str = " ") -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.solve.automaton import System
-from stickslip.sweeps.grid import START, read_grid
+from stickslip.sweeps.grid import START, read_grid, unit
 from stickslip.sweeps.measures import MEASURES
 from stickslip.sweeps.plan import required
 from stickslip.sweeps.sweep import sweep
@@ -96,7 +96,7 @@ def refine(
             break
         step //= 2
         wanted = _halved(arrays, step)
-    known = {name: (name, column) for name, column in zip(grid, values, strict=True)}
+    known = {name: (name, column, {"units": unit(system, name)}) for name, column in zip(grid, values, strict=True)}
     data = {name: (tuple(grid), array, units[name]) for name, array in arrays.items()}
     return required("xarray").Dataset({**data, "run": (tuple(grid), run)}, coords=known, attrs=found.attrs)
 
