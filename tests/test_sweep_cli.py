@@ -97,7 +97,9 @@ def test_the_command_maps_keeps_and_draws(file: Path, tmp_path: Path) -> None:
     told = json.loads(run.output)
     assert told["status"] == "complete"
     assert told["variables"]["amplitude"]["known"] == 24
-    assert {path.name for path in (tmp_path / "maps").iterdir()} == {"stops.png", "amplitude.png"}
+    assert {path.name for path in (tmp_path / "maps" / "figures").glob("*.png")} == {"stops.png", "amplitude.png"}
+    page = (tmp_path / "maps" / "report.html").read_text("utf-8")
+    assert "24 motions over frequency and kinetic: " in page
     again = CliRunner().invoke(main, ["sweep", str(file), "--store", str(store)], catch_exceptions=False)
     assert again.exit_code == 0
     assert "8 x 3 points, complete" in again.output

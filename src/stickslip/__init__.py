@@ -204,6 +204,7 @@ if TYPE_CHECKING:
         Noise as Noise,
         Sensor as Sensor,
     )
+    from stickslip.reports.maps import map_numbers as map_numbers, publish_map as publish_map
     from stickslip.reports.simulation import (
         Outcome as Outcome,
         outcome as outcome,
@@ -330,6 +331,7 @@ _ROOMS = {
     "RateState": "laws.rate_state", "SmoothStateVariable": "laws.smooth_state",
     "refine": "sweeps.refine", "design": "sweeps.design", "sensitivity": "sweeps.design",
     "sweep": "sweeps.sweep", "SweepFile": "sweeps.grid_file", "read_sweep": "sweeps.grid_file", "plot_map": "plot.maps",
+    "publish_map": "reports.maps", "map_numbers": "reports.maps",
     "squeak_rig": "squeak.virtual_rig", "sound_pressure": "squeak.sound", "squeak_record": "squeak.sound",
     "find_squeaks": "squeak.bursts", "Squeaks": "squeak.bursts", "Squeak": "squeak.bursts",
     "sound_quality": "squeak.quality", "SoundQuality": "squeak.quality",

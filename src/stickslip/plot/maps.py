@@ -11,7 +11,8 @@ import numpy as np
 from stickslip.errors import ModelError
 from stickslip.identify.sliding_balance import Slider
 from stickslip.oscillator import Oscillator
-from stickslip.plot.style import BLUE, INK, ORANGE, Array, axes_of, axis_label, prefixed, styled
+from stickslip.plot.plate import Plate, plate
+from stickslip.plot.style import BLUE, INK, ORANGE, Array, axes_of, axis_label, plain_decades, prefixed, styled
 from stickslip.solve.automaton import System
 
 if TYPE_CHECKING:
@@ -112,6 +113,21 @@ def _axis(atlas: Any, dim: str) -> tuple[Array, float, str]:
     return factor * known.values, factor, axis_label(dim.replace(".", " ").replace("_", " "), unit)
 
 
+def plates_of(atlas: Any, system: System | None = None) -> tuple[Plate, ...]:
+    """The figures of a map over one or two parameters, one for each measure, with their words."""
+    counts = {"normal_stops", "abnormal_stops"} & set(atlas.data_vars)
+    own = [str(name) for name in atlas.data_vars if name not in {"status", *counts}]
+    drawn = {**({"stops": None} if len(counts) == 2 else {}), **{name: name for name in own}}
+    cycles, settle = (atlas.attrs.get(name, "some") for name in ("cycles", "settle"))
+    said = f"Each point is a motion of its own: {cycles} periods of it, after {settle} to settle."
+    plates = []
+    for name, variable in (drawn or {"status": "status"}).items():
+        ax, words = plot_map(atlas, variable=variable, system=system), _shown(atlas, variable)[1]
+        line = " Line: Den Hartog's boundary, below which sliding does not stop." if ax.get_legend() else ""
+        plates.append(plate(name, ax, f"{words[0].upper()}{words[1:]}", said + line))
+    return tuple(plates)
+
+
 def _outcomes(values: Any) -> dict[int, str]:
     """What the numbers of a status mean, of those that are there; nothing for other variables."""
     codes, words = values.attrs.get("flag_values", ()), values.attrs.get("flag_meanings", "").split()
@@ -145,6 +161,8 @@ def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str, named
     )
     ax.grid(visible=False)
     bar = ax.figure.colorbar(drawn, ax=ax, label=words)
+    if isinstance(options.get("norm"), LogNorm):
+        plain_decades(bar.ax.yaxis)
     if isinstance(options.get("norm"), BoundaryNorm):
         bar.set_ticks([(low + high) / 2 for low, high in pairwise(edges)])
         bar.set_ticklabels([named.get(int(count), f"{count:g}") for count in whole])
