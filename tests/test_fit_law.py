@@ -56,6 +56,17 @@ def test_a_law_is_found_in_three_records(law: Any, start: Any) -> None:
     assert len(found.traces) == 3
 
 
+@pytest.mark.parametrize(("kinetic", "static"), [(1.1, 1.2), (1.5, 1.6), (0.5, 0.8)])
+def test_a_parameter_that_is_held_stays_as_it_was_given(kinetic: float, static: float) -> None:
+    record = measured(ss.Coulomb(0.9, static=1.2), 2.5)
+    start = ss.Oscillator(law=ss.Coulomb(kinetic, static=static), **RIG)
+    found = ss.fit_law(record, start, free=["kinetic"], intervals=False)
+    assert found.law.static == static
+    if static == 1.2:
+        assert found.law.kinetic == pytest.approx(0.9, rel=2e-3)
+    assert found.law.kinetic <= static
+
+
 def test_another_record_is_predicted() -> None:
     found = ss.fit_law(measured(CONTACT, 8.7), ss.Oscillator(law=CONTACT, **RIG))
     other = ss.fit_law(measured(CONTACT, 2.5), found.oscillator, free=(), intervals=False)

@@ -33,6 +33,7 @@ GRID = {
     "stiffness": (0.25, 1.0, 4.0, 64.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0),
 }  # fmt: skip
 EXCESS = (0.04, 0.15, 0.25, 0.4)  # of static over kinetic friction
+BELOW = 0.99  # of a static friction that is held: where the kinetic starts at most
 SPEEDS = (0.03, 0.1, 0.3)  # of the largest speed
 THIN = 1000.0  # readings of a channel that a first look takes
 FINALISTS = 3
@@ -239,14 +240,16 @@ def _slides_at(oscillator: Oscillator) -> bool:
 
 
 def better_start(oscillator: Oscillator, names: Sequence[str], shown: Sequence[Shown]) -> Oscillator:
-    """The law with its forces scaled to the friction that the records show."""
+    """The law with its forces, as far as they are free, scaled to the friction that the records show."""
     level = float(np.median([each.level for each in shown]))
     if "kinetic" not in names or not level > 0:
         return oscillator
-    share = level / value_of(oscillator, "kinetic")
     static = getattr(oscillator.law, "static", None)
-    changes = {"kinetic": level} | ({"static": static * share} if static is not None else {})
-    return oscillator.having(**changes)
+    if static is None:
+        return oscillator.having(kinetic=level)
+    if not {"static", "law.static"} & set(names):
+        return oscillator.having(kinetic=min(level, BELOW * static))
+    return oscillator.having(kinetic=level, static=static * level / value_of(oscillator, "kinetic"))
 
 
 def trials(oscillator: Oscillator, names: Sequence[str], fastest: float) -> Iterator[Oscillator]:
