@@ -239,7 +239,7 @@ def system_ii(given: Given) -> Any:
     ax.text(2.5, 3.3, f"three springs, k = {_kilo(told['stiffness'])} together", fontsize=8, ha="center")
     friction = f"ζ = {told['damping_ratio']:g}, f_k = {told['kinetic']:g} N"
     _told(ax, (6.75, 1.65), (8.0, 0.6), f"two linear bearings: {friction}", colour=ORANGE)
-    _moves(ax, (5.2, 3.25), 1.1, (8.0, 3.9), given["paper"]["resolution"])
+    _moves(ax, (5.2, 3.25), 1.1, (3.6, 4.2), given["paper"]["resolution"])
     return drawn
 
 
