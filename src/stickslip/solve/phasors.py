@@ -501,6 +501,16 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
                 done = False
             if done:
                 break
+        if not done and 0.0 < left < 0.999 * period:
+            # nothing ends it before the limit, perhaps
+            t, leaving, parts = left, -1, 1
+            cr, ci = _turn(nodes, 0, grid[0], grid[1], 0.0, w, t)
+            yr, yi = _turn(nodes, grid[2], grid[3], grid[4], lr, li, t) if sliding else (0.0, 0.0)
+            spread = math.exp(1.000001 * lr * t) if lr > 0.0 else 1.0
+            end = (cr, ci, yr, yi)
+            while parts <= SPLITS and not _certified(grid, piece, number, -1, w, lr, li, t, spread, end, parts, nodes):
+                parts *= 2
+            done = parts <= SPLITS
         if not done:
             break
         # the piece stands: write it, carry the state over
@@ -518,8 +528,12 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
         gap = t - clock[2]
         now = clock[1] + gap
         clock[2] = (now - clock[1]) - gap
-        if now >= period:
+        wraps = now >= period
+        if leaving < 0:
+            wraps, now, clock[2] = clock[0] < limit[0], limit[1], 0.0
+        elif wraps:
             now -= period
+        if wraps:
             clock[0] += 1.0
             ring[1] = ring[2]
             ring[2] = ring[0]
@@ -533,6 +547,9 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
             ar, ai = zr * yr - zi * yi, zr * yi + zi * yr
             x = centre + fr + ar
             v = -w * fi + lr * ar - li * ai
+        if leaving < 0:
+            settled = True
+            break
         if exits[leaving, 8] == STOPS:
             v = 0.0
         elif exits[leaving, 8] == CARRIES:

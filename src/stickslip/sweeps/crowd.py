@@ -37,7 +37,7 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[
     if not isinstance(plan.system, Oscillator) or f"{START}mode" in named or LOG in plan.measures:
         return
     tile = plan.slices(number)
-    steps = np.stack(np.mgrid[tile], axis=-1).reshape(-1, len(tile))
+    steps = np.moveaxis(np.mgrid[tile], 0, -1).reshape(-1, len(tile))
     (laws, law), (drives, drive), (owners, own) = (_different(plan, steps, part) for part in (*PARTS, ""))
     real = np.array([s is not None for s in laws])[law] & np.array([s is not None for s in drives])[drive]
     real &= np.array([s is not None for s in owners])[own]
@@ -74,12 +74,13 @@ def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Any], Index]:
     columns = [number for number, names in enumerate(own) if names]
     shape = [plan.shape[number] for number in columns]
     keys, which = np.unique(_flat(steps[:, columns], shape), return_inverse=True)
-    found = []
+    system: Any = plan.system
+    found: list[Any] = []
     for key in np.stack(np.unravel_index(keys, shape), axis=-1) if shape else [()]:
         axes = [(plan.axes[number], own[number], step) for number, step in zip(columns, key, strict=True)]
         changes = tuple((axis.names[j], axis.values[step][j]) for axis, names, step in axes for j in names)
-        plain = by_value(plan.system) and all(isinstance(value, int | float | str) for _, value in changes)
-        found.append((_known if plain else _made)(plan.system, changes))
+        plain = by_value(system) and all(isinstance(value, int | float | str) for _, value in changes)
+        found.append((_known if plain else _made)(system, changes))
     return found, which
 
 

@@ -23,8 +23,10 @@ TIRELESS = 2**62
 PARTS = 256  # steps of a run, a lap each where it is short: what moves less than STILL in a step or more is steady,
 STILL = 4e-15  # and would not move by more than PARTS times as much, some 1e-12, in the rest
 STEPS = 4  # after which a mark is made anew
-NEXT, BEGUN, SPAN, STEP, PLACE = range(5)  # of a mark: lap from which on the next look is due, lap of the mark (-1: none),
-MARK = 5  # laps after which the motion was there again (0: not yet), of a step, and time within the lap; mode and state
+# of a mark: lap from which on the next look is due, lap of the mark (-1: none), laps after which the motion was there
+# again (0: not yet), laps of a step, and time within the lap; then mode and state
+NEXT, BEGUN, SPAN, STEP, PLACE = range(5)
+MARK = 5
 CONSTANT, VARIES = 1, 2  # what friction does in a mode, beside none (0)
 # Gauss-Legendre points and weights on (0, 1)
 POINTS = (
@@ -258,7 +260,7 @@ def _unmarked(marks, step):
 
 @compiled(**OPTIONS)
 def _mark(lap, place, mode, state, tones, settled, sums, marks):
-    """Tell at the first event of a lap whether the motion is where it was at the mark; make another one now and then."""
+    """Tell at the first event of a lap whether the motion is where the mark is; after some steps, make another."""
     here, size, before, gains = marks[0], marks[1], marks[2], marks[3]
     fresh = here[BEGUN] < 0.0 or here[BEGUN] < settled <= lap
     again = not fresh and mode == here[MARK] and abs(place - here[PLACE]) <= STILL
