@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import textwrap
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -91,8 +93,6 @@ def test_what_is_done_is_not_run_again(whole: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_a_damaged_block_is_run_again(whole: Path, tmp_path: Path) -> None:
-    import shutil
-
     path = tmp_path / "map.zarr"
     shutil.copytree(whole, path)
     chunk = max((path / "amplitude" / "c").rglob("*"), key=lambda at: at.is_file())
@@ -101,6 +101,13 @@ def test_a_damaged_block_is_run_again(whole: Path, tmp_path: Path) -> None:
     chunk.write_bytes(bytes_)
     sweep(SLIDER, GRID, store=path, **SETTINGS)
     assert files(path) == files(whole)
+
+
+def test_a_map_that_is_there_needs_no_room(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=200))
+    assert sweep(SLIDER, GRID, store=whole, **SETTINGS).attrs["status"] == "complete"
+    with pytest.raises(ModelError, match="the disk has 2e-07 GB"):
+        sweep(SLIDER, GRID, store=tmp_path / "map.zarr", **SETTINGS)
 
 
 def test_other_settings_are_refused_by_name(whole: Path) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import builtins
+import itertools
 import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +17,8 @@ import pytest
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Exit, Mode, Rigid
-from stickslip.sweeps import progress
+from stickslip.sweeps import progress, serial
+from stickslip.sweeps.plan import Arrays, Plan
 
 pytest.importorskip("xarray")
 CIRCLE = 2 * math.pi
@@ -174,6 +177,35 @@ def test_a_border_is_refined_with_few_runs_and_none_wrong() -> None:
         ss.refine(slider, coarse, halvings=0)
     with pytest.raises(ModelError, match="has 1 values"):
         ss.refine(slider, {"kinetic": [0.5]})
+    with pytest.raises(ModelError, match=r"measure = 'amplitude'; borders are of what counts"):
+        ss.refine(slider, coarse, measure="amplitude")
+    with pytest.raises(ModelError, match=r"1099513724929 points.*memory"):
+        ss.refine(slider, {"frequency": [0.1, 0.2], "kinetic": [0.3, 0.5]}, halvings=20)
+
+
+@pytest.mark.parametrize("last", [12, 17])
+def test_an_interrupt_ends_a_refinement_with_what_is_known(last: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within a level, and before its first block."""
+    run_block, begun = serial.run_block, itertools.count(1)
+
+    def interrupted(plan: Plan, number: int) -> tuple[Arrays, Arrays | None]:
+        if next(begun) == last:
+            raise KeyboardInterrupt
+        return run_block(plan, number)
+
+    slider = ss.scenarios.forced(0.8, 0.5)
+    coarse = {"frequency": np.linspace(0.08, 0.3, 9), "kinetic": np.linspace(0.1, 1.2, 9)}
+    options: dict[str, Any] = {"halvings": 1, "settle": 5, "cycles": 2, "engine": "serial"}
+    whole = ss.refine(slider, coarse, **options)
+    monkeypatch.setattr(serial, "run_block", interrupted)
+    found = ss.refine(slider, coarse, **options)
+    assert next(begun) == last + 1
+    assert found.attrs["status"] == f"interrupted: {int(found.run.sum())} points were run"
+    assert 0 < found.run.sum() < whole.run.sum()
+    known = found.status.values >= 0
+    assert not np.any(found.run.values & ~known)
+    assert np.array_equal(found.normal_stops.values[known], whole.normal_stops.values[known])
+    assert np.all(np.isnan(found.normal_stops.values[~known]))
 
 
 def test_a_design_tells_what_an_answer_depends_on() -> None:
@@ -192,7 +224,8 @@ def test_a_design_tells_what_an_answer_depends_on() -> None:
         ss.design({"mass": (1.0, 2.0)}, count=3)
     with pytest.raises(ModelError, match="lowest and a higher"):
         ss.design({"mass": (2.0, 1.0)}, count=4)
-    random = ss.sweep(UNIT, ss.design({"mass": (1.0, 2.0)}, count=5, kind="random"), settle=0, cycles=1)
+    points = ss.design({"mass": (1.0, 2.0), "stiffness": (1.0, 2.0)}, count=32, kind="random")  # 8 times 2 + 2
+    random = ss.sweep(UNIT, points, settle=0, cycles=1)
     with pytest.raises(ss.EstimateError, match="Sobol design"):
         ss.sensitivity(random, variable="amplitude")
 

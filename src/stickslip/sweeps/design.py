@@ -109,8 +109,7 @@ def sensitivity(atlas: Any, *, variable: str, seed: int = 0) -> dict[str, dict[s
 
     names = [str(name) for name in atlas.coords]
     answers = np.asarray(atlas[variable].values, dtype=np.float64) if variable in atlas else np.zeros(0)
-    base, rest = divmod(len(answers), len(names) + 2) if atlas.sizes.keys() == {"point"} else (0, 1)
-    if rest or base < 2 or base & (base - 1):
+    if atlas.sizes.keys() != {"point"} or not len(answers) or not _is_sobol(atlas, names):
         raise EstimateError(f"{len(answers)} points of '{variable}' over {', '.join(names)}",
                             "the indices need the points of a Sobol design", "sweep over design(...)")  # fmt: skip
     if not np.all(np.isfinite(answers)) or np.ptp(answers) == 0:
@@ -125,6 +124,16 @@ def sensitivity(atlas: Any, *, variable: str, seed: int = 0) -> dict[str, dict[s
         }
         for j, name in enumerate(names)
     }
+
+
+def _is_sobol(atlas: Any, names: list[str]) -> bool:
+    """Whether the points are Saltelli's: a row of A, A but for each parameter in turn from B, and B's row."""
+    base, rest = divmod(atlas.sizes["point"], len(names) + 2)
+    if rest or base < 2 or base & (base - 1):
+        return False
+    rows = np.column_stack([atlas[name].values for name in names]).reshape(base, len(names) + 2, len(names))
+    ours = np.eye(len(names), dtype=bool)
+    return bool(np.all(rows[:, 1:-1] == np.where(ours, rows[:, -1:], rows[:, :1])))
 
 
 def _share(name: str, value: Any, half: Any) -> Estimate:

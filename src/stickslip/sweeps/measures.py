@@ -44,6 +44,7 @@ class Variable:
 
 LOG = "events"  # the measure that keeps every event
 EVENTS = {"stops", "stick_share", "micro_slips", "transition_speed"}  # measures that count events of one contact
+COUNTS = ("stops", "micro_slips", "period", LOG)  # measures of whole numbers, which have borders
 STATUS = Variable(
     "1", "what became of the motion", "int8", -1,
     {"flag_values": list(range(-1, len(OUTCOMES))), "flag_meanings": " ".join(("not_run", *OUTCOMES))},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,9 +12,9 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError
 from stickslip.solve.automaton import System
 from stickslip.sweeps.grid import START, read_grid, unit
-from stickslip.sweeps.measures import MEASURES
+from stickslip.sweeps.measures import COUNTS, STATUS, variables
 from stickslip.sweeps.plan import required
-from stickslip.sweeps.sweep import sweep
+from stickslip.sweeps.sweep import require_memory, sweep
 
 
 def refine(
@@ -40,7 +41,8 @@ def refine(
     grid : mapping
         Numbers by parameter, the first and coarsest grid, two at least along each.
     measure : str
-        A measure of :func:`sweep` that counts: two points differ where the rounded number or the status does.
+        A measure of :func:`sweep` that counts ("stops", "micro_slips", "period", "events"): two points differ where
+        the rounded number or the status does.
     halvings : int
         How often each interval is halved: a border is known to that part of it.
     cycles, settle, start, engine
@@ -50,12 +52,14 @@ def refine(
     -------
     xarray.Dataset
         The variables of the measure on the finest grid, what lies between equal neighbours filled in from them, with
-        ``run``: whether a point was run.
+        ``run``: whether a point was run. Where the user interrupts (Ctrl-C), what is known until then, with the status
+        "interrupted" and the points that are not known marked as not run.
 
     Raises
     ------
     ModelError
-        An axis has fewer than two numbers, the measure is unknown, or `halvings` is none.
+        An axis has fewer than two numbers, the measure counts nothing, `halvings` is none, or the finest grid fits no
+        memory.
 
     Examples
     --------
@@ -68,37 +72,48 @@ def refine(
     """
     if not (isinstance(halvings, int | np.integer) and 1 <= halvings <= 20):
         raise ModelError(f"halvings = {halvings}", "an interval is halved 1 to 20 times", "correct it")
-    if measure not in MEASURES:
-        raise ModelError(f"no measure is called '{measure}'", f"there are {', '.join(MEASURES)}", "choose one of them")
+    if measure not in COUNTS:
+        raise ModelError(f"measure = '{measure}'", f"borders are of what counts: {', '.join(COUNTS)}",
+                         "choose one of them, or sweep() the whole grid")  # fmt: skip
     for axis in read_grid(system, grid):
         if len(axis.names) != 1 or len(axis.values) < 2 or f"{START}mode" in axis.names:
             raise ModelError(f"{axis.dim} has {len(axis.values)} values", "between two there is something to halve",
                              "give two numbers at least along each parameter")  # fmt: skip
-    step = 2**halvings
+    step, left = 2**halvings, variables((measure,))
+    shape = tuple((len(column) - 1) * step + 1 for column in grid.values())
+    require_memory(math.prod(shape), left)
     values = [_finer(np.asarray(column, dtype=np.float64), step) for column in grid.values()]
-    shape = tuple(map(len, values))
-    run = np.zeros(shape, dtype=bool)
-    arrays: dict[str, NDArray[Any]] = {}
-    wanted = np.zeros(shape, dtype=bool)
+    arrays = {name: np.full(shape, variable.fill, variable.dtype) for name, variable in left.items()}
+    run, wanted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
     wanted[tuple(slice(None, None, step) for _ in shape)] = True
-    units: dict[str, Any] = {}
+    whole = True
     while True:
+        for name, variable in left.items():
+            arrays[name][wanted] = variable.fill
         places = np.argwhere(wanted)
         points = [dict(zip(grid, (v[j] for v, j in zip(values, p, strict=True)), strict=True)) for p in places]
         if points:
-            found = sweep(system, points, measures=[measure], cycles=cycles, settle=settle, start=start, engine=engine)
-            for name, column in found.data_vars.items():
-                units[str(name)] = column.attrs
-                array = arrays.setdefault(str(name), np.zeros(shape, column.dtype))
-                array[tuple(places.T)] = column.values
-            run |= wanted
-        if step == 1:
+            try:
+                found = sweep(
+                    system, points, measures=[measure], cycles=cycles, settle=settle, start=start, engine=engine
+                )
+            except KeyboardInterrupt:  # before a block of this level was done
+                if not run.any():
+                    raise
+                whole = False
+                break
+            for name, array in arrays.items():
+                array[tuple(places.T)] = found[name].values
+            run |= wanted & (arrays["status"] != STATUS.fill)
+            whole = found.attrs["status"] == "complete"
+        if step == 1 or not whole:
             break
         step //= 2
         wanted = _halved(arrays, step)
     known = {name: (name, column, {"units": unit(system, name)}) for name, column in zip(grid, values, strict=True)}
-    data = {name: (tuple(grid), array, units[name]) for name, array in arrays.items()}
-    return required("xarray").Dataset({**data, "run": (tuple(grid), run)}, coords=known, attrs=found.attrs)
+    data = {name: (tuple(grid), array, found[name].attrs) for name, array in arrays.items()}
+    attributes = {**found.attrs, "status": "complete" if whole else f"interrupted: {run.sum()} points were run"}
+    return required("xarray").Dataset({**data, "run": (tuple(grid), run)}, coords=known, attrs=attributes)
 
 
 def _finer(column: NDArray[np.float64], step: int) -> NDArray[np.float64]:

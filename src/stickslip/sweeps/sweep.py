@@ -23,7 +23,7 @@ from stickslip.solve.simulate import opening, simulate
 from stickslip.structure import Structure
 from stickslip.sweeps.engines import read_engine
 from stickslip.sweeps.grid import Grid, apart, read_grid
-from stickslip.sweeps.measures import EVENTS, FAILED, Measure, read_measures, variables
+from stickslip.sweeps.measures import EVENTS, FAILED, Measure, Variable, read_measures, variables
 from stickslip.sweeps.plan import Arrays, Keep, Plan, assemble, blank, chunked, required
 from stickslip.sweeps.progress import told
 from stickslip.sweeps.store import Store
@@ -99,9 +99,15 @@ def sweep(
     required("xarray")
     run, address = read_engine(engine)
     plan = planned(system, grid, measures=measures, cycles=cycles, settle=settle, start=start)
-    require_room(plan, store)
+    begun = store is not None and Path(store).exists()
+    if store is None:
+        require_memory(plan.size, plan.variables)
+    elif not begun:
+        require_disk(plan.size, plan.variables, store)
     with nullcontext(Memory(plan)) if store is None else Store(store, plan) as kept:
         before, status = len(kept.missing), "complete"
+        if store is not None and begun:
+            require_disk(before * math.prod(plan.chunks), plan.variables, store)
         try:
             with told(sensible(kept.keep, plan), len(plan.blocks) - before, len(plan.blocks)) as keep:
                 run(plan, kept.missing, keep, address)
@@ -179,19 +185,26 @@ def require_end(plan: Plan, steps: tuple[int, ...]) -> None:
         return  # a motion that grows without bound or chatters in time has its place on a map
 
 
-def require_room(plan: Plan, store: str | Path | None) -> None:
-    """Refuse a map that fits neither this machine's memory nor, with a store, the disk there."""
-    need = plan.size * sum(np.dtype(variable.dtype).itemsize for variable in plan.variables.values())
-    place = Path(store or ".").absolute()
+def require_memory(points: int, kept: Mapping[str, Variable]) -> None:
+    """Refuse a map that this machine's memory does not hold."""
+    _require(points, kept, "memory", _memory())
+
+
+def require_disk(points: int, kept: Mapping[str, Variable], store: str | Path) -> None:
+    """Refuse points that the disk of a store does not hold."""
+    place = Path(store).absolute()
     while not place.exists():
         place = place.parent
-    room = {"memory": _memory()} if store is None else {"disk": float(shutil.disk_usage(place).free)}
-    for word, size in room.items():
-        if need > size:
-            raise ModelError(
-                f"{plan.size} points take {need / 1e9:.3g} GB, and the {word} has {size / 1e9:.3g} GB",
-                "a map fits where it is kept", "ask for fewer points or measures",
-            )  # fmt: skip
+    _require(points, kept, "disk", float(shutil.disk_usage(place).free))
+
+
+def _require(points: int, kept: Mapping[str, Variable], where: str, room: float) -> None:
+    need = points * sum(np.dtype(variable.dtype).itemsize for variable in kept.values())
+    if need > room:
+        raise ModelError(
+            f"{points} points take {need / 1e9:.3g} GB, and the {where} has {room / 1e9:.3g} GB",
+            "a map fits where it is kept", "ask for fewer points or measures",
+        )  # fmt: skip
 
 
 def _memory() -> float:
