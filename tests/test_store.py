@@ -9,6 +9,8 @@ import subprocess
 import sys
 import textwrap
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +18,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip import Coulomb, HarmonicForce, ModelError, Oscillator, SolveError, simulate, sweep
+from stickslip import Coulomb, HarmonicForce, ModelError, Oscillator, SolveError, Trajectory, simulate, sweep
+from stickslip.sweeps.sweep import planned
 
 pytest.importorskip("zarr")
 SLIDER = Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=HarmonicForce(1.0, frequency=0.127))
@@ -115,6 +118,52 @@ def test_other_settings_are_refused_by_name(whole: Path) -> None:
     with pytest.raises(ModelError, match=r"cycles = 5 \(asked: 6\)"):
         sweep(SLIDER, GRID, store=whole, **{**SETTINGS, "cycles": 6})
     assert files(whole) == before
+
+
+def longer_than(limit: float) -> Callable[[Trajectory], float]:
+    def share(run: Trajectory) -> float:
+        return float(sum(event.time > limit for event in run.events))
+
+    return share
+
+
+HELD = {"stick", "microstick"}
+
+
+def held(run: Trajectory, part: float = 1.0) -> float:
+    return part * sum(event.kind in HELD or event.kind in {"stick", "microstick", "still"} for event in run.events)
+
+
+def checksum(measure: Callable[..., float]) -> str:
+    return planned(SLIDER, GRID, measures=[measure], cycles=1, settle=0, start=None).checksum
+
+
+def test_the_checksum_knows_all_that_decides_a_measure(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert checksum(longer_than(1.0)) == checksum(longer_than(1.0)) != checksum(longer_than(5.0))
+    assert checksum(named(partial(held, part=2.0))) != checksum(named(partial(held, part=3.0)))
+    before = checksum(held)
+    with monkeypatch.context() as patch:
+        patch.setattr(held, "__defaults__", (2.0,))
+        assert checksum(held) != before
+    with monkeypatch.context() as patch:
+        patch.setitem(globals(), "HELD", {"stick"})
+        assert checksum(held) != before
+    assert checksum(held) == before
+
+
+def named(measure: Any) -> Callable[..., float]:
+    measure.__name__ = "held"
+    return measure  # type: ignore[no-any-return]
+
+
+def test_the_checksum_is_the_same_in_every_process() -> None:
+    code = "from test_store import *; print(checksum(held), checksum(named(partial(held, part=2.0))))"
+    told = {
+        subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True,
+                       cwd=Path(__file__).parent, env={**os.environ, "PYTHONHASHSEED": seed}).stdout
+        for seed in ("1", "2")
+    }  # fmt: skip
+    assert told == {f"{checksum(held)} {checksum(named(partial(held, part=2.0)))}\n"}
 
 
 def test_another_system_is_refused(whole: Path) -> None:

@@ -8,8 +8,8 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from types import CodeType
+from functools import cached_property, partial
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from stickslip import __version__
 from stickslip.errors import ModelError
 from stickslip.solve.automaton import System
 from stickslip.sweeps.grid import Axis, coordinates, placed
-from stickslip.sweeps.measures import Measure, Variable, variables
+from stickslip.sweeps.measures import Measure, Variable, own_name, variables
 
 BLOCK = 4096  # points at most that are run together
 LEAST = 16  # blocks, where there are points enough: so that several workers share the work and progress is seen
@@ -170,13 +170,30 @@ def required(package: str) -> Any:
 
 
 def _named(measure: Measure) -> str:
-    return measure if isinstance(measure, str) else str(getattr(measure, "__qualname__", repr(measure)))
+    return measure if isinstance(measure, str) else str(getattr(measure, "__qualname__", own_name(measure)))
 
 
-def _source(measure: Measure) -> Any:
-    """What a user's function says: its name and its compiled code."""
-    code = getattr(measure, "__code__", None)
-    return _named(measure) if code is None else (_named(measure), *_said(code))
+def _source(value: Any, above: tuple[FunctionType, ...] = ()) -> Any:
+    """What decides a user's function: its code, its defaults, and what it holds or asks by name of its own module."""
+    if isinstance(value, partial):
+        return "partial", _source(value.func, above), value.args, value.keywords
+    if not isinstance(value, FunctionType):
+        own = callable(value) and not isinstance(value, type | ModuleType | BuiltinFunctionType)
+        if own and isinstance(call := type(value).__call__, FunctionType):
+            return type(value).__qualname__, _source(call, above), getattr(value, "__dict__", repr(value))
+        return getattr(value, "__name__", value)
+    if value in above or (above and value.__module__ != above[0].__module__):
+        return value.__module__, value.__qualname__
+    code = value.__code__
+    known = {name: value.__globals__[name] for name in _asked(code) if name in value.__globals__}
+    known |= {name: cell.cell_contents for name, cell in zip(code.co_freevars, value.__closure__ or (), strict=True)}
+    said = [(name, _source(known[name], (*above, value))) for name in sorted(known)]
+    return value.__qualname__, _said(code), value.__defaults__, value.__kwdefaults__, said
+
+
+def _asked(code: CodeType) -> set[str]:
+    """Names that a function asks for, also within it."""
+    return {*code.co_names}.union(*(_asked(inner) for inner in code.co_consts if isinstance(inner, CodeType)))
 
 
 def _said(code: CodeType) -> tuple[Any, ...]:
@@ -191,6 +208,8 @@ def _content(value: Any) -> str:
         return float(value).hex()
     if isinstance(value, tuple | list):
         return f"({','.join(_content(item) for item in value)})"
+    if isinstance(value, set | frozenset):
+        return f"{{{','.join(sorted(map(_content, value)))}}}"  # in whatever order this process has them
     if isinstance(value, Mapping):
         return f"{{{','.join(f'{key}:{_content(item)}' for key, item in value.items())}}}"
     if hasattr(value, "__dataclass_fields__"):
