@@ -87,7 +87,10 @@ def clustered(points: int, cycles: int, chance: random.Random) -> None:
     begin = time.perf_counter()
     threads = run(points, cycles, "threads")
     wall = time.perf_counter() - begin
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster,
+        Client(cluster) as client,
+    ):
         address = "dask://" + cluster.scheduler_address.removeprefix("tcp://")
         run(400, 2, address)  # kernels loaded
         begin = time.perf_counter()

@@ -37,7 +37,7 @@ STUCK = ss.scenarios.get("FM-1").known["stuck_positions"]
 def cluster() -> Iterator[str]:
     """Two Dask workers, for all tests of this file."""
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as running:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as running:
         yield "dask://" + running.scheduler_address.removeprefix("tcp://")
 
 

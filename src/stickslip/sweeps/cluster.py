@@ -56,7 +56,9 @@ def _client(where: str | None) -> Iterator[Client]:
     if where is None:
         with (
             dask.config.set({"distributed.scheduler.allowed-failures": DEATHS}),
-            distributed.LocalCluster(threads_per_worker=1, dashboard_address=None, silence_logs=CRITICAL) as cluster,
+            distributed.LocalCluster(
+                threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=CRITICAL
+            ) as cluster,
             distributed.Client(cluster) as client,
         ):
             client.run(_unheard)
