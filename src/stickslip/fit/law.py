@@ -22,6 +22,7 @@ from stickslip.fit.start import (
     seen_profile,
     thinned_out,
     too_few,
+    require_apart,
     value_of,
 )
 from stickslip.fit.stretch import channels_of
@@ -181,7 +182,7 @@ def fit_law(
     EstimateError
         No motion above the noise, no sliding, or sliding at one speed alone.
     ModelError
-        A parameter that the oscillator does not have.
+        A parameter that the oscillator does not have, or is named twice; a channel that is not fitted.
 
     Examples
     --------
@@ -203,6 +204,7 @@ def fit_law(
     tell = _teller(progress)
     names = free_names(oscillator, free)
     shown = [Shown.of(each, channels_of(each, channels), oscillator) for each in records]
+    require_apart(oscillator, names, nuisance, shown)
     stretches = []
     for number, each in enumerate(shown):
         each.require_sliding()

@@ -17,6 +17,7 @@ from stickslip.fit.stretch import Sensor, Stretch
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import find
 from stickslip.record.record import Record
+from stickslip.settings import nearest
 from stickslip.signals.differentiate import LEAST, differentiate
 from stickslip.signals.noise import noise_level
 
@@ -198,6 +199,34 @@ def free_names(oscillator: Oscillator, free: Sequence[str] | None) -> tuple[str,
     return tuple(found)
 
 
+def require_apart(
+    oscillator: Oscillator, names: Sequence[str], nuisance: Sequence[str], shown: Sequence[Shown]
+) -> None:
+    """Refuse a gain or delay of what is not fitted, and a parameter that is named twice."""
+    channels = list(dict.fromkeys(name for each in shown for name in each.channels))
+    taken: set[object] = set()
+    for name in (*names, *nuisance):
+        head, _, tail = name.rpartition(".")
+        sensor = _of_sensor(name)
+        if sensor and head not in channels:
+            raise ModelError(
+                f"the {tail} of '{head}'", f"the channels that are fitted are {', '.join(channels)}",
+                nearest(head, channels),
+            )  # fmt: skip
+        places: set[object] = {name} if sensor else set(find(oscillator, name))
+        if taken & places:
+            raise ModelError(
+                f"'{name}' is named twice", "a parameter is fitted once", "leave it out of free= or nuisance="
+            )
+        taken |= places
+
+
+def _of_sensor(name: str) -> bool:
+    """Whether a name is a sensor's gain or delay."""
+    head, _, tail = name.rpartition(".")
+    return head not in ("", "law", "drive") and tail in ("gain", "delay")
+
+
 def value_of(oscillator: Oscillator, name: str) -> float:
     """The present value of a parameter."""
     part = oscillator
@@ -209,7 +238,7 @@ def value_of(oscillator: Oscillator, name: str) -> float:
 def knob(oscillator: Oscillator, name: str) -> Knob:
     """How a parameter is turned."""
     head, _, tail = name.rpartition(".")
-    if head not in ("", "law", "drive") and tail in ("gain", "delay"):
+    if _of_sensor(name):
         return Knob(name, tail, 1.0, 0.01) if tail == "gain" else Knob(name, tail, 0.0, 1e-4)
     value = value_of(oscillator, name)
     if tail == "static":

@@ -199,6 +199,13 @@ def channels_of(record: Record, wanted: Sequence[str] | None) -> tuple[str, ...]
     """The channels to fit: those asked for, or all that were measured."""
     if wanted is not None:
         record.require(*wanted, question="a fitted law")
+        if strange := [name for name in wanted if name not in SENSED]:
+            raise ModelError(
+                f"channels = {', '.join(wanted)}", f"a law explains {', '.join(SENSED)}; z and force drive the motion",
+                f"leave {' and '.join(strange)} out",
+            )  # fmt: skip
+        if not wanted:
+            raise ModelError("channels = []", "a law explains one channel at least", "name one, or leave channels= out")
         return tuple(wanted)
     names = [name for name in ("x", "v", "a", "load") if name in record]
     if not {"a", "load"} & set(names) and "friction" in record:
