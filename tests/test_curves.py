@@ -156,7 +156,7 @@ def test_what_the_record_can_not_tell_is_refused_with_what_would() -> None:
         fit_curve(Record.of({"v": one_way["v"], "friction": np.zeros_like(t)}, fs=1000), curve="coulomb")
     with pytest.raises(EstimateError, match="never changes"):
         fit_curve(Record.of({"v": 0 * t, "friction": np.sin(t)}, fs=1000))
-    with pytest.raises(EstimateError, match=r"curve = 'stribek'.*perhaps 'stribeck'|stribeck"):
+    with pytest.raises(EstimateError, match=r"curve = 'stribek'.*perhaps stribeck is meant"):
         fit_curve(sweep(), curve="stribek")
     with pytest.raises(EstimateError, match="elements = 1"):
         fit_curve(sweep(), curve="tabulated", elements=1)
@@ -255,3 +255,10 @@ def test_what_is_no_record_of_friction_is_refused() -> None:
         fit_curve(lost, curve="coulomb")
     loud = fit_curve(sweep(noise=5.0), curve="coulomb")
     assert "noise is above the friction" in loud.status
+
+
+def test_loops_know_their_motion_themselves() -> None:
+    loops = friction_loops(sweep())
+    for told in ({"contact": "base"}, {"frequency": 2.0}, {"normal": 3.0}):
+        with pytest.raises(EstimateError, match=f"{next(iter(told))}= of friction_loops' answer"):
+            fit_curve(loops, curve="coulomb", **told)

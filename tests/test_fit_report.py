@@ -129,6 +129,25 @@ def test_a_curve_is_not_fitted_to_several_records_nor_a_law_to_several_masses() 
         ss.fit_records([demo], rig=rig, system=ss.squeak_rig())
 
 
+def test_what_the_settings_state_goes_before_the_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[ss.Oscillator] = []
+    monkeypatch.setattr("stickslip.analysis.fits.compare_laws", lambda records, system, **_: asked.append(system))
+    written = ss.Oscillator(mass=1.0, stiffness=9.0, law=ss.Coulomb(1.0), drive=ss.HarmonicBase(1e-3, frequency=2.5))
+    other = {"mass": 2.42, "damping": 0.0, "damper": "base", "contact": "base"}
+    for settings, drive in (
+        ({}, written.drive), (other, written.drive), (other, ss.Release()), ({"mass": 2.42}, ss.Belt(0.01)),
+    ):  # fmt: skip
+        system = written.having(damping=0.3, drive=drive)
+        ss.fit_records([ss.datasets.demo()], rig=ss.rig_settings(settings), system=system)
+        for name in ("mass", "damping", "damper"):
+            assert getattr(asked[-1], name) == settings.get(name, getattr(system, name))
+        assert asked[-1].stiffness == 9.0
+        contact = getattr(drive, "contact", None)
+        assert getattr(asked[-1].drive, "contact", None) == settings.get("contact", contact)
+    with pytest.raises(ss.ModelError, match="contact = 'base' under a Belt"):
+        ss.fit_records([ss.datasets.demo()], rig=ss.rig_settings(other), system=written.having(drive=ss.Belt(0.01)))
+
+
 def test_laws_are_not_fitted_without_motion() -> None:
     write("pull.csv", force_N=np.sin(0.01 * np.arange(2000)))
     result = fit("pull.csv", *RIG, "--laws", "Coulomb")

@@ -15,6 +15,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
 
 FRICTION = {"friction", "coefficient"}
+BASE = HarmonicBase(0.0, frequency=1.0, contact="base")  # its motion is in the record
 UNASKED = "stribeck"  # the curve of friction over the velocity, where nothing else can be fitted
 
 
@@ -45,7 +46,8 @@ def fit_records(
     laws : sequence of str, optional
         The laws to compare; all of them where left out.
     system : Oscillator, optional
-        Its constants where the rig states none, and its drive where the base's motion is not recorded.
+        Its constants, damper and contact where the rig states none, and its drive where the base's motion is not
+        recorded.
     calibration : float
         By what part gains may be wrong.
     progress : callable, optional
@@ -114,13 +116,27 @@ def _oscillator(rig: RigSettings, system: object) -> Oscillator:
     if system is not None:
         if not isinstance(system, Oscillator):
             raise ModelError("a system of several masses", "a law is fitted to an oscillator of one", "give such a one")
-        stated = {name: getattr(rig, name) for name in ("mass", "stiffness", "damping")}
-        return system.having(**{name: value for name, value in stated.items() if value is not None})
+        return _with_stated(system, rig)
     constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
     if missing := [name for name, value in constants.items() if value is None]:
         raise ModelError(
             f"no {' and no '.join(missing)}", "a law is fitted by simulating the oscillator",
             f"give {' and '.join(f'{name}=' for name in missing)}",
         )  # fmt: skip
-    drive = HarmonicBase(0.0, frequency=1.0, contact=rig.contact) if rig.contact == "base" else Release()
+    drive = BASE if rig.contact == "base" else Release()
     return Oscillator(**constants, damping=rig.damping or 0.0, damper=rig.damper, law=Coulomb(1.0), drive=drive)
+
+
+def _with_stated(system: Oscillator, rig: RigSettings) -> Oscillator:
+    """The oscillator with what the settings state of it in front."""
+    words = ("mass", "stiffness", "damping", "damper", "contact")
+    stated = {name: getattr(rig, name) for name in words if name in rig.model_fields_set}
+    stated = {name: value for name, value in stated.items() if value is not None}
+    if "contact" in stated and not hasattr(system.drive, "contact"):
+        if stated.pop("contact") == "base" and not isinstance(system.drive, Release):
+            raise ModelError(
+                f"contact = 'base' under a {type(system.drive).__name__}", "a base is what the drive moves",
+                "leave contact= out, or give a drive of the base",
+            )  # fmt: skip
+        stated |= {"drive": BASE} if rig.contact == "base" else {}
+    return system.having(**stated)

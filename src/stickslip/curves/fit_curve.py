@@ -184,7 +184,8 @@ def fit_curve(
     RecordError
         A channel is missing, broken or too short, or the units of friction and motion do not belong together.
     EstimateError
-        The record can not tell: no sliding, one speed alone, no reversal; or no such curve.
+        The record can not tell: no sliding, one speed alone, no reversal; no such curve; or contact, frequency or
+        normal load of loops, which were told these.
 
     Examples
     --------

@@ -19,10 +19,10 @@ from stickslip.fit.start import (
     bounded,
     free_names,
     knob,
+    require_apart,
     seen_profile,
     thinned_out,
     too_few,
-    require_apart,
     value_of,
 )
 from stickslip.fit.stretch import channels_of
