@@ -165,10 +165,15 @@ def test_a_name_that_is_none_is_refused() -> None:
         ({"nuisance": ["load.gain"], "channels": ["x"]}, "the channels that are fitted are x;"),
         ({"free": ["kinetic"], "nuisance": ["law.kinetic"]}, "'law.kinetic' is named twice"),
         ({"nuisance": ["x.gain", "x.gain"]}, "'x.gain' is named twice"),
+        ({"free": ["drive.amplitude"]}, "'drive.amplitude' of the drive"),
         ({"channels": ["x", "z"]}, "a law explains x, v, a, friction, load; .* leave z out"),
         ({"channels": []}, "one channel at least"),
     ],
 )
 def test_what_is_not_fitted_or_named_twice_is_refused(asked: dict[str, Any], said: str) -> None:
     with pytest.raises(ss.ModelError, match=said):
-        ss.fit_law(measured(ss.Coulomb(1.0), 8.7), ss.Oscillator(law=ss.Coulomb(1.0), **RIG), **asked)
+        ss.fit_law(
+            measured(ss.Coulomb(1.0), 8.7),
+            ss.Oscillator(law=ss.Coulomb(1.0), drive=ss.HarmonicForce(3.0, frequency=4.0), **RIG),
+            **asked,
+        )

@@ -202,7 +202,7 @@ def free_names(oscillator: Oscillator, free: Sequence[str] | None) -> tuple[str,
 def require_apart(
     oscillator: Oscillator, names: Sequence[str], nuisance: Sequence[str], shown: Sequence[Shown]
 ) -> None:
-    """Refuse a gain or delay of what is not fitted, and a parameter that is named twice."""
+    """Refuse a gain or delay of what is not fitted, a parameter of the drive, and one that is named twice."""
     channels = list(dict.fromkeys(name for each in shown for name in each.channels))
     taken: set[object] = set()
     for name in (*names, *nuisance):
@@ -214,6 +214,11 @@ def require_apart(
                 nearest(head, channels),
             )  # fmt: skip
         places: set[object] = {name} if sensor else set(find(oscillator, name))
+        if not sensor and find(oscillator, name)[0][0] == "drive":
+            raise ModelError(
+                f"'{name}' of the drive", "a law is fitted under the drive as it was measured, or as it is given",
+                "leave it out of free= and nuisance=",
+            )  # fmt: skip
         if taken & places:
             raise ModelError(
                 f"'{name}' is named twice", "a parameter is fitted once", "leave it out of free= or nuisance="
