@@ -86,18 +86,18 @@ def test_a_seals_friction_under_a_third_pressure(dataset: Sets) -> None:
     assert line.adhesion.interval[0] > 0  # the seal's own squeeze: no Amontons's law
 
 
-def test_the_frames_coefficient_of_friction(dataset: Sets) -> None:
-    """Two loads alone were recorded: a third in between is foretold alike by the line and by Amontons's law."""
+def test_the_frames_friction_is_nearly_in_proportion_to_the_load(dataset: Sets) -> None:
+    """Two loads alone were recorded: what rubs under 250 g foretells 450 g by Amontons's law, some 8 % too low."""
     levels, loads = [], [0.250 * 9.81, 0.450 * 9.81]
     for weight in ("250g", "450g"):
         files = [dataset("frame_base_excited") / f"s_b_{weight}_{side}.mat" for side in "xy"]
         record = ss.read_record(files, channels={"x": "x [mm]", "z": "y [mm]"})
         record = ss.friction_force(record, mass=3.0799, stiffness=1191, damping=0.669, damper="base")
         levels.append(ss.fit_curve(record, curve="coulomb").parameters["kinetic"])
-    line = ss.friction_over_load(levels, loads=loads)
-    assert line.coefficient.value == pytest.approx(0.3, abs=0.05)
-    between = 0.350 * 9.81
-    amontons = np.mean([each.value for each in line.coefficients])
-    assert line.friction(between).value == pytest.approx(amontons * between, rel=0.05)
     for level, found in zip((0.68, 1.32), levels, strict=True):
         assert found.value == pytest.approx(level, rel=0.05)
+    foretold = levels[0].value * loads[1] / loads[0]
+    assert 0.88 < foretold / levels[1].value < 0.97
+    line = ss.friction_over_load(levels, loads=loads)
+    assert line.coefficient.value == pytest.approx(0.3, abs=0.05)
+    assert line.adhesion.value < 0  # where Amontons's law would have none
