@@ -62,6 +62,22 @@ def find(system: Any, name: str) -> tuple[Path, ...]:
     return tuple(path for path in named if _unnumbered(path) == _unnumbered(named[0]))
 
 
+def unit(system: Any, name: str) -> str:
+    """The SI unit of a parameter, "1" of a plain number.
+
+    Examples
+    --------
+    >>> from stickslip import CompliantContact, HarmonicForce, Oscillator
+    >>> contact = CompliantContact(kinetic=1, stiffness=1e5)
+    >>> pushed = Oscillator(mass=1, stiffness=4, law=contact, drive=HarmonicForce(2, frequency=3))
+    >>> unit(pushed, "law.damping"), unit(pushed, "drive.amplitude"), unit(contact, "kinetic")
+    ('N s/m', 'N', 'N')
+    """
+    path = find(system, name)[0]
+    part = type(places(system)[path]).__name__
+    return UNITS.get(f"{part}.{path[-1]}", UNITS.get(path[-1], "1"))
+
+
 def changed(system: Part, changes: Mapping[str, Any]) -> Part:
     """The system with other values: whole parts first, then what stands in them."""
     whole = {name: value for name, value in changes.items() if name.rpartition(".")[2] in PARTS and find(system, name)}

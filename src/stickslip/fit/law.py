@@ -30,7 +30,7 @@ from stickslip.fit.surety import Surety, surety
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
-from stickslip.parameters import UNITS
+from stickslip.parameters import unit as unit_of
 from stickslip.record.record import Record
 from stickslip.statistics import mean_uncertainty, student
 
@@ -312,7 +312,7 @@ def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Osc
         if each.kind == "profile":
             continue
         values = [_value(each, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
-        unit = {"gain": "1", "delay": "s"}.get(each.kind, UNITS.get(each.name.rpartition(".")[2], "1"))
+        unit = {"gain": "1", "delay": "s"}.get(each.kind) or unit_of(system, each.name)
         sd = abs(_value(each, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
         interval = (values[1], values[2]) if sure else (math.nan, math.nan)
         found[each.name] = Estimate(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from stickslip.curves.fit_curve import CurveFit
 from stickslip.fit.which_law import LawComparison
+from stickslip.parameters import unit
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Record
 from stickslip.reports.folder import check_folder, results_folder, write_figures
@@ -16,8 +17,6 @@ from stickslip.reports.summary import Line, Summary
 from stickslip.reports.words import doubts, interval_of, number, value_of
 
 LOUD = 0.3  # of the friction, that a curve leaves for noise
-UNITS = {"kinetic": "N", "static": "N", "speed": "m/s", "stiffness": "N/m", "damping": "N s/m", "steepness": "s/m",
-         "rate": "1/(N s)", "viscous": "N s/m"}  # fmt: skip
 
 
 def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], name: str) -> Summary:
@@ -78,7 +77,7 @@ def _curve_told(found: CurveFit) -> Iterator[str]:
 
 def _values(law: object) -> str:
     told = {key: value for key, value in vars(law).items() if isinstance(value, float)}
-    return ", ".join(f"{key} {number(value, abs(value) / 1000, UNITS.get(key, '1'))}" for key, value in told.items())
+    return ", ".join(f"{key} {number(value, abs(value) / 1000, unit(law, key))}" for key, value in told.items())
 
 
 def publish_fit(
