@@ -214,7 +214,8 @@ def test_every_event_is_kept_beside_the_map(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     path, grid = tmp_path / "map.zarr", {"kinetic": [0.3, 0.6], "frequency": [0.1, 0.127]}
     found = sweep(SLIDER, grid, measures=["events", "stops"], settle=3, cycles=2, store=path)
-    kept = parquet.read_table(path.with_suffix(".events")).to_pandas()
+    folder = tmp_path / "map.zarr.events"
+    kept = parquet.read_table(folder).to_pandas()
     for j, kinetic in enumerate(grid["kinetic"]):
         for k, frequency in enumerate(grid["frequency"]):
             run = simulate(SLIDER.having(kinetic=kinetic, frequency=frequency), cycles=5)
@@ -222,10 +223,21 @@ def test_every_event_is_kept_beside_the_map(tmp_path: Path) -> None:
             late = [event for event in run.events if event.time >= 3 / frequency]
             assert [tuple(row) for row in own[list(late[0]._fields)].itertuples(index=False)] == late
             assert int(found.events[j, k]) == len(late) > 0
-    before = files(path.with_suffix(".events"))
-    (path.with_suffix(".events") / "00000000.parquet").unlink()
+    before, part = files(folder), folder / "00000000.parquet"
+    part.unlink()
     sweep(SLIDER, grid, measures=["events", "stops"], settle=3, cycles=2, store=path)
-    assert files(path.with_suffix(".events")) == before
+    assert files(folder) == before
+    part.write_bytes(part.read_bytes()[:-1] + b"?")
+    sweep(SLIDER, grid, measures=["events", "stops"], settle=3, cycles=2, store=path)
+    assert files(folder) == before
+    other = sweep(SLIDER, {"kinetic": [0.3]}, measures=["events"], settle=3, cycles=2, store=path.with_suffix(".b"))
+    assert files(folder) == before
+    assert len(parquet.read_table(tmp_path / "map.b.events")) == int(other.events.sum())
+    shutil.rmtree(path)
+    with pytest.raises(ModelError, match=r"map\.zarr\.events is there, but its map .* is not"):
+        sweep(SLIDER, {"kinetic": [0.3]}, measures=["events"], settle=3, cycles=2, store=path)
+    assert files(folder) == before
+    assert not path.exists()
 
 
 def test_a_sweep_that_can_not_begin_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -95,7 +95,7 @@ def events(name: str, engine: str, folder: Path) -> pd.DataFrame:
     """Every event of a case, point after point."""
     system, points, settle = CASES[name]
     ss.sweep(system, points, measures=["events"], settle=0, cycles=settle, engine=engine, store=folder / "map.zarr")
-    found = pd.concat([pd.read_parquet(part) for part in sorted((folder / "map.events").iterdir())])
+    found = pd.concat([pd.read_parquet(part) for part in sorted((folder / "map.zarr.events").glob("*.parquet"))])
     return found.sort_values(["point", "time"], kind="stable", ignore_index=True)
 
 

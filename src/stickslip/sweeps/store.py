@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import uuid
@@ -59,6 +60,7 @@ class Store(AbstractContextManager["Store"]):
     ) -> None:
         if error is not None and self._new and not self._done.any():
             shutil.rmtree(self.path, ignore_errors=True)  # a sweep that could not begin leaves nothing
+            shutil.rmtree(self.events, ignore_errors=True)
         os.close(self._lock)
 
     @property
@@ -86,7 +88,7 @@ class Store(AbstractContextManager["Store"]):
     @property
     def events(self) -> Path:
         """The folder of the events, a Parquet file a block."""
-        return self.path.with_suffix(".events")
+        return self.path.with_name(f"{self.path.name}.events")
 
     def _lay_out(self) -> None:
         """The whole group without blocks, made beside its place and moved there."""
@@ -105,6 +107,11 @@ class Store(AbstractContextManager["Store"]):
                 array.attrs.update({"units": variable.unit, "long_name": variable.words, **variable.attributes})
             count = len(plan.blocks)
             self._array(group, DONE, (count,), (count,), bool, False, ("block",))[...] = False
+            if LOG in plan.measures and self.events.exists():
+                raise ModelError(
+                    f"{self.events} is there, but its map {self.path} is not",
+                    "events lie beside the map that they are of", "move that folder away, or name another path",
+                )  # fmt: skip
             os.rename(draft, self.path)
         finally:
             shutil.rmtree(draft, ignore_errors=True)
@@ -145,13 +152,23 @@ class Store(AbstractContextManager["Store"]):
         """Ask again for the blocks whose bytes are not what was written."""
         for number in np.flatnonzero(self._done):
             place = self.plan.slices(int(number))
-            if LOG in self.plan.measures and not self._events_of(int(number)).exists():
+            if LOG in self.plan.measures and not self._stand(int(number)):
                 self._done[number] = False
             try:
                 for name in self.plan.variables:
                     self._group[name][place]
             except (ValueError, RuntimeError):  # a checksum or a frame that does not fit
                 self._done[number] = False
+
+    def _stand(self, number: int) -> bool:
+        """Whether the events of a block are, to the byte, what was written."""
+        whole = self._events_of(number)
+        seal = self._seal_of(number)
+        return whole.exists() and seal.exists() and seal.read_text() == _sha256(whole)
+
+    def _seal_of(self, number: int) -> Path:
+        """The checksum of a block's events: hidden, so that readers of the folder find tables alone."""
+        return self.events / f".{number:08d}.sha256"
 
     def _events_of(self, number: int) -> Path:
         return self.events / f"{number:08d}.parquet"
@@ -162,6 +179,7 @@ class Store(AbstractContextManager["Store"]):
         whole = self._events_of(number)
         part = whole.with_suffix(".partial")
         required("pyarrow.parquet").write_table(table, part)
+        self._seal_of(number).write_text(_sha256(part))
         os.replace(part, whole)
 
     @contextmanager
@@ -190,6 +208,10 @@ def _locked(path: Path) -> int:
             f"{path} is being written by another process", "a map has one writer", "wait for it, or name another path"
         ) from error
     return handle
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _difference(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
