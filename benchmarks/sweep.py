@@ -118,6 +118,7 @@ def main() -> None:
             rates[name].append(speed(run, values, step, cycles))
     own = statistics.median(rates["one core"])
     print(f"{asked.side} x {asked.side} map, {SETTLE + CYCLES} periods each: {total / own:.2f} s of one processor")
+    print("(the map skips and counts the laps that only repeat; the others march every lap, at a part of the points)")
     for name, found in rates.items():
         rate = statistics.median(found)
         print(f"{name:14s} {rate:12.4g} oscillator-periods/s; the map is {own / rate:.3g} times as fast")

@@ -103,6 +103,8 @@ def test_a_grid_without_meaning_is_refused(grid: object, words: str) -> None:
         ({"engine": "threads://two"}, "threads://two.*threads://4"),
         ({"engine": "serial://4"}, "serial has no address"),
         ({"cycles": 0}, "cycles = 0"),
+        ({"cycles": 1, "measures": ["period"]}, "cycles = 1; an orbit repeats"),
+        ({"cycles": 1, "measures": ["multipliers"]}, "cycles = 1; an orbit repeats"),
         ({"settle": -1}, "settle = -1"),
     ],
 )
@@ -130,6 +132,16 @@ def test_a_point_without_meaning_is_marked_and_the_rest_stands() -> None:
     assert math.isnan(found.amplitude[1])
 
 
+def test_what_a_measure_refuses_is_no_missing_system() -> None:
+    def refuses(run: ss.Trajectory) -> float:
+        raise ModelError("the run", "it is asked for what it has not", "ask another")
+
+    delayed = UNIT.having(law=ss.TimeDelay(ss.LinearSlope(0.5, slope=0.0), lag=0.1))
+    for system in (UNIT, delayed):
+        with pytest.raises(ModelError, match="asked for what it has not"):
+            ss.sweep(system, {"mass": [1.0]}, measures=[refuses], settle=0, cycles=1, engine="serial")
+
+
 @dataclass(frozen=True)
 class Undecided(Rigid):
     """A law with a mistake: sliding forward and holding each end at once in the other."""
@@ -153,6 +165,17 @@ def test_a_law_that_changes_for_ever_is_refused(measure: str, tmp_path: Path) ->
     assert not list(tmp_path.iterdir())
     growing = ss.sweep(UNIT, {"damping": [-1e4, 0.1]}, measures=[measure], settle=2, cycles=40)
     assert growing.status.values.tolist() == [2, 0]
+
+
+def test_a_map_draws_by_default_its_first_answer() -> None:
+    from stickslip.plot.maps import plot_map
+
+    names = ["energy", "stick_share", "amplitude", "micro_slips"]
+    for first in names:
+        measures = [first, *(name for name in names if name != first)]
+        found = ss.sweep(UNIT, {"kinetic": [0.3, 0.5]}, measures=measures, settle=1, cycles=1)
+        words = found[first].attrs["long_name"]
+        assert plot_map(found).get_ylabel().startswith(words)
 
 
 def test_the_answer_says_what_made_it() -> None:

@@ -65,9 +65,15 @@ def _alone(plan: Plan, steps: tuple[int, ...]) -> Mapping[str, Any]:
     """One motion simulated, and its Trajectory measured."""
     try:
         run = _run(plan, steps)
-        told = {"status": outcome(run), **measured(run, plan, plan.at(steps)[1])}
     except ModelError:
         return {"status": NO_SYSTEM}
+    except SolveError:
+        return {"status": FAILED}
+    try:
+        told = {
+            "status": outcome(run),
+            **measured(run, plan, plan.at(steps)[1]),
+        }  # a measure's ModelError ends the sweep
     except SolveError:
         return {"status": FAILED}
     if LOG in plan.measures:

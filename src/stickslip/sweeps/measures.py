@@ -44,6 +44,7 @@ class Variable:
 
 LOG = "events"  # the measure that keeps every event
 EVENTS = {"stops", "stick_share", "micro_slips", "transition_speed"}  # measures that count events of one contact
+REPEATS = {"period", "multipliers"}  # measures of an orbit that is there twice in what is measured
 COUNTS = ("stops", "micro_slips", "period", LOG)  # measures of whole numbers, which have borders
 STATUS = Variable(
     "1", "what became of the motion", "int8", -1,
@@ -59,7 +60,11 @@ MEASURES: dict[str, dict[str, Variable]] = {
     "micro_slips": {"micro_slips": Variable("1", "slips per period shorter than a tenth of the longest")},
     "transition_speed": {"transition_speed": Variable("m/s", "largest speed at which a microstick becomes a slip")},
     "energy": {"energy": Variable("J", "work of friction per period")},
-    "period": {"order": Variable("1", "periods of the drive after which the motion repeats; 0: none up to 8")},
+    "period": {
+        "order": Variable(
+            "1", "periods of the drive after which the motion repeats; 0: none up to 8 or half the cycles"
+        )
+    },
     "multipliers": {
         "multiplier": Variable("1", "largest Floquet multiplier", "complex128", complex(math.nan, math.nan))
     },

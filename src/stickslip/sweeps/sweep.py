@@ -23,7 +23,7 @@ from stickslip.solve.simulate import opening, simulate
 from stickslip.structure import Structure
 from stickslip.sweeps.engines import read_engine
 from stickslip.sweeps.grid import Grid, apart, read_grid
-from stickslip.sweeps.measures import EVENTS, FAILED, Measure, Variable, read_measures, variables
+from stickslip.sweeps.measures import EVENTS, FAILED, REPEATS, Measure, Variable, read_measures, variables
 from stickslip.sweeps.plan import Arrays, Keep, Plan, assemble, blank, chunked, required
 from stickslip.sweeps.progress import told
 from stickslip.sweeps.store import Store
@@ -144,6 +144,8 @@ def planned(
         opening(tables(system), begun)
     if "lyapunov" in asked and cycles < BATCHES:
         raise ModelError(f"cycles = {cycles}", f"a Lyapunov exponent needs {BATCHES} at least", "raise cycles=")
+    if asked & REPEATS and cycles < 2:
+        raise ModelError(f"cycles = {cycles}", "an orbit repeats within 2 measured periods at least", "raise cycles=")
     if asked & EVENTS and isinstance(system, Structure) and len(system.contacts) != 1:
         raise ModelError(
             f"{', '.join(sorted(asked & EVENTS))} of {len(system.contacts)} contacts",
