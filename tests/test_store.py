@@ -255,6 +255,18 @@ def test_the_cluster_gives_the_same_bytes(whole: Path, tmp_path: Path) -> None:
     assert files(path) == files(whole)
 
 
+def test_workers_that_die_are_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    from stickslip.sweeps import cluster
+
+    def deadly(run: Trajectory) -> float:
+        os._exit(1)
+
+    monkeypatch.setattr(cluster, "DEATHS", 0)
+    with pytest.raises(SolveError, match="workers of the cluster died of one block"):
+        sweep(SLIDER, {"kinetic": [0.5]}, measures=[deadly], settle=0, cycles=1, engine="dask")
+
+
 def test_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     from stickslip.sweeps import cluster

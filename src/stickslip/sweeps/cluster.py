@@ -9,7 +9,7 @@ from itertools import islice
 from logging import CRITICAL
 from typing import TYPE_CHECKING, Any
 
-from stickslip.errors import ModelError
+from stickslip.errors import ModelError, SolveError
 from stickslip.sweeps.block import run_block
 from stickslip.sweeps.plan import Keep, Plan, required
 
@@ -23,7 +23,7 @@ DEATHS = 10  # workers that may die of one block
 
 def on_cluster(plan: Plan, numbers: Sequence[int], keep: Keep, where: str | None) -> None:
     """Run blocks on the cluster whose scheduler is at `where`, or on one made of this machine's cores."""
-    from distributed import as_completed
+    from distributed import KilledWorker, as_completed
 
     with _client(where) as client:
         shared = client.scatter(plan, broadcast=True)
@@ -35,7 +35,15 @@ def on_cluster(plan: Plan, numbers: Sequence[int], keep: Keep, where: str | None
         threads = max(1, sum(client.nthreads().values()))
         running = as_completed(send(AHEAD * threads))
         for future in running:
-            keep(*future.result())
+            try:
+                done = future.result()
+            except KilledWorker as error:
+                raise SolveError(
+                    "workers of the cluster died of one block again and again",
+                    "a block fits its worker",
+                    "give the workers more memory, or look in their logs; what is kept stays",
+                ) from error
+            keep(*done)
             future.release()
             running.update(send(1))
 
