@@ -59,6 +59,23 @@ def test_the_fitted_law_can_be_simulated_as_it_was_written(tmp_path: Path) -> No
     assert again.value == pytest.approx(found.parameters["kinetic"].value, rel=0.01)
 
 
+def test_a_single_fitted_law_is_shown_and_written_too(tmp_path: Path) -> None:
+    slider = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(1.1e-3, frequency=8.7))
+    rig = ss.Rig.perfect("x", "z").having("x", white=1e-6)
+    record = rig.measure(ss.simulate(slider, duration=1.6), fs=2000, rng=1, start=0.8)
+    found = ss.fit_law(record, slider.having(kinetic=1.0))
+    assert [plate.name for plate in ss.figures(found)] == ["fit-1"]
+    folder = ss.publish_fit(found, folder=tmp_path / "fit", records=[record])
+    told = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    assert (told["law"], told["estimates"][0]["value"]) == ("Coulomb", found.law.kinetic)
+    assert ss.read_system(folder / "law" / "law.toml").system.law == found.law
+    assert ss.fit_summary(found, records=[record], name="run").headline[0] == (
+        f"The law Coulomb, fitted to x: kinetic {found.law.kinetic:.3f} N."
+    )
+    ahead = ss.fit_law(record, found.oscillator, free=(), intervals=False)
+    assert "as it was given, predicts x" in ss.fit_summary(ahead, records=[record], name="run").headline[0]
+
+
 def test_a_law_without_a_mass_says_what_it_lacks(tmp_path: Path) -> None:
     t = np.arange(8000) / 1000
     v = 0.1 * np.sin(2 * np.pi * t)

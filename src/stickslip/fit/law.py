@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,6 +123,18 @@ class LawFit(Result):
     def misfit(self) -> Mapping[str, float]:
         """Residual of each channel over its noise; 1 where the law explains everything but the noise."""
         return {name: self.residual[name] / self.noise[name] for name in self.residual}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "law": type(self.law).__name__,
+            "values": {key: value for key, value in vars(self.law).items() if isinstance(value, float)},
+            "surface": self.surface,
+            "misfit": dict(self.misfit),
+            "status": self.status,
+            "checks": list(self.checks),
+            "estimates": [each.to_dict() for each in self.estimates],
+        }
 
 
 def fit_law(

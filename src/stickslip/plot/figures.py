@@ -35,6 +35,9 @@ from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_for
 UNSURE = "not stated"  # in the status of what sensors that are not known may have made
 
 if TYPE_CHECKING:
+    from stickslip.curves.fit_curve import CurveFit
+    from stickslip.fit.law import LawFit
+    from stickslip.fit.which_law import LawComparison
     from stickslip.regimes.basins import Basins
     from stickslip.regimes.bifurcation import Bifurcation
     from stickslip.regimes.boundary import Boundary
@@ -54,17 +57,20 @@ def figures(
     | Bifurcation
     | Basins
     | Boundary
-    | Dither,
+    | Dither
+    | LawComparison
+    | LawFit
+    | CurveFit,
 ) -> tuple[Plate, ...]:
     """The figures that show a result, in reading order.
 
     Parameters
     ----------
     result : Findings, Comparison, DecayFindings, DecayComparison, TimeFrequency, SqueakFindings, SqueakComparison, \
-            Trajectory, Bifurcation, Basins, Boundary or Dither
+            Trajectory, Bifurcation, Basins, Boundary, Dither, LawComparison, LawFit or CurveFit
         What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`compare_decays`, :func:`time_frequency`,
         :func:`analyze_squeaks`, :func:`compare_squeaks`, :func:`simulate`, :func:`bifurcation`, :func:`basins`,
-        :func:`boundary` or :func:`dither` returned.
+        :func:`boundary`, :func:`dither`, :func:`compare_laws`, :func:`fit_law` or :func:`fit_curve` returned.
 
     Returns
     -------
@@ -106,7 +112,9 @@ def figures(
         from stickslip.plot.trajectory import plates_of
 
         return plates_of(result)
-    return _of_regimes(result)
+    from stickslip.plot.law import FITS, law_plates
+
+    return tuple(law_plates(result)) if isinstance(result, FITS) else _of_regimes(result)
 
 
 def _of_regimes(result: Bifurcation | Basins | Boundary | Dither) -> tuple[Plate, ...]:
@@ -121,7 +129,7 @@ def _of_regimes(result: Bifurcation | Basins | Boundary | Dither) -> tuple[Plate
     raise ModelError(
         f"figures of a {type(result).__name__}",
         "figures are of what analyze, compare, analyze_decay, compare_decays, time_frequency, analyze_squeaks, "
-        "compare_squeaks, simulate, bifurcation, basins, boundary or dither returned",
+        "compare_squeaks, simulate, bifurcation, basins, boundary, dither, compare_laws, fit_law or fit_curve returned",
         "ask one of these, or a plot_ function of the result",
     )
 

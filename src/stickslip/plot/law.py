@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stickslip.curves.fit_curve import CurveFit
+from stickslip.fit.law import LawFit
 from stickslip.fit.which_law import LawComparison
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import (
@@ -33,6 +34,7 @@ WORDS = {
     "x": ("displacement", "m"), "v": ("velocity", "m/s"), "a": ("acceleration", "m/s^2"), "load": ("load cell", "N"),
     "friction": ("friction", "N"),
 }  # fmt: skip
+FITS = (LawComparison, LawFit, CurveFit)  # what has figures of its fit
 ALONG = {"v": ("velocity", "m/s"), "x": ("displacement", "m"), "t": ("time", "s")}
 COLOURS = (BLUE, GREEN, PURPLE, SKY, ORANGE)
 SHOWN = 0.4  # s of a record that are drawn: more can not be told apart on a page
@@ -75,13 +77,13 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
 
 
 @styled
-def plot_fit(comparison: LawComparison, *, record: int = 0) -> Figure:
-    """What was measured, what the best law predicts, and what is left, over the first part of a record.
+def plot_fit(found: LawComparison | LawFit, *, record: int = 0) -> Figure:
+    """What was measured, what the fitted or best law predicts, and what is left, over the first part of a record.
 
     Parameters
     ----------
-    comparison : LawComparison
-        What :func:`~stickslip.compare_laws` returned.
+    found : LawComparison or LawFit
+        What :func:`~stickslip.compare_laws` or :func:`~stickslip.fit_law` returned.
     record : int
         Which of several records, from 0.
 
@@ -89,7 +91,9 @@ def plot_fit(comparison: LawComparison, *, record: int = 0) -> Figure:
     -------
     Figure
     """
-    traces = comparison.fit.traces[record]
+    fit = found.fit if isinstance(found, LawComparison) else found
+    name_of_law = found.best.name if isinstance(found, LawComparison) else type(fit.law).__name__
+    traces = fit.traces[record]
     names = list(traces.measured)
     figure, axes = new_figure(len(names) + 1, height=1.6 * len(names) + 1.8)
     below = axes[-1]
@@ -100,9 +104,9 @@ def plot_fit(comparison: LawComparison, *, record: int = 0) -> Figure:
         factor, unit = prefixed(measured[near] - measured[near].mean(), unit)
         ax.plot(*envelope(time[near], factor * measured[near]), color=INK, linewidth=1.4, label="measured")
         ax.plot(*envelope(time[near], factor * fitted[near]), color=ORANGE, linewidth=1.0, linestyle="--",
-                label=f"fitted: {comparison.best.name}")  # fmt: skip
+                label=f"fitted: {name_of_law}")  # fmt: skip
         ax.set_ylabel(axis_label(words, unit, "\n"))
-        left = (measured - fitted)[near] / comparison.fit.noise[name]
+        left = (measured - fitted)[near] / fit.noise[name]
         below.plot(*envelope(time[near], left), color=colour, linewidth=0.8, label=words)
     axes[0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
     below.axhline(0, color=FAINT, linewidth=0.8)
@@ -146,7 +150,7 @@ def plot_curve(found: CurveFit, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def law_plates(result: LawComparison | CurveFit) -> list[Plate]:
+def law_plates(result: LawComparison | LawFit | CurveFit) -> list[Plate]:
     """The figures of a fit, in reading order."""
     if isinstance(result, CurveFit):
         return [plate("curve", plot_curve(result), "Measured and fitted", "The curve over all samples that were used.")]
@@ -154,8 +158,10 @@ def law_plates(result: LawComparison | CurveFit) -> list[Plate]:
         "Mean square of what a law leaves over that of the best one, the mean over channels and records. Diamonds: "
         "each record predicted by a fit to the others."
     )
-    plates = [plate("laws", plot_laws(result), "How the laws stand", told)] if len(result.candidates) > 1 else []
-    count = len(result.fit.traces)
+    plates = []
+    if isinstance(result, LawComparison) and len(result.candidates) > 1:
+        plates.append(plate("laws", plot_laws(result), "How the laws stand", told))
+    count = len(result.fit.traces if isinstance(result, LawComparison) else result.traces)
     for record in range(count):
         title = "Measured and fitted" + (f", record {record + 1} of {count}" if count > 1 else "")
         words = "Top: each sensor, and what it would have read of the fitted law. Bottom: what is left between them."

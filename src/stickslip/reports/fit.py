@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from stickslip.curves.fit_curve import CurveFit
+from stickslip.fit.law import LawFit
 from stickslip.fit.which_law import LawComparison
 from stickslip.parameters import unit
 from stickslip.plot.law import law_plates
@@ -19,13 +20,13 @@ from stickslip.reports.words import doubts, interval_of, number, value_of
 LOUD = 0.3  # of the friction, that a curve leaves for noise
 
 
-def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], name: str) -> Summary:
+def fit_summary(result: LawComparison | LawFit | CurveFit, *, records: Sequence[Record], name: str) -> Summary:
     """What is told of a fit: the verdict, the parameters, how each law stands.
 
     Parameters
     ----------
-    result : LawComparison or CurveFit
-        What :func:`compare_laws` or :func:`fit_curve` returned.
+    result : LawComparison, LawFit or CurveFit
+        What :func:`compare_laws`, :func:`fit_law` or :func:`fit_curve` returned.
     records : sequence of Record
         What it was fitted to.
     name : str
@@ -58,6 +59,9 @@ def fit_summary(result: LawComparison | CurveFit, *, records: Sequence[Record], 
         headline = [*_curve_told(result)]
         return Summary(name, headline, cautions, lines=lines, settings=settings,
                        channels=list(first.channels.values()), history=first.history)  # fmt: skip
+    if isinstance(result, LawFit):
+        return Summary(name, [*_law_told(result)], cautions, lines=lines, notes=list(result.checks), settings=settings,
+                       channels=list(first.channels.values()), history=first.history)  # fmt: skip
     verdicts = [(each.name, f"{each.standing.verdict} ({_values(each.oscillator.law)})") for each in result.candidates]
     return Summary(
         name, [result.verdict], cautions, lines=lines, notes=[*result.checks, *result.fit.checks], settings=settings,
@@ -75,13 +79,20 @@ def _curve_told(found: CurveFit) -> Iterator[str]:
     yield f"{what} {left} root mean square; {found.model_error:.1%} is no noise."
 
 
+def _law_told(found: LawFit) -> Iterator[str]:
+    how = "fitted to" if found.parameters else "as it was given, predicts"
+    surface = " on a rough surface" if found.surface == "rough" else ""
+    yield f"The law {type(found.law).__name__}{surface}, {how} {', '.join(found.misfit)}: {_values(found.law)}."
+    yield f"It leaves {', '.join(f'{times:.3g} times the noise of {name}' for name, times in found.misfit.items())}."
+
+
 def _values(law: object) -> str:
     told = {key: value for key, value in vars(law).items() if isinstance(value, float)}
     return ", ".join(f"{key} {number(value, abs(value) / 1000, unit(law, key))}" for key, value in told.items())
 
 
 def publish_fit(
-    result: LawComparison | CurveFit, *, folder: str | Path, records: Sequence[Record], name: str = "Fit"
+    result: LawComparison | LawFit | CurveFit, *, folder: str | Path, records: Sequence[Record], name: str = "Fit"
 ) -> Path:
     """Write ``report.html``, ``results.json``, the figures and the law for other programs into a folder.
 
@@ -90,8 +101,8 @@ def publish_fit(
 
     Parameters
     ----------
-    result : LawComparison or CurveFit
-        What :func:`compare_laws` or :func:`fit_curve` returned.
+    result : LawComparison, LawFit or CurveFit
+        What :func:`compare_laws`, :func:`fit_law` or :func:`fit_curve` returned.
     folder : path
         The folder to make.
     records : sequence of Record
@@ -132,13 +143,13 @@ def publish_fit(
     return folder
 
 
-def fit_numbers(result: LawComparison | CurveFit) -> dict[str, object]:
+def fit_numbers(result: LawComparison | LawFit | CurveFit) -> dict[str, object]:
     """A fit as plain data for JSON: SI numbers, None where a number does not exist.
 
     Parameters
     ----------
-    result : LawComparison or CurveFit
-        What :func:`compare_laws` or :func:`fit_curve` returned.
+    result : LawComparison, LawFit or CurveFit
+        What :func:`compare_laws`, :func:`fit_law` or :func:`fit_curve` returned.
 
     Returns
     -------
@@ -151,7 +162,7 @@ def fit_numbers(result: LawComparison | CurveFit) -> dict[str, object]:
     >>> fit_numbers(ss.fit_curve(record, curve="coulomb"))["curve"]
     'coulomb'
     """
-    if isinstance(result, LawComparison):
+    if isinstance(result, LawComparison | LawFit):
         return result.to_dict()
     return {
         "curve": result.curve, "formula": result.formula, "residual": result.residual,

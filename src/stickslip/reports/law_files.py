@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.curves.fit_curve import CurveFit
 from stickslip.drives import Drive, HarmonicBase, Release
 from stickslip.errors import ModelError
+from stickslip.fit.law import LawFit
 from stickslip.fit.which_law import LawComparison
 from stickslip.identify.motion import forcing_frequency
 from stickslip.laws.export import export_law, toml_table
@@ -23,9 +24,9 @@ FILES = {
 ALONE = "# a law alone: to simulate it, add [system] with its mass and stiffness, and [drive]"
 
 
-def write_law(draft: Path, result: LawComparison | CurveFit, records: Sequence[Record]) -> None:
+def write_law(draft: Path, result: LawComparison | LawFit | CurveFit, records: Sequence[Record]) -> None:
     """The fitted law in every form that it has, into the folder law."""
-    law = result.law if isinstance(result, CurveFit) else result.fit.law
+    law = result.fit.law if isinstance(result, LawComparison) else result.law
     if law is None:
         return
     (draft / "law").mkdir()
@@ -39,14 +40,14 @@ def write_law(draft: Path, result: LawComparison | CurveFit, records: Sequence[R
         (draft / "law" / file).write_text(text.rstrip("\n") + "\n", encoding="utf-8")
 
 
-def _whole(law: str, result: LawComparison | CurveFit, record: Record) -> str:
+def _whole(law: str, result: LawComparison | LawFit | CurveFit, record: Record) -> str:
     """The law's table within a system, moved as the first record was; alone where the mass is not known."""
     if isinstance(result, CurveFit):
         told = next((step.arguments for step in record.history if step.action == "friction_force"), {})
         contact = str(told.get("contact", "ground"))
         given: Drive = HarmonicBase(0.0, frequency=1.0, contact=contact)
     else:
-        rig = result.fit.oscillator
+        rig = (result.fit if isinstance(result, LawComparison) else result).oscillator
         told = {name: getattr(rig, name) for name in ("mass", "stiffness", "damping", "damper")}
         given = rig.drive
     if told.get("mass") is None or told.get("stiffness") is None:
