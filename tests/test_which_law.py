@@ -280,6 +280,11 @@ def test_forces_are_no_surer_than_the_bases_calibration() -> None:
     assert found.fit.parameters["x.gain"].sd < 0.01
 
 
+def test_a_nuisance_of_no_channel_is_refused() -> None:
+    with pytest.raises(ss.ModelError, match="the gain of 'laod'.*perhaps load is meant"):
+        ss.compare_laws(record("Coulomb"), slider(), nuisance=["laod.gain"])
+
+
 def test_one_way_without_a_stop_is_refused() -> None:
     time = np.arange(4 * FS) / FS
     steady = ss.Record.of({"v": 5e-3 + 3e-3 * np.sin(40 * time)}, fs=FS)

@@ -16,7 +16,7 @@ from stickslip.fit.choice import CALIBRATIONS, Misfit, Standing, standings, time
 from stickslip.fit.guess import GUESSES, Seen
 from stickslip.fit.law import LawFit, answered
 from stickslip.fit.search import descend
-from stickslip.fit.start import Shown, too_few
+from stickslip.fit.start import Shown, require_apart, too_few
 from stickslip.fit.stretch import Stretch, channels_of
 from stickslip.fit.surety import surety
 from stickslip.fit.trials import (
@@ -223,7 +223,7 @@ def compare_laws(
     EstimateError
         The records can not tell of a law: no sliding, no reversal, noise above the signal.
     ModelError
-        A law that is not known, or none.
+        A law that is not known, or none; a nuisance of no channel that is fitted, or of the drive.
 
     Examples
     --------
@@ -245,6 +245,7 @@ def compare_laws(
     shown = [Shown.of(each, channels_of(each, None), oscillator) for each in records]
     for each in shown:
         each.require_sliding()
+    require_apart(oscillator, (), nuisance or (), shown)
     tell = _teller(progress, len(kinds))
     seen = Seen.of(records, oscillator)
 
