@@ -281,7 +281,7 @@ def test_forces_are_no_surer_than_the_bases_calibration() -> None:
 
 
 def test_a_nuisance_of_no_channel_is_refused() -> None:
-    with pytest.raises(ss.ModelError, match="the gain of 'laod'.*perhaps load is meant"):
+    with pytest.raises(ss.ModelError, match=r"the gain of 'laod'.*perhaps load is meant"):
         ss.compare_laws(record("Coulomb"), slider(), nuisance=["laod.gain"])
 
 
