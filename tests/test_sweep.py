@@ -132,6 +132,25 @@ def test_a_point_without_meaning_is_marked_and_the_rest_stands() -> None:
     assert math.isnan(found.amplitude[1])
 
 
+@pytest.mark.parametrize(("key", "wrong"), [("kinetic", -1.0), ("mass", 0.0), ("static", 0.1), ("frequency", 0.0)])
+def test_a_point_that_is_no_system_may_stand_first_and_where_all_are_wrong_the_grid_is_named(
+    key: str, wrong: float
+) -> None:
+    base = UNIT.having(static=0.6)
+    found = ss.sweep(base, {key: [wrong, wrong, 0.6]}, measures=["stops"], settle=2, cycles=2)
+    assert found.status.values.tolist() == [3, 3, 0]
+    with pytest.raises(ModelError, match=f"no point of the grid is a system: .*; correct the grid of {key}[.]"):
+        ss.sweep(base, {key: [wrong, wrong]}, measures=["stops"], settle=2, cycles=2)
+
+
+def test_a_border_of_what_is_a_system_is_refined() -> None:
+    found = ss.refine(UNIT, {"mass": [-1.0, 1.0]}, halvings=3, settle=2, cycles=2)
+    assert found.status.values.tolist()[:5] == [3] * 5  # up to and with a mass of 0
+    assert 3 not in found.status.values[5:]
+    with pytest.raises(ModelError, match="correct the grid of mass"):
+        ss.refine(UNIT, {"mass": [-1.0, -0.5]}, halvings=3)
+
+
 def test_what_a_measure_refuses_is_no_missing_system() -> None:
     def refuses(run: ss.Trajectory) -> float:
         raise ModelError("the run", "it is asked for what it has not", "ask another")

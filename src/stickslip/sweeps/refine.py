@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError
 from stickslip.solve.automaton import System
 from stickslip.sweeps.grid import START, read_grid, unit
-from stickslip.sweeps.measures import COUNTS, STATUS, variables
+from stickslip.sweeps.measures import COUNTS, NO_SYSTEM, STATUS, variables
 from stickslip.sweeps.plan import required
-from stickslip.sweeps.sweep import require_memory, sweep
+from stickslip.sweeps.sweep import NoSystem, require_memory, sweep
 
 
 def refine(
@@ -97,15 +97,21 @@ def refine(
                 found = sweep(
                     system, points, measures=[measure], cycles=cycles, settle=settle, start=start, engine=engine
                 )
+            except NoSystem:  # of the points beside a border of what is a system
+                if not run.any():
+                    raise
+                arrays["status"][wanted] = NO_SYSTEM
+                run |= wanted
             except KeyboardInterrupt:  # before a block of this level was done
                 if not run.any():
                     raise
                 whole = False
                 break
-            for name, array in arrays.items():
-                array[tuple(places.T)] = found[name].values
-            run |= wanted & (arrays["status"] != STATUS.fill)
-            whole = found.attrs["status"] == "complete"
+            else:
+                for name, array in arrays.items():
+                    array[tuple(places.T)] = found[name].values
+                run |= wanted & (arrays["status"] != STATUS.fill)
+                whole = found.attrs["status"] == "complete"
         if step == 1 or not whole:
             break
         step //= 2

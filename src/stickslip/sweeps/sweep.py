@@ -24,7 +24,7 @@ from stickslip.structure import Structure
 from stickslip.sweeps.engines import read_engine
 from stickslip.sweeps.grid import Grid, apart, read_grid
 from stickslip.sweeps.measures import EVENTS, FAILED, REPEATS, Measure, Variable, read_measures, variables
-from stickslip.sweeps.plan import Arrays, Keep, Plan, assemble, blank, chunked, required
+from stickslip.sweeps.plan import BLOCK, Arrays, Keep, Plan, assemble, blank, chunked, required
 from stickslip.sweeps.progress import told
 from stickslip.sweeps.store import Store
 
@@ -81,8 +81,9 @@ def sweep(
     Raises
     ------
     ModelError
-        The grid is empty or names a parameter that the system does not have; a measure or an engine is unknown; the
-        map fits neither memory nor disk; the store holds something else; no scheduler answers; there is no GPU.
+        The grid is empty, names a parameter that the system does not have, or has no point that is a system; a
+        measure or an engine is unknown; the map fits neither memory nor disk; the store holds something else; no
+        scheduler answers; there is no GPU.
     SolveError
         The store can not be written or another process writes there; the law changes its mode for ever while no
         time passes.
@@ -139,7 +140,7 @@ def planned(
     chunks = chunked([len(axis.values) for axis in axes])
     plan = Plan(system, axes, asked_for, int(cycles), int(settle), dict(start or {}), chunks)
     asked = {measure for measure in plan.measures if isinstance(measure, str)}
-    system, begun = plan.at([0] * len(axes))
+    system, begun = first_of(plan)
     if begun and not (isinstance(system, Oscillator) and isinstance(system.law, TimeDelay)):
         opening(tables(system), begun)
     if "lyapunov" in asked and cycles < BATCHES:
@@ -153,6 +154,29 @@ def planned(
             "measure with a function of the Trajectory",
         )
     return plan
+
+
+class NoSystem(ModelError):
+    """No point of a grid is a system."""
+
+
+def first_of(plan: Plan) -> tuple[System, dict[str, float | str]]:
+    """The first system of the grid, of points spread over all of it, and its start.
+
+    Raises
+    ------
+    NoSystem
+        There is none.
+    """
+    refused = None
+    for number in np.unique(np.linspace(0, plan.size - 1, min(plan.size, BLOCK)).astype(np.int64)):
+        try:
+            return plan.at(np.unravel_index(number, plan.shape))
+        except ModelError as error:
+            refused = refused or error
+    names = ", ".join(name for axis in plan.axes for name in axis.names)
+    assert refused is not None
+    raise NoSystem(f"no point of the grid is a system: {refused.value}", refused.rule, f"correct the grid of {names}")
 
 
 def sensible(keep: Keep, plan: Plan) -> Keep:
