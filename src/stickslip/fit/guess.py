@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +33,7 @@ STIFFEST, SOFTEST = 3000.0, 3.0  # of a contact against the spring that its fric
 SPEEDS = (0.02, 0.3)  # of the largest speed: where a Stribeck curve falls
 RATES = (2.0, 80.0)  # of the oscillation's angular frequency, at which friction follows
 STEEPEST = 60.0  # over the largest speed: a backbone's slope
+LIGHT = 0.02  # damping of a contact over sqrt(stiffness * mass): a hundredth of the critical
 GRID = 16
 
 
@@ -51,6 +53,8 @@ class Seen:
         Angular frequency [rad/s] of the motion: speed over displacement.
     rests : Rests
         Friction around rest.
+    mass : float
+        What slides [kg].
     """
 
     slip: Array
@@ -60,6 +64,7 @@ class Seen:
     level: float
     frequency: float
     rests: Rests
+    mass: float
 
     @classmethod
     def of(cls, records: Sequence[Record], oscillator: Oscillator) -> Seen:
@@ -90,7 +95,7 @@ class Seen:
             )  # fmt: skip
         way = float(np.std(np.concatenate(ways)))
         return cls(np.concatenate(slips), speed, friction, np.concatenate(steps), level, float(np.std(speed)) / way,
-                   Rests.together(rests))  # fmt: skip
+                   Rests.together(rests), oscillator.mass)  # fmt: skip
 
     @property
     def fastest(self) -> float:
@@ -159,7 +164,9 @@ def compliant(seen: Seen) -> list[Any]:
         held = np.abs(told) < seen.level * (1 - 1e-9)
         damping = _share(seen.speed[held], (seen.friction - told)[held])
         told = np.where(held, told + damping * seen.speed, told)
-        tried.append((seen.left(told), CompliantContact(seen.level, stiffness=float(k), damping=max(damping, 0.0))))
+        # a number that is zero is not fitted: a loss that the friction does not show is begun small
+        damping = max(damping, LIGHT * math.sqrt(float(k) * seen.mass))
+        tried.append((seen.left(told), CompliantContact(seen.level, stiffness=float(k), damping=damping)))
     return [min(tried, key=lambda each: each[0])[1]]
 
 

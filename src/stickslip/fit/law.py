@@ -294,7 +294,10 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
     worries = [too_few(shown, sum(knob.kind not in TRUSTED for knob in problem.knobs))]
     if residual[worst] > MISFIT * noise[worst]:
         times = residual[worst] / noise[worst]
-        worries.append(f"{worst} is left with {times:.3g} times its noise: the law is not the whole of it")
+        worries.append(
+            f"{worst} is left with {times:.3g} times its noise: the law is not the whole of it, or mass=, stiffness= "
+            "or a unit is wrong"
+        )
     return LawFit(
         replace(system, drive=problem.oscillator.drive), parameters, _between(problem, sure), noise, residual,
         point.chi2, sum(counts.values()), len(problem.knobs), tuple(traces), "rough" if problem.profile else "even",

@@ -302,6 +302,7 @@ def compare_laws(
     doubt = _doubt(fit, calibration)
     if doubt:
         told, confidence = undescribed(told), 0.0
+        fit = _flagged(fit, "none of the laws tried describes these records")
     if told[0].name == "Stribeck":
         rigid = _excess(fit)
     fit = _calibrated(fit, records, calibration)
@@ -364,10 +365,14 @@ def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tel
     )
     name, share = _worst(fit, noise)
     if share > LEFT:
-        words = f"the interval does not count that the law misses {share:.0%} of {name}"
-        told = {key: replace(one, status=words) if one.status == "ok" else one for key, one in fit.parameters.items()}
-        fit = replace(fit, parameters=told)
+        fit = _flagged(fit, f"the interval does not count that the law misses {share:.0%} of {name}")
     return replace(fit, noise=noise, checks=checks)
+
+
+def _flagged(fit: LawFit, words: str) -> LawFit:
+    """The fit with a reason why its parameters should not be trusted, where none is told yet."""
+    told = {key: replace(one, status=words) if one.status == "ok" else one for key, one in fit.parameters.items()}
+    return replace(fit, parameters=told)
 
 
 def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> LawFit:
