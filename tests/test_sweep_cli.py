@@ -134,3 +134,33 @@ def test_the_map_is_drawn_over_its_parameters() -> None:
     assert [tick.get_text() for tick in status.get_yticklabels()] == ["moving", "at rest"]
     with pytest.raises(ModelError, match="has no 'stick'"):
         ss.plot_map(atlas, variable="stick")
+
+
+def test_a_map_that_can_not_be_drawn_says_why(tmp_path: Path) -> None:
+    slider = forced(0.8, 0.5)
+    cube = {"frequency": [0.1, 0.13], "kinetic": [2.0, 3.0], ("mass", "stiffness"): [(1, 1), (2, 2)]}
+    atlas = ss.sweep(slider, cube, measures=["stops"], settle=2, cycles=2)
+    page = (ss.publish_map(atlas, folder=tmp_path / "cube", system=slider) / "report.html").read_text("utf-8")
+    assert "over frequency and kinetic and mass with stiffness: 8 at rest" in page
+    assert "There is no figure: the map is over 3 parameters" in page
+    assert "Nothing moves anywhere" in page
+    thin = ss.sweep(slider, {**cube, "kinetic": [0.5]}, measures=["stops"], settle=2, cycles=2)
+    folder = ss.publish_map(thin.isel(mass_stiffness=[0]), folder=tmp_path / "thin", system=slider)
+    assert "no figure" not in (folder / "report.html").read_text("utf-8")
+    assert (folder / "figures" / "stops.png").is_file()
+
+
+def test_what_is_white_on_a_map_is_explained() -> None:
+    from stickslip.plot.maps import plates_of
+
+    slider = forced(0.8, 0.5)
+    atlas = ss.sweep(
+        slider, {"frequency": [0.1, 0.13], "kinetic": [0.1, 0.5]}, measures=["multipliers"], settle=0, cycles=2
+    )
+    assert bool(atlas.multiplier.isnull().all())
+    (figure,) = plates_of(atlas)
+    assert figure.caption.endswith("White: no number at 4 of 4 points (no orbit repeats yet after the settling).")
+    whole = ss.sweep(slider, {"kinetic": [-1.0, 0.5], "frequency": [0.1, 0.13]}, measures=["stops"], settle=2, cycles=2)
+    legend = ss.plot_map(whole).get_legend()
+    assert legend is not None
+    assert legend.get_texts()[0].get_text() == "white: no number at 2 of 4 points (no such system)"

@@ -14,6 +14,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import BLUE, INK, ORANGE, Array, axes_of, axis_label, plain_decades, prefixed, styled
 from stickslip.solve.automaton import System
+from stickslip.sweeps.measures import UNKNOWN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,10 +83,17 @@ def plot_map(atlas: Any, *, variable: str | None = None, system: System | None =
     up, lift, upward = _axis(atlas, values.dims[1])
     _colour(ax, across, up, factor * values.values.T, axis_label(words, spelled), named)
     curve = None if system is None else den_hartog(system, values.dims, across / scale)
+    told: list[Any] = []
     if curve is not None:
-        ax.plot(across, lift * curve, color=ORANGE, linewidth=1.8, label="Den Hartog (1931): no stops below")
+        told += ax.plot(across, lift * curve, color=ORANGE, linewidth=1.8, label="Den Hartog (1931): no stops below")
         ax.set_ylim(up[0], up[-1])
-        ax.legend(loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
+    white = _white(atlas, values)
+    if white:
+        from matplotlib.patches import Patch
+
+        told.append(Patch(facecolor="white", edgecolor=INK, linewidth=0.6, label=white))
+    if told:
+        ax.legend(handles=told, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
     ax.set_xlabel(label)
     ax.set_ylabel(upward)
     return ax
@@ -104,6 +112,20 @@ def _shown(atlas: Any, variable: str | None) -> tuple[Any, str, str]:
     return values, atlas[name].attrs.get("long_name", name), atlas[name].attrs.get("units", "1")
 
 
+def _white(atlas: Any, values: Any) -> str:
+    """What the points without a number are; nothing where there are none."""
+    unknown = ~np.isfinite(values.values)
+    many = int(np.sum(unknown))
+    if not many:
+        return ""
+    status = atlas.get("status")
+    became = {} if status is None else _outcomes(status.where(unknown, -2).astype(int).assign_attrs(status.attrs))
+    lost = [word for word in became.values() if word not in ("moving", "at rest")]
+    reason = atlas[values.name].attrs.get(UNKNOWN) if values.name in atlas else None
+    why = " or ".join([*lost, *([reason] if reason and len(lost) < len(became) else [])])
+    return f"white: no number at {many} of {unknown.size} points{why and f' ({why})'}"
+
+
 def _axis(atlas: Any, dim: str) -> tuple[Array, float, str]:
     """Values along a dimension as drawn, their scale to SI, and the label."""
     known = atlas[dim] if dim in atlas.coords and atlas[dim].dtype.kind == "f" else None
@@ -119,12 +141,16 @@ def plates_of(atlas: Any, system: System | None = None) -> tuple[Plate, ...]:
     own = [str(name) for name in atlas.data_vars if name not in {"status", *counts}]
     drawn = {**({"stops": None} if len(counts) == 2 else {}), **{name: name for name in own}}
     cycles, settle = (atlas.attrs.get(name, "some") for name in ("cycles", "settle"))
-    said = f"Each point is a motion of its own: {cycles} periods of it, after {settle} to settle."
+    said = f"Each point is a motion of its own, measured over {cycles} periods after {settle} in which it settles."
     plates = []
     for name, variable in (drawn or {"status": "status"}).items():
-        ax, words = plot_map(atlas, variable=variable, system=system), _shown(atlas, variable)[1]
-        line = " Line: Den Hartog's boundary, below which sliding does not stop." if ax.get_legend() else ""
-        plates.append(plate(name, ax, f"{words[0].upper()}{words[1:]}", said + line))
+        ax, (values, words, _) = plot_map(atlas, variable=variable, system=system), _shown(atlas, variable)
+        line = (
+            " Line: Den Hartog's boundary, below which sliding does not stop." if ax.get_legend() and ax.lines else ""
+        )
+        white = _white(atlas, values)
+        left = f" {white[0].upper()}{white[1:]}." if white else ""
+        plates.append(plate(name, ax, f"{words[0].upper()}{words[1:]}", said + line + left))
     return tuple(plates)
 
 

@@ -51,7 +51,7 @@ def publish_map(atlas: Any, *, folder: str | Path, system: System | None = None)
     """Write ``report.html``, ``results.json`` and the figures of a map as SVG and PNG into a folder.
 
     The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
-    is left alone. A map over more than two parameters has no figures.
+    is left alone. A map over more than two parameters that change has no figures, and the page says so.
 
     Parameters
     ----------
@@ -86,7 +86,9 @@ def publish_map(atlas: Any, *, folder: str | Path, system: System | None = None)
     """
     folder = Path(folder)
     check_folder(folder)
-    plates = plates_of(atlas, system) if 1 <= len(atlas.dims) <= 2 else ()
+    changing = sum(size > 1 for size in atlas.sizes.values())
+    flat = atlas.squeeze() if 1 <= changing < len(atlas.dims) else atlas
+    plates = plates_of(flat, system) if 1 <= len(flat.dims) <= 2 else ()
     with results_folder(folder, map_numbers(atlas)) as draft:
         (draft / "report.html").write_text(render([Section(_words(atlas), plates)]), encoding="utf-8")
         (draft / "figures").mkdir()
@@ -102,11 +104,25 @@ def _words(atlas: Any) -> Summary:
         word.replace("_", " "): int(np.sum(status.values == code)) for code, word in zip(codes, words, strict=True)
     }
     became = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
-    over = " and ".join(str(dim).replace("_", " ") for dim in atlas.dims)
+    over = " and ".join(_over(atlas, str(dim)) for dim in atlas.dims)
     whole = atlas.attrs.get("status", "complete")
     cautions = [] if whole == "complete" else [f"The map is not whole: {whole}."]
     cautions += [f"{counts[word]} points have no answer: {word}." for word in LOST if counts.get(word)]
+    if sum(size > 1 for size in atlas.sizes.values()) > 2:
+        cautions.append(
+            f"There is no figure: the map is over {len(atlas.dims)} parameters, and two can be drawn. Choose with "
+            "sel() and draw that with plot_map(), or sweep over fewer."
+        )
+    if counts.get("at rest") == status.size:
+        cautions.append("Nothing moves anywhere: friction holds the mass at every point. Drive it harder, or near its "
+                        "own frequency.")  # fmt: skip
     return Summary("Map", (f"{status.size} motions over {over}: {became}.",), cautions, settings=_settings(atlas.attrs))
+
+
+def _over(atlas: Any, dim: str) -> str:
+    """A dimension in words; parameters that change together with each other."""
+    names = [str(name) for name in atlas.coords if atlas[name].dims == (dim,)] if dim not in atlas.coords else [dim]
+    return " with ".join(name.replace("_", " ") for name in names or [dim])
 
 
 def _settings(attributes: Mapping[str, Any]) -> dict[str, str]:

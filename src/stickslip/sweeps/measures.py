@@ -42,6 +42,7 @@ class Variable:
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
 
+UNKNOWN = "where_unknown"  # the attribute of a variable that says where a motion leaves no number
 LOG = "events"  # the measure that keeps every event
 EVENTS = {"stops", "stick_share", "micro_slips", "transition_speed"}  # measures that count events of one contact
 REPEATS = {"period", "multipliers"}  # measures of an orbit that is there twice in what is measured
@@ -58,7 +59,13 @@ MEASURES: dict[str, dict[str, Variable]] = {
     "amplitude": {"amplitude": Variable("m", "largest displacement from zero")},
     "stick_share": {"stick_share": Variable("1", "share of the time that the contact holds")},
     "micro_slips": {"micro_slips": Variable("1", "slips per period shorter than a tenth of the longest")},
-    "transition_speed": {"transition_speed": Variable("m/s", "largest speed at which a microstick becomes a slip")},
+    "transition_speed": {
+        "transition_speed": Variable(
+            "m/s",
+            "largest speed at which a microstick becomes a slip",
+            attributes={UNKNOWN: "no microstick becomes a slip"},
+        )
+    },
     "energy": {"energy": Variable("J", "work of friction per period")},
     "period": {
         "order": Variable(
@@ -66,7 +73,13 @@ MEASURES: dict[str, dict[str, Variable]] = {
         )
     },
     "multipliers": {
-        "multiplier": Variable("1", "largest Floquet multiplier", "complex128", complex(math.nan, math.nan))
+        "multiplier": Variable(
+            "1",
+            "largest Floquet multiplier",
+            "complex128",
+            complex(math.nan, math.nan),
+            {UNKNOWN: "no orbit repeats yet after the settling"},
+        )
     },
     "lyapunov": {"lyapunov": Variable("1/s", "largest Lyapunov exponent")},
     LOG: {LOG: Variable("1", "events of the measured periods")},
