@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,7 +19,7 @@ from stickslip import scenarios
 from stickslip.errors import ModelError
 from stickslip.laws.c_code import at, modes_of
 from stickslip.laws.curved import exp
-from stickslip.laws.export import FORMATS, FORMULAS
+from stickslip.laws.export import FORMATS, FORMULAS, formula_of
 from stickslip.laws.formula import Formula
 
 LAWS = {
@@ -48,6 +49,20 @@ CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 def test_every_law_is_here() -> None:
     assert set(scenarios.LAWS) <= {type(law).__name__ for law in LAWS.values()}
     assert set(scenarios.LAWS) == set(FORMULAS)
+
+
+ALL = {
+    **LAWS, "plain Coulomb": ss.Coulomb(1.1), "plain contact": ss.CompliantContact(1.1, stiffness=192000),
+    "plain slope": ss.LinearSlope(1.0, slope=0.1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_formula_names_no_parameter_that_is_not_there(name: str) -> None:
+    law, told = ALL[name], ss.export_law(ALL[name], format="simulink").splitlines()[0]
+    absent = [field.name for field in fields(law) if getattr(law, field.name) is None]  # type: ignore[arg-type]
+    assert not [each for each in absent if re.search(rf"\b{each}\b", told)]
+    assert ("relaxes" in told) == (name == "consistent contact")
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -236,7 +251,7 @@ def test_modelica_is_one_class_whose_statements_end(name: str) -> None:
 @pytest.mark.parametrize("format", ["modelica", "simulink"])
 def test_blocks_hold_every_number_and_the_formula(name: str, format: str) -> None:
     law, text = LAWS[name], ss.export_law(LAWS[name], format=format)
-    assert FORMULAS[type(law).__name__] in text.splitlines()[0]
+    assert formula_of(law) in text.splitlines()[0]
     for key, value in tomllib.loads(ss.export_law(law))["law"].items():
         if isinstance(value, float):
             assert re.search(rf"\b{key} = {re.escape(repr(value))};", text)

@@ -209,7 +209,8 @@ def test_thinning_keeps_both_ends(count: int, limit: int) -> None:
 @pytest.mark.parametrize(
     ("peak", "unit", "shown"),
     [(0.0123, "m", "mm"), (2e-5, "m/s", "µm/s"), (0.3, "N", "N"), (4500.0, "N", "kN"), (0.002, "J", "mJ"),
-     (120.0, "s", "s"), (0.5, "rad", "rad"), (2.0, "m/s^2", "m/s²"), (0.0, "m", "m"), (0.29, "1", "1")],
+     (120.0, "s", "s"), (0.5, "rad", "rad"), (2.0, "m/s^2", "m/s²"), (0.0, "m", "m"), (0.29, "1", "1"),
+     (199014.0, "N/m", "N/m"), (4.2e6, "N/m", "MN/m"), (15656605923.0, "N/m", "GN/m")],
 )  # fmt: skip
 def test_units_are_chosen_to_be_read(peak: float, unit: str, shown: str) -> None:
     assert prefixed(peak, unit)[1] == shown

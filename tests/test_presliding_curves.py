@@ -115,3 +115,7 @@ def test_what_can_not_be_fitted_is_refused() -> None:
     t = np.arange(4000) / FS
     with pytest.raises(EstimateError, match="needs motion both ways"):
         fit_curve(Record.of({"x": t + 0.01 * np.sin(9 * t), "friction": 1 + 0.1 * np.sin(t)}, fs=FS), curve="dahl")
+    x = 5e-3 * np.sin(2 * np.pi * t)
+    slides = Record.of({"x": x, "friction": 1.1 * np.sign(np.cos(2 * np.pi * t)) + 1e-2 * np.sin(977 * t)}, fs=FS)
+    with pytest.raises(EstimateError, match="the contact's stiffness does not show in this record"):
+        fit_curve(slides, curve="dahl")

@@ -64,3 +64,5 @@ def test_what_is_no_step_is_refused() -> None:
         fit_curve(Record.of({"x": V1 * t, "friction": 1 + 0 * t + 1e-3 * np.sin(t)}, fs=50), curve="aging")
     with pytest.raises(EstimateError, match="goes forward"):
         fit_curve(Record.of({"x": 1e-3 * np.abs(t - 20), "friction": np.sign(t - 20)}, fs=50), curve="aging")
+    with pytest.raises(EstimateError, match=r"the displacement goes to and fro; .*fit a curve over the speed"):
+        fit_curve(Record.of({"x": 1e-3 * np.sin(t), "friction": np.sign(np.cos(t))}, fs=50), curve="aging")

@@ -19,8 +19,9 @@ GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
 POUND_FORCE = 4.4482216152605  # N
 INCH = 0.0254  # m
 NOTHING = 1e-12  # what is smaller is rounding, in every unit that has prefixes
-_PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _PREFIXED = ("m", "m/s", "m/N", "N", "N m", "N s/m", "s", "Pa", "J", "V")
+_STIFF = 1e6  # N/m, from which a stiffness has a prefix
 _READABLE = ("N", "N m", "N s/m", "V")  # a few hundredths of these are read more easily than thousandths
 
 
@@ -194,7 +195,8 @@ def prefixed(values: NDArray[np.float64] | float, unit: str) -> tuple[float, str
     """
     finite = np.abs(np.atleast_1d(values)[np.isfinite(np.atleast_1d(values))])
     peak = float(finite.max()) if finite.size else 0.0
-    if unit not in _PREFIXED or peak < NOTHING or (unit in _READABLE and 0.01 <= peak < 1):
+    plain = unit not in _PREFIXED and not (unit == "N/m" and peak >= _STIFF)
+    if plain or peak < NOTHING or (unit in _READABLE and 0.01 <= peak < 1):
         return 1.0, spelled(unit)
     size, prefix = next(((s, p) for s, p in _PREFIXES if peak >= s), _PREFIXES[-1])
     return (1.0, unit) if size == 1.0 or (unit == "s" and size > 1) else (1.0 / size, prefix + unit)

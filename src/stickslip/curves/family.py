@@ -174,10 +174,16 @@ def _few(samples: Samples, along: str) -> Samples:
 def _require_separable(jacobian: Array, family: Family) -> None:
     lengths = np.linalg.norm(jacobian, axis=0)
     condition = np.linalg.cond(jacobian / np.where(lengths > 0, lengths, 1.0)) if np.all(lengths > 0) else np.inf
+    if condition > INSEPARABLE and family.along == "x":
+        raise EstimateError(
+            "the contact's stiffness does not show in this record: its friction is that of sliding alone",
+            "a stiffness is told by readings in which the contact holds, next to the reversals",
+            "measure smaller strokes, or sample faster and x more finely, or fit a curve over the speed",
+        )
     if condition > INSEPARABLE:
         raise EstimateError(
-            f"the condition number of the parameters of {family.formula.partition(',')[0]} is {condition:.3g}",
-            f"parameters that one motion tells apart have less than {INSEPARABLE:g}",
+            f"this record can not tell the parameters of {family.formula.partition(',')[0]} from each other",
+            "other values of them would leave as little",
             "choose a curve with fewer parameters, or give a record of slower and faster motion",
         )
 

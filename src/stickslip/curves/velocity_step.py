@@ -14,6 +14,7 @@ from stickslip.laws.rate_state import RateState
 Array = NDArray[np.float64]
 
 LEAST_STEP = 1.2  # ratio of the two speeds
+LEAST_WAY = 1.5  # times the way from its first reading to its last, from which on a displacement goes to and fro
 STALLED = 1e5  # times the fastest rate's time, in one sample
 RATIOS = (0.5, 1.0, 1.5)  # b over a, to begin with
 DISTANCES = 8  # ways of renewal to begin with, from that of a few samples to that after the step
@@ -124,6 +125,11 @@ def step_of(samples: Samples) -> tuple[float, float, float]:
         width = 1.5 * (grid[1] - grid[0])
         low, high = max(best[0] - width, 0.0), min(best[0] + width, time[-1])
     corner, before, after = best
+    if np.ptp(x) > LEAST_WAY * abs(x[-1] - x[0]):
+        raise EstimateError(
+            "the displacement goes to and fro", "a velocity step goes forward: steady sliding one way, then faster or "
+            "slower the same way", "give such a record, or fit a curve over the speed, as stribeck",
+        )  # fmt: skip
     if min(before, after) <= 0 or max(before, after) < LEAST_STEP * min(before, after):
         raise EstimateError(
             f"the driving speed goes from {before:.3g} to {after:.3g} m/s",

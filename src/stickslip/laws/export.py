@@ -33,7 +33,7 @@ FORMULAS = {
     "FrictionCurve": "f = F(|v|) sign(v) while sliding, |f| <= static at rest",
     "PositionLoad": "f = (kinetic + gradient x) sign(v) where that load is positive, else no contact",
     "CompliantContact": "f = kinetic sign(v) while sliding; f = stiffness (x - anchor) + damping v from each reversal "
-    "until |f| = static, the anchor then kinetic/stiffness behind; by the rule 'consistent' it relaxes while sliding",
+    "until |f| = static, the anchor then kinetic/stiffness behind",
     "InertialContact": "f = stiffness (x - y) + damping (x' - y'), mass y'' = f - kinetic sign(y')",
     "ElastoSlip": "f = sum of elements, each a spring of its stiffness that slips at its force",
     "StateVariable": "f = theta, theta' = -kinetic rate (theta - level sign(v)), level = kinetic, 1 where printed is "
@@ -54,7 +54,7 @@ FORMULAS = {
 def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
     """How is a friction law written for another program?
 
-    * ``"toml"``: the table ``[law]`` of a system's file, as :func:`read_system` reads it back;
+    * ``"toml"``: the table ``[law]`` of a system's file; with ``[system]`` beside it :func:`read_system` reads it;
     * ``"python"``: a function of the speed, or a class that is led step by step where the law has a memory; each runs
       as it stands;
     * ``"c"``: C99 code of the friction in each mode, of what ends a mode, and a test vector that it checks itself by;
@@ -103,6 +103,12 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
 def formula_of(law: Law | CurvedLaw) -> str:
     """The law's friction in the names of its parameters."""
     told = FORMULAS[type(law).__name__]
+    if getattr(law, "static", "") is None:  # a parameter that is not there is not named
+        told = told.replace("static", "kinetic" if hasattr(law, "kinetic") else "F(0)")
+    if getattr(law, "steepness", "") is None:
+        told = told.partition("; steepness")[0]
+    if getattr(law, "rule", "") == "consistent":
+        told += "; while sliding the deflection (x - anchor) relaxes as stiffness and damping let it"
     if isinstance(law, FrictionCurve):
         told += f", F = {_curve_text(law)}"
     inner = getattr(law, "law", None)
