@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
@@ -72,13 +73,28 @@ def _client(where: str | None) -> Iterator[Client]:
             client.run(_unheard)
             yield client
         return
+    _require_port(where)
     try:
         client = distributed.Client(f"tcp://{where}", timeout=PATIENCE)
     except (OSError, TimeoutError, ValueError) as error:
-        raise ModelError(
-            f"no Dask scheduler answers at {where}",
-            f"it is asked for {PATIENCE} s",
-            "start one there with `dask scheduler`, or leave the address for a cluster of this machine",
-        ) from error
+        raise _unanswered(where, f"it is asked for {PATIENCE} s") from error
     with client:
         yield client
+
+
+def _require_port(where: str) -> None:
+    """Refuse an address whose port is closed at once: the client of a scheduler goes on asking."""
+    host, _, port = where.rpartition(":")
+    if not (host and port.isdecimal()):
+        return
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=PATIENCE).close()
+    except ConnectionRefusedError as error:
+        raise _unanswered(where, "its port is closed") from error
+    except (OSError, OverflowError):
+        return  # the client says what is the matter
+
+
+def _unanswered(where: str, how: str) -> ModelError:
+    step = "start one there with `dask scheduler`, or leave the address for a cluster of this machine"
+    return ModelError(f"no Dask scheduler answers at {where}", how, step)
