@@ -255,6 +255,7 @@ def test_what_is_no_record_of_friction_is_refused() -> None:
         fit_curve(lost, curve="coulomb")
     loud = fit_curve(sweep(noise=5.0), curve="coulomb")
     assert "noise is above the friction" in loud.status
+    assert all("ok" not in each.status for each in loud.estimates)
 
 
 def test_loops_know_their_motion_themselves() -> None:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 CURVES = (
     "coulomb", "viscous", "stribeck", "asymmetric", "tabulated", "dahl", "jenkins", "iwan", "maxwell", "aging", "slip",
 )  # fmt: skip
+LONG = 30  # letters of a status that is not said twice
 
 
 @click.command()
@@ -121,9 +122,15 @@ def _show(
     console.print(f"\n[bold]{escape(summary.title)}[/bold]")
     for sentence in (*summary.headline, *summary.cautions):
         console.print(escape(spoken(sentence)))
-    rows = [[line.name, line.value, line.interval, line.status] for line in summary.lines]
+    told = " ".join((*summary.headline, *summary.cautions))
+    rows = [[line.name, line.value, line.interval, _brief(line.status, told)] for line in summary.lines]
     console.print(table(("quantity", "value", "95 % interval", "how sure"), rows))
     if summary.verdicts:
         console.print(table(("law tried", "verdict"), summary.verdicts))
     if written is not None:
         click.echo(f"Report: {written / 'report.html'}")
+
+
+def _brief(status: str, told: str) -> str:
+    """A status in its column; a long one that stands above the table is not said once more in each row."""
+    return "as said above" if len(status) > LONG and status in told else status

@@ -34,6 +34,7 @@ FILLED = 0.1  # of the samples, that were not measured: more than that is worth 
 LOST = 7.0  # half an interval of a logarithm from which on nothing is known of its number
 TIED = 0.99  # correlation of two parameters from which on they are told together alone
 ONE_WAY = "motion goes one way: a constant force is not told from friction"
+TOO_NOISY = "the friction's noise is above the friction: give more cycles, or a quieter sensor"
 NOT_FOLLOWED = "of a curve that the friction does not follow"
 OVER_WAY = ("dahl", "jenkins", "iwan", "maxwell")
 POSITIVE = ("speed", "exponent", "width", "distance")  # found by their logarithm: so is their interval
@@ -280,6 +281,8 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
             found[name] = replace(each, status="the record tells nothing of it")
     if missed > MISSES:
         found = {name: replace(each, status=NOT_FOLLOWED) for name, each in found.items()}
+    if TOO_NOISY in worries:
+        found = {name: replace(each, status=TOO_NOISY) if each.status == "ok" else each for name, each in found.items()}
     if filled > FILLED:
         worries.append(f"{filled:.0%} of the samples were not measured, but filled in between others")
     for names, word in family.beware(found, samples):
@@ -324,7 +327,7 @@ def _worries(member: Member, samples: Samples, along: str, missed: float) -> lis
         many = f"{samples.cycles} cycle{'s' * (samples.cycles > 1)}"
         words.append(f"{many} for {len(names)} parameters: give more of them")
     if samples.noise > float(np.sqrt(np.mean(member.fitted**2))):
-        words.append("the friction's noise is above the friction: give more cycles, or a quieter sensor")
+        words.append(TOO_NOISY)
     if cyclic and not samples.reverses:
         words.append(f"{ONE_WAY}; let it reverse")
     if along == "v" and samples.speed_spread < LEAST_SPREAD:
