@@ -16,6 +16,10 @@ import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.fit.choice import CERTAIN, Evidence, Misfit, standings
 from stickslip.fit.guess import GUESSES, Seen
+from stickslip.fit.search import Knob, Problem
+from stickslip.fit.start import Shown
+from stickslip.fit.stretch import channels_of
+from stickslip.fit.surety import _end
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Step
 
@@ -240,6 +244,16 @@ def test_the_static_friction_of_a_stribeck_curve_lies_in_its_interval() -> None:
     assert found.fit.parameters["static"].includes(1.2)
     assert found.fit.parameters["static"].value == pytest.approx(1.2, rel=2e-3)
     assert set(ss.compare_laws(record("Stribeck"), slider(), laws=["Coulomb", "Stribeck"]).best.left) == {"x", "load"}
+
+
+def test_a_level_above_a_held_static_friction_ends_its_interval() -> None:
+    """The releases tell the static friction, which is held; looking for the end of the level's interval passed it."""
+    told = record("Coulomb")
+    shown = Shown.of(told, channels_of(told, None), slider())
+    system = slider().having(law=ss.Coulomb(0.95, static=1.0))
+    problem = Problem.of(system, [shown.stretch(0, (0, len(told) - 1))], [Knob("kinetic", "log", 0.95)])
+    end = _end(problem, problem.begin(np.zeros(1)), 0, 1.0, 1e300, lambda: None)
+    assert 0 < end < 0.1  # of a logarithm: 5 % lie between
 
 
 # ---- records that tell nothing

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.errors import ModelError
 from stickslip.fit.search import Knob, Point, Problem, Slopes, descend, rows_of, without_starts
 from stickslip.fit.start import thinned_out
 from stickslip.fit.stretch import Sensor
@@ -119,7 +120,10 @@ def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, te
 
     def rise(u: float) -> float:
         tell()
-        held = _held(problem, k, u)
+        try:
+            held = _held(problem, k, u)
+        except ModelError:  # a kinetic friction above a static one that is held, where the releases tell it
+            return math.inf
         rest = np.delete(point.u, k)
         start = replace(held.at(rest, point.starts), u=rest)
         return descend(replace(held, knobs=others), start, passes=3).chi2 - point.chi2 if start.raw else math.inf
