@@ -11,6 +11,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from stickslip.lab.frames import unframed
 
 
 @dataclass(frozen=True)
@@ -72,3 +75,10 @@ def running_lab(browser: Path | None = None) -> Iterator[Lab]:
             raise
         finally:
             process.stdout.close()
+
+
+def received(socket: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The next answer on a socket, but for the word that kernels are compiled, which comes on a machine's first run."""
+    while (found := unframed(socket.receive_bytes()))[0]["kind"] == "compiling":
+        pass
+    return found

@@ -14,8 +14,8 @@ pytest.importorskip("starlette", reason="the extra [lab] is not installed")
 from starlette.testclient import TestClient
 
 import stickslip as ss
+from labs import received
 from stickslip.lab import explored
-from stickslip.lab.frames import unframed
 from stickslip.lab.server import lab_app
 
 HOME, BEARER = "http://127.0.0.1:8723", {"authorization": "Bearer t"}
@@ -38,9 +38,9 @@ def drawn(client: TestClient, request: dict[str, Any]) -> list[tuple[dict[str, A
     """All that comes until the map is done or refused."""
     with client.websocket_connect("ws://127.0.0.1:8723/map", headers=BEARER) as socket:
         socket.send_text(json.dumps(request))
-        found = [unframed(socket.receive_bytes())]
+        found = [received(socket)]
         while found[-1][0]["kind"] == "part":
-            found.append(unframed(socket.receive_bytes()))
+            found.append(received(socket))
     return found
 
 
@@ -88,14 +88,14 @@ def test_a_map_can_be_cancelled_and_another_asked(client: TestClient) -> None:
     large = {**ASKED, "x": {**ASKED["x"], "count": 60}, "y": {**ASKED["y"], "count": 60}}
     with client.websocket_connect("ws://127.0.0.1:8723/map", headers=BEARER) as socket:
         socket.send_text(json.dumps(large))
-        assert unframed(socket.receive_bytes())[0]["kind"] == "part"
+        assert received(socket)[0]["kind"] == "part"
         socket.send_text(json.dumps({"id": 2, "want": "cancel"}))
         count = 1
-        while unframed(socket.receive_bytes())[0]["kind"] != "cancelled":
+        while received(socket)[0]["kind"] != "cancelled":
             count += 1
         assert count < 30  # of 30 strips alone
         socket.send_text(json.dumps({**ASKED, "id": 3}))
-        assert unframed(socket.receive_bytes())[0]["id"] == 3
+        assert received(socket)[0]["id"] == 3
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ pytest.importorskip("starlette", reason="the extra [lab] is not installed")
 from starlette.testclient import TestClient
 
 import stickslip as ss
+from labs import received
 from stickslip.lab import drawn
 from stickslip.lab.frames import frame, unframed
 from stickslip.lab.server import lab_app
@@ -39,7 +40,7 @@ def client() -> Iterator[TestClient]:
 def asked(client: TestClient, want: str, state: Any, **more: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     with client.websocket_connect("ws://127.0.0.1:8723/play", headers=BEARER) as socket:
         socket.send_text(json.dumps({"id": 1, "want": want, "state": state, **more}))
-        return unframed(socket.receive_bytes())
+        return received(socket)
 
 
 def state_of(client: TestClient, name: str) -> Any:
@@ -168,9 +169,9 @@ def test_of_many_states_the_newest_is_answered(client: TestClient) -> None:
         for number in range(1, 201):
             law = {"name": "Coulomb", "kinetic": 0.5 + number / 400}
             socket.send_text(json.dumps({"id": number, "want": "run", "state": {**STATE, "law": law}}))
-        answered = [unframed(socket.receive_bytes())[0]["id"]]
+        answered = [received(socket)[0]["id"]]
         while answered[-1] != 200:
-            answered.append(unframed(socket.receive_bytes())[0]["id"])
+            answered.append(received(socket)[0]["id"])
     assert answered == sorted(answered)
     assert len(answered) < 200
     assert time.perf_counter() - begun < 20
@@ -184,9 +185,9 @@ def test_a_long_run_ends_when_another_is_asked(client: TestClient) -> None:
         time.sleep(1.0)
         begun = time.perf_counter()
         socket.send_text(json.dumps({"id": 2, "want": "run", "state": STATE, "afresh": True}))
-        first, _ = unframed(socket.receive_bytes())
+        first, _ = received(socket)
         assert (first["id"], first["kind"]) in ((1, "overtaken"), (1, "error"))  # an error where the worker was new
-        assert unframed(socket.receive_bytes())[0]["kind"] == "run"
+        assert received(socket)[0]["kind"] == "run"
         assert time.perf_counter() - begun < 15
 
 

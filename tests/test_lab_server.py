@@ -13,7 +13,7 @@ from starlette.testclient import TestClient  # noqa: E402
 from starlette.websockets import WebSocketDisconnect  # noqa: E402
 
 import stickslip as ss  # noqa: E402
-from stickslip.lab.frames import unframed  # noqa: E402
+from labs import received  # noqa: E402
 from stickslip.lab.server import lab_app  # noqa: E402
 
 COMPLIANT = ss.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
@@ -175,9 +175,9 @@ def test_each_parameter_is_offered_in_the_unit_that_a_file_takes(client: TestCli
 def test_a_socket_survives_what_it_does_not_understand(client: TestClient, path: str, message: str | bytes) -> None:
     with client.websocket_connect(f"ws://127.0.0.1:{PORT}{path}", headers=BEARER) as socket:
         (socket.send_text if isinstance(message, str) else socket.send_bytes)(message)  # type: ignore[arg-type]
-        header, _ = unframed(socket.receive_bytes())
+        header, _ = received(socket)
         assert header["kind"] == "error"
         assert header["error"].endswith(".")
         if path == "/play":
             socket.send_text(json.dumps({"id": 2, "want": "run", "state": STATE}))
-            assert unframed(socket.receive_bytes())[0]["kind"] == "run"
+            assert received(socket)[0]["kind"] == "run"
