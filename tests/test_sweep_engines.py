@@ -134,7 +134,7 @@ SIMULATED = {name: CASES[name] for name in ("rigid", "compliant", "a belt")}
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What the simulated GPU gives for some cases, from a process of its own."""
     if importlib.util.find_spec("numba.cuda") is None:
-        pytest.skip("numba has no CUDA target: pip install stickslip[gpu]")
+        pytest.skip('numba has no CUDA target: pip install ".[gpu]"')
     folder = tmp_path_factory.mktemp("cuda")
     environment = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-W", "error", __file__, str(folder)]

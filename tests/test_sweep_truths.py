@@ -183,7 +183,7 @@ def test_the_exponent_of_chaos(engine: str) -> None:
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     """What the simulated GPU gives for the cases, from a process of its own."""
     if importlib.util.find_spec("numba.cuda") is None:
-        pytest.skip("numba has no CUDA target: pip install stickslip[gpu]")
+        pytest.skip('numba has no CUDA target: pip install ".[gpu]"')
     folder = tmp_path_factory.mktemp("cuda")
     environment = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
     run = subprocess.run(

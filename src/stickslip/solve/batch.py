@@ -187,6 +187,6 @@ def _on_gpu(given: Any, out: Any, scratch: Any) -> None:
         from stickslip.solve.gpu import march_all
     except ImportError as absent:
         raise SolveError(
-            "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install "stickslip[gpu]"'
+            "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install ".[gpu]" in the checkout'
         ) from absent
     march_all(given, out, scratch)

@@ -31,7 +31,7 @@ def cuda(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = N
         from stickslip.sweeps.watch_gpu import THREADS, each
     except ImportError as absent:
         raise ModelError(
-            "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install "stickslip[gpu]"'
+            "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install ".[gpu]" in the checkout'
         ) from absent
     require_gpu(INSTEAD)
     if LOG in plan.measures:

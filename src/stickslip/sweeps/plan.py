@@ -165,7 +165,9 @@ def required(package: str) -> Any:
         return importlib.import_module(package)
     except ImportError as absent:
         raise ModelError(
-            f"{package} is not installed", "maps are made with the extra 'maps'", 'pip install "stickslip[maps]"'
+            f"{package} is not installed",
+            "maps are made with the extra 'maps'",
+            'pip install ".[maps]" in the checkout',
         ) from absent
 
 
