@@ -70,11 +70,8 @@ def _alone(plan: Plan, steps: tuple[int, ...]) -> Mapping[str, Any]:
     except SolveError:
         return {"status": FAILED}
     try:
-        told = {
-            "status": outcome(run),
-            **measured(run, plan, plan.at(steps)[1]),
-        }  # a measure's ModelError ends the sweep
-    except SolveError:
+        told = {"status": outcome(run), **measured(run, plan, plan.at(steps)[1])}
+    except SolveError:  # a measure's ModelError ends the sweep
         return {"status": FAILED}
     if LOG in plan.measures:
         log = logged(run, plan.settle)
