@@ -18,8 +18,7 @@ lab: $(VENV)/.lab
 	$(BIN)/stickslip lab
 
 test: $(VENV)/.dev
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m "not alone" -n 2 --dist loadfile
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m alone
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
