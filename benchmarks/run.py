@@ -48,8 +48,8 @@ print(json.dumps({
 }))
 """
 
-# What others take to read the same file, smooth, differentiate and transform its channels, and draw six figures of them:
-# the measure of a machine, as fast or slow this minute as it is for the main job.
+# What others take to read the same file, smooth, differentiate and transform its channels, and draw six figures of
+# them: the measure of a machine, as fast or slow this minute as it is for the main job.
 YARDSTICK = """
 import io, resource, sys
 import matplotlib
@@ -119,7 +119,7 @@ def yardstick(file: Path) -> float:
 
 
 def _alone(code: str, file: Path) -> str:
-    """What a program prints on one thread: another one of the linear algebra's waits in a loop, which counts as work."""
+    """What a program prints on one thread: a second one of the linear algebra's waits in a loop, counted as work."""
     one = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
     run = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=True, env=one)
     return run.stdout

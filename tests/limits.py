@@ -30,7 +30,7 @@ _FORKS.set_forkserver_preload(["stickslip.cli.program", "numpy", "pandas", "pint
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a call ended: exit code (None where it was stopped for time), what it printed, its largest memory in bytes."""
+    """How a call ended: exit code (None where it was stopped), what it printed, its largest memory in bytes."""
 
     code: int | None
     out: str
@@ -89,13 +89,12 @@ def _within_limits(call: Callable[..., object], arguments: tuple[Any, ...], fold
         os.dup2(nothing.fileno(), 0)
         os.dup2(out.fileno(), 1)
         os.dup2(err.fileno(), 2)
-        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)
-        sys.stderr = open(2, "w", encoding="utf-8", closefd=False)
+        sys.stdout, sys.stderr = (os.fdopen(number, "w", encoding="utf-8", closefd=False) for number in (1, 2))
         try:
             call(*arguments)
         except SystemExit as end:
             code = end.code if isinstance(end.code, int) else int(end.code is not None)
-        except BaseException:
+        except BaseException:  # noqa: BLE001: whatever gets out is what the test looks for
             traceback.print_exc()
             code = 70
         with contextlib.suppress(OSError, ValueError):

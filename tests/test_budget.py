@@ -17,8 +17,8 @@ def benchmarks() -> ModuleType:
     return loaded("benchmarks/run.py")
 
 
-# The main job takes 2.5 to 3.3 times what pandas, scipy and matplotlib take for a like one, on a machine busy with other
-# things or not; another second of a processor, one in ten, shows.
+# The main job takes 2.5 to 3.3 times what pandas, scipy and matplotlib take for a like one, on a busy machine and on a
+# quiet one; another second of a processor, one in ten, shows.
 MOST = 3.4
 TRIES = 4
 
