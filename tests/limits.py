@@ -94,7 +94,7 @@ def _within_limits(call: Callable[..., object], arguments: tuple[Any, ...], fold
             call(*arguments)
         except SystemExit as end:
             code = end.code if isinstance(end.code, int) else int(end.code is not None)
-        except BaseException:  # noqa: BLE001: whatever gets out is what the test looks for
+        except BaseException:  # noqa: BLE001  (whatever gets out is what the test looks for)
             traceback.print_exc()
             code = 70
         with contextlib.suppress(OSError, ValueError):
