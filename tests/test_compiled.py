@@ -14,9 +14,9 @@ import stickslip
 
 PACKAGE = Path(stickslip.__file__).parent
 ASK = (
-    "import stickslip.solve.kernel as k, stickslip.compiled as c; import numpy as np;"
+    "import stickslip.solve.kernel as k, stickslip.compiled as c; import numpy as np; from pathlib import Path;"
     "order = k.opening_order(np.zeros(3), np.zeros(3), 3);"
-    "stats = k.opening_order.stats; print(order, sum(stats.cache_hits.values()), c.folder())"
+    "stats = k.opening_order.stats; print(order, sum(stats.cache_hits.values()), c.folder(Path(k.__file__)))"
 )
 
 
@@ -49,6 +49,28 @@ def test_a_change_in_one_file_is_seen_by_its_callers_in_others(copy: Path) -> No
     constant = copy / "stickslip" / "solve" / "roots.py"
     constant.write_text(constant.read_text("utf-8").replace("NOISE = 64 *", "NOISE = 65 *"), "utf-8")
     assert ask(copy)[2] != first
+
+
+def test_a_change_in_one_file_leaves_the_kernels_of_others(copy: Path) -> None:
+    first = ask(copy)[2]
+    other = copy / "stickslip" / "signals" / "turns.py"
+    other.write_text(other.read_text("utf-8") + "\n# another word\n", "utf-8")
+    order, hits, folder = ask(copy)
+    assert (order, hits, folder) == (3, 1, first)
+
+
+def test_what_nothing_has_loaded_for_long_is_removed(copy: Path) -> None:
+    kept = ask(copy)[2]
+    stale, recent = kept.with_name("generated_0-0"), kept.with_name("generated_1-1")
+    for folder in (stale, recent):
+        folder.mkdir()
+    os.utime(stale, (0, 0))
+    constant = copy / "stickslip" / "solve" / "roots.py"
+    constant.write_text(constant.read_text("utf-8").replace("NOISE = 64 *", "NOISE = 65 *"), "utf-8")
+    ask(copy)
+    assert not stale.exists()
+    assert recent.exists()
+    assert kept.exists()
 
 
 def test_an_install_that_may_not_be_written_keeps_them_with_the_user(copy: Path, tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
 """How the kernels are compiled: one source for the CPU and the GPU, kept on disk.
 
 numba keeps a compiled function as long as its own file stands as it was, and does not see that a function it calls in
-another file has changed. So the folder is named after the content of every file that holds kernels.
+another file has changed. So a file's kernels are kept in a folder that is named after its content and that of every
+file whose kernels, constants or tuples it imports: an edited kernel is compiled anew with those that call it alone.
 
 A CUDA kernel calls the same functions: numba compiles them anew for the device.
 """
@@ -11,10 +12,13 @@ from __future__ import annotations
 import atexit
 import hashlib
 import os
+import re
+import shutil
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
@@ -26,6 +30,10 @@ from numba import cfunc, config, njit
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
+PACKAGE = Path(__file__).parent
+HOLDS_KERNELS = "@compiled("
+IMPORT = re.compile(r"^from (stickslip[\w.]*) import (\([^)]*\)|[^\n]+)", re.MULTILINE)
+UNUSED = 30 * 86400.0  # s after which what nothing has loaded is removed
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -40,7 +48,7 @@ def pointer(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], An
 
 def _keeping(compiler: Callable[..., Any], options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
     def compile_(function: Callable[..., Any]) -> Any:
-        kept, place = config.CACHE_DIR, folder()
+        kept, place = config.CACHE_DIR, folder(Path(function.__code__.co_filename))
         if place is None or config.DISABLE_JIT:
             return compiler(**options)(function)
         config.CACHE_DIR = str(place)
@@ -55,7 +63,8 @@ def _keeping(compiler: Callable[..., Any], options: dict[str, Any]) -> Callable[
 def generated(source: str) -> ModuleType:
     """The module of a text, kept beside what is compiled of it."""
     name = "generated_" + hashlib.sha256(source.encode()).hexdigest()[:16]
-    file = (folder() or _passing()) / f"{name}.txt"  # no module of the package
+    place = _kept(f"{name}-{_digest(_closure(source))}") or _passing()
+    file = place / f"{name}.txt"  # no module of the package
     if not file.exists() or file.read_text("utf-8") != source:
         part = file.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
         part.write_text(source, "utf-8")
@@ -78,27 +87,87 @@ def _passing() -> Path:
 
 
 @cache
-def folder() -> Path | None:
-    """Where compiled kernels are kept: the first place that may be written, named after their sources."""
-    name = "kernels-" + digest(Path(__file__).parent)
+def folder(file: Path) -> Path | None:
+    """Where the compiled kernels of a file are kept; None where nothing may be written."""
+    if file.suffix == ".txt":  # generated: kept beside its text
+        return file.parent
+    if not file.is_relative_to(PACKAGE):
+        return None
+    name = ".".join(file.relative_to(PACKAGE).with_suffix("").parts)
+    return _kept(f"{name}-{digest(file)}")
+
+
+def digest(file: Path) -> str:
+    """What a file and all whose kernels or constants it imports say, in 16 digits."""
+    return _digest({file: _text(file), **_closure(_text(file))})
+
+
+def _digest(texts: dict[Path, str]) -> str:
+    held = (f"{file.relative_to(PACKAGE).as_posix()}\0{texts[file]}" for file in sorted(texts))
+    return hashlib.sha256("\0".join(held).encode()).hexdigest()[:16]
+
+
+def _closure(text: str) -> dict[Path, str]:
+    """The files of the package that decide what is compiled of a text that imports them, and their texts."""
+    reached: dict[Path, str] = {}
+    waiting = list(_imported(text))
+    while waiting:
+        file = waiting.pop()
+        if file not in reached:
+            reached[file] = _text(file)
+            if HOLDS_KERNELS in reached[file]:
+                waiting += _imported(reached[file])
+    return reached
+
+
+def _imported(text: str) -> Iterator[Path]:
+    """The files whose kernels, constants or tuples a text imports: Python's own functions are not compiled into it."""
+    for module, listed in IMPORT.findall(text):
+        base = PACKAGE.joinpath(*module.split(".")[1:])
+        for name in re.findall(r"\w+", re.sub(r"#.*| as \w+", "", listed)):
+            file = base.with_suffix(".py") if base.with_suffix(".py").exists() else base / f"{name}.py"
+            if file.exists() and (name[0].isupper() or HOLDS_KERNELS in _text(file)):
+                yield file
+
+
+@cache
+def _text(file: Path) -> str:
+    return file.read_text("utf-8")
+
+
+def _kept(name: str) -> Path | None:
+    """The folder of this name at the first place that may be written, made with what is out of use there removed."""
+    root = _root()
+    if root is None:
+        return None
+    place = root / name
+    if not place.exists():
+        _prune(root)
+    place.mkdir(exist_ok=True)
+    os.utime(place)
+    return place
+
+
+def _prune(root: Path) -> None:
+    """Remove what nothing has loaded for long: kernels of earlier sources, and code of formulas tried once."""
+    for place in root.iterdir():
+        if place.stat().st_mtime < time.time() - UNUSED:
+            shutil.rmtree(place, ignore_errors=True)
+
+
+@cache
+def _root() -> Path | None:
     chosen = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []
     # Not the common temporary folder: what numba finds there it would run, whoever put it there.
-    for parent in (*chosen, Path(__file__).parent / "__pycache__", _own_cache()):
+    for parent in (*chosen, PACKAGE / "__pycache__", _own_cache()):
+        root = parent / "kernels"
         try:
-            (parent / name).mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=parent / name).close()
+            root.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=root).close()
         except OSError:
             continue
-        return parent / name
+        return root
     return None
-
-
-def digest(sources: Path) -> str:
-    """What the files that hold kernels say, in 16 digits."""
-    files = sorted(sources.rglob("*.py"))
-    texts = [(file.relative_to(sources).as_posix().encode(), file.read_bytes()) for file in files]
-    held = [name + text for name, text in texts if b"@compiled(" in text]
-    return hashlib.sha256(b"\0".join(held)).hexdigest()[:16]
 
 
 def _own_cache() -> Path:
