@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import atexit
 import hashlib
+import logging
 import os
 import re
 import shutil
@@ -27,6 +28,7 @@ from types import ModuleType
 from typing import Any
 
 from numba import cfunc, config, njit
+from numba.core import event
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
@@ -34,6 +36,44 @@ PACKAGE = Path(__file__).parent
 HOLDS_KERNELS = "@compiled("
 IMPORT = re.compile(r"^from (stickslip[\w.]*) import (\([^)]*\)|[^\n]+)", re.MULTILINE)
 UNUSED = 30 * 86400.0  # s after which what nothing has loaded is removed
+
+
+class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
+    """Says when numba begins to compile, which it does not for what it finds on disk, and counts for how long.
+
+    Attributes
+    ----------
+    seconds : float
+        That this process has spent compiling so far.
+    """
+
+    def __init__(self) -> None:
+        self.seconds, self._depth, self._began = 0.0, 0, 0.0
+        event.register("numba:compile", self)
+
+    def on_start(self, event: Any) -> None:
+        """A function, or one that it calls, is compiled."""
+        if not self._depth:
+            self._began = time.perf_counter()
+            if not self.seconds:
+                _say("compiling for this machine, once; what is compiled is kept")
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        """It is done."""
+        self._depth -= 1
+        if not self._depth:
+            self.seconds += time.perf_counter() - self._began
+
+
+def _say(words: str) -> None:
+    """To who sits before a prompt of Python; else to who listens to the log of the package."""
+    if hasattr(sys, "ps1"):
+        print(f"stickslip: {words}", file=sys.stderr)
+    logging.getLogger(__package__).info(words)
+
+
+compilation = Compilation()
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
