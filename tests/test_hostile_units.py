@@ -200,3 +200,34 @@ def test_long_titles_are_read_at_once(tmp_path: Path) -> None:
     told = [{"fs": 10, "data": [1, 2, 3], "name": title, "unit_str": ""} for title in LONG_TITLES]
     (tmp_path / "run.json").write_text(json.dumps(told))
     civil(program("check", "run.json", folder=tmp_path))
+
+
+@pytest.mark.parametrize("name", ["#1", "Zeit Kanal", "Zeit_Kanal"])
+def test_a_unit_is_stated_by_any_name_of_a_column(tmp_path: Path, name: str) -> None:
+    (tmp_path / "run.csv").write_text("Zeit Kanal,x\n0,1\n10,2\n20,1\n30,3\n")
+    record = ss.read_record(tmp_path / "run.csv", time="#1", units={name: "ms", "#2": "mm"})
+    assert record.fs == pytest.approx(100)
+    np.testing.assert_allclose(record["x"], [1e-3, 2e-3, 1e-3, 3e-3])
+
+
+def test_a_unit_is_stated_for_a_column_of_one_file(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t,x\n0,1\n10,2\n20,1\n30,3\n")
+    (tmp_path / "b.csv").write_text("t,z\n0,1\n0.01,2\n0.02,1\n0.03,3\n")
+    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    record = ss.read_record(paths, units={"a.csv:#1": "ms", "b.csv:z": "mm"})
+    assert record.fs == pytest.approx(100)
+    np.testing.assert_allclose(record["z"] * 1e3, record["x"])
+
+
+def test_a_unit_stated_for_a_channel_is_not_that_of_a_column_with_its_name(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("t,Group/y,Group/x\n0,1,1\n0.01,2,2\n0.02,1,1\n0.03,3,3\n")
+    record = ss.read_record(tmp_path / "run.csv", channels={"x": "`Group/y`", "q": "`Group/x`"}, units={"x": "mm"})
+    assert record.channels["q"].unit == "1"
+    np.testing.assert_allclose(record["q"], 1e3 * record["x"])
+
+
+@pytest.mark.parametrize("name", ["#4", "q"])
+def test_a_unit_of_nothing_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / "run.csv").write_text(f"t,x\n{ROWS}")
+    with pytest.raises(RecordError, match="there is no channel or column"):
+        ss.read_record(tmp_path / "run.csv", units={name: "mm"})
