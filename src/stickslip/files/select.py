@@ -12,8 +12,9 @@ from stickslip.errors import RecordError
 from stickslip.files.expression import Linear, Spec, apply_sensitivity, channel_unit, linear, split_spec, unknown
 from stickslip.files.table import Column, Table, unique
 from stickslip.files.titles import last_part
+from stickslip.printing import printable
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
-from stickslip.units import Unit, parse_unit
+from stickslip.units import LONGEST, Unit, parse_unit
 
 TIME_WORDS = (
     "t", "time", "timestamp", "timestamps", "elapsed", "timeelapsed", "elapsedtime", "xvalue", "zeit", "times",
@@ -33,7 +34,7 @@ class Source:
 
     def to_dict(self) -> dict[str, str | int]:
         """Plain data for the history: the name without its folder."""
-        return {"name": self.path.name, "sha256": self.sha256, "bytes": self.bytes, "format": self.format}
+        return {"name": printable(self.path.name), "sha256": self.sha256, "bytes": self.bytes, "format": self.format}
 
 
 Key = tuple[int, str]  # the file's number and the column's name
@@ -202,9 +203,10 @@ class Columns:
         try:
             return channel_unit(stated, name)
         except RecordError:
-            if name in VOCABULARY or stated not in {column.unit for column in self.columns.values()}:
+            own = " ".join(re.sub(r"[][,\"]", " ", printable(stated)).split())[:LONGEST]  # fit for a header: "q [own]"
+            if not own or name in VOCABULARY or stated not in {column.unit for column in self.columns.values()}:
                 raise
-            return Unit(stated, 1.0, stated)  # a unit of the instrument's own ("counts"): the numbers stay as written
+            return Unit(own, 1.0, own)  # a unit of the instrument's own ("counts"): the numbers stay as written
 
     def time(self, asked: str | None) -> dict[int, TimeColumn]:
         """The time column of each file that has one: the one asked for, or one recognised by its name."""
