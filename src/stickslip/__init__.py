@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         StickslipError as StickslipError,
     )
     from stickslip.estimate import Estimate as Estimate
+    from stickslip.printing import printable as printable
     from stickslip.analysis.fits import fit_records as fit_records
     from stickslip.analysis.experiment import ExperimentPlan as ExperimentPlan, plan_experiment as plan_experiment
     from stickslip.files.read import read_blocks as read_blocks, read_record as read_record
@@ -267,7 +268,7 @@ if TYPE_CHECKING:
 _ROOMS = {
     "StickslipError": "errors", "RecordError": "errors", "FormatError": "errors",
     "EstimateError": "errors", "ModelError": "errors", "SolveError": "errors",
-    "Estimate": "estimate",
+    "Estimate": "estimate", "printable": "printing",
     "Record": "record.record", "Channel": "record.channels", "Step": "record.record", "Fault": "record.check",
     "from_pandas": "record.exchange", "from_xarray": "record.exchange", "from_sep005": "record.exchange",
     "read_record": "files.read", "read_blocks": "files.read", "write_record": "files.write",

@@ -1,6 +1,20 @@
-"""``python -m stickslip``: the command line."""
+"""The program's door: ``stickslip`` and ``python -m stickslip``."""
 
-from stickslip.cli.program import main
+import sys
+
+from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
+
+
+def main() -> None:
+    """Run the command line; Ctrl-C ends it in one sentence, while it is still being loaded too."""
+    try:
+        from stickslip.cli.program import main as program
+
+        program(prog_name="stickslip")
+    except KeyboardInterrupt:
+        print(SENTENCE, file=sys.stderr)
+        sys.exit(INTERRUPTED)
+
 
 if __name__ == "__main__":
-    main(prog_name="stickslip")
+    main()

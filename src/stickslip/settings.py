@@ -14,6 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from stickslip.errors import ModelError, RecordError
 from stickslip.units import parse_value
 
+LONGEST = 200  # characters of a value in a message
 STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 Settings = TypeVar("Settings", bound=BaseModel)
 
@@ -101,7 +102,7 @@ def checked(
         kind = model.model_fields[path[0]].annotation if path[0] in model.model_fields else None
         if first["type"] == "missing" and len(inner) < len(path):
             raise ModelError(
-                f"{where} sets {key} = {_inside(values, inner)!r}",
+                f"{where} sets {key} = {_brief(_inside(values, inner))}",
                 f"{int(path[-1]) + 1} values are needed at least",
                 f"correct {key}",
             ) from error
@@ -110,7 +111,7 @@ def checked(
             step = f"add {path[0]} = {value if 'dict' in str(kind) else 'VALUE'}"
             raise ModelError(f"{where} has no {key}", f"{key} is needed", step) from error
         raise ModelError(
-            f"{where} sets {key} = {first['input']!r}",
+            f"{where} sets {key} = {_brief(first['input'])}",
             _said(first["msg"]),
             f"correct {key}",
         ) from error
@@ -130,6 +131,12 @@ def _inside(values: Mapping[str, Any], path: Sequence[str]) -> Any:
     for key in path:
         values = values.get(key) if isinstance(values, Mapping) else None  # type: ignore[assignment]
     return values
+
+
+def _brief(value: object) -> str:
+    """A value as it was written; the beginning of one that is longer than a sentence bears."""
+    text = repr(value)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
 def _said(message: str) -> str:

@@ -5,6 +5,7 @@ Common laboratory spellings are read from a table, everything else by pint (impo
 
 from __future__ import annotations
 
+import collections
 import functools
 import math
 import re
@@ -23,6 +24,14 @@ _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, 
 _PREFIXED = ("m", "m/s", "m/N", "N", "N m", "N s/m", "s", "Pa", "J", "V")
 _STIFF = 1e6  # N/m, from which a stiffness has a prefix
 _READABLE = ("N", "N m", "N s/m", "V")  # a few hundredths of these are read more easily than thousandths
+LONGEST = 40  # characters of a unit; "kg m^2/A/s^2.5" has 14
+LONGEST_VALUE = 100  # characters of a number with its unit
+_LETTER = "A-Za-zÀ-ÖØ-öø-ÿΑ-ω_°%‰ΩÅ"  # no digits but 0 to 9: pint reads a raised one as a power
+_POWER = r"-?(?:[1-9](?:\.5)?|0?\.5)|\([1-9]/2\)"
+_TERM = rf"[{_LETTER}][{_LETTER}0-9]*(?:\^(?:{_POWER}))?"
+_CHAIN = rf"{_TERM}(?:[ /]{_TERM})*"
+_UNIT = re.compile(rf"(1/)?({_CHAIN})(?:/\(({_CHAIN})\))?")  # of all that pint would evaluate, only this reaches it
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 
 
 @dataclass(frozen=True)
@@ -37,11 +46,24 @@ class Unit:
         Factor to SI.
     si : str
         Name of the SI unit, spelled in one way throughout ("m/s^2", "N s/m", "1").
+
+    Raises
+    ------
+    RecordError
+        The scale is 0 or not finite.
     """
 
     text: str
     scale: float
     si: str
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.scale) or self.scale == 0:
+            raise RecordError(
+                f"unit '{self.text}' is {self.scale:g} {self.si}",
+                "a unit is a finite part or multiple of its SI unit",
+                "correct the unit or the sensitivity",
+            )
 
 
 def _prefixed(base: str, si: str, scale: float, prefixes: str) -> dict[str, tuple[float, str]]:
@@ -50,7 +72,7 @@ def _prefixed(base: str, si: str, scale: float, prefixes: str) -> dict[str, tupl
 
 
 _TABLE: dict[str, tuple[float, str]] = {
-    "1": (1.0, "1"), "": (1.0, "1"), "-": (1.0, "1"), "%": (0.01, "1"), "FS": (1.0, "1"),
+    "1": (1.0, "1"), "": (1.0, "1"), "-": (1.0, "1"), "%": (0.01, "1"), "FS": (1.0, "1"), "dimensionless": (1.0, "1"),
     **_prefixed("m", "m", 1.0, "kcdmun"), "micron": (1e-6, "m"), "microns": (1e-6, "m"), "meter": (1.0, "m"),
     "in": (INCH, "m"), "inch": (INCH, "m"), "mil": (INCH / 1000, "m"), "ft": (12 * INCH, "m"),
     **_prefixed("m/s", "m/s", 1.0, "kcdmun"), "in/s": (INCH, "m/s"), "inch/s": (INCH, "m/s"), "km/h": (1 / 3.6, "m/s"),
@@ -84,10 +106,20 @@ _BY_QUANTITY = {
 }  # fmt: skip
 _TABLE["mg0"] = (GRAVITY / 1000, "m/s^2")
 _TABLE["rpm_turns"] = (1 / 60, "Hz")  # of a frequency, turns are counted; of a rate of rotation, radians
+_SIGNS = str.maketrans({"μ": "u", "µ": "u", "²": "^2", "³": "^3", "·": " "})
 
 
 def _normal(text: str) -> str:
-    text = text.strip().replace("μ", "u").replace("µ", "u").replace("²", "^2").replace("·", " ").replace("**", "^")
+    text = (
+        text.strip()
+        .replace("μ", "u")
+        .replace("µ", "u")
+        .replace("²", "^2")
+        .replace("³", "^3")
+        .replace("·", " ")
+        .replace("**", "^")
+    )
+    text = re.sub(r"\s+per\s+", "/", re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z]|$)", " ", text)).strip()  # N.m, in.
     text = re.sub(r"(?<=[A-Za-z])2\b", "^2", text)  # m/s2
     text = re.sub(r"\bsec(s|onds?)?\b", "s", text)
     text = re.sub(r"/\s*s\s*/\s*s\b", "/s^2", text)
@@ -113,19 +145,26 @@ def parse_unit(text: str, expect: str | None = None) -> Unit:
     Raises
     ------
     RecordError
-        The unit is unknown or measures something else than expected.
+        The unit is unknown, is no multiple of an SI unit (degC, dB), or measures something else than expected.
 
     Examples
     --------
     >>> parse_unit("mm").scale, parse_unit("g", expect="m/s^2").scale
     (0.001, 9.80665)
     """
-    name = _normal(text)
+    name = _normal(text) if len(text) <= LONGEST else text
     if expect is not None:
         name = _BY_QUANTITY.get((name, expect), name)
     if name not in _TABLE and re.fullmatch(r"[A-Z][a-z]{2,}", name):  # a word: Volts, Newtons
         name = name.lower()
-    scale, si = _TABLE[name] if name in _TABLE else _by_pint(name, text)
+    known = _TABLE.get(name) or _by_pint(name)
+    if known is None:
+        raise RecordError(
+            f"unit '{text if len(text) <= LONGEST else f'{text[:LONGEST]}...'}' is not known",
+            "a unit is written like mm, m/s^2, g, N, lbf or deg, and is a multiple of an SI unit",
+            "correct it in the file's header or in channels= or units=",
+        )
+    scale, si = known
     if expect is not None and si != expect:
         raise RecordError(
             f"unit '{text}' is measured in {si}",
@@ -159,13 +198,16 @@ def parse_value(text: str | float, expect: str) -> float:
     >>> parse_value("250 g", "kg"), parse_value("1.2 N/mm", "N/m"), parse_value(3, "kg"), parse_value("150 rpm", "Hz")
     (0.25, 1200.0, 3.0, 2.5)
     """
-    match = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", str(text))
-    if match is None or not math.isfinite(float(match[1])):
+    stated = str(text).strip()
+    match = re.fullmatch(rf"({_NUMBER})\s*(.*)", stated) if len(stated) <= LONGEST_VALUE else None
+    value = float(match[1]) * (parse_unit(match[2], expect).scale if match[2] else 1.0) if match else math.nan
+    if not math.isfinite(value):
         raise RecordError(
-            f"'{text}' is not a finite number", f"a number in {expect} is needed", f"write it like '2.5 {expect}'"
+            f"'{stated[:LONGEST_VALUE]}' is not a finite number",
+            f"a number in {expect} is needed",
+            f"write it like '2.5 {expect}'",
         )
-    value, unit = float(match[1]), match[2].strip()
-    return value * parse_unit(unit, expect).scale if unit else value
+    return value
 
 
 def parse_range(text: str, expect: str) -> tuple[float, float]:
@@ -207,28 +249,39 @@ def spelled(unit: str) -> str:
     return unit.replace("^2", "²").replace("^3", "³")
 
 
-@functools.cache
-def _by_pint(name: str, text: str) -> tuple[float, str]:
-    import tokenize
-
+@functools.lru_cache(maxsize=1024)  # a file of many strange units keeps no more of them
+def _by_pint(name: str) -> tuple[float, str] | None:
+    """Factor and SI unit of names with powers; None for anything else."""
     import pint
 
+    match = _UNIT.fullmatch(name) if len(name) <= LONGEST else None
+    if match is None:
+        return None
     registry = _registry()
     try:
-        quantity = registry.Quantity(1.0, name.replace(" ", "*")).to_base_units()
-    except (
-        pint.errors.PintError, tokenize.TokenError, SyntaxError,
-        AttributeError, TypeError, ValueError, AssertionError, KeyError,
-    ) as error:  # fmt: skip
-        raise RecordError(
-            f"unit '{text}' is not known",
-            "a unit is written like mm, m/s^2, g, N, lbf or deg",
-            "correct it in the file's header or in channels= or units=",
-        ) from error
+        units = registry.UnitsContainer(_powers(*match.groups()))
+        zero, one = (registry.Quantity(value, units).to_base_units() for value in (0.0, 1.0))
+    except (pint.errors.PintError, OverflowError):
+        return None
+    scale = float(one.magnitude)
+    if zero.magnitude != 0 or not math.isfinite(scale) or scale == 0:  # degC and dB have no factor
+        return None
     for si, dimension in _dimensions().items():
-        if dimension == quantity.dimensionality and si != "rad":
-            return float(quantity.magnitude), si
-    return float(quantity.magnitude), f"{quantity.units:~C}".replace("**", "^").replace("*", " ")
+        if dimension == one.dimensionality and si != "rad":
+            return scale, si
+    si = f"{one.units:~C}".replace("**", "^").replace("*", " ") or "1"
+    return (scale, si) if si == "1" or _UNIT.fullmatch(si) else None  # what is written is read again
+
+
+def _powers(reciprocal: str | None, chain: str, below: str | None) -> dict[str, float]:
+    """The power of each of pint's names in ``chain/(below)``, or in ``1/chain/(below)``."""
+    registry, powers = _registry(), collections.defaultdict[str, float](float)
+    for terms, sign in ((f"{'/' if reciprocal else ' '}{chain}", 1), (f" {below}" if below else "", -1)):
+        for joint, name, power in re.findall(rf"([ /])([^ /^]+)(?:\^({_POWER}))?", terms):
+            halves = re.fullmatch(r"\((\d)/2\)", power)
+            size = float(halves[1]) / 2 if halves else float(power or 1)
+            powers[registry.get_name(name)] += sign * size * (-1 if joint == "/" else 1)
+    return powers
 
 
 @functools.cache

@@ -10,6 +10,7 @@ import click
 import stickslip as ss
 from stickslip.cli.options import reading_options
 from stickslip.cli.records import collected, groups_of, read, rig_of
+from stickslip.cli.terminal import complain, say
 from stickslip.cli.words import spoken
 
 
@@ -23,14 +24,14 @@ def check(file: str, **options: Any) -> None:
     for group in groups_of(file):
         with collected(refused, group):
             record = read(group, rig)
-            click.echo(f"{record!r}")
+            say(f"{record!r}")
             for channel in record.channels.values():
                 if "no unit stated" in channel.source:
-                    click.echo(f"- {channel.name}: {channel.source}; say --units if it is another")
+                    say(f"- {channel.name}: {channel.source}; say --units if it is another")
             for words in [str(fault) for fault in record.check()] or ["nothing wrong was found"]:
-                click.echo(f"- {spoken(words)}")
+                say(f"- {spoken(words)}")
     for error in refused[:-1]:
-        click.echo(f"stickslip: {spoken(error)}", err=True)
+        complain(spoken(error))
     if refused:
         raise refused[-1]
 
@@ -49,7 +50,7 @@ def convert(file: str, out: Path, force: bool, **options: Any) -> None:
         raise click.BadParameter(f"'{out}' is the file to be read", param_hint="OUT")
     if out.exists() and not force:
         raise click.BadParameter(f"'{out}' is there already; --force writes over it", param_hint="OUT")
-    click.echo(ss.write_record(read(groups[0], rig_of(**options)), out, overwrite=force))
+    say(ss.write_record(read(groups[0], rig_of(**options)), out, overwrite=force))
 
 
 @click.command()
@@ -57,9 +58,9 @@ def convert(file: str, out: Path, force: bool, **options: Any) -> None:
 def datasets(name: str | None) -> None:
     """List the public record sets, or fetch the one named and tell its columns, units and rig."""
     if name is not None:
-        click.echo(ss.datasets.info(name), err=True)
+        say(ss.datasets.info(name), err=True)
         for path in ss.datasets.fetch(name).files:
-            click.echo(path)
+            say(path)
         return
     for each in ss.datasets.names():
-        click.echo(f"{ss.datasets.info(each)}\n")
+        say(f"{ss.datasets.info(each)}\n")

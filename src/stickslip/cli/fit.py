@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import default_folder, groups_of, name_of, read, rig_of
-from stickslip.cli.show import table
+from stickslip.cli.terminal import paragraph, print_table, say, say_json
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
@@ -112,23 +111,19 @@ def _show(
     result: LawComparison | CurveFit, records: list[Record], name: str, written: Path | None, *, as_json: bool
 ) -> None:
     if as_json:
-        click.echo(json.dumps(ss.fit_numbers(result), indent=2, ensure_ascii=False, allow_nan=False))
+        say_json(ss.fit_numbers(result))
         return
-    from rich.console import Console
-    from rich.markup import escape
-
     summary = ss.fit_summary(result, records=records, name=name)
-    console = Console(highlight=False, soft_wrap=False)
-    console.print(f"\n[bold]{escape(summary.title)}[/bold]")
+    paragraph((f"\n{summary.title}", "bold"))
     for sentence in (*summary.headline, *summary.cautions):
-        console.print(escape(spoken(sentence)))
+        paragraph(spoken(sentence))
     told = " ".join((*summary.headline, *summary.cautions))
     rows = [[line.name, line.value, line.interval, _brief(line.status, told)] for line in summary.lines]
-    console.print(table(("quantity", "value", "95 % interval", "how sure"), rows))
+    print_table(("quantity", "value", "95 % interval", "how sure"), rows)
     if summary.verdicts:
-        console.print(table(("law tried", "verdict"), summary.verdicts))
+        print_table(("law tried", "verdict"), summary.verdicts)
     if written is not None:
-        click.echo(f"Report: {written / 'report.html'}")
+        say(f"Report: {written / 'report.html'}")
 
 
 def _brief(status: str, told: str) -> str:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import click
 
+from stickslip.cli.terminal import say
+
 PORT = 8723
 
 
@@ -33,7 +35,7 @@ def lab(port: int, no_browser: bool) -> None:
         address = f"http://127.0.0.1:{door.getsockname()[1]}/?token={token}"
 
         def opened(folder: Path) -> None:
-            click.echo(f"The lab is open at {address}\nCtrl-C ends it.")
+            say(f"The lab is open at {address}\nCtrl-C ends it.")
             if not no_browser:
                 webbrowser.open(doorway(folder, address).as_uri())
 

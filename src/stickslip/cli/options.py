@@ -28,7 +28,7 @@ def reading_options(command: Callable[..., None]) -> Callable[..., None]:
             "--units",
             multiple=True,
             metavar='"COLUMN=UNIT"',
-            help="Unit of a column whose header states none. Repeatable.",
+            help='Unit of a column whose header states none: "x=mm", "#1=ms". Repeatable.',
         ),
         click.option("--fs", metavar="HZ", help="Sampling rate, for a file that states none."),
         click.option("--time", metavar="COLUMN", help="Column that holds the time, where its header does not say."),

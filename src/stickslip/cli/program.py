@@ -11,11 +11,13 @@ from stickslip.cli.analyze import analyze, demo
 from stickslip.cli.decay import decay
 from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
+from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
 from stickslip.cli.lab import lab
 from stickslip.cli.rig import rig
-from stickslip.cli.simulate import INTERRUPTED, simulate
+from stickslip.cli.simulate import simulate
 from stickslip.cli.squeak import squeak
 from stickslip.cli.sweep import sweep
+from stickslip.cli.terminal import complain, say
 from stickslip.cli.thesis import thesis
 from stickslip.cli.wavelet import wavelet
 from stickslip.cli.words import spoken
@@ -24,18 +26,31 @@ from stickslip.cli.words import spoken
 class _Commands(click.Group):
     """Every error that stickslip raises on purpose ends as one sentence and its exit code."""
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """What is asked wrongly before any command is refused as within one."""
+        if not args:
+            return super().parse_args(ctx, args)  # shows the help
+        try:
+            return super().parse_args(ctx, args)
+        except click.UsageError as error:
+            ctx.exit(_misused(error, ctx.command_path))
+
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            click.echo("stickslip: interrupted; nothing was written.", err=True)
+            say(SENTENCE, err=True)
             ctx.exit(INTERRUPTED)
         except click.UsageError as error:
-            click.echo(f"stickslip: {error.format_message().rstrip('.')}; see {ctx.command_path} --help.", err=True)
-            ctx.exit(error.exit_code)
+            ctx.exit(_misused(error, ctx.command_path))
         except ss.StickslipError as error:
-            click.echo(f"stickslip: {spoken(error)}", err=True)
+            complain(spoken(error))
             ctx.exit(error.exit_code)
+
+
+def _misused(error: click.UsageError, command: str) -> int:
+    complain(f"{error.format_message().rstrip('.')}; see {command} --help.")
+    return error.exit_code
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})

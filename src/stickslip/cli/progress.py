@@ -7,6 +7,8 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 
+import stickslip as ss
+
 PATIENCE = 2.0  # seconds of silence before a progress bar is shown
 
 
@@ -19,9 +21,8 @@ def progress(steps: int) -> Iterator[Callable[[str, float], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    columns = (
-        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
-    )  # fmt: skip
+    words = TextColumn("{task.description}", markup=False)  # a file may be called "[/x].csv"
+    columns = (SpinnerColumn(), words, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     bar = Progress(*columns, console=Console(stderr=True), transient=True)
     task = bar.add_task("", total=steps)
     patience = threading.Timer(PATIENCE, bar.start)
@@ -30,7 +31,7 @@ def progress(steps: int) -> Iterator[Callable[[str, float], None]]:
     if PATIENCE <= 0:
         patience.join()
     try:
-        yield lambda words, done: bar.update(task, completed=done, description=words, refresh=True)
+        yield lambda words, done: bar.update(task, completed=done, description=ss.printable(words), refresh=True)
     finally:
         patience.cancel()
         bar.stop()

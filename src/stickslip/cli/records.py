@@ -17,6 +17,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import pair
+from stickslip.cli.terminal import complain
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
@@ -125,7 +126,12 @@ def names_of(groups: Sequence[Sequence[Path]]) -> list[list[str]]:
 
 
 def default_folder(groups: Sequence[Sequence[Path]]) -> Path:
-    return Path(f"{groups[0][0].stem}-stickslip") if len(groups) == 1 else Path("comparison-stickslip")
+    return folder_after(groups[0][0], "stickslip") if len(groups) == 1 else Path("comparison-stickslip")
+
+
+def folder_after(file: Path, ending: str) -> Path:
+    """A folder's name after a file's, without the signs in it that can not be seen."""
+    return Path("".join(sign if sign.isprintable() else "-" for sign in f"{file.stem}-{ending}"))
 
 
 def read(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = ()) -> Record:
@@ -161,11 +167,12 @@ def _told(rig: RigSettings) -> dict[str, Any]:
 
 def _with_source(record: Record, files: Sequence[Path], names: Sequence[str]) -> Record:
     """The record with its files in the history, called as told; one that write_record kept comes back without."""
-    called = dict(zip((path.name for path in files), names or (path.name for path in files), strict=True))
+    own = [ss.printable(path.name) for path in files]
+    called = dict(zip(own, map(ss.printable, names) if names else own, strict=True))
     known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
     if called.keys() <= known:
         return dataclasses.replace(record, history=tuple(_called(step, called) for step in record.history))
-    sources = [{"name": called[path.name], "sha256": _checksum(path)} for path in files]
+    sources = [{"name": name, "sha256": _checksum(path)} for name, path in zip(called.values(), files, strict=True)]
     step = ss.Step("read_record", {"files": sources}, "a record as it was written")
     return dataclasses.replace(record, history=(*record.history, step))
 
@@ -246,4 +253,4 @@ def with_left_out(results: Result, refused: Sequence[ss.StickslipError]) -> Resu
 
 def name_left_out(refused: Iterable[ss.StickslipError]) -> None:
     for error in refused:
-        click.echo(f"stickslip: left out: {spoken(error)}", err=True)
+        complain(f"left out: {spoken(error)}")

@@ -12,7 +12,8 @@ import stickslip as ss
 from stickslip.cli.cases import case_options, folder_name, wanted_case
 from stickslip.cli.options import pair, result_options
 from stickslip.cli.progress import progress
-from stickslip.cli.show import print_json, table
+from stickslip.cli.show import print_json
+from stickslip.cli.terminal import print_table, say
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def rig(case: str, output: Path | None, as_json: bool, plan: bool, **options: An
     else:
         _show_record(results)
     if written is not None:
-        click.echo(f"Results: {written}")
+        say(f"Results: {written}")
 
 
 def _bench(preset: str, changes: tuple[str, ...]) -> Rig:
@@ -148,27 +149,23 @@ def _told(results: Record | ExperimentPlan) -> dict[str, Any]:
 
 
 def _show_record(record: Record) -> None:
-    from rich.console import Console
-
-    click.echo(repr(record))
+    say(repr(record))
     rows = [(name, f"{value:.6g}") for name, value in record.truth.items() if name != "events"]
-    Console(highlight=False).print(table(("what is true", "SI"), rows))
+    print_table(("what is true", "SI"), rows)
     for fault in record.check():
-        click.echo(f"- {spoken(fault)}")
+        say(f"- {spoken(fault)}")
 
 
 def _show_plan(plan: ExperimentPlan, needs: Sequence[tuple[str, str]]) -> None:
-    from rich.console import Console
-
     rows = [
         [f"{setup.fs:g}", ", ".join(setup.sensors), *(str(setup.accuracy[each]) for each in plan.questions)]
         for setup in plan.setups
     ]
-    Console(highlight=False).print(table(("fs [Hz]", "sensors", *plan.questions), rows))
-    click.echo(f"Root-mean-square errors of {plan.draws} record{'s' * (plan.draws > 1)} at each rate.")
+    print_table(("fs [Hz]", "sensors", *plan.questions), rows)
+    say(f"Root-mean-square errors of {plan.draws} record{'s' * (plan.draws > 1)} at each rate.")
     for reason in plan.refusals:
-        click.echo(f"- {spoken(reason)}")
+        say(f"- {spoken(reason)}")
     for question, error in needs:
         setup = plan.enough(question, error)
         found = f"{', '.join(setup.sensors)} at {setup.fs:g} Hz" if setup else "none of these"
-        click.echo(f"{question} within {error}: {found}")
+        say(f"{question} within {error}: {found}")

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import itertools
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 import stickslip as ss
+from stickslip.cli.terminal import paragraph, print_table, say, say_json
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
@@ -33,13 +31,11 @@ if TYPE_CHECKING:
 
 
 SHOWN_EVENTS = 12
-WHOLE = 28  # letters of a name that is not broken
 
 
 def print_json(told: Mapping[str, Any]) -> None:
     """Results for a machine, which begin as results.json does: with what made them."""
-    made = {"program": "stickslip", "version": ss.__version__, **told}
-    click.echo(json.dumps(made, indent=2, ensure_ascii=False, allow_nan=False))
+    say_json({"program": "stickslip", "version": ss.__version__, **told})
 
 
 def show(
@@ -51,34 +47,27 @@ def show(
     if as_json:
         print_json(results.to_dict())
         return
-    from rich.console import Console
-
-    console = Console(highlight=False, soft_wrap=False)
     parts = getattr(results, "findings", ())
     if isinstance(results, ss.SqueakComparison):  # a line each: the page has the rest
-        _print_lines(console, parts)
+        _print_lines(parts)
         parts = ()
     for part in (*parts, results):
-        _print_table(console, part)
+        _print_table(part)
     if written is not None:
-        click.echo(f"Report: {written / 'report.html'}")
+        say(f"Report: {written / 'report.html'}")
 
 
-def _print_lines(console: Any, parts: Sequence[Asked]) -> None:
-    from rich.markup import escape
-
+def _print_lines(parts: Sequence[Asked]) -> None:
     for part in parts:
         told = ss.summary(part)
-        console.print(f"[bold]{escape(told.title)}[/bold]: {escape(spoken(told.headline[0]))}")
+        paragraph((told.title, "bold"), f": {spoken(told.headline[0])}")
 
 
-def _print_table(console: Any, results: Asked) -> None:
-    from rich.markup import escape
-
+def _print_table(results: Asked) -> None:
     summary = ss.summary(results)
-    console.print(f"\n[bold]{escape(summary.title)}[/bold]")
+    paragraph((f"\n{summary.title}", "bold"))
     for sentence in (*summary.headline, *summary.cautions, *(f"- {fault}" for fault in summary.faults or ())):
-        console.print(escape(spoken(sentence)))
+        paragraph(spoken(sentence))
     truth = summary.has_truth
     headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")
     rows = [
@@ -86,34 +75,30 @@ def _print_table(console: Any, results: Asked) -> None:
         for line in summary.lines
     ]
     if rows:
-        console.print(table(headings, rows))
+        print_table(headings, rows)
     for each in summary.tables:
-        console.print(f"\n{escape(each.title)}")
-        console.print(table(each.headings, each.rows))
+        paragraph(f"\n{each.title}")
+        print_table(each.headings, each.rows)
         if each.note:
-            console.print(f"[dim]{escape(each.note)}[/dim]")
+            paragraph((each.note, "dim"))
     if summary.verdicts:
-        console.print(table(("motion tried", "verdict"), summary.verdicts))
+        print_table(("motion tried", "verdict"), summary.verdicts)
     for note in summary.notes:
-        console.print(f"[dim]Note: {escape(spoken(note))}[/dim]")
+        paragraph((f"Note: {spoken(note)}", "dim"))
 
 
 def show_run(result: Outcome, written: Path | None, *, as_json: bool) -> None:
     if as_json:
         print_json(result.to_dict())
         return
-    from rich.console import Console
-    from rich.markup import escape
-
-    console = Console(highlight=False, soft_wrap=False)
-    console.print(f"\n[bold]{escape(result.case.name)}[/bold]  {escape(result.case.about)}")
+    paragraph((f"\n{result.case.name}", "bold"), f"  {result.case.about}")
     for sentence in result.sentences:
-        console.print(escape(sentence))
-    console.print(table(("quantity", "value"), result.rows))
+        paragraph(sentence)
+    print_table(("quantity", "value"), result.rows)
     if result.known:
         answers = [(name, str(pair["known"]), str(pair["found"])) for name, pair in result.known.items()]
-        console.print("\nKnown of this scenario, and what the engine finds:")
-        console.print(table(("answer", "known", "found"), answers))
+        paragraph("\nKnown of this scenario, and what the engine finds:")
+        print_table(("answer", "known", "found"), answers)
     count, events = result.run.event_counts().total(), list(itertools.islice(result.run.each_event(), SHOWN_EVENTS))
     if events:
         several = any(event.contact for event in events)
@@ -122,23 +107,9 @@ def show_run(result: Outcome, written: Path | None, *, as_json: bool) -> None:
             for event in events
         ]
         headings = ("time [s]", "event", *(["contact"] if several else []), "mode that begins")
-        console.print("")
-        console.print(table(headings, rows))
+        say()
+        print_table(headings, rows)
         if count > len(rows):
-            click.echo(f"... and {count - len(rows)} more{', in events.csv' if written is not None else ''}")
+            say(f"... and {count - len(rows)} more{', in events.csv' if written is not None else ''}")
     if written is not None:
-        click.echo(f"Results: {written}")
-
-
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Any:
-    from rich.markup import escape
-    from rich.table import Table
-
-    rows = list(rows)
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for place, heading in enumerate(headings):
-        whole = place == 0 and max((len(row[0]) for row in rows), default=0) <= WHOLE
-        table.add_column(escape(heading), overflow="fold", no_wrap=whole)
-    for row in rows:
-        table.add_row(*(escape(cell) for cell in row))
-    return table
+        say(f"Results: {written}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,12 @@ import click
 
 import stickslip as ss
 from stickslip.cli.cases import case_options, folder_name, wanted_case
+from stickslip.cli.interrupted import INTERRUPTED
 from stickslip.cli.options import result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.show import show_run
+from stickslip.cli.terminal import say, say_json
 
-INTERRUPTED = 130
 LIST_WIDTH = 100
 
 
@@ -69,19 +69,19 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
 def _list_scenarios(*, as_json: bool) -> None:
     found = {name: ss.scenarios.get(name) for name in ss.scenarios.names()}
     if as_json:
-        click.echo(json.dumps({name: each.about for name, each in found.items()}, indent=2, ensure_ascii=False))
+        say_json({name: each.about for name, each in found.items()})
         return
     cases = [(ss.scenario_case(name), ", ".join(each.known).replace("_", " ")) for name, each in found.items()]
     for (about, parts, known), group in itertools.groupby(
         cases, key=lambda each: (each[0].about, each[0].parts, each[1])
     ):
-        click.echo(f"\n{about}\n  {parts}; known: {known}")
+        say(f"\n{about}\n  {parts}; known: {known}")
         line = ""
         for case, _ in group:
             name = f'  "{case.name}"'
             if len(line) + len(name) > LIST_WIDTH:
-                click.echo(line)
+                say(line)
                 line = ""
             line += name
-        click.echo(line)
-    click.echo(f'\n{len(found)} scenarios; run one with: stickslip simulate "NAME"')
+        say(line)
+    say(f'\n{len(found)} scenarios; run one with: stickslip simulate "NAME"')

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
 import stickslip as ss
-from stickslip.cli.show import table
-from stickslip.cli.simulate import INTERRUPTED
+from stickslip.cli.interrupted import INTERRUPTED
+from stickslip.cli.terminal import paragraph, print_table, say, say_json
 
 
 @click.command()
@@ -38,18 +37,15 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
         ss.publish_map(found, folder=output, system=asked.case.system)
     told, whole = ss.map_numbers(found), found.attrs["status"] == "complete"
     if as_json:
-        click.echo(json.dumps({**told, "store": str(place)}, indent=2, allow_nan=False))
+        say_json({**told, "store": str(place)})
         raise SystemExit(0 if whole else INTERRUPTED)
-    from rich.console import Console
-
-    console = Console(highlight=False, soft_wrap=False)
-    console.print(f"\n[bold]{' x '.join(map(str, found.sizes.values()))} points, {found.attrs['status']}[/bold]")
+    paragraph((f"\n{' x '.join(map(str, found.sizes.values()))} points, {found.attrs['status']}", "bold"))
     rows = [[name, *(f"{part[key]:.6g}" if part[key] is not None else "-" for key in ("least", "most")),
              str(part["known"]), part["unit"]] for name, part in told["variables"].items()]  # fmt: skip
-    console.print(table(("measure", "least", "most", "points", "unit"), rows))
-    click.echo(f"Map: {place}")
+    print_table(("measure", "least", "most", "points", "unit"), rows)
+    say(f"Map: {place}")
     if output is not None:
-        click.echo(f"Report: {output / 'report.html'}")
+        say(f"Report: {output / 'report.html'}")
     if not whole:
-        click.echo("Call again to go on.")
+        say("Call again to go on.")
         raise SystemExit(INTERRUPTED)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import itertools
-import json
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -15,7 +14,7 @@ import click
 import stickslip as ss
 from stickslip.cli.options import result_options
 from stickslip.cli.progress import progress
-from stickslip.cli.show import table
+from stickslip.cli.terminal import paragraph, print_table, say, say_json
 
 CHECKOUT = Path(ss.__file__).parents[2]
 _ROW = ("place", "quantity", "verdict", "why")
@@ -52,7 +51,7 @@ def thesis(chapters: tuple[str, ...], source: Path | None, output: Path | None, 
         done = pages.reproduce(wanted, folder=folder, tell=tell)
     found = pages.results(done)
     if as_json:
-        click.echo(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False))
+        say_json(found)
     else:
         _show(found, done, folder)
     if found["verdicts"][pages.CHANGED]:
@@ -72,10 +71,6 @@ def _pages(source: Path) -> ModuleType:
 
 
 def _show(found: dict[str, Any], done: tuple[Any, ...], folder: Path | None) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-
-    console = Console(highlight=False, soft_wrap=False)
     rows = []
     others = (entry for entry in found["numbers"] if entry["verdict"] != "same")
     for key, group in itertools.groupby(others, key=lambda entry: [entry[name] for name in _ROW]):
@@ -88,10 +83,10 @@ def _show(found: dict[str, Any], done: tuple[Any, ...], folder: Path | None) -> 
             [f"{key[0]}: {key[1]}{label}", entries[0]["printed"], "-" if ours is None else f"{ours:.4g}", *key[2:]]
         )
     if rows:
-        console.print(table(("number", "printed", "ours", "verdict", "why"), rows))
+        print_table(("number", "printed", "ours", "verdict", "why"), rows)
     counts = [[chapter.name, *(str(chapter.counts[verdict]) for verdict in found["verdicts"])] for chapter in done]
-    console.print(table(("chapter", *found["verdicts"]), counts))
+    print_table(("chapter", *found["verdicts"]), counts)
     total = ", ".join(f"{count} {verdict}" for verdict, count in found["verdicts"].items() if count)
-    console.print(escape(f"{len(found['numbers'])} printed numbers: {total}."))
+    paragraph(f"{len(found['numbers'])} printed numbers: {total}.")
     if folder is not None:
-        click.echo(f"Report: {folder / 'thesis.html'}")
+        say(f"Report: {folder / 'thesis.html'}")

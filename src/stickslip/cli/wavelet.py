@@ -11,7 +11,7 @@ import click
 import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
-from stickslip.cli.records import groups_of, name_of, read_parts, rig_of
+from stickslip.cli.records import folder_after, groups_of, name_of, read_parts, rig_of
 from stickslip.cli.show import show
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | No
         raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is mapped at a time", param_hint="FILE")
     asked = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation", "mass", "stiffness")}
     rig = rig_of(**options)
-    folder = output or (None if as_json else Path(f"{groups[0][0].stem}-wavelet"))
+    folder = output or (None if as_json else folder_after(groups[0][0], "wavelet"))
     with progress(3) as tell:
         tell(f"reading {name_of(groups[0])}", 0)
         parts = _told_of(read_parts(groups[0], rig), tell)

@@ -27,7 +27,7 @@ def read(path: Path, options: Options) -> Table:
     """One column a channel: "sound" where there is one, else "ch1", "ch2" ..., in units of full scale."""
     soundfile = optional("soundfile")
     notes = [UNCALIBRATED, *_check_container(path)]
-    with reading(path, NAME), soundfile.SoundFile(str(path)) as file:
+    with reading(path, NAME), path.open("rb") as handle, soundfile.SoundFile(handle) as file:
         frames, rate, count = int(file.frames), float(file.samplerate), int(file.channels)
     if not (0 < frames < 2**62 and rate > 0):
         raise FormatError(
@@ -39,7 +39,7 @@ def read(path: Path, options: Options) -> Table:
 
     def blocks(wanted: Sequence[str], size: int) -> Iterator[Block]:
         rows = 0
-        with reading(path, NAME), soundfile.SoundFile(str(path)) as file:
+        with reading(path, NAME), path.open("rb") as handle, soundfile.SoundFile(handle) as file:
             for samples in file.blocks(blocksize=size, dtype="float64", always_2d=True):
                 rows += len(samples)
                 yield {name: np.ascontiguousarray(samples[:, names.index(name)]) for name in wanted}

@@ -154,7 +154,7 @@ def apply_sensitivity(text: str, measured: Unit, channel: str) -> Unit:
     # A symbol of two meanings ("g", "lb") belongs to the channel, whichever side it stands on.
     if _measures(upper, measured):
         output = channel_unit(lower, channel)
-        factor = output.scale / (value * parse_unit(upper).scale)
+        factor = output.scale / parse_unit(upper).scale / value  # inf where the product would be zero
     elif _measures(lower, measured):
         output = channel_unit(upper, channel)
         factor = value * output.scale / parse_unit(lower).scale

@@ -14,7 +14,7 @@ from stickslip.errors import FormatError
 from stickslip.files import hdf5
 from stickslip.files.matlab_elements import check_version_5
 from stickslip.files.table import Array, Column, Options, Table, optional, reading, slices
-from stickslip.files.titles import SLASH
+from stickslip.files.titles import path_parts
 
 NAME = "MATLAB"
 SUFFIXES = (".mat",)
@@ -167,7 +167,7 @@ def _read_v73(path: Path) -> Table:
         for place, dataset in hdf5.datasets(file, links):
             if place.startswith("#"):  # MATLAB's own store of what cells and objects refer to
                 continue
-            name = SLASH.sub(".", place)
+            name = ".".join(path_parts(place))
             reason = _refusal_v73(dataset)
             if reason is not None:
                 left_out.append(f"{name} ({reason})")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,11 @@ def recognise(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: Options) -> Table:
     """The numeric columns, and dates as seconds since the first."""
-    parquet = optional("pyarrow.parquet")
     types = optional("pyarrow.types")
     columns: list[Column] = []
     left_out: list[str] = []
     record: Mapping[str, Any] = {}
-    with reading(path, NAME), parquet.ParquetFile(path) as file:
+    with _opened(path) as file:
         rows, schema = int(file.metadata.num_rows), file.schema_arrow
         if (schema.metadata or {}).get(KEY.encode()):
             record = parse_metadata(schema.metadata[KEY.encode()])
@@ -51,7 +51,7 @@ def read(path: Path, options: Options) -> Table:
     def blocks(wanted: Sequence[str], size: int) -> Iterator[Block]:
         origins: dict[str, Any] = {}
         count = 0
-        with reading(path, NAME), parquet.ParquetFile(path, pre_buffer=False) as file:
+        with _opened(path) as file:
             for batch in file.iter_batches(batch_size=size, columns=list(wanted), use_threads=False):
                 count += len(batch)
                 yield {name: _numbers(batch.column(name), name, origins) for name in wanted}
@@ -64,6 +64,14 @@ def read(path: Path, options: Options) -> Table:
 
     notes = (f"not numbers, left out: {', '.join(left_out)}",) if left_out else ()
     return Table(tuple(columns), blocks, notes=notes, record=record)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    parquet = optional("pyarrow.parquet")
+    # pyarrow takes no path that is not UTF-8
+    with reading(path, NAME), path.open("rb") as handle, parquet.ParquetFile(handle, pre_buffer=False) as file:
+        yield file
 
 
 def _numbers(values: Any, name: str, origins: dict[str, Any]) -> Array:

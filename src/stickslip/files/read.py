@@ -52,8 +52,8 @@ def read_record(
     fs : float, optional
         Sampling rate [Hz]; overrides the file's time column.
     units : mapping of str to str, optional
-        Units of channels or columns for which neither the file nor `channels` states one. SI is assumed, and
-        said in the channel's source, where nobody states a unit.
+        Units of channels, or of columns by any of their names (``"#1"``), for which neither the file nor `channels`
+        states one. SI is assumed, and said in the channel's source, where nobody states a unit.
     time : str, optional
         The time column, with its unit where it is not s: ``"#1 [ms]"``. Otherwise recognised by name.
     rows : (int or None, int or None), optional
@@ -160,17 +160,17 @@ def _open(
     if fs is not None and not (np.isfinite(fs) and fs > 0):
         raise RecordError(f"fs = {fs} Hz", "a sampling rate is positive and finite", "pass fs= in Hz")
     sources = tuple(_source(one, options) for one in paths)
-    columns = Columns(sources)
-    times = columns.time(time, units or {}) if fs is None or time is not None else {}
+    columns = Columns(sources, units, channels or ())
+    times = columns.time(time) if fs is None or time is not None else {}
     notes = [note for source in sources for note in source.table.notes]
     if channels is not None:
-        wanted = columns.asked(channels, units or {})
+        wanted = columns.asked(channels)
         _require_equal_length(columns, wanted, times if fs is None else {})
     else:
-        wanted, more = columns.every(units or {}, times)
+        wanted, more = columns.every(times)
         notes += more
     notes += columns.notes
-    columns.check_units(units or {}, [one.channel.name for one in wanted])
+    columns.check_units([one.channel.name for one in wanted])
     if not wanted:
         raise RecordError(
             f"{', '.join(one.name for one in paths)} has no column beside time",

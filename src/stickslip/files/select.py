@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,8 +12,9 @@ from stickslip.errors import RecordError
 from stickslip.files.expression import Linear, Spec, apply_sensitivity, channel_unit, linear, split_spec, unknown
 from stickslip.files.table import Column, Table, unique
 from stickslip.files.titles import last_part
+from stickslip.printing import printable
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
-from stickslip.units import Unit, parse_unit
+from stickslip.units import LONGEST, Unit, parse_unit
 
 TIME_WORDS = (
     "t", "time", "timestamp", "timestamps", "elapsed", "timeelapsed", "elapsedtime", "xvalue", "zeit", "times",
@@ -33,7 +34,7 @@ class Source:
 
     def to_dict(self) -> dict[str, str | int]:
         """Plain data for the history: the name without its folder."""
-        return {"name": self.path.name, "sha256": self.sha256, "bytes": self.bytes, "format": self.format}
+        return {"name": printable(self.path.name), "sha256": self.sha256, "bytes": self.bytes, "format": self.format}
 
 
 Key = tuple[int, str]  # the file's number and the column's name
@@ -59,10 +60,15 @@ class TimeColumn:
 
 
 class Columns:
-    """The columns of all files under every name that they may be called by."""
+    """The columns of all files under every name that they may be called by, with the units stated for them.
 
-    def __init__(self, sources: Sequence[Source]) -> None:
-        self.sources = sources
+    `units` are by channel, or by any name of a column; what names one of the `channels` asked for means the channel.
+    """
+
+    def __init__(
+        self, sources: Sequence[Source], units: Mapping[str, str] | None = None, channels: Iterable[str] = ()
+    ) -> None:
+        self.sources, self.units = sources, units or {}
         self.columns: dict[Key, Column] = {
             (number, column.name): column for number, source in enumerate(sources) for column in source.table.columns
         }
@@ -80,6 +86,7 @@ class Columns:
         self._admit([(last_part(name), key) for name, key in exact])
         self._admit([(f"{name} [{self.columns[key].unit}]", key) for name, key in exact])
         self._admit([(_word_of(last_part(name)), key) for name, key in exact])  # as a check-up shows it
+        self._stated = {key: unit for name, unit in self.units.items() for key in self._called(name, set(channels))}
         self.constants = {name: value for source in sources for name, value in source.table.constants.items()}
 
     def _admit(self, pairs: Iterable[tuple[str, Key]]) -> None:
@@ -88,6 +95,15 @@ class Columns:
         for name, key in pairs:
             if counts[name] == 1:
                 self._by_name.setdefault(name, key)
+
+    def _called(self, name: str, channels: Container[str]) -> list[Key]:
+        """The columns titled like that, or the one that may be called so."""
+        titled, one = [key for key in self.columns if key[1] == name], self.find(name)
+        return titled or ([one] if one is not None and name not in channels else [])
+
+    def unit_of(self, key: Key) -> str | None:
+        """The unit that is stated for a column, or else in its file."""
+        return self._stated.get(key, self.columns[key].unit)
 
     def find(self, name: str) -> Key | None:
         """The column called by that name, where there is exactly one."""
@@ -104,30 +120,30 @@ class Columns:
             scales[key] = scales.get(key, 0.0) + scale
         return scales, found
 
-    def asked(self, channels: Mapping[str, str], units: Mapping[str, str]) -> list[Wanted]:
+    def asked(self, channels: Mapping[str, str]) -> list[Wanted]:
         """The channels of a channel map."""
         wanted = []
         for name, text in channels.items():
             spec = split_spec(str(text))
             scales, found = self.combination(spec.arithmetic)
             plain = next(iter(scales)) if found.plain() else None
-            stated = spec.unit if spec.unit is not None else units.get(name)
+            stated = spec.unit if spec.unit is not None else self.units.get(name)
             if stated is None and plain:
-                stated = units.get(plain[1], self.columns[plain].unit)
+                stated = self.unit_of(plain)
             wanted.append(Wanted(*self._channel(checked_name(name), spec, stated), scales, found.offset))
         return wanted
 
-    def every(self, units: Mapping[str, str], times: Mapping[int, TimeColumn]) -> tuple[list[Wanted], list[str]]:
+    def every(self, times: Mapping[int, TimeColumn]) -> tuple[list[Wanted], list[str]]:
         """All columns that share one clock, named by the vocabulary where they match it; and notes on the others."""
         taken = {time.key for time in times.values()}
         keys = [key for key, column in self.columns.items() if key not in taken and not is_time(column)]
         kept = self._on_one_clock(keys, times)
         notes = [f"left out {self.columns[key].name} (another length or rate)" for key in keys if key not in kept]
-        titles = unique([self._title(self.columns[key], units) for key in kept])
+        titles = unique([self._title(key) for key in kept])
         wanted = []
         for name, key in zip(titles, kept, strict=True):
             column = self.columns[key]
-            stated = units.get(name, units.get(column.name, column.unit))
+            stated = self.units.get(name, self.unit_of(key))
             wanted.append(
                 Wanted(*self._channel(name, Spec(column.name, column.name, None, ""), stated), {key: 1.0}, 0.0)
             )
@@ -147,10 +163,9 @@ class Columns:
                 kept += [k for k in mine if (self.columns[k].rows, self.columns[k].fs, self.columns[k].start) == chosen]
         return kept
 
-    def _title(self, column: Column, units: Mapping[str, str]) -> str:
+    def _title(self, key: Key) -> str:
         """A channel name for a column: a word of the vocabulary where name and unit fit one."""
-        last = last_part(column.name)
-        unit = units.get(column.name, column.unit)
+        last, unit = last_part(key[1]), self.unit_of(key)
         word = last.lower() if len(last) > 1 and unit else last  # "Friction" without unit may be a coefficient
         if word in VOCABULARY:
             try:
@@ -188,33 +203,33 @@ class Columns:
         try:
             return channel_unit(stated, name)
         except RecordError:
-            if name in VOCABULARY or stated not in {column.unit for column in self.columns.values()}:
+            own = " ".join(re.sub(r"[][,\"]", " ", printable(stated)).split())[:LONGEST]  # fit for a header: "q [own]"
+            if not own or name in VOCABULARY or stated not in {column.unit for column in self.columns.values()}:
                 raise
-            return Unit(stated, 1.0, stated)  # a unit of the instrument's own ("counts"): the numbers stay as written
+            return Unit(own, 1.0, own)  # a unit of the instrument's own ("counts"): the numbers stay as written
 
-    def time(self, asked: str | None, units: Mapping[str, str]) -> dict[int, TimeColumn]:
+    def time(self, asked: str | None) -> dict[int, TimeColumn]:
         """The time column of each file that has one: the one asked for, or one recognised by its name."""
         times = {}
         for number, source in enumerate(self.sources):
             if asked is not None:
-                found = self._asked_time(number, asked, units)
+                found = self._asked_time(number, asked)
             else:
                 named = [column for column in source.table.columns if is_time(column)]
                 best = min(named, key=_time_rank, default=None)
-                unit = units.get(best.name, best.unit or "s") if best else "s"
-                found = self._time_column(number, best, named, unit) if best else None
+                found = self._time_column(number, best, named) if best else None
             if found:
                 times[number] = found
         if asked is not None and not times:
             raise unknown("time column", asked, [name for _, name in self.columns])
         return times
 
-    def _time_column(self, number: int, best: Column, named: Sequence[Column], unit: str) -> TimeColumn:
+    def _time_column(self, number: int, best: Column, named: Sequence[Column]) -> TimeColumn:
         twins = [column.name for column in named if re.fullmatch(re.escape(best.name) + r"_\d+", column.name)]
-        scale = parse_unit(unit, expect="s").scale
+        scale = parse_unit(self.unit_of((number, best.name)) or "s", expect="s").scale
         return TimeColumn((number, best.name), scale, tuple((number, name) for name in twins))
 
-    def _asked_time(self, number: int, asked: str, units: Mapping[str, str]) -> TimeColumn | None:
+    def _asked_time(self, number: int, asked: str) -> TimeColumn | None:
         spec = split_spec(asked)
         table = self.sources[number].table
         by_name = {f"#{n}": column for n, column in enumerate(table.columns, 1)}
@@ -223,14 +238,14 @@ class Columns:
         column = by_name.get(spec.arithmetic.strip("`"))
         if column is None:
             return None
-        stated = spec.unit or units.get(column.name) or column.unit or "s"
+        stated = spec.unit or self.unit_of((number, column.name)) or "s"
         return TimeColumn((number, column.name), parse_unit(stated, expect="s").scale)
 
-    def check_units(self, units: Mapping[str, str], channels: Iterable[str]) -> None:
+    def check_units(self, channels: Iterable[str]) -> None:
         """Refuse a unit for something that is neither a channel nor a column."""
         known = list(dict.fromkeys([*channels, *(name for _, name in self.columns)]))
-        for name in units:
-            if name not in known:
+        for name in self.units:
+            if name not in known and self.find(name) is None:
                 raise unknown("channel or column", name, known)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -10,7 +11,7 @@ from stickslip.errors import StickslipError
 from stickslip.files.table import Block, Table, unique
 from stickslip.units import parse_unit
 
-SLASH = re.compile(r"[/\\](?![^\[(]*[\])])")  # between the parts of a path; one in brackets belongs to a unit
+_SLASH = re.compile(r"[\[(][^\[(\])]*[\])]|([/\\])")  # one in brackets belongs to a unit
 
 
 def titled(table: Table) -> Table:
@@ -41,15 +42,17 @@ def titled(table: Table) -> Table:
 
 def split_name(text: str) -> tuple[str, str | None]:
     """Part ``"x [mm]"``, ``"x (mm)"`` or ``"x, mm"`` into name and unit."""
-    match = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]\s*", text)
-    if match and match[1]:
-        return match[1], match[2].strip()
-    match = re.fullmatch(r"(.*?)\s*(?:\(([^()]*(?:\([^()]*\))?[^()]*)\)|,\s*([^,]+))\s*", text)
-    if match and match[1]:
+    text = text.strip()
+    name, bracket, unit = text[:-1].rpartition("[") if text.endswith("]") else ("", "", "")
+    if bracket and name.strip() and "]" not in unit:
+        return name.strip(), unit.strip()
+    # no two parts that fit the same signs: a title of any length is read in one pass
+    match = re.fullmatch(r"(.*?)(?:\(([^()]*(?:\([^()]*\)[^()]*)?)\)|,([^,]+))", text)
+    if match and match[1].strip():
         unit = (match[2] or match[3] or "").strip()
         if is_unit(unit):
-            return match[1], unit
-    return text.strip(), None
+            return match[1].strip(), unit
+    return text, None
 
 
 def is_unit(text: str) -> bool:
@@ -65,4 +68,10 @@ def is_unit(text: str) -> bool:
 
 def last_part(name: str) -> str:
     """The name without the path before it."""
-    return SLASH.split(name)[-1]
+    return path_parts(name)[-1]
+
+
+def path_parts(name: str) -> list[str]:
+    """A name's parts between slashes of either kind."""
+    slashes = [match.start() for match in _SLASH.finditer(name) if match[1]]
+    return [name[before + 1 : after] for before, after in itertools.pairwise([-1, *slashes, len(name)])]

@@ -121,7 +121,8 @@ def _write_parquet(path: Path, columns: Columns, metadata: str) -> None:
     fields = [arrow.field(name, arrow.float64(), metadata={"unit": unit}) for name, (unit, _) in columns.items()]
     schema = arrow.schema(fields, metadata={KEY: metadata})
     table = arrow.Table.from_arrays([arrow.array(values) for _, values in columns.values()], schema=schema)
-    parquet.write_table(table, path, row_group_size=ROWS_AT_ONCE)
+    with path.open("wb") as file:  # pyarrow takes no path that is not UTF-8
+        parquet.write_table(table, file, row_group_size=ROWS_AT_ONCE)
 
 
 WRITERS: dict[str, Callable[[Path, Columns, str], None]] = {

@@ -13,6 +13,7 @@ from typing import Any
 from stickslip import __version__
 from stickslip.errors import ModelError, RecordError
 from stickslip.plot.plate import Plate
+from stickslip.printing import printable
 from stickslip.reports.page import Asked, render, sections_of
 from stickslip.squeak.listening import Clip
 
@@ -86,7 +87,7 @@ def results_folder(folder: Path, results: Mapping[str, Any]) -> Iterator[Path]:
         yield draft
         files = sorted(str(path.relative_to(draft).as_posix()) for path in draft.rglob("*") if path.is_file())
         told = {"program": PROGRAM, "version": __version__, "files": [*files, NUMBERS], **results}
-        text = json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False)
+        text = printable(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
         (draft / NUMBERS).write_text(text + "\n", encoding="utf-8")
 
 

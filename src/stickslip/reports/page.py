@@ -22,6 +22,7 @@ from stickslip.files.write import whole
 from stickslip.plot import style
 from stickslip.plot.figures import figures
 from stickslip.plot.plate import Plate
+from stickslip.printing import printable
 from stickslip.record.record import Record
 from stickslip.reports.summary import Summary, summary
 from stickslip.squeak.listening import Clip, burst_clips
@@ -120,10 +121,15 @@ def templates(*folders: Path) -> Environment:
 
     environment = Environment(
         loader=ChoiceLoader([PackageLoader("stickslip.reports"), FileSystemLoader(folders)]), autoescape=True,
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_visible,
     )  # fmt: skip
     environment.filters.update(inline_svg=inline_svg, told=told, spelled=style.spelled, played=played, heard=heard)
     return environment
+
+
+def _visible(value: Any) -> Any:
+    """What the page is given: text of others shows its hidden signs."""
+    return type(value)(printable(value)) if isinstance(value, str) else value
 
 
 def heard(clips: Sequence[Clip]) -> Sequence[Clip]:
