@@ -14,6 +14,7 @@ import os
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable
 from functools import cache
 from importlib.machinery import SourceFileLoader
@@ -25,6 +26,8 @@ from typing import Any
 from numba import cfunc, config, njit
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
+KEPT = 256  # generated modules on disk, the latest used: what a user comes back to, some 20 MB
+IN_USE = 60.0  # s: one that was used so lately may be about to be read by another process
 FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
 
 
@@ -60,6 +63,8 @@ def generated(source: str) -> ModuleType:
         part = file.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
         part.write_text(source, "utf-8")
         part.replace(file)
+        _prune(file.parent)
+    os.utime(file, ns=(time.time_ns(), file.stat().st_mtime_ns))  # used now; numba goes by the time of its writing
     loader = SourceFileLoader(f"{__package__}.{name}", str(file))
     spec = spec_from_loader(loader.name, loader)
     assert spec is not None
@@ -67,6 +72,15 @@ def generated(source: str) -> ModuleType:
     sys.modules[loader.name] = module
     loader.exec_module(module)
     return module
+
+
+def _prune(place: Path) -> None:
+    """Delete the generated modules that were not used for longest, with what was compiled of them."""
+    used = sorted(((file.stat().st_atime, file) for file in place.glob("generated_*.txt")), reverse=True)
+    for last, file in used[KEPT:]:
+        if last < time.time() - IN_USE:
+            for old in (file, *place.glob(f"{file.stem}.*")):
+                old.unlink(missing_ok=True)
 
 
 @cache
