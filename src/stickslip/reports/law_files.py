@@ -15,6 +15,7 @@ from stickslip.fit.law import LawFit
 from stickslip.fit.which_law import LawComparison
 from stickslip.identify.motion import forcing_frequency
 from stickslip.laws.export import export_law, toml_table
+from stickslip.laws.written import quoted
 from stickslip.record.record import Record
 
 FILES = {
@@ -76,5 +77,7 @@ def _drive(record: Record, given: Drive) -> Drive:
 
 
 def _plain(name: str, values: Mapping[str, Any]) -> str:
-    lines = [f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value!r}" for key, value in values.items()]
+    lines = [
+        f"{key} = {quoted(value)}" if isinstance(value, str) else f"{key} = {value!r}" for key, value in values.items()
+    ]
     return "\n".join([f"[{name}]", *lines])
