@@ -33,7 +33,7 @@ def series(q, mode, y, h, s):
 '''
 
 
-# Curved nodes of all modes, each some 0.5 s of compiling at the highest order on a core of 2024; the package's own laws
+# Curved nodes of all modes, each some 0.7 s of compiling at the highest order; the package's own laws
 # have up to 20.
 MOST = 32
 
