@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 import tomllib
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -217,11 +217,16 @@ def test_mujoco_has_coulomb_and_viscous_joints() -> None:
     for law in LAWS.values():
         file = ElementTree.fromstring(ss.export_law(law, format="mujoco"))
         assert file.tag == "mujocoinclude"
-        assert [part.tag for part in file] in (["joint"], ["custom"])
+        assert [part.tag for part in file] in (["joint"], ["custom"], ["actuator"])
         assert all(part.get("name") and part.get("data") for part in file.iterfind("custom/*"))
-    found = ElementTree.fromstring(ss.export_law(LAWS["LuGre"], format="mujoco"))
+    lugre = LAWS["LuGre"]
+    found = ElementTree.fromstring(ss.export_law(replace(lugre, exponent=1.5), format="mujoco"))
     given = {each.get("name"): float(each.get("data")) for each in found.iter("numeric")}
     assert given["LuGre_damping"] == 316.23
+    (motor,) = ElementTree.fromstring(ss.export_law(lugre, format="mujoco")).iter("dcmotor")  # its exponent is 2
+    levels = [lugre.stiffness, lugre.damping, lugre.kinetic, lugre.static, lugre.speed]
+    assert [float(each) for each in motor.get("lugre", "").split()] == levels
+    assert float(motor.get("damping", "")) == lugre.viscous
 
 
 @pytest.mark.parametrize("name", LAWS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -57,6 +58,34 @@ def test_the_fitted_law_can_be_simulated_as_it_was_written(tmp_path: Path) -> No
     run = ss.simulate(case.system, duration=2.0, start=case.start).record(fs=2000)
     again = ss.friction_loops(run.rows(1000, len(run))).level
     assert again.value == pytest.approx(found.parameters["kinetic"].value, rel=0.01)
+
+
+def test_a_law_fitted_to_a_pull_is_written_with_the_pull(tmp_path: Path) -> None:
+    t, rng = np.arange(4000) / 1000, np.random.default_rng(5)
+    z = 0.003 + 2e-3 * t + 1e-6 * np.sin(60 * t) + rng.normal(0, 1e-6, t.size)
+    v = 2e-3 * (1 + np.sin(40 * t))
+    made = {"x": np.cumsum(v) / 1000, "v": v, "z": z, "friction": 1.1 + rng.normal(0, 0.01, t.size)}
+    step = ss.Step("friction_force", {"mass": 2.42, "stiffness": 2310.0, "contact": "ground"}, "")
+    record = dataclasses.replace(ss.Record.of(made, fs=1000), history=(step,))
+    folder = ss.publish_fit(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", records=[record])
+    drive = ss.read_system(folder / "law" / "law.toml").system.drive
+    assert isinstance(drive, ss.Ramp)
+    assert drive.speed == pytest.approx(2e-3, rel=1e-3)
+
+
+def test_the_load_of_the_settings_makes_a_force_of_a_coefficient(tmp_path: Path) -> None:
+    t, rng = np.arange(4000) / 1000, np.random.default_rng(0)
+    v = 0.1 * np.sin(2 * np.pi * t)
+    told = {"v": v, "coefficient": 0.3 * np.sign(v) + rng.normal(0, 0.003, t.size)}
+    record = ss.Record.of(told, fs=1000)
+    step = ss.Step("read_record", {"files": [{"name": "run_250g.csv"}]}, "")
+    record = dataclasses.replace(record, history=(*record.history, step))
+    rig = ss.rig_settings({"normal": {"*100g*": 9.0, "*250g*": "2.5 N"}})
+    kinetic = ss.fit_records([record], rig=rig, curve="coulomb")[0].parameters["kinetic"]  # type: ignore[union-attr]
+    assert kinetic.unit == "N"
+    assert kinetic.value == pytest.approx(0.75, rel=0.01)
+    alone = ss.fit_records([record], rig=ss.rig_settings({}), curve="coulomb")[0].parameters["kinetic"]  # type: ignore[union-attr]
+    assert alone.unit == "1"
 
 
 def test_a_single_fitted_law_is_shown_and_written_too(tmp_path: Path) -> None:

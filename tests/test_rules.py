@@ -212,3 +212,10 @@ def test_the_examples_run(module: str, tmp_path: Path, monkeypatch: pytest.Monke
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
     results = doctest.testmod(importlib.import_module(module), optionflags=flags)
     assert results.failed == 0, f"{results.failed} of {results.attempted} examples of {module} failed; see above"
+
+
+def test_the_files_that_contributing_names_are_there() -> None:
+    root = PACKAGE.parent.parent
+    told = re.findall(r"`((?:src/)?[\w/]+(?:\.py|\.toml|/))`", (root / "CONTRIBUTING.md").read_text("utf-8"))
+    assert len(told) > 8
+    assert not [name for name in told if not ((root / name).exists() or (PACKAGE / name).exists())]

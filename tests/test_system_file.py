@@ -276,7 +276,7 @@ def test_a_curve_is_a_formula_of_the_speed(tmp_path: Path) -> None:
     law = read_system(written(tmp_path, text)).system.law  # type: ignore[union-attr]
     assert isinstance(law, ss.FrictionCurve)
     assert law.friction(0.7) == pytest.approx(3 / (1 + 1.42 * 0.7) + 1 + 0.1 * 0.49, rel=1e-15)
-    for curve, told in (("1 / v", "no value at rest"), ("v^2", r"has 'v \^ 2'"), ("w", "has 'w'"), ("1 +", "read"),
+    for curve, told in (("1 / v", "no value at rest"), ("v^2", r"has '\^'"), ("w", "has 'w'"), ("1 +", "read"),
                         ("__import__('os')", "has"), ("v ** v", "has"), ("9**9**9**9", "rest"),
                         ("1" * 400, "400")):  # fmt: skip
         with pytest.raises(ModelError, match=f"(?s)line 8.*{told}"):

@@ -36,6 +36,8 @@ PACKAGE = Path(__file__).parent
 HOLDS_KERNELS = "@compiled("
 IMPORT = re.compile(r"^from (stickslip[\w.]*) import (\([^)]*\)|[^\n]+)", re.MULTILINE)
 UNUSED = 30 * 86400.0  # s after which what nothing has loaded is removed
+KEPT = 256  # generated modules on disk, the latest used: what a user comes back to, some 20 MB
+IN_USE = 60.0  # s: one that was used so lately may be about to be read by another process
 
 
 class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
@@ -189,9 +191,12 @@ def _kept(name: str) -> Path | None:
 
 
 def _prune(root: Path) -> None:
-    """Remove what nothing has loaded for long: kernels of earlier sources, and code of formulas tried once."""
-    for place in root.iterdir():
-        if place.stat().st_mtime < time.time() - UNUSED:
+    """Remove what nothing has loaded for long: kernels of earlier sources, generated code beyond the latest used."""
+    now, used = time.time(), {place: place.stat().st_mtime for place in root.iterdir()}
+    latest = sorted((place for place in used if place.name.startswith("generated_")), key=lambda place: -used[place])
+    crowded = {place for place in latest[KEPT:] if used[place] < now - IN_USE}
+    for place in used:
+        if place in crowded or used[place] < now - UNUSED:
             shutil.rmtree(place, ignore_errors=True)
 
 

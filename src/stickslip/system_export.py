@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip.errors import ModelError
 from stickslip.laws.formula import Formula
+from stickslip.laws.written import quoted
 from stickslip.parameters import PARTS
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import nearest
@@ -119,7 +120,7 @@ def _toml_value(value: Any) -> str:
         return f"{{ {', '.join(f'{key} = {_toml_value(each)}' for key, each in value.items())} }}"
     if isinstance(value, list):
         return f"[{', '.join(map(_toml_value, value))}]"
-    return json.dumps(value, ensure_ascii=False)
+    return quoted(value) if isinstance(value, str) else json.dumps(value)
 
 
 def _python(case: Case, held: Mapping[str, Any]) -> Iterator[str]:

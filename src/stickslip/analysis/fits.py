@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from stickslip.analysis.preparation import normal_load
 from stickslip.config import RigSettings
 from stickslip.curves.fit_curve import CurveFit, fit_curve
 from stickslip.drives import HarmonicBase, Release
@@ -40,7 +41,7 @@ def fit_records(
     records : sequence of Record
         Of one rig; a curve is fitted to one.
     rig : RigSettings
-        Mass, spring, damper, and what the mass slides on.
+        Mass, spring, damper, what the mass slides on, and the normal load, which makes a force of a coefficient.
     curve : str, optional
         A curve's name, as :func:`fit_curve` knows it, instead of laws.
     laws : sequence of str, optional
@@ -78,7 +79,7 @@ def fit_records(
         raise ModelError(f"a curve and {len(records)} records", "a curve is fitted to one", "give one of them alone")
     if curve is not None:
         friction = _with_friction(records[0], rig)
-        return fit_curve(friction, curve=curve, contact=rig.contact), [friction]
+        return fit_curve(friction, curve=curve, contact=rig.contact, normal=_load(friction, rig)), [friction]
     found = compare_laws(records, _oscillator(rig, system), laws=laws, calibration=calibration, progress=progress)
     return found, list(records)
 
@@ -94,6 +95,12 @@ def _only_curve(record: Record, *, asked: bool) -> str | None:
             'name its column, as in channels={"x": "COLUMN [mm]"}',
         )  # fmt: skip
     return None
+
+
+def _load(record: Record, rig: RigSettings) -> float | None:
+    """The normal load as measured, or as the settings state it for the record's files."""
+    files = [file["name"] for step in record.history for file in step.arguments.get("files", ())]
+    return normal_load(record, rig, " + ".join(files), [])
 
 
 def _with_friction(record: Record, rig: RigSettings) -> Record:

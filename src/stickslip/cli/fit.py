@@ -36,7 +36,7 @@ LONG = 30  # letters of a status that is not said twice
     type=click.Path(path_type=Path),
     metavar="SYSTEM.TOML",
     help="File of the oscillator, as stickslip simulate reads it: its constants, and the drive where z is not recorded "
-    "(a base at a known amplitude and frequency, a belt, a ramp). The time of the drive is that of the record.",
+    "(a base at a known amplitude and frequency, a belt, a ramp). It starts with the first sample, whatever its time.",
 )
 @click.option(
     "--laws",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
 from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
-from stickslip.laws.written import written
+from stickslip.laws.written import remark, written
 
 Modes = Sequence[Mode | CurvedMode]
 INPUTS = ("x", "v", "hold", "hold_rate", "delayed_speed")
@@ -45,7 +46,7 @@ def c_code(law: Law | CurvedLaw, formula: str) -> str:
     memory = list(law.memory)
     names = {name: f"in->{name}" for name in INPUTS} | {name: f"s->memory[{j}]" for j, name in enumerate(memory)}
     head = HEAD.format(
-        formula=formula, memory=len(memory), size=max(1, len(memory)),
+        formula=remark(formula), memory=len(memory), size=max(1, len(memory)),
         modes=", ".join(f"{_token(mode.name)} = {number}" for number, mode in enumerate(modes)),
     )  # fmt: skip
     parts = [head, _start(law, names), _force(modes, names), _rates(modes, memory, names), _leave(modes, names)]
@@ -58,6 +59,11 @@ def modes_of(law: Law | CurvedLaw) -> Modes:
 
 
 def _require_writable(law: Law | CurvedLaw, modes: Modes) -> None:
+    if len({_token(mode.name) for mode in modes}) < len(modes):
+        raise ModelError(
+            f"modes called {', '.join(mode.name for mode in modes)}",
+            "each has a name of its own in letters and digits", "name them so",
+        )  # fmt: skip
     for mode in modes:
         forms = [*(exit_.quantity for exit_ in mode.exits), *mode.rates.values()]
         if mode.friction is not None and any("df" in form for form in forms if not isinstance(form, Expression)):
@@ -69,7 +75,7 @@ def _require_writable(law: Law | CurvedLaw, modes: Modes) -> None:
 
 
 def _token(name: str) -> str:
-    return "FRICTION_" + name.upper().replace(" ", "_")
+    return "FRICTION_" + re.sub(r"\W", "_", name.upper(), flags=re.ASCII)
 
 
 def _text(form: Expression | Row, names: Mapping[str, str]) -> str:

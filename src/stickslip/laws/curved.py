@@ -84,14 +84,30 @@ class Expression:
         Returns
         -------
         float
+
+        Raises
+        ------
+        ModelError
+            A symbol has no value, or the formula has none there (a root or a logarithm of less than nothing).
         """
+        try:
+            return self._at(values)
+        except (ArithmeticError, TypeError, ValueError) as error:
+            place = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+            raise ModelError(
+                f"a formula has no value at {place or 'its numbers'} ({error})",
+                "friction is a real, finite number wherever the motion leads",
+                "correct the formula",
+            ) from error
+
+    def _at(self, values: Mapping[str, float]) -> float:
         if self.kind == "number":
             return self.value
         if self.kind == "symbol":
             if self.name not in values:
                 raise ModelError(f"no value for '{self.name}'", "every symbol has a value", f"give {self.name}=")
             return float(values[self.name])
-        parts = [part.at(**values) for part in self.parts]
+        parts = [part._at(values) for part in self.parts]
         if self.kind == "sum":
             return math.fsum(parts)
         if self.kind == "product":

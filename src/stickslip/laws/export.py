@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
+from math import isfinite
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
-from stickslip.laws.c_code import c_code
+from stickslip.laws.c_code import c_code, modes_of
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.curved import CurvedLaw, lifted, symbol
 from stickslip.laws.formula import Formula
 from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.lugre import LuGre
 from stickslip.laws.python_code import python_code
 from stickslip.laws.rough import RoughSurface
 from stickslip.laws.stribeck import FrictionCurve
 from stickslip.laws.tabulated import Tabulated
 from stickslip.laws.time_delay import SpeedCurve
-from stickslip.laws.written import written
+from stickslip.laws.written import one_line, quoted, remark, written
 from stickslip.settings import nearest
 
 TABLE = 33  # points of a curve over the speed, where a program takes a table
@@ -59,8 +62,11 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
       as it stands;
     * ``"c"``: C99 code of the friction in each mode, of what ends a mode, and a test vector that it checks itself by;
     * ``"mujoco"``, ``"modelica"``, ``"simulink"``: a block of parameters with the formula beside. Where the program has
-      friction of that kind, in its own words: MuJoCo's joints Coulomb and viscous friction, Modelica's
-      ``SupportFriction``, which the model then extends, and Simulink's lookup table any friction over the speed.
+      friction of that kind, in its own words: MuJoCo's joints Coulomb and viscous friction, its ``dcmotor`` that of
+      LuGre, Modelica's ``SupportFriction``, which the model then extends, and Simulink's lookup table any friction
+      over the speed.
+
+    A law that is not of this package is written from its modes, in every form but TOML.
 
     Parameters
     ----------
@@ -90,9 +96,9 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
     """
     if format not in FORMATS:
         raise ModelError(f"format = '{format}'", f"it is one of {', '.join(FORMATS)}", nearest(str(format), FORMATS))
-    if isinstance(law, type) or not (hasattr(law, "modes") or hasattr(law, "rates")):
+    if not _is_law(law):
         raise ModelError(f"law = {law!r}", "a law is exported with its values", "give one, as in Coulomb(1.1)")
-    if isinstance(law, RoughSurface):
+    if any(isinstance(part, RoughSurface) for part in _nested(law)):
         raise ModelError(
             "a rough surface", "its friction follows a place by chance, and has no formula",
             "export the contact on it, law.contact",
@@ -102,6 +108,8 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
 
 def formula_of(law: Law | CurvedLaw) -> str:
     """The law's friction in the names of its parameters."""
+    if not _of_package(law):
+        return _formula_of_modes(law)
     told = FORMULAS[type(law).__name__]
     if getattr(law, "static", "") is None:  # a parameter that is not there is not named
         told = told.replace("static", "kinetic" if hasattr(law, "kinetic") else "F(0)")
@@ -113,6 +121,32 @@ def formula_of(law: Law | CurvedLaw) -> str:
         told += f", F = {_curve_text(law)}"
     inner = getattr(law, "law", None)
     return f"{told}; {formula_of(inner)}" if is_dataclass(inner) else told  # type: ignore[arg-type]
+
+
+def _is_law(law: object) -> bool:
+    return not isinstance(law, type) and (hasattr(law, "modes") or hasattr(law, "rates"))
+
+
+def _nested(law: Any) -> Iterator[Any]:
+    """A law and those within it."""
+    while _is_law(law):
+        yield law
+        law = getattr(law, "law", None)
+
+
+def _of_package(law: object) -> bool:
+    """Whether it is a law of this package, by more than its name."""
+    return type(law).__name__ in FORMULAS and type(law).__module__.startswith(f"{__package__}.")
+
+
+def _formula_of_modes(law: Law | CurvedLaw) -> str:
+    """The friction of any law, as its modes have it."""
+    told = []
+    for mode in modes_of(law):
+        rates = [f"{name}' = {written(form)}" for name, form in mode.rates.items()]
+        force = "what holds the mass" if mode.friction is None else written(mode.friction)
+        told.append(f"{mode.name}: " + ", ".join([f"f = {force}", *rates]))
+    return "; ".join(told)
 
 
 def breakaway_of(law: Law | CurvedLaw) -> float | None:
@@ -127,14 +161,16 @@ def _curve_text(law: FrictionCurve) -> str:
 
 
 def _values(law: object) -> Iterator[tuple[str, Any]]:
-    for field in fields(law):  # type: ignore[arg-type]
+    for field in fields(law) if is_dataclass(law) else ():
         value = getattr(law, field.name)
         if value is not None:
             yield field.name, _curve_text(law) if field.name == "curve" and isinstance(law, FrictionCurve) else value
 
 
 def _toml(law: Law | CurvedLaw) -> str:
-    return f"# {formula_of(law)}\n{toml_table('law', law)}"
+    if strange := [type(part).__name__ for part in _nested(law) if not _of_package(part)]:
+        raise ModelError(f"a {strange[0]}", f"a system's file names one of {', '.join(FORMULAS)}", "export Python or C")
+    return f"# {remark(formula_of(law))}\n{toml_table('law', law)}"
 
 
 def toml_table(heading: str, thing: object) -> str:
@@ -148,7 +184,7 @@ def _toml_value(value: Any) -> str:
         inner = ", ".join(f"{name} = {_toml_value(each)}" for name, each in _values(value))
         return f'{{ name = "{type(value).__name__}", {inner} }}'
     if isinstance(value, str):
-        return f'"{value}"'
+        return quoted(value)
     return f"[{', '.join(map(_number, value))}]" if _listed(value) else _number(value)
 
 
@@ -162,7 +198,20 @@ def _flat(law: object, within: str = "") -> Iterator[tuple[str, Any]]:
         if is_dataclass(value):
             yield from _flat(value, f"{within}{name}_")
         elif name != "curve":
-            yield within + name, value
+            yield within + name, _parameter(within + name, value)
+
+
+def _parameter(name: str, value: Any) -> Any:
+    """A value that a block of parameters can hold."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, str):
+        return one_line(value)
+    if not all(isinstance(part, int | float) and isfinite(part) for part in (value if _listed(value) else [value])):
+        raise ModelError(
+            f"{name} of type {type(value).__name__}",
+            "a block of parameters holds finite numbers, lists of them, and text", "export Python or C",
+        )  # fmt: skip
+    return value
 
 
 def _number(value: Any) -> str:
@@ -190,6 +239,9 @@ def _mujoco(law: Law | CurvedLaw) -> str:
     if isinstance(law, Coulomb | LinearSlope) and static in (None, law.kinetic) and getattr(law, "slope", 0.0) >= 0:
         where = "include this file in the body that rubs"
         own = [f'  <joint type="slide" frictionloss="{law.kinetic!r}" damping="{getattr(law, "slope", 0.0)!r}"/>']
+    elif isinstance(law, LuGre) and law.exponent == 2 and law.viscous >= 0:
+        where = "include this file in the model, with the name of the joint that rubs for JOINT; MuJoCo 4 or later"
+        own = _dcmotor(law)
     else:
         where = "no joint of MuJoCo rubs so: apply it in a callback (mjcb_passive), as in the C code; include this file"
         own = ["  <custom>"]
@@ -197,16 +249,27 @@ def _mujoco(law: Law | CurvedLaw) -> str:
             data = " ".join(map(_number, value)) if _listed(value) else value
             kind = "text" if isinstance(value, str) else "numeric"
             data = data if isinstance(data, str) else repr(float(data))
-            own.append(f'    <{kind} name="{name}_{key}" data="{data}"/>')
+            own.append(f"    <{kind} name={quoteattr(f'{name}_{key}')} data={quoteattr(data)}/>")
         own.append("  </custom>")
-    told = formula_of(law).replace("--", "- -")  # which ends no comment
+    told = remark(formula_of(law))
     return "\n".join(["<mujocoinclude>", f"  <!-- {told} -->", f"  <!-- {where} -->", *own, "</mujocoinclude>"])
+
+
+def _dcmotor(law: LuGre) -> list[str]:
+    """A motor that no current drives: its bearing has the friction, the motor itself 1e-18 N s/m of damping."""
+    bristles = (law.stiffness, law.damping, law.kinetic, law.static, law.speed)
+    return [
+        "  <actuator>",
+        '    <dcmotor joint="JOINT" input="none" motorconst="1e-9" resistance="1"',
+        f'             lugre="{" ".join(map(_number, bristles))}" damping="{_number(law.viscous)}"/>',
+        "  </actuator>",
+    ]
 
 
 def _modelica(law: Law | CurvedLaw) -> str:
     name, table = type(law).__name__, _table(law)
     rubs = table is not None and table.forces[0] > 0
-    lines = [f"// {formula_of(law)}", f"{'model' if rubs else 'record'} {name}Friction"]
+    lines = [f"// {remark(formula_of(law))}", f"{'model' if rubs else 'record'} {name}Friction"]
     if table is not None and rubs:
         speeds, forces = list(table.speeds), list(table.forces)
         if isinstance(law, Tabulated):  # level beyond the last: Modelica goes on as the last two points
@@ -215,9 +278,11 @@ def _modelica(law: Law | CurvedLaw) -> str:
         lines.append(f"{_strays(table, '  //')}  extends Modelica.Mechanics.Translational.Components.SupportFriction(")
         lines.append(f"    f_pos = [{rows}],\n    peak = {table.breakaway / table.forces[0]!r});")
     for key, value in _flat(law):
-        if isinstance(value, str | bool):
-            kind = "String" if isinstance(value, str) else "Boolean"
-            lines.append(f"  parameter {kind} {key} = {_toml_value(value)};")
+        if isinstance(value, bool):
+            lines.append(f"  parameter Boolean {key} = {_number(value)};")
+        elif isinstance(value, str):
+            text = value.replace("\\", "\\\\").replace('"', '\\"')
+            lines.append(f'  parameter String {key} = "{text}";')
         else:
             data = f"{{{', '.join(map(_number, value))}}}" if _listed(value) else _number(value)
             lines.append(f"  parameter Real {key}{'[:]' if _listed(value) else ''} = {data};")
@@ -225,10 +290,14 @@ def _modelica(law: Law | CurvedLaw) -> str:
 
 
 def _simulink(law: Law | CurvedLaw) -> str:
-    lines = [f"% {formula_of(law)}"]
+    lines = [f"% {remark(formula_of(law))}"]
     for key, value in _flat(law):
         data = (
-            f"'{value}'" if isinstance(value, str) else f"[{' '.join(map(_number, value))}]" if _listed(value) else ""
+            f"'{value.replace(chr(39), chr(39) * 2)}'"
+            if isinstance(value, str)
+            else f"[{' '.join(map(_number, value))}]"
+            if _listed(value)
+            else ""
         )
         lines.append(f"{type(law).__name__}.{key} = {data or _number(value)};")
     if (table := _table(law)) is not None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import ast
+import math
+import re
 from dataclasses import dataclass
 
 from stickslip.errors import ModelError
 from stickslip.laws import curved
 from stickslip.laws.curved import FUNCTIONS, Expression, lifted
 
-LONGEST = 300  # characters; the parser's recursion stays shallow
+LONGEST = 300  # characters
+DEEPEST = 60  # levels of the tree: it is walked by recursion here, where it is written and where it is solved
+SIGNS = re.compile(r"[\w.+\-*/() ]*", re.ASCII)
 _GRAMMAR = f"a curve is made of numbers, the speed v [m/s], + - * / **, brackets and {', '.join(FUNCTIONS)}"
 
 
@@ -20,7 +24,8 @@ class Formula:
     Attributes
     ----------
     text : str
-        Numbers, the speed ``v`` [m/s], ``+ - * / **``, brackets, and the functions exp, log, tanh, asinh, sqrt.
+        Numbers, the speed ``v`` [m/s], ``+ - * / **``, brackets, and the functions exp, log, tanh, asinh, sqrt; kept as
+        its tree is written, so that what leaves with a law is the arithmetic and nothing that stood beside it.
 
     Raises
     ------
@@ -32,6 +37,8 @@ class Formula:
     >>> popp = Formula("3 / (1 + 1.42 * v) + 1 + 0.1 * v**2")
     >>> round(popp(lifted(1.0)).at(), 6)
     2.339669
+    >>> Formula("((1.5)+v*2)").text
+    '1.5 + v * 2'
     """
 
     text: str
@@ -39,22 +46,36 @@ class Formula:
     def __post_init__(self) -> None:
         if len(self.text) > LONGEST:
             raise self._refused(f"of {len(self.text)} characters")
+        if foreign := SIGNS.sub("", self.text):
+            raise self._refused(f"has {foreign[0]!a}")
+        tree = self._tree()
+        if _depth(tree) > DEEPEST:
+            raise self._refused(f"is more than {DEEPEST} levels deep")
         try:
-            self(lifted(0.0)).at()
-        except (ArithmeticError, TypeError, ValueError) as error:
-            raise self._refused(f"has no value at rest ({error})") from error
+            rest = self(lifted(0.0))
+        except OverflowError as error:  # of a whole number
+            raise self._refused("has a number beyond all range") from error
+        try:
+            rest.at()
+        except ModelError as error:
+            raise self._refused("has no value at rest") from error
+        object.__setattr__(self, "text", ast.unparse(tree))
 
     def __call__(self, speed: Expression) -> Expression:
         """The curve at a speed."""
+        return lifted(self._value(self._tree(), speed))
+
+    def _tree(self) -> ast.expr:
         try:
-            tree = ast.parse(self.text, mode="eval")
-        except (SyntaxError, ValueError) as error:
+            return ast.parse(self.text.strip(), mode="eval").body
+        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:  # of the parser, by its depth
             raise self._refused("can not be read") from error
-        return lifted(self._value(tree.body, speed))
 
     def _value(self, node: ast.expr, speed: Expression) -> Expression | float:
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
-            return float(node.value)
+            value = float(node.value)
+            if math.isfinite(value):
+                return value
         if isinstance(node, ast.Name) and node.id == "v":
             return speed
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
@@ -87,9 +108,18 @@ class Formula:
 
     def _refused(self, what: str) -> ModelError:
         return ModelError(
-            f"the curve '{self.text[:60]}' {what}", _GRAMMAR, "correct it, as in 1.0 + 0.5 * exp(-v / 0.1)"
+            f"the curve {self.text[:60]!a} {what}", _GRAMMAR, "correct it, as in 1.0 + 0.5 * exp(-v / 0.1)"
         )
 
 
 def _has_speed(node: ast.expr) -> bool:
     return any(isinstance(part, ast.Name) and part.id == "v" for part in ast.walk(node))
+
+
+def _depth(tree: ast.expr) -> int:
+    """Levels of the operations, without recursion."""
+    depth, level = 0, [tree]
+    while level:
+        depth += 1
+        level = [part for node in level for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr)]
+    return depth

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
+from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Row
 from stickslip.laws.c_code import Modes, modes_of
 from stickslip.laws.curved import FUNCTIONS, CurvedLaw, Expression
-from stickslip.laws.written import written
+from stickslip.laws.written import remark, written
 
 OVER_SPEED = ["back", "stuck", "forward"]  # modes of a law that the speed alone tells
 OTHERS = ("hold", "hold_rate", "delayed_speed")  # that a law may ask for beside x and v
@@ -52,8 +53,9 @@ def python_code(law: Law | CurvedLaw, formula: str, breakaway: float | None) -> 
     used = [name for name in OTHERS if re.search(rf"\b{name}\b", body)]
     functions = [name for name in FUNCTIONS if re.search(rf"\b{name}\(", body)]
     head = [
-        f"# {formula}", "# friction [N], positive against positive velocity; x [m], v [m/s] of the mass against the "
-        "counter-face", *(f"# {NOTES[name]}" for name in used),
+        f"# {remark(formula)}",
+        "# friction [N], positive against positive velocity; x [m], v [m/s] of the mass against the counter-face",
+        *(f"# {NOTES[name]}" for name in used),
     ]  # fmt: skip
     imports = [f"from math import {', '.join(functions)}", "", ""] if functions else ["", ""]
     body = body.replace(", OTHERS", "".join(f", {name}" for name in used))
@@ -70,6 +72,8 @@ def _function(modes: Modes, breakaway: float) -> str:
 
 
 def _class(law: Law | CurvedLaw, modes: Modes) -> str:
+    if strange := [name for name in law.memory if not name.isidentifier()]:
+        raise ModelError(f"memory called '{strange[0]}'", "Python writes it as self.NAME", "name it in letters")
     names = {name: f"self.{name}" for name in law.memory}
     back, still, forward = law.entry
     start = repr(still) if back == still == forward else f"{back!r} if v < 0 else {forward!r} if v > 0 else {still!r}"

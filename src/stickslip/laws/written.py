@@ -2,12 +2,44 @@
 
 from __future__ import annotations
 
+import json
+import math
+import re
 from collections.abc import Callable, Mapping
 
+from stickslip.errors import ModelError
 from stickslip.laws.base import Row
 from stickslip.laws.curved import Expression
 
 OPERATORS = {"sum": "+", "product": "*", "quotient": "/"}
+MARKS = re.compile(r"(?<=\*)(?=/)|(?<=/)(?=\*)|(?<=-)(?=-)")  # within what opens or ends a comment in C or XML
+
+
+def one_line(text: str) -> str:
+    """A text as one line of signs that can be printed: what no line comment and no literal ends at."""
+    return " ".join("".join(sign if sign.isprintable() else " " for sign in text).split())
+
+
+def remark(text: str) -> str:
+    """A text as it may stand in a comment of any of the languages.
+
+    Examples
+    --------
+    >>> remark("of a curve */ evil(); /* -->")
+    'of a curve * / evil(); / * - ->'
+    """
+    return MARKS.sub(" ", one_line(text)).rstrip("\\")
+
+
+def quoted(text: str) -> str:
+    """A text as a string of TOML, which is one of JSON too.
+
+    Examples
+    --------
+    >>> print(quoted('a sieve of 6"'))
+    "a sieve of 6\\""
+    """
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def written(form: Expression | Row, *, names: Mapping[str, str] | None = None, c: bool = False) -> str:
@@ -27,11 +59,17 @@ def written(form: Expression | Row, *, names: Mapping[str, str] | None = None, c
     return _expression(form, lambda name: called(name, name) or name, c)
 
 
+def _number(value: float) -> str:
+    if not math.isfinite(value):
+        raise ModelError(f"a number {value} of the law", "what is written is finite", "correct the law's values")
+    return repr(float(value))
+
+
 def _form(form: Row, named: Callable[[str], str]) -> str:
     terms = [(float(value), "" if name == "1" else named(name)) for name, value in form.items() if value != 0]
     text = ""
     for value, name in terms:
-        size = f"{abs(value)!r} * {name}" if name and abs(value) != 1 else name or repr(abs(value))
+        size = f"{_number(abs(value))} * {name}" if name and abs(value) != 1 else name or _number(abs(value))
         sign = "-" if value < 0 else "+"
         text += f" {sign} {size}" if text else size if value > 0 else f"-{size}"
     return text or "0.0"
@@ -39,7 +77,7 @@ def _form(form: Row, named: Callable[[str], str]) -> str:
 
 def _expression(form: Expression, named: Callable[[str], str], c: bool) -> str:
     if form.kind == "number":
-        return repr(float(form.value)) if form.value >= 0 else f"({float(form.value)!r})"
+        return f"({_number(form.value)})" if form.value < 0 else _number(form.value)
     if form.kind == "symbol":
         return named(form.name)
     if form.kind == "power":
@@ -47,10 +85,10 @@ def _expression(form: Expression, named: Callable[[str], str], c: bool) -> str:
         return f"pow({base}, {float(form.value)!r})" if c else f"({base})**{float(form.value)!r}"
     if form.kind in OPERATORS:
         left, right = (_expression(part, named, c) for part in form.parts)
-        inner = ("sum",) if form.kind == "product" else ("sum", "product", "quotient")
-        if form.kind != "sum":
-            left = f"({left})" if form.parts[0].kind == "sum" else left
-            right = f"({right})" if form.parts[1].kind in (*inner, "quotient") else right
+        if form.kind != "sum" and form.parts[0].kind == "sum":
+            left = f"({left})"
+        if form.parts[1].kind in (("sum",) if form.kind == "sum" else OPERATORS):  # in the order of the tree
+            right = f"({right})"
         if left.startswith("(-") and left.endswith(")") and form.parts[0].kind == "number":
             left = left[1:-1]
         return f"{left} {OPERATORS[form.kind]} {right}"

@@ -9,18 +9,20 @@ from typing import Any
 import numpy as np
 
 from stickslip.curves.fit_curve import CurveFit
-from stickslip.drives import Drive, HarmonicBase, Release
+from stickslip.drives import Drive, HarmonicBase, Ramp, Release
 from stickslip.errors import ModelError
 from stickslip.fit.law import LawFit
 from stickslip.fit.which_law import LawComparison
 from stickslip.identify.motion import forcing_frequency
 from stickslip.laws.export import export_law, toml_table
+from stickslip.laws.written import quoted
 from stickslip.record.record import Record
 
 FILES = {
     "toml": "law.toml", "python": "friction.py", "c": "friction.c", "mujoco": "mujoco.xml", "modelica": "friction.mo",
     "simulink": "friction.m",
 }  # fmt: skip
+STEADY = 0.05  # of its spread that a base may stray from a straight line: a tone over its half period strays by 0.2
 ALONE = "# a law alone: to simulate it, add [system] with its mass and stiffness, and [drive]"
 
 
@@ -62,9 +64,12 @@ def _whole(law: str, result: LawComparison | LawFit | CurveFit, record: Record) 
 
 
 def _drive(record: Record, given: Drive) -> Drive:
-    """The strongest tone of the base, or what the fit was told."""
+    """The base's steady pull or strongest tone, or what the fit was told."""
     if "z" in record and np.ptp(record["z"]) > 0:
         z, time = record["z"], np.arange(len(record)) / record.fs
+        speed, begin = np.polyfit(time, z, 1)
+        if np.std(z - begin - speed * time) < STEADY * np.std(z) and getattr(given, "contact", "ground") == "ground":
+            return Ramp(float(speed))
         frequency = forcing_frequency(z, record.fs).value
         turns = 2 * np.pi * frequency * time
         a, b, _ = np.linalg.lstsq(np.column_stack([np.cos(turns), np.sin(turns), np.ones(len(z))]), z, rcond=None)[0]
@@ -76,5 +81,7 @@ def _drive(record: Record, given: Drive) -> Drive:
 
 
 def _plain(name: str, values: Mapping[str, Any]) -> str:
-    lines = [f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value!r}" for key, value in values.items()]
+    lines = [
+        f"{key} = {quoted(value)}" if isinstance(value, str) else f"{key} = {value!r}" for key, value in values.items()
+    ]
     return "\n".join([f"[{name}]", *lines])

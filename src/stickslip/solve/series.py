@@ -8,6 +8,7 @@ Its numbers (weights, constants, exponents) are arguments of the code: laws that
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any, NamedTuple
@@ -16,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import generated
+from stickslip.errors import ModelError
 from stickslip.solve.taylor import ASINH, EXP, LINEAR, LOG, POWER, PRODUCT, QUOTIENT, SLOPE, SQUARE, TANH
 
 Number = tuple[int, ...]
+VARIABLE = re.compile(r"\b[dexqr]\d+\b|\b[dexqr]\d+(?=_)")  # that a :class:`_Writer` names
 HEAD = '''"""Taylor coefficients of one kind of system; written by `stickslip.solve.series`."""
 
 from stickslip.compiled import pointer
@@ -28,6 +31,11 @@ from stickslip.solve.taylor import CODE, STILL, value
 @pointer(CODE, error_model="numpy", fastmath={"contract"})
 def series(q, mode, y, h, s):
 '''
+
+
+# Curved nodes of all modes, each some 0.7 s of compiling at the highest order; the package's own laws
+# have up to 20.
+MOST = 32
 
 
 class Structure(NamedTuple):
@@ -46,9 +54,17 @@ class Structure(NamedTuple):
 def expansion(nodes: tuple[NDArray[Any], ...], kept: tuple[Number, ...], order: int) -> tuple[int, NDArray[np.float64]]:
     """Address of compiled code that fills a work array with coefficients 0 .. `order`, and its numbers.
 
+    Raises a ModelError where the law has so many curved nodes that compiling would not end soon.
+
     It takes the numbers, the mode, the state, the unit of time and the work array; coefficient k of node j stands at
     j (order + 1) + k. The state's are complete, other nodes lack the last (but have that of order 0).
     """
+    if (count := curved_nodes(nodes)) > MOST:
+        raise ModelError(
+            f"a law of {count} different products, quotients and functions in all its modes",
+            f"each is compiled as a series; more than {MOST} would take minutes",
+            "write the curve with fewer, or as a table of points (Tabulated)",
+        )
     kinds, left, right, power, low, weight, index, constant, first, rate, factor = nodes
     parts = [
         np.concatenate([weight[low[a] : low[b]], constant[a:b], power[a:b], factor[mode]])
@@ -60,6 +76,11 @@ def expansion(nodes: tuple[NDArray[Any], ...], kept: tuple[Number, ...], order: 
     columns = [tuple(column.tolist()) for column in (kinds, left, right, low, index, first)]
     structure = Structure._make([*columns, tuple(map(tuple, rate.tolist())), kept])
     return _compiled(structure, order, numbers.shape[1]), numbers.ravel()
+
+
+def curved_nodes(nodes: tuple[NDArray[Any], ...]) -> int:
+    """How many nodes of a tape are more than a weighted sum."""
+    return int(np.count_nonzero(nodes[0] != LINEAR))
 
 
 @cache
@@ -75,7 +96,9 @@ def source(structure: Structure, order: int, stride: int) -> str:
     text = [f"    b = {stride} * mode"]
     for lines, having in modes.items():
         text.append(f"    if {' or '.join(f'mode == {mode}' for mode in having)}:")
-        text.extend("        " + line for line in lines)
+        # Names of its own: numba goes through all code again for each variable that two branches assign,
+        # which took as long as all the rest of compiling.
+        text.extend("        " + VARIABLE.sub(rf"\g<0>of{having[0]}", line) for line in lines)
     return HEAD + "\n".join(text) + "\n"
 
 

@@ -104,7 +104,7 @@ def _settled(law: CurvedLaw, rates: Mapping[str, object], speed: float) -> dict[
                 value = np.array([rates[n].at(**at) for n in memory])  # type: ignore[attr-defined]
                 slope = np.array([[rates[n].slope(o).at(**at) for o in memory] for n in memory])  # type: ignore[attr-defined]
                 step = np.linalg.solve(slope, value) if memory else value
-            except (ValueError, np.linalg.LinAlgError):
+            except (ModelError, np.linalg.LinAlgError):
                 break
             if np.all(np.abs(step) <= 1e-14 * np.abs(guess)):
                 return dict(zip(memory, map(float, guess), strict=True))
