@@ -13,7 +13,6 @@ from stickslip.estimate import Estimate
 from stickslip.identify.consistency import Consistency
 from stickslip.identify.likely_contact import STRAYING
 from stickslip.identify.load_cell import ALONE
-from stickslip.identify.loops import DRIVES
 from stickslip.identify.mixups import ONE_SLIP
 from stickslip.record.record import Record
 
@@ -56,7 +55,7 @@ def flagged(found: Any, reason: str) -> Any:
     """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
     if isinstance(found, Estimate):
         lesser = found.status == "ok" or found.status.endswith(CRUDE)
-        if found.name == "forcing frequency" or not (lesser or found.status == DRIVES):
+        if found.name == "forcing frequency" or not (lesser or not found.known):
             return found
         return replace(found, status=reason if lesser else f"{reason}; {found.status}")
     if found is None:

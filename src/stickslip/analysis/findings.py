@@ -89,10 +89,11 @@ class Findings(Result):
 
     @property
     def level(self) -> Estimate | None:
-        """The sliding friction: from the loops, or the Coulomb term of the regression."""
-        if self.loops is not None:
-            return self.loops.level
-        return self.regression.coulomb if self.regression is not None else None
+        """The sliding friction, where it is known: from the loops, or the Coulomb term of the regression."""
+        told = self.loops.level if self.loops is not None else None
+        if self.loops is None and self.regression is not None:
+            told = self.regression.coulomb
+        return told if told is not None and told.known else None
 
     @property
     def coefficient(self) -> Estimate | None:

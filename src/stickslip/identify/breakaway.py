@@ -312,7 +312,8 @@ def _stray(stroke: Stroke, *, wide: bool) -> float:
 def _widened(estimate: Estimate, below: float, above: float) -> Estimate:
     """The estimate, its interval as far as noise and the instant of a sample may have moved it."""
     low, high = estimate.interval
-    return replace(estimate, interval=(low - below, high + above), sd=float(np.hypot(estimate.sd, (below + above) / 4)))
+    wide = replace(estimate, interval=(low - below, high + above), sd=float(np.hypot(estimate.sd, (below + above) / 4)))
+    return wide.within(0.0)
 
 
 def _balance(record: Record) -> Balance | None:

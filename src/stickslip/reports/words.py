@@ -194,6 +194,9 @@ def _of_directions(forward: Estimate | None, back: Estimate | None, what: str = 
 def _of_loops(findings: Findings) -> Iterator[str]:
     loops = findings.loops
     assert loops is not None
+    if not loops.level.known:
+        yield f"How large the friction is can not be told: {loops.level.status}."
+        return
     yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
     lesser = re.fullmatch(FEW, loops.level.status) or loops.level.status.endswith(LEFT_OUT)  # said among the cautions
     if loops.level.status != "ok" and not lesser:
@@ -235,6 +238,9 @@ def _of_sticks(findings: Findings) -> Iterator[str]:
 def _of_breakaway(found: Breakaway) -> Iterator[str]:
     ratio = found.ratio
     low, high = ratio.interval
+    if not math.isfinite(low + high):
+        yield f"What it bears just before it slips can not be told: {ratio.status}."
+        return
     more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
     sides = " and ".join(f"{value_of(each)} {each.name.split()[-1]}" for each in (found.forward, found.back) if each)
     yield (
