@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import stickslip as ss
+from stickslip.cli.program import main
 from stickslip.estimate import Estimate
 from stickslip.fit.choice import Evidence, Misfit, standings
 
@@ -194,3 +197,84 @@ def test_no_misfit_is_below_one() -> None:
         assert all(each.misfit >= 1 for each in told)
         rejected = {each.name: each.verdict for each in told if not each.kept}
         assert "times" not in rejected.get("compliant", "")
+
+
+# ---- units that nobody stated, and channels that contradict each other
+
+
+def written(folder: Path, record: ss.Record, *, units: bool) -> Path:
+    """The record as a table of a data logger, with its units in the header or without."""
+    names = [f"{name} [{record.channels[name].unit}]" if units else name for name in record]
+    columns = np.column_stack([record.time, *(record[name] for name in record)])
+    path = folder / "logger.csv"
+    np.savetxt(path, columns, delimiter=",", header=",".join(["time [s]", *names]), comments="", fmt="%.9g")
+    return path
+
+
+def millimetres(*names: str, seed: int) -> ss.Record:
+    """x and z as numbers of millimetres, which somebody takes for metres."""
+    made = rig(elastic=1e5, level=1.2, damping=60.0)
+    return seen({**made, "x": 1e3 * made["x"], "z": 1e3 * made["z"]}, *names, seed=seed, x=2e-4)
+
+
+def test_a_unit_that_nobody_stated_is_a_finding_that_leads(tmp_path: Path) -> None:
+    record = ss.read_record(written(tmp_path, millimetres("x", "z", seed=91), units=False))
+    unstated = [fault for fault in record.check() if fault.kind == "unit"]
+    assert [fault.channel for fault in unstated] == ["x", "z"]
+    assert "read as m it spans" in str(unstated[0])
+    findings = ss.analyze(record, mass=MASS, stiffness=SPRING)
+    headline = ss.summary(findings).headline
+    assert headline[:2] == [str(fault) for fault in unstated]
+    assert findings.level is not None
+    assert findings.level.status != "ok"
+    told = list(findings.to_dict())
+    assert told.index("faults") < told.index("estimates")
+
+
+def test_a_unit_that_was_stated_is_no_finding(tmp_path: Path) -> None:
+    path = written(tmp_path, millimetres("x", "z", seed=92), units=False)
+    for stated in ({"units": {"x": "mm", "z": "mm"}}, {"channels": {"x": "x [mm]", "z": "z [mm]"}}):
+        record = ss.read_record(path, **stated)  # type: ignore[arg-type]
+        assert not any(fault.kind == "unit" for fault in record.check())
+    assert not ss.read_record(written(tmp_path, millimetres("x", "z", seed=93), units=True)).check()
+
+
+def test_a_record_written_again_keeps_that_its_unit_was_assumed(tmp_path: Path) -> None:
+    record = ss.read_record(written(tmp_path, millimetres("x", "z", seed=94), units=False))
+    again = ss.read_record(ss.write_record(record, tmp_path / "again.csv"))
+    assert [fault.kind for fault in again.check()] == [fault.kind for fault in record.check()]
+
+
+def test_terminal_page_and_json_begin_with_the_unit(tmp_path: Path) -> None:
+    path = written(tmp_path, millimetres("x", "z", seed=95), units=False)
+    run = CliRunner()
+    asked = ["analyze", str(path), "--mass", str(MASS), "--stiffness", str(SPRING), "--output", str(tmp_path / "out")]
+    text = " ".join(run.invoke(main, asked).output.split())
+    assert text.index("x states no unit") < text.index("slides against")
+    assert text.count("x states no unit") == 1
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert page.index("x states no unit") < page.index("slides against")
+    told = (tmp_path / "out" / "results.json").read_text(encoding="utf-8")
+    assert told.index("x states no unit") < told.index('"estimates"')
+
+
+@pytest.mark.parametrize(("scale", "seed"), [(1 / 9.80665, 101), (1e3, 102)])
+def test_channels_that_contradict_each_other_lead_and_no_force_is_told(scale: float, seed: int) -> None:
+    made = rig(elastic=1e5, level=1.2, damping=60.0, frequency=4.0)
+    record = seen({**made, "a": scale * made["a"]}, "x", "z", "a", seed=seed, x=2e-7, a=1e-3 * scale)
+    findings = ss.analyze(record, mass=MASS, stiffness=SPRING, damping=60.0)
+    headline = ss.summary(findings).headline
+    assert "contradict" in headline[0]
+    assert "a is in" in headline[0]
+    assert not any(f" {unit} " in sentence for sentence in headline for unit in ("N", "kN", "mN", "N/m", "kg"))
+    assert findings.loops is not None
+    assert findings.loops.level.status.startswith("the channels contradict each other")
+    told = list(findings.to_dict())
+    assert told.index("contradiction") < told.index("estimates")
+
+
+def test_channels_that_agree_contradict_nothing() -> None:
+    made = rig(elastic=1e5, level=1.2, damping=60.0, frequency=4.0)
+    findings = ss.analyze(seen(made, "x", "z", "a", seed=103, x=2e-7, a=1e-3), mass=MASS, stiffness=SPRING, damping=60)
+    assert not findings.contradiction
+    assert "slides against" in ss.summary(findings).headline[0]

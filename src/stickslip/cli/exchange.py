@@ -24,9 +24,6 @@ def check(file: str, **options: Any) -> None:
         with collected(refused, group):
             record = read(group, rig)
             click.echo(f"{record!r}")
-            for channel in record.channels.values():
-                if "no unit stated" in channel.source:
-                    click.echo(f"- {channel.name}: {channel.source}; say --units if it is another")
             for words in [str(fault) for fault in record.check()] or ["nothing wrong was found"]:
                 click.echo(f"- {spoken(words)}")
     for error in refused[:-1]:

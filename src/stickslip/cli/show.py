@@ -77,7 +77,8 @@ def _print_table(console: Any, results: Asked) -> None:
 
     summary = ss.summary(results)
     console.print(f"\n[bold]{escape(summary.title)}[/bold]")
-    for sentence in (*summary.headline, *summary.cautions, *(f"- {fault}" for fault in summary.faults or ())):
+    faults = [f"- {fault}" for fault in summary.faults or () if fault not in summary.headline]
+    for sentence in (*summary.headline, *summary.cautions, *faults):
         console.print(escape(spoken(sentence)))
     truth = summary.has_truth
     headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from stickslip.identify.mechanism import UNTOLD
 from stickslip.identify.presliding import Presliding
 from stickslip.identify.pull import Pull
 from stickslip.identify.slip_ringing import SlipRinging
+from stickslip.record.check import Fault
 from stickslip.units import NOTHING, prefixed
 
 NEVER = "The contact never sticks."
@@ -151,7 +152,20 @@ def ringing_told(found: TimeFrequency) -> Iterator[str]:
         yield f"The signal jumps or kinks {len(found.spikes)} times, in {groups} group{'s' * (groups > 1)}."
 
 
+def leading(faults: Iterable[Fault]) -> list[str]:
+    """What the check-up found wrong with units: every number hangs on it, so that it comes first."""
+    return [str(fault) for fault in faults if fault.kind == "unit"]
+
+
 def _of_findings(findings: Findings) -> Iterator[str]:
+    if findings.contradiction:
+        yield (
+            f"The channels contradict each other: perhaps {findings.contradiction}. Until that is mended no force is "
+            "told here; the table has what they give as they are."
+        )
+        if findings.sticks is not None:
+            yield from _of_sticks(findings)
+        return
     if findings.loops is not None:
         yield from _of_loops(findings)
     found = findings.regression
