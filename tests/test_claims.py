@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.signal import lsim
 
 import stickslip as ss
 from stickslip.cli.program import main
@@ -278,3 +279,80 @@ def test_channels_that_agree_contradict_nothing() -> None:
     findings = ss.analyze(seen(made, "x", "z", "a", seed=103, x=2e-7, a=1e-3), mass=MASS, stiffness=SPRING, damping=60)
     assert not findings.contradiction
     assert "slides against" in ss.summary(findings).headline[0]
+
+
+# ---- the swing of the friction, and whose noise it is
+
+
+@pytest.mark.parametrize(("noise", "seed"), [(0.02, 111), (0.05, 112), (0.1, 113)])
+def test_an_accelerometer_s_noise_is_no_swing_of_the_friction(noise: float, seed: int) -> None:
+    """A contact whose friction is constant while it slides, by an accelerometer of some noise."""
+    made = rig(elastic=3e5, level=1.2, damping=60.0, amplitude=2e-3)
+    record = seen(made, "x", "z", "a", seed=seed, x=2e-7, a=noise)
+    record = ss.friction_force(record.with_details("a", noise=noise), mass=MASS, stiffness=SPRING, damping=60.0)
+    found = ss.breakaway(record)
+    for swing in (found.swing_forward, found.swing_back):
+        assert swing is not None
+        assert swing.interval[0] < 0.3 * MASS * noise / 1.2  # it is told from none by no more than that
+        assert swing.value < 0.5 * MASS * noise / 1.2
+
+
+@pytest.mark.parametrize(("share", "seed"), [(0.1, 121), (0.2, 122)])
+def test_a_swing_that_is_there_is_told_through_the_noise(share: float, seed: int) -> None:
+    made = rig(elastic=3e5, level=1.2, damping=60.0, amplitude=2e-3, duration=14.0)
+    time = np.arange(len(made["x"])) / FS
+    made["friction"] = made["friction"] - 60.0 * made["v"]
+    rng = np.random.default_rng(seed)
+    tones, phases = rng.uniform(60, 110, 24), rng.uniform(0, 2 * np.pi, 24)
+    vibration = np.sin(2 * np.pi * np.outer(time, tones) + phases).sum(axis=1) / math.sqrt(12)
+    made["friction"] += share * 1.2 * vibration
+    found = ss.breakaway(seen(made, "x", "friction", seed=seed, x=2e-7, friction=0.05))
+    for swing in (found.swing_forward, found.swing_back):
+        assert swing is not None
+        assert swing.interval[0] > 0
+        assert swing.value == pytest.approx(share, rel=0.2)
+
+
+# ---- which sensors the friction is taken from
+
+
+def felt(*, noise: float, seed: int, mount: tuple[float, float] | None = None, gain: float = 1.0) -> ss.Record:
+    """x, z, a and a load cell of that noise, ideal or on a mount of which nothing is stated."""
+    made = rig(elastic=3e5, level=1.2, damping=20.0, amplitude=2e-3, duration=5.0)
+    load = made["friction"] - 20.0 * made["v"]
+    made["true"] = load
+    if mount is not None:
+        turn = 2 * math.pi * mount[0]
+        system = ([turn**2], [1.0, 2 * mount[1] * turn, turn**2])
+        load = lsim(system, load, np.arange(len(load)) / FS)[1]
+    record = seen({**made, "load": gain * load}, "x", "z", "a", "load", "true", seed=seed, x=2e-6, a=0.2, load=noise)
+    return record
+
+
+def method_of(record: ss.Record) -> tuple[str, float]:
+    """The method that was chosen, and how far its friction is from the true one [N]."""
+    bare = record.rows(0, len(record))
+    kept = {name: bare[name] for name in bare if name != "true"}
+    findings = ss.analyze(ss.Record.of(kept, fs=FS), mass=MASS, stiffness=SPRING, damping=20.0)
+    off = (findings.record["friction"] - record["true"])[100:-100]
+    return str(findings.settings["differentiation"]), float(np.std(off))
+
+
+@pytest.mark.parametrize(
+    ("mount", "seed"), [(None, 131), ((120.0, 0.05), 132), ((300.0, 0.02), 133)], ids=["ideal", "120 Hz", "300 Hz"]
+)
+def test_a_load_cell_of_far_less_noise_is_not_left_aside(mount: tuple[float, float] | None, seed: int) -> None:
+    method, off = method_of(felt(noise=2e-3, seed=seed, mount=mount))
+    assert method == "fusion"
+    assert off < 0.15  # 0.4 N by the motion alone
+
+
+@pytest.mark.parametrize(("gain", "seed"), [(0.8, 142), (4.448, 143)], ids=["a calibration", "a unit"])
+def test_a_load_cell_that_reads_something_else_is_left_aside(gain: float, seed: int) -> None:
+    assert method_of(felt(noise=2e-3, seed=seed, gain=gain))[0] == "smoother"
+
+
+@pytest.mark.parametrize(("mount", "seed"), [((60.0, 0.05), 144), ((45.0, 0.2), 145)], ids=["60 Hz", "45 Hz"])
+def test_a_load_cell_that_rings_makes_no_friction_worse(mount: tuple[float, float], seed: int) -> None:
+    """It is left aside, or its mount is found in the record and taken out."""
+    assert method_of(felt(noise=2e-3, seed=seed, mount=mount))[1] < 0.45
