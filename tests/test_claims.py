@@ -120,6 +120,15 @@ def test_a_rig_without_friction_has_none_below_zero(seed: int) -> None:
     assert not loops.level.known or loops.level.interval[1] < 0.05
 
 
+def test_no_friction_is_told_as_at_most() -> None:
+    record = seen(rig(damping=1.0, frequency=4.0, duration=4.0), "x", "z", seed=62, x=1e-6)
+    findings = ss.analyze(record, mass=MASS, stiffness=SPRING, damping=1.0)
+    assert findings.level is not None
+    assert findings.level.interval[0] == 0
+    assert "at most" in sentences(findings)
+    assert "slides against" not in sentences(findings)
+
+
 def test_a_friction_that_drives_is_no_number() -> None:
     made = rig(elastic=1e5, level=1.2, damping=2.0)
     findings = ss.analyze(seen({**made, "friction": -made["friction"]}, "x", "friction", seed=71, friction=0.01))

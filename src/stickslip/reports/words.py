@@ -211,7 +211,11 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     if not loops.level.known:
         yield f"How large the friction is can not be told: {loops.level.status}."
         return
-    yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
+    if loops.level.interval[0] == 0:
+        highest = value_of(loops.level, loops.level.interval[1])
+        yield f"No sliding friction can be told from none: it is {highest} at most (95 % sure)."
+    else:
+        yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
     lesser = re.fullmatch(FEW, loops.level.status) or loops.level.status.endswith(LEFT_OUT)  # said among the cautions
     if loops.level.status != "ok" and not lesser:
         yield f"That is not to be trusted: {loops.level.status}."
