@@ -17,6 +17,7 @@ from stickslip.identify.motion import is_measured
 from stickslip.identify.slip_ringing import ringing_of
 from stickslip.identify.strokes import FAST, Stroke, Strokes, find_strokes
 from stickslip.record.record import Record
+from stickslip.signals.differentiate import noise_along
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import mean_of_cycles
 
@@ -403,9 +404,7 @@ def _noise(record: Record) -> Array:
     """Standard deviation of the friction's noise at each sample: as its balance tells it, as stated, or as it shows."""
     if "friction_sd" in record and not is_measured(record, "friction"):
         return record["friction_sd"]
-    stated = record.channels["friction"].noise
-    level = noise_level(record["friction"], record.fs) if stated is None else stated
-    return np.full(len(record), level)
+    return noise_along(record["friction"], record.fs, record.channels["friction"].noise)
 
 
 def _root(square: Estimate) -> Estimate:
