@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -77,6 +77,38 @@ class Estimate:
             self.status,
             self.checks,
         )
+
+    @property
+    def known(self) -> bool:
+        """Whether it has a value; where it has none that is possible, the value is NaN and the status says why."""
+        return math.isfinite(self.value)
+
+    def unknown(self, why: str) -> Estimate:
+        """The same estimate without a value, and the reason as its status."""
+        return replace(self, value=math.nan, interval=(math.nan, math.nan), sd=math.nan, status=why)
+
+    def within(self, low: float = -math.inf, high: float = math.inf, *, otherwise: str = "") -> Estimate:
+        """The same estimate of a quantity that can not lie outside `low` to `high`.
+
+        The interval is cut to what is possible, and the value moves to the nearest of it. Where nothing of the interval
+        is possible, or an interval without ends leaves the value to chance, it is not known; `otherwise` says why.
+
+        Examples
+        --------
+        >>> friction = Estimate.normal("sliding friction", -0.1, sd=0.1, unit="N", method="")
+        >>> friction.within(0.0).value, friction.within(0.0).known
+        (0.0, True)
+        >>> friction.scaled(10, "N").within(0.0, high=5.0).includes(-0.1), friction.within(0.2).known
+        (False, False)
+        """
+        ends = max(low, self.interval[0]), min(high, self.interval[1])
+        outside = not low <= self.value <= high
+        if not outside and ends == self.interval:
+            return self
+        if ends[0] > ends[1] or (outside and not math.isfinite(self.sd)):
+            bound = f"below {low:g}" if self.value < low else f"above {high:g}"
+            return self.unknown(otherwise or f"the record gives a value {bound} {self.unit}, which can not be")
+        return replace(self, value=min(max(self.value, low), high), interval=ends)
 
     def includes(self, value: float) -> bool:
         """Whether the 95 % interval holds `value`."""

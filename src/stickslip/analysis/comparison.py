@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.analysis.findings import Findings
+from stickslip.curves.load import LATE
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.statistics import student
@@ -114,6 +115,7 @@ def compare(findings: Sequence[Findings]) -> Comparison:
         )
         if not line[1].includes(0.0):
             coefficient = replace(coefficient, status="the line misses the origin: see friction at no load")
+        line = (line[0].within(0.0, otherwise="friction falls with the load"), line[1].within(0.0, otherwise=LATE))
     else:
         notes.append("Fewer than three loads: whether the line passes through the origin can not be told.")
     return Comparison(tuple(findings), coefficient, line, tuple(notes))

@@ -193,6 +193,7 @@ class DecayFindings(Result):
         """Plain data for JSON: settings, releases, estimates, bounds, faults, notes and history."""
         told: dict[str, Any] = {
             "name": self.name,
+            "faults": [str(fault) for fault in self.faults],
             "settings": dict(self.settings),
             "model": self.best.model,
             "status": self.best.status,
@@ -212,7 +213,6 @@ class DecayFindings(Result):
             "comparisons": [estimate.to_dict() for estimate in self.comparisons],
             "decrements": None if self.thesis is None else _decrements(self.thesis),
             "truth": dict(self.record.truth),
-            "faults": [str(fault) for fault in self.faults],
             "notes": list(self.notes),
             "history": [step.to_dict() for step in self.record.history],
         }  # fmt: skip

@@ -13,8 +13,6 @@ from stickslip.estimate import Estimate
 from stickslip.identify.consistency import Consistency
 from stickslip.identify.likely_contact import STRAYING
 from stickslip.identify.load_cell import ALONE
-from stickslip.identify.loops import DRIVES
-from stickslip.identify.mixups import ONE_SLIP
 from stickslip.record.record import Record
 
 BY_FORCE = (
@@ -31,10 +29,11 @@ def doubted(
     answers: dict[str, Any], record: Record, *, unknown: str, refusals: Sequence[StickslipError]
 ) -> dict[str, Any]:
     """The answers, flagged by the gravest doubt that concerns each; `unknown` is what is not stated of the rig."""
-    told = dict(answers)
+    told, gravest = dict(answers), dict[str, str]()
     for reason, keys in _reasons(told.get("consistency"), record, unknown, refusals):
         for key in keys:
-            told[key] = flagged(told.get(key), reason)
+            if gravest.setdefault(key, reason) == reason:
+                told[key] = flagged(told.get(key), reason)
     return told
 
 
@@ -48,6 +47,8 @@ def _reasons(
         yield NO_BASE, (*BY_FORCE, "sticks")
     if unknown:
         yield unknown, BY_FORCE
+    if unstated := [f"{name} is read as {each.unit}" for name, each in record.channels.items() if each.assumed]:
+        yield f"nobody stated a unit: {' and '.join(unstated)}", (*BY_FORCE, "regression", "asymmetric", "pull")
     if strays := [error.value for error in refusals if STRAYING in error.value]:
         yield f"{strays[0]}: a mass, a spring or a sensor is not as stated, or the contact no spring", ONSETS
 
@@ -56,7 +57,7 @@ def flagged(found: Any, reason: str) -> Any:
     """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
     if isinstance(found, Estimate):
         lesser = found.status == "ok" or found.status.endswith(CRUDE)
-        if found.name == "forcing frequency" or not (lesser or found.status == DRIVES):
+        if found.name == "forcing frequency" or not (lesser or not found.known):
             return found
         return replace(found, status=reason if lesser else f"{reason}; {found.status}")
     if found is None:
@@ -69,9 +70,11 @@ def flagged(found: Any, reason: str) -> Any:
 
 def _contradiction(told: Consistency | None) -> str:
     """What one slip in the channels, or in the rig's constants, would explain; a clipped sensor says so itself."""
-    failed = told.failed if told is not None else ()
-    if slips := [check.sentence for check in failed if check.name == ONE_SLIP]:
-        return f"the channels contradict each other: perhaps {slips[0]}"
+    if told is None:
+        return ""
+    if told.slip:
+        return f"the channels contradict each other: perhaps {told.slip}"
+    failed = told.failed
     if any("range" in check.name for check in failed):
         return ""
     apart = [check.sentence for check in failed if any(word in check.name for word in BALANCED)]

@@ -89,10 +89,11 @@ class Findings(Result):
 
     @property
     def level(self) -> Estimate | None:
-        """The sliding friction: from the loops, or the Coulomb term of the regression."""
-        if self.loops is not None:
-            return self.loops.level
-        return self.regression.coulomb if self.regression is not None else None
+        """The sliding friction, where it is known: from the loops, or the Coulomb term of the regression."""
+        told = self.loops.level if self.loops is not None else None
+        if self.loops is None and self.regression is not None:
+            told = self.regression.coulomb
+        return told if told is not None and told.known else None
 
     @property
     def coefficient(self) -> Estimate | None:
@@ -127,6 +128,11 @@ class Findings(Result):
         told = ((names.get(name, name), getattr(value, "status", "ok")) for name, value in vars(self).items())
         return tuple(f"{name}: {status}." for name, status in told if status != "ok" and name in names.values())
 
+    @property
+    def contradiction(self) -> str:
+        """What slip of the hand in the channels forbids to trust any force, in words; else empty."""
+        return self.consistency.slip if self.consistency is not None else ""
+
     def true_value(self, estimate: Estimate) -> float | None:
         """The true value of what was estimated, where the record is simulated and tells it."""
         true = self.record.truth.get(estimate.name)
@@ -136,12 +142,13 @@ class Findings(Result):
         """Plain data for JSON: settings, estimates, faults, notes and history."""
         told = {
             "name": self.name,
+            "faults": [str(fault) for fault in self.faults],
+            "contradiction": self.contradiction,
             "settings": dict(self.settings),
             "normal_load": self.normal,
             "estimates": [estimate.to_dict() for estimate in self.estimates],
             "regression_residual": None if self.regression is None else self.regression.residual,
             "truth": dict(self.record.truth),
-            "faults": [str(fault) for fault in self.faults],
             "notes": list(self.notes),
             "history": [step.to_dict() for step in self.record.history],
         }

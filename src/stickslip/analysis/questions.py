@@ -73,8 +73,9 @@ def analyze(
         What the damper ends on, and what the mass slides on; the ground unless stated.
     method : str
         How the friction is found: one of :func:`friction_force`'s, or "auto": all sensors together where there is an
-        accelerometer or a load cell beside x whose mount is stated or shows, else the displacement differentiated by a
-        smoother. The notes say which, and why.
+        accelerometer or a load cell beside x whose mount is stated or shows, or where a load cell leaves far less noise
+        in the friction and else what the motion alone leaves; else the displacement differentiated by a smoother. The
+        notes say which, and why.
 
     Returns
     -------

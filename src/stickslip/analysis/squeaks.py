@@ -128,6 +128,7 @@ class SqueakFindings(Result):
         """Plain data for JSON: settings, bursts, estimates, coupling, faults, notes and history."""
         told = {
             "name": self.name,
+            "faults": [str(fault) for fault in self.faults],
             "settings": dict(self.settings),
             "normal_load": self.normal,
             "squeaks": {key: value for key, value in self.squeaks.to_dict().items() if key not in ("notes", "history")},
@@ -143,7 +144,6 @@ class SqueakFindings(Result):
             "sound_quality": None if self.quality is None else self.quality.to_dict(),
             "impulses": None if self.impulses is None else self.impulses.to_dict(),
             "estimates": [each.to_dict() for each in self.estimates],
-            "faults": [str(fault) for fault in self.faults],
             "notes": list(self.notes),
             "history": [step.to_dict() for step in self.record.history],
         }

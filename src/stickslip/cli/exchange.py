@@ -25,9 +25,6 @@ def check(file: str, **options: Any) -> None:
         with collected(refused, group):
             record = read(group, rig)
             say(f"{record!r}")
-            for channel in record.channels.values():
-                if "no unit stated" in channel.source:
-                    say(f"- {channel.name}: {channel.source}; say --units if it is another")
             for words in [str(fault) for fault in record.check()] or ["nothing wrong was found"]:
                 say(f"- {spoken(words)}")
     for error in refused[:-1]:

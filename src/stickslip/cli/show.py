@@ -66,7 +66,8 @@ def _print_lines(parts: Sequence[Asked]) -> None:
 def _print_table(results: Asked) -> None:
     summary = ss.summary(results)
     paragraph((f"\n{summary.title}", "bold"))
-    for sentence in (*summary.headline, *summary.cautions, *(f"- {fault}" for fault in summary.faults or ())):
+    faults = [f"- {fault}" for fault in summary.faults or () if fault not in summary.headline]
+    for sentence in (*summary.headline, *summary.cautions, *faults):
         paragraph(spoken(sentence))
     truth = summary.has_truth
     headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")

@@ -18,6 +18,7 @@ from stickslip.units import parse_value
 Array = NDArray[np.float64]
 
 LEAST_REACH = 1.05  # ratio of the largest load to the smallest
+LATE = "the line goes below zero, which no friction does: it begins late, or grows by more than the load"
 FAR = 0.5  # of the range of loads: further outside it the line is not known to hold
 
 
@@ -30,14 +31,16 @@ class LoadLine(Result):
     coefficient : Estimate
         Friction per load, the slope of the line.
     adhesion : Estimate
-        Friction [N] without load that the line goes through: adhesion, or a preload; below zero where friction begins
-        late.
+        Friction [N] without load: adhesion, or a preload; zero at least, and without a value where the line surely goes
+        below, friction beginning late.
     coefficients : tuple of Estimate
         Friction over load, of each load alone; alike where the adhesion is none.
     loads : ndarray, shape (n,)
         Loads [N].
+    line : ndarray, shape (2,)
+        Where the line meets no load [N], be it below zero, and its slope.
     covariance : ndarray, shape (2, 2)
-        Of the adhesion and the coefficient.
+        Of these.
     quantile : float
         Of Student's t, for 95 %.
     status : str
@@ -48,6 +51,7 @@ class LoadLine(Result):
     adhesion: Estimate
     coefficients: tuple[Estimate, ...]
     loads: Array
+    line: Array
     covariance: Array
     quantile: float
     status: str
@@ -75,10 +79,10 @@ class LoadLine(Result):
             else "ok"
         )
         return Estimate.normal(
-            f"friction under {newtons:.3g} N", self.adhesion.value + self.coefficient.value * newtons,
+            f"friction under {newtons:.3g} N", float(row @ self.line),
             sd=math.sqrt(float(row @ self.covariance @ row)), unit="N", method="line through friction over load",
             quantile=self.quantile, status=far,
-        )  # fmt: skip
+        ).within(0.0, otherwise=LATE)  # fmt: skip
 
 
 def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | str]) -> LoadLine:
@@ -128,24 +132,26 @@ def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | st
     sds = np.maximum(sds, 1e-9 * np.abs(values).max())
     columns = np.column_stack([np.ones(len(weights)), weights]) / sds[:, None]
     covariance = np.linalg.inv(columns.T @ columns)
-    adhesion, coefficient = covariance @ (columns.T @ (values / sds))
+    line = covariance @ (columns.T @ (values / sds))
     freedom = len(values) - 2
-    left = values / sds - columns @ np.array([adhesion, coefficient])
+    left = values / sds - columns @ line
     excess = float(left @ left) / freedom if freedom else 1.0
     quantile = student(freedom) if excess > 1 else NORMAL_95
     covariance = covariance * max(1.0, excess)
     method = f"line through friction under {len(values)} loads"
     checks = (f"frictions stray from the line by {math.sqrt(excess):.2g} times their deviations",) if freedom else ()
-    two = [
-        Estimate.normal(name, value, sd=math.sqrt(variance), unit=unit, method=method, quantile=quantile, checks=checks)
-        for name, value, variance, unit in (
-            ("friction without load", adhesion, covariance[0, 0], "N"),
-            ("coefficient of friction", coefficient, covariance[1, 1], "1"),
-        )
-    ]
+    named = (("friction without load", "N", LATE), ("coefficient of friction", "1", "friction falls with the load"))
+    adhesion, coefficient = (
+        Estimate.normal(
+            name, line[row], sd=math.sqrt(covariance[row, row]), unit=unit, method=method, quantile=quantile,
+            checks=checks,
+        ).within(0.0, otherwise=why)
+        for row, (name, unit, why) in enumerate(named)
+    )  # fmt: skip
     each = tuple(
         level.scaled(1 / float(load), "1", f"friction over load of {load:.3g} N")
         for level, load in zip(levels, weights, strict=True)
     )
     doubtful = [level.status for level in levels if level.status != "ok"]
-    return LoadLine(two[1], two[0], each, weights, covariance, quantile, "; ".join(dict.fromkeys(doubtful)) or "ok")
+    status = "; ".join(dict.fromkeys(doubtful)) or "ok"
+    return LoadLine(coefficient, adhesion, each, weights, line, covariance, quantile, status)

@@ -197,7 +197,8 @@ class Columns:
         weighed = re.search(r"(?:^|[ /(])(m?g)\)?$", spec.sensitivity or stated or "")
         if weighed and unit.si == "kg":
             self.notes.append(f"{name}: {weighed[1]} read as a mass; call the channel a or acc if it is gravity")
-        return Channel(name, unit.si, described(name, unit.si), source, spec.sensitivity), unit.scale
+        assumed = stated is None and unit.si != "1"
+        return Channel(name, unit.si, described(name, unit.si), source, spec.sensitivity, assumed=assumed), unit.scale
 
     def _unit(self, name: str, stated: str) -> Unit:
         try:

@@ -68,7 +68,7 @@ class Standing:
     name, family : str
         The law.
     misfit : float
-        Mean square of what it leaves over that of the best law, the mean over channels and records; 1 is the best.
+        Mean square of what it leaves over the least that any law leaves, the mean over channels and records: 1 or more.
     criterion : float
         Schwarz's information criterion less that of the best law; more is worse.
     prediction : float
@@ -109,7 +109,7 @@ class Evidence:
         return math.log(FEIGNED) * math.fsum(self.counts.values())
 
     def over(self, squares: Mapping[Key, float], best: Mapping[Key, float]) -> float:
-        """What is left over what the best law leaves, the mean over channels and records."""
+        """What is left over what another law, or any law, leaves: the mean over channels and records."""
         floors = {name: noise**2 for name, noise in self.noise.items()}
         return float(np.mean([max(squares[n], low) / max(best[n], low) for n, low in floors.items()]))
 
@@ -132,19 +132,20 @@ def standings(
     inner, sure = _within([each for each in order if each.family == order[0].family], evidence, likely)
     best = next(each for each in order if each.name == next(iter(inner)))
     order.sort(key=lambda each: each is not best)
-    ratios = {each.name: evidence.over(each.squares, best.squares) for each in order}
+    least = {key: min(each.squares[key] for each in order) for key in evidence.noise}
+    ratios = {each.name: evidence.over(each.squares, least) for each in order}
     forecasts = _forecasts(order, evidence)
     odds = _odds([each for each in order if each.name not in limits], best, evidence, forecasts)
     near = {name for name, each in odds.items() if each > UNLIKELY}
     level = evidence.criterion(best.squares, best.count)
     told = []
     for each in order:
+        worse = evidence.criterion(each.squares, each.count) - level
         kept = each.name in inner or each.name in near
-        words = inner.get(each.name) or ("not rejected" if kept else f"rejected: {_why(each, best, ratios)}")
+        words = inner.get(each.name) or ("not rejected" if kept else f"rejected: {_why(each, best, ratios, worse)}")
         limit = each.name in limits
         if limit:
             words = "so stiff that it is a rigid contact, and explains nothing more"
-        worse = evidence.criterion(each.squares, each.count) - level
         told.append(
             Standing(each.name, each.family, ratios[each.name], worse, forecasts[each.name], kept, words, limit)
         )
@@ -179,9 +180,13 @@ def _limits(order: Sequence[Misfit], evidence: Evidence) -> set[str]:
     return {each.name for each in order if each.stiff and rigid - worth[each.name] <= evidence.allowance}
 
 
-def _why(law: Misfit, best: Misfit, ratios: Mapping[str, float]) -> str:
-    idle = law.count > best.count and ratios[law.name] <= 1.1
-    return "its further parameters explain nothing more" if idle else f"misfit {times(ratios[law.name])}"
+def _why(law: Misfit, best: Misfit, ratios: Mapping[str, float], worse: float) -> str:
+    """What speaks against a law: its parameters, its misfit, or the criterion that weighs what tells a story."""
+    if law.count > best.count and ratios[law.name] <= 1.1 * ratios[best.name]:
+        return "its further parameters explain nothing more"
+    if ratios[law.name] <= ratios[best.name]:
+        return f"it leaves more where the records tell most, its criterion {worse:.3g} worse"
+    return f"misfit {times(ratios[law.name])}"
 
 
 def times(ratio: float) -> str:

@@ -184,9 +184,9 @@ def compare_laws(
     r"""Which friction law is it?
 
     Each law is fitted to all records, the exact engine in the loop, from starts that the friction tells without any
-    law and from the ends of the simpler laws' searches. A law's misfit is the mean square of what it leaves over that
-    of the best law, each channel by its own measure: the error of the model is larger than the noise, and its variance
-    is what the best law leaves. The laws are ranked by Schwarz's criterion with that variance,
+    law and from the ends of the simpler laws' searches. A law's misfit is the mean square of what it leaves over the
+    least that any law leaves, each channel by its own measure: the error of the model is larger than the noise, and its
+    variance is what the best law leaves. The laws are ranked by Schwarz's criterion with that variance,
 
     .. math:: \sum_c n_c \log S_c + p \log \sum_c n_c
 
@@ -467,8 +467,8 @@ def _answer(
     families = list(dict.fromkeys(each.family for each in kept))
     excess_ = excess_ if told[0].family == "rigid" else None
     checks = tuple(
-        f"{each.name}: misfit {times(each.misfit)} the best one's"
-        + (f", of records left out {times(each.prediction)}" if math.isfinite(each.prediction) else "")
+        f"{each.name}: misfit {times(each.misfit)} the least"
+        + (f", of records left out {times(each.prediction)} the best one's" if math.isfinite(each.prediction) else "")
         for each in told
     )
     step = Step(
@@ -517,8 +517,9 @@ def _sentences(
     else:
         said = []
         if rivals:
-            least = times(min(each.misfit for each in rivals))
-            said.append(f"the misfit of any other family tried is at least {least} as large")
+            least = min(each.misfit for each in rivals) / best.misfit
+            larger = f"the misfit of any other family tried is at least {times(least)} as large"
+            said.append(larger if least > 1 else "another family leaves no less where the records tell most")
         if limits:
             said.append(f"{_either(limits)} would have to be so stiff that it says the same")
         told = "; ".join(said) or "no law of another family was tried"

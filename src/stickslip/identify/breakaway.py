@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.identify.balance import Balance
 from stickslip.identify.force import FUSIONS
 from stickslip.identify.load_cell import ALONE
@@ -17,6 +17,7 @@ from stickslip.identify.motion import is_measured
 from stickslip.identify.slip_ringing import ringing_of
 from stickslip.identify.strokes import FAST, Stroke, Strokes, find_strokes
 from stickslip.record.record import Record
+from stickslip.signals.differentiate import noise_along
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import mean_of_cycles
 
@@ -40,6 +41,7 @@ CREEPS = 0.1  # of a stroke's largest speed, below which it does not slide for g
 RINGS = 1.5  # times what a mount's ring is after half a cycle it is at its start, at most
 LEAST = 8  # samples in which a stick's end and a slip's start can be told
 STEADY = 0.3  # of the sliding friction: one that swings by more is no friction to be quoted
+UNSURE = 0.2  # of the noise's variance, by which what is taken off may be wrong (95 %)
 QUARTILE = 0.6744897501960817  # of the normal distribution
 
 
@@ -59,8 +61,8 @@ class Breakaway(Result):
     ringing_difference : Estimate or None
         Forward less back [Hz].
     swing_forward, swing_back : Estimate or None
-        How much the friction swings about its level while it slides, over that level; a friction that is steady enough
-        to be called one does so by less than 30 %.
+        How much the friction swings about its level while it slides, over that level, its noise taken off; a friction
+        that is steady enough to be called one does so by less than 30 %.
     count : int
         Strokes looked at.
     status : str
@@ -144,7 +146,7 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
         )
     rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
     heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
-    swings = [_swing([each for each in borne.strokes if each.way == way], side) for way, side in SIDES]
+    swings = [_swing(record, [each for each in borne.strokes if each.way == way], side) for way, side in SIDES]
     return Breakaway(
         _flagged(levels[0], status), _flagged(levels[1], status), _flagged(ratio, status) or ratio, *heard,
         swings[0], swings[1], len(borne.strokes), status,
@@ -312,7 +314,8 @@ def _stray(stroke: Stroke, *, wide: bool) -> float:
 def _widened(estimate: Estimate, below: float, above: float) -> Estimate:
     """The estimate, its interval as far as noise and the instant of a sample may have moved it."""
     low, high = estimate.interval
-    return replace(estimate, interval=(low - below, high + above), sd=float(np.hypot(estimate.sd, (below + above) / 4)))
+    wide = replace(estimate, interval=(low - below, high + above), sd=float(np.hypot(estimate.sd, (below + above) / 4)))
+    return wide.within(0.0)
 
 
 def _balance(record: Record) -> Balance | None:
@@ -373,18 +376,41 @@ def _summed(values: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2)])
 
 
-def _swing(strokes: Sequence[Stroke], side: str) -> Estimate | None:
-    """Median deviation of the friction from its median while it slides, as a normal law's standard deviation."""
-    shares = []
+def _swing(record: Record, strokes: Sequence[Stroke], side: str) -> Estimate | None:
+    """Median deviation of the friction from its median while it slides, as a normal law's, less that of its noise."""
+    noise, squares, noises = _noise(record), [], []
     for stroke in strokes:
         speed = np.gradient(stroke.displacement)
-        friction = stroke.friction[stroke.slip :][speed[stroke.slip :] > FAST * speed.max()]
-        if len(friction):
-            shares.append(float(np.median(np.abs(friction - np.median(friction)))) / QUARTILE / stroke.level)
-    if not shares:
+        rows = stroke.slip + np.flatnonzero(speed[stroke.slip :] > FAST * speed.max())
+        if len(rows):
+            friction = stroke.friction[rows]
+            swing = float(np.median(np.abs(friction - np.median(friction)))) / QUARTILE
+            noises.append((float(np.median(noise[stroke.first + rows])) / stroke.level) ** 2)
+            squares.append((swing / stroke.level) ** 2 - noises[-1])
+    if not squares:
         return None
-    found = mean_of_cycles(
-        f"swing of the friction while sliding {side}", shares, unit="1", method="median deviation from the median"
-    )
+    square = mean_of_cycles(
+        f"swing of the friction while sliding {side}", squares, unit="1",
+        method="median deviation from the median, less the noise",
+    )  # fmt: skip
+    half = UNSURE * float(np.mean(noises))
+    low, high = square.interval
+    found = _root(replace(square, interval=(low - half, high + half), sd=float(np.hypot(square.sd, half / 2))))
     swings = f"the friction swings by {100 * found.value:.0f} % of its level while it slides: a vibration of the rig"
-    return found if found.value < STEADY else replace(found, status=f"{swings} or a faulty record, no steady friction")
+    return replace(found, status=f"{swings} or a faulty record, no steady friction") if found.value >= STEADY else found
+
+
+def _noise(record: Record) -> Array:
+    """Standard deviation of the friction's noise at each sample: as its balance tells it, as stated, or as it shows."""
+    if "friction_sd" in record and not is_measured(record, "friction"):
+        return record["friction_sd"]
+    return noise_along(record["friction"], record.fs, record.channels["friction"].noise)
+
+
+def _root(square: Estimate) -> Estimate:
+    """The square root of an estimate that can not be below zero."""
+    possible = square.within(0.0, otherwise="its noise is larger than all that the friction swings by")
+    low, high = (float(np.sqrt(end)) for end in possible.interval)
+    return replace(
+        possible, value=float(np.sqrt(possible.value)), interval=(low, high), sd=(high - low) / (2 * NORMAL_95)
+    )

@@ -198,7 +198,7 @@ def compare_force(
     mounts = find_mounts(lines, balanced, told) if "a" in record and bands[0].verdict != "differ" else ()
     return ForceComparison(
         difference=_flagged(_difference(lines, direct - indirect), cut),
-        agree_up_to=_flagged(_agree_up_to(bands, tolerance, lines), cut),
+        agree_up_to=_flagged(_agree_up_to(bands, tolerance, lines, record.fs / 2), cut),
         bands=bands,
         resonances=mounts,
         time=record.time,
@@ -251,7 +251,7 @@ def _difference(lines: Lines, difference: Array) -> Estimate:
     )  # fmt: skip
 
 
-def _agree_up_to(bands: tuple[ForceBand, ...], tolerance: float, lines: Lines) -> Estimate:
+def _agree_up_to(bands: tuple[ForceBand, ...], tolerance: float, lines: Lines, nyquist: float) -> Estimate:
     """Where the ratio leaves its tolerance for the first time; its ends, where it surely has and may have."""
     heard = [band for band in bands if band.verdict != "noise"]
     middle = np.array([band.centre for band in heard])
@@ -272,7 +272,7 @@ def _agree_up_to(bands: tuple[ForceBand, ...], tolerance: float, lines: Lines) -
         f"ratio within {100 * tolerance:g} % of 1 in bands a factor of {RATIO:g} wide", status,
         (f"{lines.count} {'cycles' if lines.cycles else 'windows'}",
          f"{len(heard)} of {len(bands)} bands have both forces in common"),
-    )  # fmt: skip
+    ).within(0.0, nyquist)  # fmt: skip
 
 
 def _crossing(frequency: Array, off: Array, tolerance: float) -> float:

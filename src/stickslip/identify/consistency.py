@@ -20,7 +20,7 @@ from stickslip.identify.forced_checks import (
     stops_check,
     velocity_check,
 )
-from stickslip.identify.mixups import mixups
+from stickslip.identify.mixups import ONE_SLIP, mixups
 from stickslip.identify.motion import is_measured, require_change
 from stickslip.identify.sensor_checks import cycle_checks, range_checks, sampling_check, silence_checks, silent
 from stickslip.identify.stated import Stated, stated_checks, what_fails
@@ -51,6 +51,11 @@ class Consistency(Result):
     def failed(self) -> tuple[Check, ...]:
         """The checks that fail."""
         return tuple(check for check in self.checks if check.verdict == FAILS)
+
+    @property
+    def slip(self) -> str:
+        """The one slip of the hand (a sign, two cables, a unit) that would make the channels agree; else empty."""
+        return next((check.sentence for check in self.failed if check.name == ONE_SLIP), "")
 
     def __getitem__(self, name: str) -> Check:
         """The check of that name."""

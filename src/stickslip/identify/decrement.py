@@ -245,7 +245,7 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
         "dry friction displacement", found[1], sd=spread[1], unit="rad" if ring_down.unit.startswith("rad") else "m",
         status=status, checks=_quoted(scatter.dry_displacement),
         method=f"equation {of_dry}, mean of the last {last}",
-    )  # fmt: skip
+    ).within(0.0)  # fmt: skip
     natural = frequency.scaled(1 / math.sqrt(1 - found[0] ** 2), "Hz", "natural frequency")
     bias = _bias(ring_down, form, centre + side * found[2], spread[2], status)
     return Decrement(

@@ -200,7 +200,7 @@ def extreme_decay(
         "method": f"least squares over {len(sizes)} extremes", "quantile": student(max(1, len(sizes) - FREE)),
     }  # fmt: skip
     damping = Estimate.normal("damping ratio", damping_ratio(beta), sd=beta_sd / (1 + beta**2) ** 1.5, unit="1", **told)
-    displacement = Estimate.normal("dry friction displacement", dry, sd=dry_sd, unit=ring_down.unit, **told)
+    displacement = Estimate.normal("dry friction displacement", dry, sd=dry_sd, unit=ring_down.unit, **told).within(0.0)
     return EnvelopeDecay(
         damping, displacement, _frequency(ring_down, damping.value, told["method"]), told["method"],
         "noise lengthens every extreme, and a sample seldom falls on one: some times less sure than the whole waveform",

@@ -272,7 +272,7 @@ def _resonance(mode: _Mode, channels: Sequence[str], ratio: float | None, *, kno
     return Resonance(
         name,
         Estimate.normal(f"frequency of the {name}", mode.frequency, sd=mode.sd[0], unit="Hz", method=method),
-        Estimate.normal(f"damping ratio of the {name}", mode.damping, sd=mode.sd[1], unit="1", method=method),
+        Estimate.normal(f"damping ratio of the {name}", mode.damping, sd=mode.sd[1], unit="1", method=method).within(0),
         shown,
         evidence,
     )

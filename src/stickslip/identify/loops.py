@@ -208,10 +208,7 @@ def _magnitudes(
     }
     how = "speed-weighted median, mean of cycles"
     found = {key: mean_of_cycles(name, values, unit=unit, method=how) for key, (name, values) in wanted.items()}
-    for key in ("forward", "back", "level"):
-        if found[key].value < 0:
-            found[key] = replace(found[key], status=DRIVES)
-    return found
+    return found | {key: found[key].within(0.0, otherwise=DRIVES) for key in ("forward", "back", "level")}
 
 
 def _levels(
@@ -234,7 +231,8 @@ def _levels(
 def _energy(friction: Array, motion: Motion, cycles: Cycles) -> Estimate:
     work = np.concatenate([[0.0], np.cumsum((friction[1:] + friction[:-1]) / 2 * np.diff(motion.displacement))])
     per_cycle = np.diff(np.interp(cycles.edges, np.arange(len(work)), work))
-    return mean_of_cycles("energy per cycle", per_cycle, unit="J", method="closed integral of f dx, mean of cycles")
+    found = mean_of_cycles("energy per cycle", per_cycle, unit="J", method="closed integral of f dx, mean of cycles")
+    return found.within(0.0, otherwise=DRIVES)
 
 
 def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], unit: str) -> Estimate:
@@ -326,9 +324,9 @@ def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.in
 
 
 def _status(cycles: Cycles, found: dict[str, Estimate], energy: Estimate) -> str:
-    words = [] if found["forward"].status in ("ok", DRIVES) else [found["forward"].status]
+    words = [found["forward"].status] if found["forward"].known and found["forward"].status != "ok" else []
     if cycles.status != "ok":
         words.append(cycles.status)
-    if found["level"].value < 0 or energy.value < 0:
+    if not (found["level"].known and energy.known):
         words.append(DRIVES)
     return "; ".join(words) or "ok"

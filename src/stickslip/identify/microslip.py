@@ -139,7 +139,7 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
     per_stick = mean_of_cycles(
         "micro-slips per stick", [float(count) for count in counts], unit="1",
         method="cuts between rings of one mode, by dynamic programming",
-    )  # fmt: skip
+    ).within(0.0)  # fmt: skip
     blurred = "without a load cell whose mount is stated, one may be missed or seen twice" if ringing.blurred else ""
     status = "; ".join(word for word in (ringing.status, astray, blurred) if word not in ("", "ok")) or "ok"
     low, high = per_stick.interval

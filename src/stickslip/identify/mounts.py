@@ -180,7 +180,9 @@ def _named(fit: _Fitted, kind: str, balance: _MeanLines) -> list[Resonance]:
         Resonance(
             name,
             Estimate.normal(f"frequency of the {name}", frequency, sd=frequency * sd[0], unit="Hz", method=method),
-            Estimate.normal(f"damping ratio of the {name}", damping, sd=damping * sd[1], unit="1", method=method),
+            Estimate.normal(
+                f"damping ratio of the {name}", damping, sd=damping * sd[1], unit="1", method=method
+            ).within(0),
             (channel,),
             f"{channel} swings where {other} does not",
         )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
-from stickslip.identify.motion import FORCES
+from stickslip.identify.motion import FORCES, is_measured
 from stickslip.identify.strokes import Stroke, Strokes, find_strokes
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
@@ -24,6 +24,9 @@ SIDES = ((1, "forward"), (-1, "back"))
 LOW, HIGH = 0.2, 0.8  # of the sliding friction, between which a line is drawn on either side of zero
 FEW = 4  # samples for a line
 FELT = 5e-4  # of a stroke: a contact that gives way by less is not told from a rigid one
+ELASTIC = 1 / 3  # of a stroke, that friction may take to turn: one that follows the speed seems to give way over 0.44
+RIGID = 0.02  # of a stroke: where friction may take more to build up, a contact is not shown to be rigid
+BLURRED = 0.5  # of the samples over which a balance of forces blurs a jump: a quicker build-up is the blur's
 APART = 2.0  # times: compliances that differ by more between the directions are worth a word
 
 
@@ -40,7 +43,7 @@ class Presliding(Result):
     backlash : Estimate or None
         Play: how far it moves between the line on which friction falls and that on which it builds up.
     compliance_forward, compliance_back : Estimate
-        Displacement over friction [m/N]; below zero where it moves against its load.
+        Displacement over friction [m/N]; without a value where the verdict is "can not be told".
     verdict : str
         "gives way", "rigid" or "can not be told".
     evidence : str
@@ -75,7 +78,9 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     the surer of the two), :math:`1/C` the stiffness, and the distance of both lines at no friction the play. A contact
     that gives way does so alike in both directions; where C is not told from zero, or is smaller than 0.05 % of the
     stroke, it is rigid as far as the record can tell; where the mass moves against its load while it sticks, something
-    else moves (the frame, the sensor), and its compliance can not be told.
+    else moves (the frame, the sensor), and its compliance can not be told. Nor can it where friction would take more
+    than a third of a stroke to turn round, as one that follows the speed seems to, or builds up within the samples over
+    which a balance of forces blurs a jump.
 
     Parameters
     ----------
@@ -114,13 +119,18 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     found = [_compliance(strokes.to(way), f"compliance {side}", f"{length}/{strokes.unit}") for way, side in SIDES]
     level = float(np.median([each.level for each in strokes.strokes]))
     least = max(FELT * span, noise) / level  # compliance that would just be felt
-    verdict, evidence = _verdict(found, level, least, length)
+    most = ELASTIC * span / 2 / level  # friction turns from one side to the other
+    verdict, evidence = _verdict(found, level, (least, RIGID * span / level, most), length)
+    if verdict == "gives way" and not is_measured(record, "friction") and _blurred(strokes):
+        verdict, evidence = "can not be told", f"{evidence}, as fast as the balance of forces lets a jump be seen"
     gives = verdict == "gives way"
     sides = [
         _inverse(each, f"presliding stiffness {side}") if gives else None
         for each, (_, side) in zip(found, SIDES, strict=True)
     ]
-    status = "ok" if verdict != "can not be told" and "times as much" not in evidence else evidence
+    untold = verdict == "can not be told"
+    found = [each.unknown(evidence) if untold else each.within(0.0, otherwise=evidence) for each in found]
+    status = evidence if untold or _uneven(found) else "ok"
     if _rings(strokes.strokes):
         status = "the contact rings while friction builds up, so that a line says little: see contact_stiffness(record)"
     return Presliding(
@@ -137,6 +147,16 @@ def _branch(stroke: Stroke, low: float, high: float) -> tuple[float, float] | No
         return None
     slope, offset = np.polyfit(friction[inside], stroke.displacement[: stroke.slip + 1][inside], 1)
     return float(offset), float(slope)
+
+
+def _blurred(strokes: Strokes) -> bool:
+    """Whether the friction builds up faster than a balance of forces can follow, in most strokes."""
+    rows = [
+        np.count_nonzero((each.friction > LOW * each.level) & (each.friction < HIGH * each.level)
+                         & (np.arange(len(each.friction)) <= each.slip))
+        for each in strokes.strokes
+    ]  # fmt: skip
+    return float(np.median(rows)) < BLURRED * strokes.motion.blur
 
 
 def _rings(strokes: Sequence[Stroke]) -> bool:
@@ -173,8 +193,11 @@ def _backlash(strokes: Strokes) -> Estimate | None:
     return mean_of_cycles("backlash", gaps, unit=strokes.motion.unit, method=how)
 
 
-def _verdict(found: Sequence[Estimate], level: float, least: float, length: str) -> tuple[str, str]:
-    """Whether the contact gives way, and why."""
+def _verdict(
+    found: Sequence[Estimate], level: float, limits: tuple[float, float, float], length: str
+) -> tuple[str, str]:
+    """Whether the contact gives way, and why; by the compliance that is felt, still rigid, and possible."""
+    least, rigid, most = limits
     ways = [each.value * level for each in found]
     factor, unit = prefixed(np.array([*ways, least * level]), length)
     said = " and ".join(f"{factor * way:.2g} {unit} {side}" for way, (_, side) in zip(ways, SIDES, strict=True))
@@ -182,12 +205,22 @@ def _verdict(found: Sequence[Estimate], level: float, least: float, length: str)
     against = [each for each in found if each.interval[1] < 0 and abs(each.value) > least]
     if against:
         return "can not be told", f"{moves}, against its load: something else moves than the contact"
+    if any(each.value > most for each in found):
+        return "can not be told", f"{moves}, too much of its stroke for a contact that slides"
     if all(abs(each.value) < least or each.includes(0.0) for each in found):
+        if any(each.interval[1] > max(rigid, least) for each in found):
+            return "can not be told", f"{moves}, or much more: it scatters too much"
         return "rigid", f"{moves}; {factor * least * level:.2g} {unit} would be felt"
     if any(each.value < least or each.interval[0] <= 0 for each in found):
         return "can not be told", f"{moves}: not in both directions"
     small, large = sorted(each.value for each in found)
-    return "gives way", moves if large < APART * small else f"{moves}: {large / small:.2g} times as much one way"
+    return "gives way", f"{moves}: {large / small:.2g} times as much one way" if _uneven(found) else moves
+
+
+def _uneven(found: Sequence[Estimate]) -> bool:
+    """Whether a contact that gives way does so by far more in one direction."""
+    small, large = sorted(each.value for each in found)
+    return 0 < APART * small <= large
 
 
 def _both(found: Sequence[Estimate]) -> Estimate:

@@ -121,7 +121,7 @@ def pulled_slider(record: Record, *, channel: str = "load") -> Pull:
     frequency = Estimate(
         "slips per second", 1 / every.value, (1 / every.interval[1], _over(every.interval[0])),
         every.sd / every.value**2, "Hz", "mean time from slip to slip", every.status, every.checks,
-    )  # fmt: skip
+    ).within(0.0, record.fs / 2)  # fmt: skip
     return Pull(
         rate,
         mean_of_cycles("force at breakaway", levels[tops], unit=unit, method="largest force before each slip, mean"),

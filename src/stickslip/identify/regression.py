@@ -267,6 +267,7 @@ UNITS = {"inertia": "kg", "viscous": "N s/m", "coulomb": "N", "offset": "N", "st
 TURNING = {"inertia": "kg m^2", "viscous": "N m s/rad", "coulomb": "N m", "offset": "N m", "stiffness": "N m/rad"}
 WORDS = {"inertia": "inertia", "viscous": "viscous friction", "coulomb": "Coulomb friction", "offset": "constant force",
          "stiffness": "stiffness"}  # fmt: skip
+POSITIVE = ("inertia", "coulomb", "stiffness")  # viscous friction may fall with the speed
 
 
 def _answer(
@@ -290,7 +291,8 @@ def _answer(
     for index, term in enumerate(terms):
         word, _, side = term.partition("_")
         unit = (TURNING if turning else UNITS)[word]
-        found[term] = fit.estimate(index, f"{WORDS[word]} {side}".strip(), unit, method, status=status, checks=checks)
+        told = fit.estimate(index, f"{WORDS[word]} {side}".strip(), unit, method, status=status, checks=checks)
+        found[term] = told.within(0.0) if word in POSITIVE else told
     for word in ("viscous", "coulomb"):
         if word not in found:
             found[word] = _mean_of_both(found[f"{word}_forward"], found[f"{word}_back"], WORDS[word])

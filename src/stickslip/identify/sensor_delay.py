@@ -253,7 +253,7 @@ def _answer(
         frequency = estimate(
             f"{name}, frequency", 1 / (2 * math.pi * root), [0, 0, 0, 1 / (4 * math.pi * root**3)], "Hz"
         )
-        damping = estimate(f"{name}, damping ratio", damped / (2 * root), slope, "1")
+        damping = estimate(f"{name}, damping ratio", damped / (2 * root), slope, "1").within(0.0)
     return SensorDelay(
         estimate(f"delay of {second} behind {first}", found.delay, [1, 0, 0, 0], "s", status),
         estimate(f"gain of {second} over {first}", gain, [0, 1, 0, 0], "1"),

@@ -223,7 +223,7 @@ def _within_noise(limit: float, motion: Motion) -> str:
 
 def _per_cycle_of(sticks: Sequence[StickEvent], cycles: Cycles, motion: Motion, rule: str) -> Estimate:
     method = f"sticks begun in each cycle; {rule}"
-    return mean_of_cycles("stops per cycle", _counted(sticks, cycles, motion), unit="1", method=method)
+    return mean_of_cycles("stops per cycle", _counted(sticks, cycles, motion), unit="1", method=method).within(0.0)
 
 
 def _kind(sticks: Sequence[StickEvent], microslips: Estimate | None) -> str:
@@ -430,7 +430,7 @@ def _share_of(events: tuple[StickEvent, ...], cycles: Cycles, motion: Motion) ->
         "stuck share of the time", held / np.diff(cycles.edges), unit="1",
         method="mean of cycles; the contact holds from where the velocity turns to where the friction reaches its "
         "limit, a micro-slip within a stick taken off",
-    )  # fmt: skip
+    ).within(0.0, 1.0)  # fmt: skip
 
 
 def _time_in(kinds: tuple[str, ...], events: tuple[StickEvent, ...], cycles: Cycles, motion: Motion) -> Array:
@@ -448,4 +448,5 @@ def _microslips(events: tuple[StickEvent, ...]) -> Estimate:
     slips = np.array([event.time for event in events if event.kind == "microslip"])
     sticks = [event for event in events if event.kind == "stick" and event.whole]
     counts = [float(np.sum((each.time < slips) & (slips < each.time + each.duration))) for each in sticks]
-    return mean_of_cycles("micro-slips per stick", counts, unit="1", method="turns of the velocity within a stick")
+    method = "turns of the velocity within a stick"
+    return mean_of_cycles("micro-slips per stick", counts, unit="1", method=method).within(0.0)

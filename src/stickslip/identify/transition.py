@@ -146,7 +146,7 @@ def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float |
     pooled = heard_mode(ringing)
     sticks = _stick_by_stick(record, channel, ringing, pooled)
     unit = record.channels[channel].unit
-    frequency, damping = pooled.frequency, pooled.damping
+    frequency, damping = pooled.possible(ringing.fs)
     wavelet = _by_wavelet([stick.wavelet_frequency for stick in sticks])
     amplitude = mean_of_cycles(
         "transition amplitude", [stick.amplitude.value for stick in sticks], unit=unit,
@@ -197,6 +197,10 @@ class Mode:
     noise: float
     windows: tuple[Window, ...]
     correlation: float
+
+    def possible(self, fs: float) -> tuple[Estimate, Estimate]:
+        """Frequency and damping as far as a sampled ring that dies away can have them."""
+        return self.frequency.within(0.0, fs / 2), self.damping.within(0.0, 1.0)
 
 
 def _none(value: str, rule: str) -> EstimateError:
@@ -291,7 +295,7 @@ def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: Mode
         begin, middle = window.rings[0].first, ringing.time(window, len(window.values) / 2)
         event = min(events, key=lambda event: abs(event.time + event.duration / 2 - middle))
         size, sd = _amplitude(window, pooled, ringing)
-        frequency, damping = (own.frequency, own.damping) if own is not None else _untold_alone(pooled)
+        frequency, damping = own.possible(ringing.fs) if own is not None else _untold_alone(pooled)
         found.append(
             StickTransition(
                 time=ringing.time(window, begin), duration=event.duration, frequency=frequency, damping=damping,
@@ -307,10 +311,7 @@ def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: Mode
 
 def _untold_alone(pooled: Mode) -> tuple[Estimate, ...]:
     """Frequency and damping of all sticks, for one that does not tell them by itself."""
-    nothing, why = (-math.inf, math.inf), "this stick alone does not tell it"
-    return tuple(
-        replace(each, sd=math.inf, interval=nothing, status=why) for each in (pooled.frequency, pooled.damping)
-    )
+    return tuple(each.unknown("this stick alone does not tell it") for each in (pooled.frequency, pooled.damping))
 
 
 def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: Mode) -> list[float]:
@@ -340,8 +341,8 @@ def _by_wavelet(peaks: list[float]) -> Estimate:
     name, method = "transition frequency by wavelet", "local maximum of the Morlet map in each stick, mean of sticks"
     if np.isfinite(peaks).any():
         return mean_of_cycles(name, peaks, unit="Hz", method=method)
-    nowhere = (-math.inf, math.inf)
-    return Estimate(name, math.nan, nowhere, math.inf, "Hz", method, status="the map has no local maximum in any stick")
+    nothing = Estimate(name, math.nan, (math.nan, math.nan), math.nan, "Hz", method)
+    return nothing.unknown("the map has no local maximum in any stick")
 
 
 def _agreement(frequency: Estimate, wavelet: Estimate) -> str:
@@ -371,7 +372,7 @@ def _stiffness(mode: Mode, mass: float | str | None, spring: float | str | None)
     return Estimate.normal(
         "contact stiffness by frequency", kilograms * square - k, sd=kilograms * square * relative, unit="N/m",
         method="K = m |p|^2 - k", quantile=quantile, status=status,
-    )  # fmt: skip
+    ).within(0.0, otherwise="it rings slower than on its spring alone: mass= or stiffness= is wrong")  # fmt: skip
 
 
 def _loop_stiffness(record: Record, ringing: Ringing, mode: Mode) -> Estimate | None:
@@ -392,7 +393,7 @@ def _loop_stiffness(record: Record, ringing: Ringing, mode: Mode) -> Estimate | 
     if np.linalg.cond(design / np.linalg.norm(design, axis=0)) > 100:
         return None
     line = least_squares(design, np.concatenate(force))
-    return line.estimate(0, "contact stiffness by loops", "N/m", "friction on x and v in the rings")
+    return line.estimate(0, "contact stiffness by loops", "N/m", "friction on x and v in the rings").within(0.0)
 
 
 def _status(ringing: Ringing, pooled: Mode, doubt: str) -> str:

@@ -116,7 +116,7 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
 
 def _untold(channel: ss.Channel) -> bool:
     """Whether nobody stated a unit: what it is in is then not known, unless it may well have none."""
-    return UNTOLD in channel.source or (channel.unit == "1" and channel.name not in ("sound", "coefficient"))
+    return channel.assumed or (channel.unit == "1" and channel.name not in ("sound", "coefficient"))
 
 
 def _fault(fault: Fault) -> dict[str, Any]:

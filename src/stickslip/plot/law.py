@@ -42,7 +42,7 @@ SHOWN = 0.4  # s of a record that are drawn: more can not be told apart on a pag
 
 @styled
 def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
-    """The misfit of each law over that of the best one, and which laws are rejected.
+    """The misfit of each law over the least that any law leaves, and which laws are rejected.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set_yticks(places, [each.name for each in told])
     ax.set_ylim(len(told) - 0.4, -0.6)
-    ax.set_xlabel("misfit, over that of the best law")
+    ax.set_xlabel("misfit, over the least that any law leaves")
     ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
     return ax
 
@@ -155,8 +155,8 @@ def law_plates(result: LawComparison | LawFit | CurveFit) -> list[Plate]:
     if isinstance(result, CurveFit):
         return [plate("curve", plot_curve(result), "Measured and fitted", "The curve over all samples that were used.")]
     told = (
-        "Mean square of what a law leaves over that of the best one, the mean over channels and records. Diamonds: "
-        "each record predicted by a fit to the others."
+        "Mean square of what a law leaves over the least that any law leaves, the mean over channels and records. "
+        "Diamonds: each record predicted by a fit to the others, over what the best law leaves so."
     )
     plates = []
     if isinstance(result, LawComparison) and len(result.candidates) > 1:

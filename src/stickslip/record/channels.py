@@ -66,6 +66,8 @@ class Channel:
         Mass [kg] between the contact and a load cell, whose inertia the cell feels too.
     discharge : float or None
         Time constant [s] with which a piezoelectric sensor forgets; None: it does not.
+    assumed : bool
+        Whether nobody stated its unit, and the usual one of its kind was taken.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Channel:
     mount: tuple[float, float] | None = None
     inertia: float = 0.0
     discharge: float | None = None
+    assumed: bool = False
 
     def __post_init__(self) -> None:
         described(checked_name(self.name), self.unit)

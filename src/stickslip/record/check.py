@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from stickslip.record import flaws
 from stickslip.record.clock import BRIDGED, fit_line, inspect, is_uniform
 from stickslip.record.flaws import Runs
+from stickslip.units import prefixed
 
 if TYPE_CHECKING:
     from stickslip.record.record import Record
@@ -31,8 +32,8 @@ class Fault:
     Attributes
     ----------
     kind : str
-        "short", "clock", "rate", "backwards", "repeated stamps", "jitter", "gap", "missing", "constant", "clipped",
-        "frozen", "spike", "drift" or "coarse".
+        "short", "unit", "clock", "rate", "backwards", "repeated stamps", "jitter", "gap", "missing", "constant",
+        "clipped", "frozen", "spike", "drift" or "coarse".
     channel : str or None
         The channel it is in; None for the clock, and for three or more channels that are all constant.
     rows : tuple of (first, last)
@@ -68,10 +69,10 @@ class Fault:
 def find_faults(record: Record) -> list[Fault]:
     """What is wrong with a record; empty when nothing is.
 
-    The clock is checked for stamps that stand still and jump, go back, repeat, jitter, are lost, or leave gaps; each
-    channel for values that are not numbers, a constant, clipping, frozen samples, spikes, drift, and too few levels. A
-    plateau of a stuck mass, a friction force's square wave, a sensor's steps, and rest at the end of a decay are
-    no faults.
+    A unit that nobody stated is told with what the channel spans in the one taken. The clock is checked for stamps that
+    stand still and jump, go back, repeat, jitter, are lost, or leave gaps; each channel for values that are no numbers,
+    a constant, clipping, frozen samples, spikes, drift, and too few levels. A plateau of a stuck mass, a friction
+    force's square wave, a sensor's steps, and rest at the end of a decay are no faults.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ def find_faults(record: Record) -> list[Fault]:
     >>> [fault.kind for fault in find_faults(Record.of({"x": [1.0] * 100}, fs=50.0))]
     ['constant']
     """
-    faults = _short(record)
+    faults = [*_short(record), *_unstated(record)]
     if record.stamps is not None and not is_uniform(record.stamps):
         faults += _clock_faults(record.stamps)
     with np.errstate(over="ignore", invalid="ignore"):  # a damaged file holds 1e300: its square is no news
@@ -202,6 +203,21 @@ def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
 
 
 # ---- the channels
+
+
+def _unstated(record: Record) -> list[Fault]:
+    """Channels whose unit nobody stated, with what they span in the one that was taken."""
+    faults = []
+    for name, channel in record.channels.items():
+        finite = record[name][np.isfinite(record[name])]
+        if channel.assumed and len(finite):
+            factor, unit = prefixed(float(np.ptp(finite)), channel.unit)
+            message = (
+                f"{name} states no unit: read as {channel.unit} it spans {factor * np.ptp(finite):.3g} {unit}; "
+                f'if it is in another, say which, as in channels={{"{name}": "COLUMN [UNIT]"}}.'
+            )
+            faults.append(Fault("unit", name, ((0, len(record) - 1),), message))
+    return faults
 
 
 def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:

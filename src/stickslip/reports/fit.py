@@ -15,7 +15,7 @@ from stickslip.reports.folder import check_folder, results_folder, write_figures
 from stickslip.reports.law_files import write_law
 from stickslip.reports.page import Section, render
 from stickslip.reports.summary import Line, Summary
-from stickslip.reports.words import doubts, interval_of, number, value_of
+from stickslip.reports.words import doubts, interval_of, leading, number, value_of
 
 LOUD = 0.3  # of the friction, that a curve leaves for noise
 
@@ -52,20 +52,21 @@ def fit_summary(result: LawComparison | LawFit | CurveFit, *, records: Sequence[
         "records": str(len(records)), "sampling rate": f"{first.fs:g} Hz",
         "length": ", ".join(f"{record.duration:g} s" for record in records),
     }  # fmt: skip
+    first_said = list(dict.fromkeys(words for record in records for words in leading(record.check())))
     told = result.status == "ok" or (isinstance(result, LawComparison) and result.status in result.verdict)
     unsaid = [each for each in result.estimates if each.status not in result.status]
     cautions = [*([] if told else [f"{result.status}."]), *doubts(unsaid)]
     if isinstance(result, CurveFit):
-        headline = [*_curve_told(result)]
+        headline = [*first_said, *_curve_told(result)]
         return Summary(name, headline, cautions, lines=lines, settings=settings,
                        channels=list(first.channels.values()), history=first.history)  # fmt: skip
     if isinstance(result, LawFit):
-        return Summary(name, [*_law_told(result)], cautions, lines=lines, notes=list(result.checks), settings=settings,
-                       channels=list(first.channels.values()), history=first.history)  # fmt: skip
+        return Summary(name, [*first_said, *_law_told(result)], cautions, lines=lines, notes=list(result.checks),
+                       settings=settings, channels=list(first.channels.values()), history=first.history)  # fmt: skip
     verdicts = [(each.name, f"{each.standing.verdict} ({_values(each.oscillator.law)})") for each in result.candidates]
     return Summary(
-        name, [result.verdict], cautions, lines=lines, notes=[*result.checks, *result.fit.checks], settings=settings,
-        verdicts=verdicts, channels=list(first.channels.values()), history=result.history,
+        name, [*first_said, result.verdict], cautions, lines=lines, notes=[*result.checks, *result.fit.checks],
+        settings=settings, verdicts=verdicts, channels=list(first.channels.values()), history=result.history,
     )  # fmt: skip
 
 

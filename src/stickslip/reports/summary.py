@@ -17,7 +17,7 @@ from stickslip.estimate import Estimate
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record, Step
 from stickslip.reports import decay, squeak
-from stickslip.reports.words import cautions, doubts, headline, interval_of, number, ringing_told, value_of
+from stickslip.reports.words import cautions, doubts, headline, interval_of, leading, number, ringing_told, value_of
 
 _CONSTANT_UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 
@@ -183,7 +183,7 @@ def _of_findings(findings: Findings | DecayFindings) -> Summary:
         told, settings, notes = headline(findings), _settings(findings), list(findings.notes)
         estimates = findings.estimates
     return Summary(
-        findings.name, told, cautions(findings),
+        findings.name, [*leading(findings.faults), *told], cautions(findings),
         lines=[_line(estimate, findings.true_value(estimate)) for estimate in estimates],
         faults=[str(fault) for fault in findings.faults], notes=notes, settings=settings,
         verdicts=decay.verdicts(findings) if isinstance(findings, DecayFindings) else (),
@@ -194,7 +194,8 @@ def _of_findings(findings: Findings | DecayFindings) -> Summary:
 def _of_time_frequency(found: TimeFrequency) -> Summary:
     record = found.record
     return Summary(
-        found.name, list(ringing_told(found)), doubts(found.estimates), lines=[_line(each) for each in found.estimates],
+        found.name, [*leading(record.check()), *ringing_told(found)], doubts(found.estimates),
+        lines=[_line(each) for each in found.estimates],
         faults=[str(fault) for fault in record.check()], notes=found.notes,
         settings={
             "channel": found.channel, "wavelet frequency": f"{found.wavelets.attrs['wavelet_frequency']:g}",
@@ -221,7 +222,8 @@ def _of_squeaks(found: SqueakFindings) -> Summary:
         tables.append(Table(title, *squeak.coupling_table(found.coupling), squeak.coupling_note(found.coupling)))
     low, high = found.squeaks.band
     return Summary(
-        found.name, list(squeak.headline(found)), [*squeak.cautions(found), *doubts(found.estimates)],
+        found.name, [*leading(found.faults), *squeak.headline(found)],
+        [*squeak.cautions(found), *doubts(found.estimates)],
         lines=[_line(each) for each in found.estimates], faults=[str(fault) for fault in found.faults],
         notes=found.notes, tables=tables,
         settings={
@@ -271,9 +273,12 @@ def _of_estimates(estimates: list[Estimate], record: Record | None) -> Summary:
     lines = [_line(estimate) for estimate in estimates]
     if record is None:
         return Summary("Estimates", lines=lines)
-    faults = [str(fault) for fault in record.check()]
+    found = record.check()
+    faults = [str(fault) for fault in found]
     channels = list(record.channels.values())
-    return Summary(record_name(record), lines=lines, faults=faults, channels=channels, history=record.history)
+    return Summary(
+        record_name(record), leading(found), lines=lines, faults=faults, channels=channels, history=record.history
+    )
 
 
 def _line(estimate: Estimate, true: float | None = None, *, name: str | None = None) -> Line:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from stickslip.identify.mechanism import UNTOLD
 from stickslip.identify.presliding import Presliding
 from stickslip.identify.pull import Pull
 from stickslip.identify.slip_ringing import SlipRinging
+from stickslip.record.check import Fault
 from stickslip.units import NOTHING, prefixed
 
 NEVER = "The contact never sticks."
@@ -151,7 +152,20 @@ def ringing_told(found: TimeFrequency) -> Iterator[str]:
         yield f"The signal jumps or kinks {len(found.spikes)} times, in {groups} group{'s' * (groups > 1)}."
 
 
+def leading(faults: Iterable[Fault]) -> list[str]:
+    """What the check-up found wrong with units: every number hangs on it, so that it comes first."""
+    return [str(fault) for fault in faults if fault.kind == "unit"]
+
+
 def _of_findings(findings: Findings) -> Iterator[str]:
+    if findings.contradiction:
+        yield (
+            f"The channels contradict each other: perhaps {findings.contradiction}. Until that is mended no force is "
+            "told here; the table has what they give as they are."
+        )
+        if findings.sticks is not None:
+            yield from _of_sticks(findings)
+        return
     if findings.loops is not None:
         yield from _of_loops(findings)
     found = findings.regression
@@ -194,7 +208,14 @@ def _of_directions(forward: Estimate | None, back: Estimate | None, what: str = 
 def _of_loops(findings: Findings) -> Iterator[str]:
     loops = findings.loops
     assert loops is not None
-    yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
+    if not loops.level.known:
+        yield f"How large the friction is can not be told: {loops.level.status}."
+        return
+    if loops.level.interval[0] == 0:
+        highest = value_of(loops.level, loops.level.interval[1])
+        yield f"No sliding friction can be told from none: it is {highest} at most (95 % sure)."
+    else:
+        yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
     lesser = re.fullmatch(FEW, loops.level.status) or loops.level.status.endswith(LEFT_OUT)  # said among the cautions
     if loops.level.status != "ok" and not lesser:
         yield f"That is not to be trusted: {loops.level.status}."
@@ -235,6 +256,9 @@ def _of_sticks(findings: Findings) -> Iterator[str]:
 def _of_breakaway(found: Breakaway) -> Iterator[str]:
     ratio = found.ratio
     low, high = ratio.interval
+    if not math.isfinite(low + high):
+        yield f"What it bears just before it slips can not be told: {ratio.status}."
+        return
     more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
     sides = " and ".join(f"{value_of(each)} {each.name.split()[-1]}" for each in (found.forward, found.back) if each)
     yield (
