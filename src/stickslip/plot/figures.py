@@ -139,10 +139,11 @@ def _of_findings(findings: Findings) -> list[Plate]:
     events = findings.sticks.events if findings.sticks is not None else ()
     sticks = [event for event in events if event.kind == "stick"]
     plates = [*_of_friction(findings), *_over_time(findings, sticks=len(sticks)), *_of_contact(findings)]
-    if sticks:
+    if any(event.whole for event in sticks):
         plates.append(
             plate("sticks", partial(plot_sticks, findings), "How long it sticks and slips",
-                   "Each mark is one stretch of sticking or slipping; the bars count how often each duration occurred.")
+                   "Each mark is one whole stretch of sticking or slipping; the bars count how often each duration "
+                   "occurred.")
         )  # fmt: skip
     return plates
 
