@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import inspect
 import json
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -61,3 +64,50 @@ def test_a_decay_without_a_finite_worst_case_is_drawn_and_written(tmp_path):
     bounds = replace(found.thesis.bounds, **unbounded)
     folder = ss.publish(replace(found, thesis=replace(found.thesis, bounds=bounds)), folder=tmp_path / "results")
     assert (folder / "figures" / "bounds.svg").exists()
+
+
+ROOMS = ("identify", "decay", "curves", "squeak", "signals")
+# what searches for seconds in any record of this length, and is asked by others of the list or in its own tests
+LONG = {"transition", "find_microslips", "mechanism", "lag_or_compliance", "synchronise", "sound_quality", "resample",
+        "wavelet_map", "wavelet_blocks", "wavelet_overview"}  # fmt: skip
+CHANNELS = ("x", "v", "a", "z", "friction", "load", "sound")
+STATED = {"channel": "x", "channels": "x", "fs": 500.0}
+
+
+def questions() -> list[str]:
+    """Public functions of a record alone, by their signatures."""
+    names = []
+    for name in ss.__all__:
+        function = getattr(ss, name)
+        if not inspect.isfunction(function) or function.__module__.split(".")[1] not in ROOMS or name in LONG:
+            continue
+        first, *others = inspect.signature(function).parameters.values()
+        needed = {each.name for each in others if each.default is each.empty and each.kind is not each.VAR_POSITIONAL}
+        if "Record" in str(first.annotation) and needed <= STATED.keys():
+            names.append(name)
+    return names
+
+
+TIME = np.arange(1000) / 1000
+SINE, NOISE = np.sin(10 * np.pi * TIME), np.random.default_rng(0).standard_normal(1000)
+DEGENERATE = {
+    "zero": 0 * TIME, "constant": 0 * TIME + 3.7, "impulse": np.eye(1000)[500], "noise": NOISE,
+    "decay": np.exp(-3 * TIME) * np.cos(20 * np.pi * TIME), "large": 1e300 * SINE, "small": 1e-300 * NOISE,
+    "least": 5e-324 * np.sign(SINE), "holes": np.where(abs(TIME - 0.5) < 0.05, np.nan, SINE),
+    "one": NOISE[:1], "three": NOISE[:3], "nineteen": SINE[:19], "299": NOISE[:299],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", questions())
+def test_a_degenerate_record_has_an_answer_or_a_sentence(name):
+    """Nothing but StickslipError comes out, and no warning: they are errors here."""
+    question: Callable[..., object] = getattr(ss, name)
+    asked = inspect.signature(question).parameters.values()
+    needed = {each.name: STATED[each.name] for each in asked if each.default is each.empty and each.name in STATED}
+    by_name = {key: value for key, value in needed.items() if key != "channels"}
+    for wave in DEGENERATE.values():
+        for alike in (True, False):
+            rows = {c: wave if alike else (1 + k) * np.roll(wave, 7 * k + 1) for k, c in enumerate(CHANNELS)}
+            record = ss.Record.of(rows, fs=1000)
+            with contextlib.suppress(ss.StickslipError):
+                repr(question(record, *(["x"] if "channels" in needed else []), **by_name))
