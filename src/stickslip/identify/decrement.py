@@ -309,8 +309,7 @@ def _best_pair(x: Array, errors: Array, form: str) -> tuple[int, int]:
     """The i and m for which the exact worst-case error of beta is least; the relative one, where errors may hide it."""
     found = np.abs(ex.differences(x, form))
     both = errors[2:] + errors[:-2] if form == "immune" else errors[1:] + errors[:-1]
-    # extremes read in counts may be equal: their difference tells nothing
-    off = np.divide(both, found, out=np.full_like(found, math.inf), where=found > 0)
+    off = ex.relative(both, found)
     best, chosen = math.inf, (0, 1)
     for first in range(min(len(found) - 1, MOST)):
         m = np.arange(1, len(found) - first)
@@ -403,8 +402,8 @@ def _few(count: int) -> tuple[str, ...]:
 
 def _scatter(x: Array, beta: float, form: str, order: int, frequency: float) -> Scatter:
     found = ex.differences(x, form)
-    ratio = -found[1:] / found[:-1]
-    rates = -np.log(ratio[ratio > 0]) / math.pi
+    falls = found[1:] * found[:-1] < 0
+    rates = -np.log(-found[1:][falls] / found[:-1][falls]) / math.pi
     dry = np.array([_displacement(float(each), beta, order, frequency) for each in ex.dry(x, beta, form=form)])
     return Scatter(rates / np.sqrt(1 + rates**2), dry)
 
