@@ -229,3 +229,12 @@ def test_a_slider_that_swings_is_not_called_stick_slip() -> None:
 def test_a_force_that_does_not_drop_tells_nothing_of_slips() -> None:
     with pytest.raises(EstimateError, match="three slips"):
         ss.pulled_slider(ss.Record.of({"load": np.linspace(0, 1, 5000)}, fs=1000))
+
+
+def test_a_slip_that_the_end_of_the_record_cuts_is_not_counted() -> None:
+    """The last drop is half as far: of a few that would be seen in their mean."""
+    time = np.arange(1750) / 1000  # five swings and a quarter beyond the last maximum
+    wave = 1 + 0.1 * np.cos(2 * np.pi * 3 * time) + np.random.default_rng(3).normal(0, 1e-4, time.size)
+    found = ss.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
+    assert found.drop.value == pytest.approx(0.2, rel=0.02)
+    assert len(found.slips) == 4

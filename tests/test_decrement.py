@@ -162,6 +162,17 @@ def test_the_pendulum_with_the_bad_clock(dataset):
         assert decay.dry_displacement.unit == "rad"
 
 
+@pytest.mark.parametrize("name", ["60.txt", "100.txt"])
+def test_extremes_that_are_read_in_counts_may_be_equal(dataset, name):
+    """The largest samples of a slow decay differ by whole counts, or by none: no warning, and an answer."""
+    path = dataset("pendulum_bad_clock") / name
+    record = ss.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
+    decay = ss.decrement(record, location="sample")
+    assert 0.004 < decay.damping_ratio.value < 0.0075
+    with pytest.raises(ss.EstimateError, match=r'about zero; .* form="plain" takes zero for the rest position'):
+        ss.decrement(record, form="plain")  # it hangs half a degree beside zero
+
+
 def test_the_large_pendulum_is_flagged(dataset):
     record = ss.read_record(dataset("pendulum_decay") / "pend1.csv", channels={"theta": "#2 [rad]"}, time="#1")
     decay = ss.decrement(record)

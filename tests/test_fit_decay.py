@@ -587,3 +587,14 @@ def test_no_half_cycle_is_added_before_a_record_that_begins_with_the_release(dam
             found = ss.fit_decay(ss.Record.of({"x": motion + level * noise}, fs=500))
             assert found.release_time.value == pytest.approx(0.0, abs=0.004)
             assert found.amplitude.value == pytest.approx(start, abs=5 * level)
+
+
+def test_the_mean_of_several_candidates_lies_within_its_interval():
+    """A candidate too unlikely for the interval still has its share in the mean."""
+    from stickslip.decay.fit_decay import _mean
+
+    rows = np.array([np.full(6, 1.0), np.full(6, 2.0)])
+    ends = np.tile([0.99, 1.01], (6, 1))
+    found = _mean(rows, np.array([0.9, 0.1]), np.eye(6), ends, [(3,), (4,)], [(), ()])
+    assert np.all(found.values == pytest.approx(1.1))
+    assert np.all((found.ends[:, 0] <= found.values) & (found.values <= found.ends[:, 1]))

@@ -58,6 +58,17 @@ def test_every_figure_of_the_demonstration_is_drawn_once_without_pyplot(demo: Fi
                    for axes in plate.figure.axes)  # fmt: skip
 
 
+def test_a_stick_or_slip_that_the_record_cuts_is_not_counted(demo: Findings, plates: tuple[Plate, ...]) -> None:
+    """The demonstration begins and ends within a slip, of which 13 ms are left at the end."""
+    assert demo.sticks is not None
+    cut = [event for event in demo.sticks.events if not event.whole]
+    assert [event.kind for event in cut] == ["slip", "slip"]
+    left = next(plate for plate in plates if plate.name == "sticks").figure.axes[0]
+    drawn = {line.get_label(): len(line.get_xdata()) for line in left.get_lines()}  # type: ignore[arg-type]
+    whole = [event.kind for event in demo.sticks.events if event.whole]
+    assert drawn == {"stick": whole.count("stick"), "slip": whole.count("slip")}
+
+
 def test_images_are_valid_small_and_the_same_again(demo: Findings, plates: tuple[Plate, ...]) -> None:
     for plate, again in zip(plates, figures(demo), strict=True):
         assert ET.fromstring(plate.svg()).tag.endswith("svg")

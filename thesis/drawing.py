@@ -28,7 +28,7 @@ COLOURS = {"x": BLUE, "v": GREEN, "a": PURPLE, "friction": ORANGE}
 
 def figure(number: str, drawn: Figure | Axes, words: str, *, title: str = "") -> Plate:
     """A figure of the thesis by its number, or one of ours with a title; `words` say how ours came about."""
-    return plate(f"figure-{number}", drawn, title or f"Figure {number}", words)
+    return plate(f"figure-{number}", lambda: drawn, title or f"Figure {number}", words)
 
 
 def printed_caption(drawn: Plate) -> str:

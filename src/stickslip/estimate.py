@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from stickslip.errors import EstimateError
 from stickslip.units import prefixed
 
 NORMAL_95 = 1.959963984540054  # two-sided 95 % quantile of the normal distribution
 MOST_DECIMALS = 6  # printed in the plain unit
+UNKNOWN = "unknown"
+ROUNDING = 1e-12  # of the largest number, by which arithmetic alone may put a value beside its interval
 
 
 @dataclass(frozen=True)
 class Estimate:
     """A number found in a record, with its 95 % interval.
+
+    It counts as its value (``float(level)``, ``f"{level:.3f}"``); printed, it has the digits that its interval leaves.
 
     Attributes
     ----------
@@ -25,7 +31,8 @@ class Estimate:
     value : float
         The estimate, in `unit`.
     interval : tuple of float
-        Low and high end of the 95 % interval.
+        Low and high end of the 95 % interval, the value between them; infinite where an end is open, NaN where it is
+        not known.
     sd : float
         Standard deviation of the estimate.
     unit : str
@@ -37,10 +44,22 @@ class Estimate:
     checks : tuple of str
         What was checked, with the numbers.
 
+    Raises
+    ------
+    EstimateError
+        A value outside its own interval.
+
     Examples
     --------
-    >>> print(Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="median of 18 half cycles"))
+    >>> level = Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="median of 18 half cycles")
+    >>> print(level)
     sliding friction 1.318 N (95 %: 1.310 to 1.326)
+    >>> float(level), f"{level:.1f}"
+    (1.318, '1.3')
+    >>> print(Estimate("contact stiffness", 7121, (4226, math.inf), math.inf, "N/m", "likelihood"))
+    contact stiffness 7121 N/m (95 %: at least 4226)
+    >>> print(Estimate("viscous damping", 0.0, (0.0, 0.3), 0.15, "N s/m", "likelihood"))
+    viscous damping below 0.30 N s/m (95 %)
     >>> print(Estimate.normal("energy in a cycle", 1.2e-7, sd=2e-8, unit="J", method="mean of cycles"))
     energy in a cycle 120 nJ (95 %: 81 to 159)
     >>> print(Estimate.normal("memory", 1.2e-7, sd=2e-8, unit="m s/N", method="slope"))
@@ -55,6 +74,17 @@ class Estimate:
     method: str
     status: str = "ok"
     checks: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        low, high = self.interval
+        finite = [abs(number) for number in (low, self.value, high) if math.isfinite(number)]
+        rounding = ROUNDING * max(finite, default=0.0)
+        if self.value < low - rounding or self.value > high + rounding or low > high:
+            raise EstimateError(
+                f"a {self.name} of {self.value:.6g} {self.unit} with a 95 % interval of {low:.6g} to {high:.6g}",
+                "an estimate lies within its own interval",
+                "take both from one method; report this if stickslip made it",
+            )
 
     @classmethod
     def normal(
@@ -122,19 +152,59 @@ class Estimate:
             "method": self.method, "status": self.status, "checks": list(self.checks),
         }  # fmt: skip
 
+    @property
+    def spread(self) -> float:
+        """The standard deviation that the interval amounts to, on the side that is closed; without any, `sd`."""
+        low, high = self.interval
+        if math.isfinite(high - low):
+            return (high - low) / (2 * NORMAL_95)
+        closed = [abs(self.value - end) for end in self.interval if math.isfinite(end)]
+        return closed[0] / NORMAL_95 if closed and math.isfinite(closed[0]) and closed[0] > 0 else self.sd
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether all that is told is a bound: the value is not finite, or zero and the end of its own interval."""
+        low, high = self.interval
+        return low < high and (not math.isfinite(self.value) or (self.value == 0.0 and 0.0 in self.interval))
+
+    def between(self, number: Callable[[float], str]) -> str:
+        """The 95 % interval in words, its ends written by `number`; an end that is none is not written."""
+        low, high = self.interval
+        if math.isnan(low + high):  # also of both ends open: infinity less infinity
+            return UNKNOWN
+        if low < high and (math.isinf(low) or math.isinf(high)):
+            return f"at least {number(low)}" if math.isinf(high) else f"at most {number(high)}"
+        if self.is_bound:
+            return f"below {number(high)}" if low == 0 else f"above {number(low)}"
+        return f"{number(low)} to {number(high)}"
+
+    def __float__(self) -> float:
+        return self.value
+
+    def __format__(self, form: str) -> str:
+        return format(self.value, form) if form else str(self)
+
     def __str__(self) -> str:
-        spread = self.sd if self.sd > 0 else self.interval[1] - self.interval[0]
-        numbers, unit, digits = np.array([self.value, *self.interval]), self.unit, decimals(spread, self.value)
-        form = f".{digits}f"
+        write, unit = self._written()
+        flag = "" if self.status == "ok" else f" [{self.status}]"
+        known = self.between(write)
+        if math.isnan(self.value):
+            return f"{self.name} {UNKNOWN}{flag}"
+        if self.is_bound:
+            return f"{self.name} {known}{unit} (95 %){flag}"
+        return f"{self.name} {write(self.value)}{unit} (95 %: {known}){flag}"
+
+    def _written(self) -> tuple[Callable[[float], str], str]:
+        """How its numbers are written, and the unit behind them."""
+        numbers, unit, digits = np.array([self.value, *self.interval]), self.unit, decimals(self.spread, self.value)
+        factor, form = 1.0, f".{digits}f"
         if digits > MOST_DECIMALS:  # zeros to be counted: a prefix, or an exponent where the unit has none
             factor, unit = prefixed(numbers, unit)
-            numbers, digits = factor * numbers, decimals(factor * spread, factor * self.value)
-            largest = np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0)
+            digits = decimals(factor * self.spread, factor * self.value)
+            largest = factor * np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0)
             exponent = digits > MOST_DECIMALS and largest > 0
             form = f".{max(0, digits + math.floor(math.log10(largest)))}e" if exponent else f".{digits}f"
-        value, low, high = (f"{number:{form}}" for number in numbers)
-        flag = "" if self.status == "ok" else f" [{self.status}]"
-        return f"{self.name} {value}{'' if unit == '1' else f' {unit}'} (95 %: {low} to {high}){flag}"
+        return (lambda number: f"{factor * number:{form}}"), "" if unit == "1" else f" {unit}"
 
 
 class Result:

@@ -13,12 +13,16 @@ Answer = TypeVar("Answer")
 
 @dataclass(frozen=True)
 class Asked:
-    """What came of the questions so far: notes in words, and the errors behind those that failed."""
+    """What came of the questions so far: notes in words, and the errors behind those that failed.
+
+    A question aside (how late a sensor is, whether two forces agree) helps the others along. Where it has no answer
+    they are asked without it, and it is no reason why a record tells nothing.
+    """
 
     notes: list[str] = field(default_factory=list)
     refusals: list[StickslipError] = field(default_factory=list)
 
-    def ask(self, question: str, answer: Callable[[], Answer]) -> Answer | None:
+    def ask(self, question: str, answer: Callable[[], Answer], *, aside: bool = False) -> Answer | None:
         """The answer; where the record can not give one, None and a note."""
         try:
             return answer()
@@ -26,5 +30,6 @@ class Asked:
             raise
         except StickslipError as error:
             self.notes.append(f"{question}: {error}")
-            self.refusals.append(error)
+            if not aside:
+                self.refusals.append(error)
             return None

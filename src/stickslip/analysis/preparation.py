@@ -78,7 +78,7 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
         if "x" in whole and _enough(whole, rig):
             if "load" in whole and ("a" in whole or not _base_seen(whole)):
                 comparison = asked.ask(
-                    "Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig))
+                    "Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig)), aside=True
                 )
                 whole = _with_mounts(whole, comparison, asked)
             if method == "auto" and _base_moves(whole, comparison, asked):
@@ -134,6 +134,7 @@ def _weighed(record: Record, rig: RigSettings, asked: Asked) -> RigSettings:
     found = asked.ask(
         "Mass and stiffness",
         lambda: mass_and_stiffness(middle(record, STRETCH), damping=rig.damping or 0.0, **ends),
+        aside=True,
     )
     if found is None:
         return rig
@@ -171,7 +172,7 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
     """The record with the delay of displacement against acceleration stated, where it was not."""
     if not {"x", "a"} <= set(record) or any(record.channels[name].delay for name in ("x", "z", "a") if name in record):
         return record, None
-    found = asked.ask("Sensor delay", lambda: sensor_delay(middle(record, STRETCH)))
+    found = asked.ask("Sensor delay", lambda: sensor_delay(middle(record, STRETCH)), aside=True)
     if found is None:
         return record, None
     if found.gain.value < 0:
@@ -340,7 +341,9 @@ def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
 
 def _tell_per_mass(record: Record, rig: RigSettings, asked: Asked) -> None:
     """What can be said without mass, spring and load cell."""
-    found = asked.ask("Friction per mass", lambda: friction_force(record, contact=rig.contact, method="motion"))
+    found = asked.ask(
+        "Friction per mass", lambda: friction_force(record, contact=rig.contact, method="motion"), aside=True
+    )
     if found is not None:
         level = float(np.median(np.abs(found["friction_per_mass"])))
         asked.notes.append(f"Friction per mass: {level:.4g} m/s^2 (median); {found.history[-1].outcome}.")

@@ -63,7 +63,9 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
         near = descend(part, part.at(point.u, part.own(point.starts)), passes=2, tell=tell)
         allowed = 3.84 * excess * sum(map(len, near.residuals)) / sum(map(len, point.residuals))
         for k in faint:
-            ends[k] = [_end(part, near, k, side, allowed, tell) for side in (-1.0, 1.0)]
+            low, high = (_end(part, near, k, side, allowed, tell) for side in (-1.0, 1.0))
+            apart = float(point.u[k] - near.u[k])  # what thinning moved: the ends are to hold about either peak
+            ends[k] = max(problem.knobs[k].least, low + min(0.0, apart)), high + max(0.0, apart)
     return Surety(sd, freedom, ends, correlations)
 
 

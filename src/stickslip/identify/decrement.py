@@ -296,9 +296,11 @@ def _alternating(x: Array, errors: Array, form: str, times: Array) -> tuple[int,
     when = f"{times[min(int(wrong[0]) + 1, len(x) - 1)]:.4g} s"
     if count < max(NEEDED[form], len(x) / 2):
         raise EstimateError(
-            f"the extremes near {when} do not shrink in turn",
+            f"the extremes near {when} do not shrink in turn{'' if form == 'immune' else ' about zero'}",
             "each extreme of a free decay lies inside the one before on its side",
-            "an extreme is missing or disturbed there: cut the record with record.between(first, last)",
+            "an extreme is missing or disturbed there: cut the record with record.between(first, last)"
+            if form == "immune"
+            else 'form="plain" takes zero for the rest position: take the offset off, or choose form="immune"',
         )
     return count, (f"the extremes from {when} on do not shrink in turn and are left out",)
 
@@ -306,7 +308,8 @@ def _alternating(x: Array, errors: Array, form: str, times: Array) -> tuple[int,
 def _best_pair(x: Array, errors: Array, form: str) -> tuple[int, int]:
     """The i and m for which the exact worst-case error of beta is least; the relative one, where errors may hide it."""
     found = np.abs(ex.differences(x, form))
-    off = (errors[2:] + errors[:-2] if form == "immune" else errors[1:] + errors[:-1]) / found
+    both = errors[2:] + errors[:-2] if form == "immune" else errors[1:] + errors[:-1]
+    off = ex.relative(both, found)
     best, chosen = math.inf, (0, 1)
     for first in range(min(len(found) - 1, MOST)):
         m = np.arange(1, len(found) - first)
@@ -314,7 +317,11 @@ def _best_pair(x: Array, errors: Array, form: str) -> tuple[int, int]:
         alternate = ex.differences(x, form)[first + 1 :] * (-1.0) ** m * ex.differences(x, form)[first] > 0
         with np.errstate(invalid="ignore", divide="ignore"):
             worst = -np.log((1 - later) / (1 + off[first])) / (m * math.pi)
-        worst = np.where(alternate & (later < 1), worst, np.where(alternate, 1e6 * (later + off[first]) / m, math.inf))
+        worst = np.where(
+            alternate & (later < 1) & (off[first] < math.inf),
+            worst,
+            np.where(alternate, 1e6 * (later + off[first]) / m, math.inf),
+        )
         if len(worst) and worst.min() < best:
             best, chosen = float(worst.min()), (first, int(m[np.argmin(worst)]))
     if not math.isfinite(best):
@@ -395,8 +402,8 @@ def _few(count: int) -> tuple[str, ...]:
 
 def _scatter(x: Array, beta: float, form: str, order: int, frequency: float) -> Scatter:
     found = ex.differences(x, form)
-    ratio = -found[1:] / found[:-1]
-    rates = -np.log(ratio[ratio > 0]) / math.pi
+    falls = found[1:] * found[:-1] < 0
+    rates = -np.log(-found[1:][falls] / found[:-1][falls]) / math.pi
     dry = np.array([_displacement(float(each), beta, order, frequency) for each in ex.dry(x, beta, form=form)])
     return Scatter(rates / np.sqrt(1 + rates**2), dry)
 

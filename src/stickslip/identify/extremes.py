@@ -100,6 +100,11 @@ def rate_bound(extremes: ArrayLike, *, i: int, m: int, error: float, beta: float
     return 2 * (1 + fade) * error / (m * math.pi * fade * abs(float(differences(extremes)[i - 1])))
 
 
+def relative(errors: Array, found: Array) -> Array:
+    """Errors over the sizes of differences; infinite where extremes read in counts are equal, which tells nothing."""
+    return np.divide(errors, found, out=np.full_like(found, math.inf), where=found > 0)
+
+
 def rate_worst(extremes: ArrayLike, *, i: int, m: int, error: float | Array) -> float:
     """The largest error of beta itself, not to first order: the later difference smaller, the earlier one larger.
 
@@ -108,7 +113,7 @@ def rate_worst(extremes: ArrayLike, *, i: int, m: int, error: float | Array) -> 
     """
     found = np.abs(differences(extremes))
     errors = np.broadcast_to(np.asarray(error, dtype=float), np.shape(extremes))
-    off = (errors[2:] + errors[:-2]) / found
+    off = relative(errors[2:] + errors[:-2], found)
     if off[i - 1 + m] >= 1:
         return math.inf
     return -math.log((1 - off[i - 1 + m]) / (1 + off[i - 1])) / (m * math.pi)

@@ -145,7 +145,7 @@ def _derivative(seen: Seen, channel: str, name: str, unit: str) -> Check:
     read, moved = seen.strongest(channel), (1j * seen.angular) ** order * seen.strongest("x")
     if seen.lines.cycles is None:  # a window's line is no single frequency, and begins at any phase
         moved = seen.lines.amplitudes[RATES[order - 1]][:, seen.at]
-        turn = np.conj(moved) / np.abs(moved)
+        turn = np.exp(-1j * np.angle(moved))
         read, moved = read * turn, moved * turn
     left, right = abs(read.mean()), abs(moved.mean())
     turned = -1.0 if (complex(read.mean()) * complex(moved.mean()).conjugate()).real < 0 else 1.0

@@ -135,16 +135,22 @@ def _over(value: float) -> float:
 
 
 def _turns(force: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Maxima of the force, each followed by a drop that counts, and the minima after them."""
+    """Maxima of the force, each followed by a drop that counts, and the minima after them.
+
+    A drop after which the force does not rise as much again is cut by the end of the record, and left out.
+    """
     from scipy.signal import find_peaks
 
     _, found = find_peaks(force, prominence=NOISY * noise)
     if not len(found["prominences"]):
         return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
     usual = float(np.quantile(found["prominences"], 0.9))
-    tops = find_peaks(force, prominence=max(NOISY * noise, DROP * usual))[0]
+    counts = max(NOISY * noise, DROP * usual)
+    tops = find_peaks(force, prominence=counts)[0]
     edges = np.append(tops, len(force))
     bottoms = [high + int(np.argmin(force[high:next_])) for high, next_ in zip(tops, edges[1:], strict=True)]
+    if bottoms and force[-1] - force[bottoms[-1]] < counts:  # it may fall on beyond the end
+        tops, bottoms = tops[:-1], bottoms[:-1]
     return tops, np.array(bottoms, dtype=np.intp)
 
 

@@ -259,6 +259,12 @@ def _answer(
     velocity = np.mean([np.interp(friction, each.force, each.speed) for each in branches], axis=0)
     # per lag, friction is read where the mass has gathered more speed: by its acceleration at the turn
     lagging = f"a lag of 1 ms that is not stated would change it by {1e3 * LAG * turn**2 * amplitude[0]:.2g} mm/s"
+    if not stiffness.value > 0:
+        raise EstimateError(
+            f"a contact of {stiffness.value:.3g} {stiffness.unit}",
+            "a contact that holds is pushed back: its stiffness is above zero",
+            "check the signs of friction and displacement",
+        )
     known = np.array([turn, amplitude[0], level.value, math.log(stiffness.value)])
     doubt = np.diag([2 * math.pi * loops.frequency.sd, amplitude[1], level.sd, stiffness.sd / stiffness.value]) ** 2
     stops = _stops(loops, branches, turn * amplitude[0])

@@ -90,19 +90,21 @@ def plot_velocity_loop(findings: Findings | SqueakFindings, *, ax: Axes | None =
 
 @styled
 def plot_sticks(findings: Findings) -> Figure:
-    """How long the contact stuck, over the record's time, and how often each duration occurred.
+    """How long the contact stuck and slipped, over the record's time, and how often each duration occurred.
+
+    A stick or slip that the record's begin or end cuts lasted longer than is known, and is not shown.
 
     Parameters
     ----------
     findings : Findings
-        With sticks.
+        With sticks or slips that lie within the record as wholes.
 
     Returns
     -------
     Figure
     """
     assert findings.sticks is not None
-    events = findings.sticks.events
+    events = [event for event in findings.sticks.events if event.whole]
     figure, left = new_figure(height=3.0)
     factor, unit = prefixed(np.array([event.duration for event in events]), "s")
     bins = np.linspace(0, factor * max(event.duration for event in events), 40).tolist()

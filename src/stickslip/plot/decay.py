@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -180,14 +181,20 @@ def plot_bounds(found: Decrement) -> Figure:
             ax.plot(bounds.m, value + side * first_order, color=BLUE, linestyle="--", linewidth=1.0, label=words)
         ax.plot(bounds.m, value, "o-", color=INK, markersize=3, linewidth=0.9, label="estimate")
         ax.axvline(bounds.best, color=GREEN, linewidth=0.9, linestyle=":")
-        middle = float(np.median(value))
-        reach = 3 * float(np.nanmedian(np.where(np.isfinite(worst), worst, np.nan))) + float(np.ptp(value))
-        ax.set_ylim(middle - reach, middle + reach)
+        _within_reach(ax, value, worst, first_order)
         ax.set_ylabel(label)
     legend_above(axes[0], columns=3)
     axes[1].set_xlabel("half cycles m between the two differences")
     figure.align_ylabels(list(axes))
     return figure
+
+
+def _within_reach(ax: Axes, value: Array, *errors: Array) -> None:
+    """Limits that show the values and the first of their errors that is finite anywhere; an axis of its own if none."""
+    bounded = next((each[np.isfinite(each)] for each in errors if np.isfinite(each).any()), np.zeros(1))
+    middle, reach = float(np.median(value)), 3 * float(np.median(bounded)) + float(np.ptp(value))
+    if math.isfinite(middle + reach) and reach > 0:
+        ax.set_ylim(middle - reach, middle + reach)
 
 
 @styled
@@ -239,7 +246,7 @@ def plates_together(comparison: DecayComparison) -> list[Plate]:
     )
     shown = (("damping_ratio", "Damping ratio of each record"), ("dry_displacement", "Dry friction of each record"))
     return [
-        plate(quantity.replace("_", "-"), plot_records(comparison, quantity=quantity), title, words)
+        plate(quantity.replace("_", "-"), partial(plot_records, comparison, quantity=quantity), title, words)
         for quantity, title in shown
     ]
 
@@ -255,12 +262,12 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
     ) * ring.isochronous
     grey = "Grey: at rest before the release or after." if ring.held or ring.stopped else ""
     plates = [
-        plate("decay", plot_decay(findings), "How it dies away",
+        plate("decay", partial(plot_decay, findings), "How it dies away",
               f"{envelopes}{grey}{many}")
     ]  # fmt: skip
     if findings.waveform is not None or (ring.order == 0 and findings.best in (findings.motion, thesis)):
         plates.append(
-            plate("identified", plot_identified(findings), "Recorded and identified",
+            plate("identified", partial(plot_identified, findings), "Recorded and identified",
                   "Top: the motion that the identified friction gives, over the recorded one. Bottom: what is left "
                   "between them; a pattern there is friction of another kind.")
         )  # fmt: skip
@@ -268,20 +275,20 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
         words = f"Release {release + 1} of {several}"
         fitted = 0 if findings.waveform is None else len(findings.waveform.time)
         if release >= fitted or findings.best is findings.motion:
-            swings = plot_decay(findings, release=release)
+            swings = partial(plot_decay, findings, release=release)
             plates.append(plate(f"decay-{release + 1}", swings, words, envelopes.strip()))
         else:
-            drawn = plot_identified(findings, release=release)
+            drawn = partial(plot_identified, findings, release=release)
             plates.append(plate(f"identified-{release + 1}", drawn, words, "Recorded, identified and what is left."))
     if thesis is not None:
         plates.append(
-            plate("differences", plot_differences(thesis), "Amplitude differences",
+            plate("differences", partial(plot_differences, thesis), "Amplitude differences",
                   "Differences of every other extreme know nothing of dry friction. On the exponential, the rest of "
                   "the damping is viscous; beside it, the friction is of another kind, or an extreme was misread.")
         )  # fmt: skip
         if len(thesis.bounds.m) > 2:
             plates.append(
-                plate("bounds", plot_bounds(thesis), "How far errors of the extremes can reach",
+                plate("bounds", partial(plot_bounds, thesis), "How far errors of the extremes can reach",
                       f"If no extreme is off by more than {_length(thesis)}, the truth lies in the band: over few half "
                       "cycles the differences change little, over many they become small. Dotted: the best choice.")
             )  # fmt: skip

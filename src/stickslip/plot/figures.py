@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from stickslip.analysis.comparison import Comparison
@@ -138,10 +139,11 @@ def _of_findings(findings: Findings) -> list[Plate]:
     events = findings.sticks.events if findings.sticks is not None else ()
     sticks = [event for event in events if event.kind == "stick"]
     plates = [*_of_friction(findings), *_over_time(findings, sticks=len(sticks)), *_of_contact(findings)]
-    if sticks:
+    if any(event.whole for event in sticks):
         plates.append(
-            plate("sticks", plot_sticks(findings), "How long it sticks and slips",
-                   "Each mark is one stretch of sticking or slipping; the bars count how often each duration occurred.")
+            plate("sticks", partial(plot_sticks, findings), "How long it sticks and slips",
+                   "Each mark is one whole stretch of sticking or slipping; the bars count how often each duration "
+                   "occurred.")
         )  # fmt: skip
     return plates
 
@@ -152,13 +154,13 @@ def _of_friction(findings: Findings) -> list[Plate]:
     if findings.loops is not None:
         plates += [
             plate(
-                "friction-velocity", plot_velocity_loop(findings), "Friction against velocity",
+                "friction-velocity", partial(plot_velocity_loop, findings), "Friction against velocity",
                 "Dry friction is a step: about the same force (dotted) at every speed, against the motion. A slope to "
                 "either side is friction that changes with speed; points between the levels at zero velocity are the "
                 "sticking contact, which bears any force up to the level.",
             ),
             plate(
-                "friction-displacement", plot_displacement_loop(findings), "Friction against displacement",
+                "friction-displacement", partial(plot_displacement_loop, findings), "Friction against displacement",
                 "One turn is one cycle and its area is the work lost to friction. Flat top and bottom: sliding. Steep "
                 "sides: the contact sticks, and their slope is the contact's own stiffness. The band is the scatter "
                 "between cycles.",
@@ -167,7 +169,7 @@ def _of_friction(findings: Findings) -> list[Plate]:
     if findings.regression is not None:
         plates.append(
             plate(
-                "regression", plot_regression(findings), "Does the friction model explain the force?",
+                "regression", partial(plot_regression, findings), "Does the friction model explain the force?",
                 "Top: the measured force and the force that inertia, viscous and dry friction together give. Bottom: "
                 "what is left over; a pattern there is friction that the model does not hold.",
             )
@@ -180,16 +182,20 @@ def _over_time(findings: Findings, *, sticks: int) -> list[Plate]:
     near = close_up(findings)
     stuck = " Grey: the contact sticks." if sticks else ""
     shaded = stuck if sticks <= MOST_SHADES else ""
-    plates = [plate("record", plot_traces(findings), "The record", f"Every channel used, over the whole time.{shaded}")]
+    plates = [
+        plate(
+            "record", partial(plot_traces, findings), "The record", f"Every channel used, over the whole time.{shaded}"
+        )
+    ]
     if near is not None:
         plates.append(
-            plate("close-up", plot_traces(findings, record=near), "A closer look",
+            plate("close-up", partial(plot_traces, findings, record=near), "A closer look",
                    f"A few cycles from the middle of the record.{stuck}")
         )  # fmt: skip
     if force_balance(findings.record) is not None:
         plates.append(
-            plate("force-balance", plot_force_balance(findings, record=near), "Where the friction force comes from",
-                   f"{_how_it_adds_up(findings)}{stuck}")
+            plate("force-balance", partial(plot_force_balance, findings, record=near),
+                  "Where the friction force comes from", f"{_how_it_adds_up(findings)}{stuck}")
         )  # fmt: skip
     return plates
 
@@ -199,33 +205,33 @@ def _of_contact(findings: Findings) -> list[Plate]:
     plates, found = [], findings.breakaway
     if found is not None and findings.loops is not None and UNSURE not in found.ratio.status:
         plates.append(
-            plate("breakaway", plot_breakaway(findings), "Before it slips, and while it slides",
+            plate("breakaway", partial(plot_breakaway, findings), "Before it slips, and while it slides",
                    "Where the contact bears more before it slips than while it slides, its friction falls as slip "
                    "begins; bars are 95 % intervals.")
         )  # fmt: skip
     if findings.transition is not None:
         plates.append(
-            plate("transition", plot_transition_speed(findings.transition), "From holding to sliding",
+            plate("transition", partial(plot_transition_speed, findings.transition), "From holding to sliding",
                    "The mean friction after a turn against the velocity: it grows with the contact's give, and slides "
                    "from the transition speed on. Bands are 95 % intervals of each way to find that speed.")
         )  # fmt: skip
     events = findings.sticks.events if findings.sticks is not None else ()
     if any(event.kind == "microslip" for event in events):
         plates.append(
-            plate("micro-slips", plot_micro_slips(findings), "Inside one stick",
+            plate("micro-slips", partial(plot_micro_slips, findings), "Inside one stick",
                    "The mass rings on its contact when it comes to rest, and slips a little again where the ring is "
                    "more than the contact bears.")
         )  # fmt: skip
     compared = findings.comparison
     if compared is not None and (_is_fused(findings) or UNLIKE in compared.status):
         plates.append(
-            plate("force-comparison", plot_force_comparison(compared), "The force felt and the force computed",
+            plate("force-comparison", partial(plot_force_comparison, compared), "The force felt and the force computed",
                    "Both forces over time, their size in each band, and their ratio: above the frequency up to which "
                    "they agree, the mounts of the sensors swing.")
         )  # fmt: skip
     if findings.consistency is not None and findings.consistency.failed:
         plates.append(
-            plate("consistency", plot_consistency(findings.consistency), "What can not all be true",
+            plate("consistency", partial(plot_consistency, findings.consistency), "What can not all be true",
                    "Two sides of each check, and how far they are apart; to the right of the dotted line they can not "
                    "be one. The sentences are above.")
         )  # fmt: skip
@@ -250,12 +256,12 @@ def _of_comparison(comparison: Comparison) -> list[Plate]:
     plates = []
     if comparison.coefficient is not None:
         plates.append(
-            plate("friction-load", plot_load_dependence(comparison), "Friction against normal load",
+            plate("friction-load", partial(plot_load_dependence, comparison), "Friction against normal load",
                    "Points on a line through the origin mean one coefficient of friction for all records.")
         )  # fmt: skip
     if any(findings.level is not None for findings in comparison.findings):
         plates.append(
-            plate("levels", plot_levels(comparison), "Friction of each record",
+            plate("levels", partial(plot_levels, comparison), "Friction of each record",
                    "The sliding friction found in each record, with its 95 % interval.")
         )  # fmt: skip
     return plates

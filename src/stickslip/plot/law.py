@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -153,17 +154,24 @@ def plot_curve(found: CurveFit, *, ax: Axes | None = None) -> Axes:
 def law_plates(result: LawComparison | LawFit | CurveFit) -> list[Plate]:
     """The figures of a fit, in reading order."""
     if isinstance(result, CurveFit):
-        return [plate("curve", plot_curve(result), "Measured and fitted", "The curve over all samples that were used.")]
+        return [
+            plate(
+                "curve",
+                partial(plot_curve, result),
+                "Measured and fitted",
+                "The curve over all samples that were used.",
+            )
+        ]
     told = (
         "Mean square of what a law leaves over the least that any law leaves, the mean over channels and records. "
         "Diamonds: each record predicted by a fit to the others, over what the best law leaves so."
     )
     plates = []
     if isinstance(result, LawComparison) and len(result.candidates) > 1:
-        plates.append(plate("laws", plot_laws(result), "How the laws stand", told))
+        plates.append(plate("laws", partial(plot_laws, result), "How the laws stand", told))
     count = len(result.fit.traces if isinstance(result, LawComparison) else result.traces)
     for record in range(count):
         title = "Measured and fitted" + (f", record {record + 1} of {count}" if count > 1 else "")
         words = "Top: each sensor, and what it would have read of the fitted law. Bottom: what is left between them."
-        plates.append(plate(f"fit-{record + 1}", plot_fit(result, record=record), title, words))
+        plates.append(plate(f"fit-{record + 1}", partial(plot_fit, result, record=record), title, words))
     return plates

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -150,8 +151,12 @@ def plates_of(atlas: Any, system: System | None = None) -> tuple[Plate, ...]:
         )
         white = _white(atlas, values)
         left = f" {white[0].upper()}{white[1:]}." if white else ""
-        plates.append(plate(name, ax, f"{words[0].upper()}{words[1:]}", said + line + left))
+        plates.append(plate(name, partial(_itself, ax), f"{words[0].upper()}{words[1:]}", said + line + left))
     return tuple(plates)
+
+
+def _itself(drawn: Axes) -> Axes:
+    return drawn
 
 
 def _outcomes(values: Any) -> dict[int, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -334,7 +335,7 @@ def plot_condition_loops(comparison: SqueakComparison) -> Figure:
         slope = found.loops.slope
         low, high = slope.interval
         left.set_title(_short(found.name), loc="left")
-        digits = decimals(slope.sd, slope.value)
+        digits = decimals(slope.spread, slope.value)
         told = f"{slope.value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f}) {spelled(slope.unit)}"
         right.set_title(told, loc="right", fontsize=8)
     return figure
@@ -344,7 +345,7 @@ def plates_of_squeaks(found: SqueakFindings) -> list[Plate]:
     """The figures of one record."""
     squeaks = found.squeaks
     plates = [
-        plate("spectrogram", plot_squeaks(squeaks), "When it sounds, and how high",
+        plate("spectrogram", partial(plot_squeaks, squeaks), "When it sounds, and how high",
               "Above: the signal, its bursts shaded and numbered. Below: how strong each frequency is at each time; "
               "bright is strong, and a white line is a burst's dominant frequency.")
     ]  # fmt: skip
@@ -353,33 +354,34 @@ def plates_of_squeaks(found: SqueakFindings) -> list[Plate]:
         return plates
     if found.spectra is not None:
         plates.append(
-            plate("spectra", plot_burst_spectra(found.spectra, channel=squeaks.channel, record=found.record),
+            plate("spectra", partial(plot_burst_spectra, found.spectra, channel=squeaks.channel, record=found.record),
                   "What sounds in the bursts",
                   f"Power spectra of each channel in {found.spectra.compared}; a peak that stands above the other line "
                   "belongs to the bursts.")
         )  # fmt: skip
         if found.spectra.coherence:
             plates.append(
-                plate("coherence", plot_coherence(found.spectra, channel=squeaks.channel, record=found.record),
+                plate("coherence", partial(plot_coherence, found.spectra, channel=squeaks.channel, record=found.record),
                       f"Which frequencies the motions share with the {_words(found.record, squeaks.channel)}",
                       "Coherence is 1 where two channels move together and 0 where they have nothing to do with each "
                       "other; what is below the dotted line may be chance.")
             )  # fmt: skip
     if not math.isnan(squeaks.forcing):
         plates.append(
-            plate("forcing-cycle", plot_forcing_cycle(squeaks), "Where in the cycle it sounds",
+            plate("forcing-cycle", partial(plot_forcing_cycle, squeaks), "Where in the cycle it sounds",
                   "Above: the sliding velocity over the forcing cycle; a mark is the loudest moment of a burst. Below: "
                   "each burst from its beginning to its end, thick where it is within ten decibel of its loudest "
                   "moment.")
         )  # fmt: skip
     if len(found.record) > 1:
         plates.append(
-            plate("burst", plot_burst(found, burst=loudest), f"Burst {squeaks.bursts.index(loudest) + 1}, the loudest",
+            plate("burst", partial(plot_burst, found, burst=loudest),
+                  f"Burst {squeaks.bursts.index(loudest) + 1}, the loudest",
                   "Every channel about it; shaded from its beginning to its end.")
         )  # fmt: skip
     if found.loops is not None:
         plates.append(
-            plate("friction-velocity", plot_velocity_loop(found), "Friction against velocity",
+            plate("friction-velocity", partial(plot_velocity_loop, found), "Friction against velocity",
                   "Friction that falls away from zero velocity feeds a vibration, one that rises damps it. Dotted: the "
                   "sliding friction to either side.")
         )  # fmt: skip
@@ -391,10 +393,10 @@ def plates_of_conditions(comparison: SqueakComparison) -> list[Plate]:
     if all(each.loops is None for each in comparison.findings):
         return []
     return [
-        plate("conditions", plot_conditions(comparison), "Friction, and how it changes with speed",
+        plate("conditions", partial(plot_conditions, comparison), "Friction, and how it changes with speed",
               "Left: sliding friction, over the load where all loads are known. Right: its slope against speed; left "
               "of zero it falls with speed."),
-        plate("loops", plot_condition_loops(comparison), "Friction against displacement and velocity",
+        plate("loops", partial(plot_condition_loops, comparison), "Friction against displacement and velocity",
               "Each condition in a row, each row with a scale of its own. Grey: cycles; orange: their mean; dots: the "
               "mean at each velocity. The number is the slope against speed with its 95 % interval."),
     ]  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -302,11 +303,16 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
     plates = []
     if first > 0:
         plates.append(
-            plate("whole-run", plot_motion(run), "The whole run", f"From the start, over all of the time.{shaded}")
+            plate(
+                "whole-run",
+                partial(plot_motion, run),
+                "The whole run",
+                f"From the start, over all of the time.{shaded}",
+            )
         )
     words = "As long as it moves" if run.status == "at rest" else "The last cycles"
     plates.append(
-        plate("motion", plot_motion(run, first=first, last=last), words,
+        plate("motion", partial(plot_motion, run, first=first, last=last), words,
               f"Exact between events; friction jumps where a slip begins, ends or turns.{shaded}")
     )  # fmt: skip
     several = contacts_of(run) > 1
@@ -317,7 +323,7 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
         name, which = (f"-x{j + 1}", f" of x{j + 1}") if masses > 1 else ("", "")
         holds = "" if several or not contacts_of(run) else " Marked: where the contact holds."
         plates.append(
-            plate(f"phase-portrait{name}", plot_phase(run, mass=j), f"Phase portrait{which}",
+            plate(f"phase-portrait{name}", partial(plot_phase, run, mass=j), f"Phase portrait{which}",
                   f"Velocity against displacement, run through clockwise.{holds}")
         )  # fmt: skip
     return tuple(plates)
@@ -326,17 +332,18 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
 def _of_contact(run: Trajectory, contact: int, name: str, which: str) -> list[Plate]:
     """Loops of one contact; `name` and `which` tell it from others."""
     plates = [
-        plate(f"friction-displacement{name}", plot_loop(run, contact=contact), f"Friction against displacement{which}",
+        plate(f"friction-displacement{name}", partial(plot_loop, run, contact=contact),
+              f"Friction against displacement{which}",
               "The area of a loop is the work that friction takes in a cycle. Flat top and bottom: sliding. Sides: the "
               "contact holds, upright where it is rigid, sloping where it gives way."),
-        plate(f"friction-velocity{name}", plot_loop(run, against="slip", contact=contact),
+        plate(f"friction-velocity{name}", partial(plot_loop, run, against="slip", contact=contact),
               f"Friction against sliding velocity{which}",
               "The law as the motion passes through it. A contact that holds bears whatever the other forces ask for: "
               "the upright at zero."),
     ]  # fmt: skip
     if pressed(run, contact):
         plates.append(
-            plate(f"friction-load{name}", plot_loop(run, against="load", contact=contact),
+            plate(f"friction-load{name}", partial(plot_loop, run, against="load", contact=contact),
                   f"Friction against normal load{which}",
                   "Sliding lies on the two edges of a wedge, whose slope is the coefficient of friction; holding lies "
                   "between them; at its tip the contact lifts off.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -163,7 +164,7 @@ def plates_of(found: TimeFrequency) -> list[Plate]:
         "below the strongest; bright is strong. Hatched: an end of the record is felt there. A band that runs along is "
         "a vibration; an upright spike is a jump or a kink."
     )
-    plates = [plate("map", plot_wavelet(found.wavelets, record=record), "Time and frequency", words)]
+    plates = [plate("map", partial(plot_wavelet, found.wavelets, record=record), "Time and frequency", words)]
     if found.ringing is not None:
         rings = (
             "A closed island is a contact that rings while the mass sticks; the spikes around it are where it "
@@ -171,8 +172,8 @@ def plates_of(found: TimeFrequency) -> list[Plate]:
         )
         rests = "No ringing of a contact is told in it; the spikes are where the mass sticks and slips."
         told = rings if found.transition is not None else rests
-        plates.append(plate("stick", plot_stick(found), "A stick, looked at closely", told))
-    lines = plot_wavelet(found.wavelets, record=record, style="lines")
+        plates.append(plate("stick", partial(plot_stick, found), "A stick, looked at closely", told))
+    lines = partial(plot_wavelet, found.wavelets, record=record, style="lines")
     plates.append(plate("contours", lines, "The same map in contour lines", f"{LEVELS} lines span {SPAN:g} dB."))
     return plates
 

@@ -35,6 +35,9 @@ DETAILS = (
 )  # of a channel, that a user may know better than the file
 
 
+MEASURABLE = 1e60  # in SI, as its inverse: beyond, the fourth power of a reading is no number any more
+
+
 @dataclass(frozen=True)
 class Step:
     """One thing that was done to a record.
@@ -248,6 +251,7 @@ class Record:
                     f"{question} needs numbers throughout",
                     f"see record.check(): {cure(self.samples[name])}",
                 )
+            _require_size(self.channels[name], self.samples[name], question)
 
     # ---- deriving
 
@@ -375,6 +379,17 @@ class Record:
         names = ", ".join(f"{channel.name} [{channel.unit}]" for channel in self.channels.values())
         clock = "broken clock, about " if self.stamps is not None else ""
         return f"Record({names}; {len(self)} samples, {clock}{self.fs:g} Hz, from {self.start:g} s)"
+
+
+def _require_size(channel: Channel, values: Array, question: str) -> None:
+    """Refuse readings whose powers no computer holds: a unit or a column is wrong."""
+    largest = float(np.max(np.abs(values), initial=0.0))
+    if largest > MEASURABLE or 0 < largest < 1 / MEASURABLE:
+        raise RecordError(
+            f"channel {channel.name} reads {largest:.3g} {channel.unit} at most",
+            f"{question} needs readings between {1 / MEASURABLE:g} and {MEASURABLE:g} {channel.unit}",
+            "correct the unit or the column",
+        )
 
 
 def _frozen(values: ArrayLike) -> Array:

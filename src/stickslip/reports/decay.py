@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,7 +13,7 @@ from stickslip.decay.answer import beginning, rig_units
 from stickslip.decay.choice import SIZE
 from stickslip.estimate import Estimate
 from stickslip.identify.release import CAUGHT
-from stickslip.reports.words import interval_of, number, value_of
+from stickslip.reports.words import WITHIN_DIGIT, interval_of, number, value_of
 
 MOST = 0.5  # of the power of what is left over
 OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
@@ -132,7 +133,10 @@ def _reach(estimate: Estimate) -> str:
     """The interval; the value where it is narrower than the digits shown."""
     low, high = estimate.interval
     words = interval_of(estimate)
-    return f"within {words}" if " to " in words else value_of(estimate) if low < high else words
+    if words == WITHIN_DIGIT:
+        return value_of(estimate)
+    two_sided = -math.inf < low < high < math.inf and not estimate.is_bound
+    return f"within {words}" if two_sided else words
 
 
 def verdicts(findings: DecayFindings) -> list[tuple[str, str]]:

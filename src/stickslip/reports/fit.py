@@ -11,9 +11,9 @@ from stickslip.fit.which_law import LawComparison
 from stickslip.parameters import unit
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Record
+from stickslip.reports import page
 from stickslip.reports.folder import check_folder, results_folder, write_figures
 from stickslip.reports.law_files import write_law
-from stickslip.reports.page import Section, render
 from stickslip.reports.summary import Line, Summary
 from stickslip.reports.words import doubts, interval_of, leading, number, value_of
 
@@ -134,12 +134,11 @@ def publish_fit(
     """
     folder = Path(folder)
     check_folder(folder)
-    plates = law_plates(result)
-    summary = fit_summary(result, records=records, name=name)
+    section = page.section(fit_summary(result, records=records, name=name), law_plates(result), png=True)
     with results_folder(folder, fit_numbers(result)) as draft:
-        (draft / "report.html").write_text(render([Section(summary, plates)]), encoding="utf-8")
+        (draft / "report.html").write_text(page.render([section]), encoding="utf-8")
         (draft / "figures").mkdir()
-        write_figures(draft / "figures", "", plates)
+        write_figures(draft / "figures", "", section.plates)
         write_law(draft, result, records)
     return folder
 

@@ -61,7 +61,7 @@ def publish(
     """
     folder = Path(folder)
     check_folder(folder)
-    sections = sections_of(results)
+    sections = sections_of(results, png=True)
     with results_folder(folder, results.to_dict()) as draft:
         (draft / "report.html").write_text(render(sections), encoding="utf-8")
         for number, section in enumerate(sections):

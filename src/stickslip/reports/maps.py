@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.plot.maps import plates_of
+from stickslip.reports import page
 from stickslip.reports.folder import check_folder, results_folder, write_figures
-from stickslip.reports.page import Section, render
 from stickslip.reports.summary import Summary
 from stickslip.solve.automaton import System
 
@@ -89,10 +89,11 @@ def publish_map(atlas: Any, *, folder: str | Path, system: System | None = None)
     changing = sum(size > 1 for size in atlas.sizes.values())
     flat = atlas.squeeze() if 1 <= changing < len(atlas.dims) else atlas
     plates = plates_of(flat, system) if 1 <= len(flat.dims) <= 2 else ()
+    section = page.section(_words(atlas), plates, png=True)
     with results_folder(folder, map_numbers(atlas)) as draft:
-        (draft / "report.html").write_text(render([Section(_words(atlas), plates)]), encoding="utf-8")
+        (draft / "report.html").write_text(page.render([section]), encoding="utf-8")
         (draft / "figures").mkdir()
-        write_figures(draft / "figures", "", plates)
+        write_figures(draft / "figures", "", section.plates)
     return folder
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
@@ -21,7 +21,7 @@ from stickslip.estimate import Estimate
 from stickslip.files.write import whole
 from stickslip.plot import style
 from stickslip.plot.figures import figures
-from stickslip.plot.plate import Plate
+from stickslip.plot.plate import Plate, drawable
 from stickslip.printing import printable
 from stickslip.record.record import Record
 from stickslip.reports.summary import Summary, summary
@@ -93,21 +93,24 @@ def report(
     return Path(path)
 
 
-def sections_of(
-    results: Results,
-    record: Record | None = None,
-) -> list[Section]:
-    """The sections of the page, with their figures drawn."""
+def sections_of(results: Results, record: Record | None = None, *, png: bool = False) -> list[Section]:
+    """The sections of the page, with their figures drawn; as PNG too where these are asked for."""
     if isinstance(results, Comparison | DecayComparison | SqueakComparison):
-        return [_section(part) for part in (results, *results.findings)]
+        return [_section(part, png=png) for part in (results, *results.findings)]
     if isinstance(results, Findings | DecayFindings | TimeFrequency | SqueakFindings):
-        return [_section(results)]
+        return [_section(results, png=png)]
     return [Section(summary(cast(Sequence[Estimate], results), record=record))]
 
 
-def _section(part: Asked) -> Section:
+def section(words: Summary, plates: Iterable[Plate], clips: Sequence[Clip] = (), *, png: bool = False) -> Section:
+    """Words, and the figures that can be drawn; of the others a note."""
+    drawn, lost = drawable(plates, png=png)
+    return Section(replace(words, notes=(*words.notes, *lost)), drawn, clips)
+
+
+def _section(part: Asked, *, png: bool) -> Section:
     clips = burst_clips(part.squeaks) if isinstance(part, SqueakFindings) else ()
-    return Section(summary(part), figures(part), clips)
+    return section(summary(part), figures(part), clips, png=png)
 
 
 def render(sections: Sequence[Section]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from stickslip.analysis.experiment import ExperimentPlan
@@ -58,5 +59,6 @@ def publish_rig(results: Record | ExperimentPlan, *, folder: str | Path, form: s
         return Path(folder)
     with results_folder(Path(folder), results.to_dict()) as draft:
         caption = "Root-mean-square error against the sampling rate, for each choice of sensors."
-        write_figures(draft / "figures", "", [plate("plan", plot_plan(results), "What each setup tells", caption)])
+        plan = plate("plan", partial(plot_plan, results), "What each setup tells", caption)
+        write_figures(draft / "figures", "", [plan])
     return Path(folder)

@@ -17,6 +17,7 @@ from stickslip.files.write import WRITERS, write_record
 from stickslip.laws.formula import Formula
 from stickslip.parameters import PARTS
 from stickslip.plot.figures import figures
+from stickslip.plot.plate import drawable
 from stickslip.plot.trajectory import (
     contacts_of,
     cycle_of,
@@ -203,12 +204,15 @@ def publish_run(
     run = result.run
     require_output(result.case, folder=folder, fs=fs, form=form, animation=animation)
     rate = fs or result.case.fs or default_rate(run)
-    with results_folder(Path(folder), {**result.to_dict(), "fs": rate}) as draft:
+    numbers = {**result.to_dict(), "fs": rate}
+    with results_folder(Path(folder), numbers) as draft:
         tell("writing the record", 1)
         write_record(run.record(fs=rate), draft / f"record.{form}")
         _write_events(run, draft / "events.csv")
         tell("drawing the figures", 2)
-        write_figures(draft / "figures", "", figures(run))
+        plates, lost = drawable(figures(run), png=True)
+        numbers |= {"notes": lost} if lost else {}
+        write_figures(draft / "figures", "", plates)
         if animation is not None:
             from stickslip.plot.animation import animate
 

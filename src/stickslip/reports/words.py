@@ -13,7 +13,7 @@ from stickslip.analysis.decays import DecayFindings
 from stickslip.analysis.findings import Findings
 from stickslip.analysis.preparation import LEFT_OUT
 from stickslip.analysis.time_frequency import TimeFrequency
-from stickslip.estimate import NORMAL_95, Estimate, decimals
+from stickslip.estimate import UNKNOWN, Estimate, decimals
 from stickslip.identify.breakaway import Breakaway
 from stickslip.identify.mechanism import UNTOLD
 from stickslip.identify.presliding import Presliding
@@ -22,6 +22,7 @@ from stickslip.identify.slip_ringing import SlipRinging
 from stickslip.record.check import Fault
 from stickslip.units import NOTHING, prefixed
 
+WITHIN_DIGIT = "within its last digit"  # an interval narrower than the digits shown
 NEVER = "The contact never sticks."
 RARELY = 0.005  # of the time
 WANDERS = 1.5  # times its lowest frequency: a ridge that goes farther may be chance
@@ -42,7 +43,7 @@ def number(value: float, sd: float, unit: str) -> str:
     '12.3 mm'
     """
     if not math.isfinite(value):
-        return "unknown"
+        return UNKNOWN
     factor, text = prefixed(value, unit)
     digits = _digits(factor * sd, factor * value)
     return f"{factor * value:.{digits}f}{'' if text == '1' else ' ' + text}"
@@ -52,7 +53,7 @@ def value_of(estimate: Estimate, value: float | None = None) -> str:
     """The estimate's value; or another one (the true one) with the same unit and digits."""
     value = estimate.value if value is None else value
     if not math.isfinite(value):
-        return "unknown"
+        return UNKNOWN
     factor, text, digits = _scale(estimate)
     return f"{_rounded(factor * value, digits)}{text}"
 
@@ -60,21 +61,25 @@ def value_of(estimate: Estimate, value: float | None = None) -> str:
 def interval_of(estimate: Estimate) -> str:
     """The estimate's 95 % interval, in the unit of its value."""
     low, high = estimate.interval
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return "unknown"
     if low == high:
         return "no scatter"
     factor, text, digits = _scale(estimate)
     # An end cut to fewer digits than another row gives the same value would exclude it.
-    inside = "whichever" in estimate.name and low < estimate.value < high
+    inside = "whichever" in estimate.name and -math.inf < low < estimate.value < high < math.inf
     while (
         inside
         and digits < 7
         and not round(factor * low, digits) <= factor * estimate.value <= round(factor * high, digits)
     ):
         digits += 1
-    ends = _rounded(factor * low, digits), _rounded(factor * high, digits)
-    return f"{ends[0]} to {ends[1]}{text}" if ends[0] != ends[1] else "within its last digit"
+
+    def written(end: float) -> str:
+        return _rounded(factor * end, digits)
+
+    if math.isfinite(high - low) and written(low) == written(high):
+        return WITHIN_DIGIT
+    between = estimate.between(written)
+    return between if between == UNKNOWN else f"{between}{text}"
 
 
 def headline(result: Findings | Comparison) -> list[str]:
@@ -346,18 +351,12 @@ def _rounded(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def _sd(estimate: Estimate) -> float:
-    """The standard deviation, or what a wide interval that is not symmetric amounts to."""
-    low, high = estimate.interval
-    return max(estimate.sd, (high - low) / (2 * NORMAL_95)) if math.isfinite(high - low) else estimate.sd
-
-
 def _digits(sd: float, value: float) -> int:
     if max(abs(value), sd) < NOTHING:
         return 0
     if sd == 0:  # a constant that was given, a count that never varied
         return max(0, len(f"{value:.4g}".partition(".")[2]))
-    most = FIGURES - 1 - math.floor(math.log10(abs(value))) if value else FIGURES
+    most = FIGURES - 1 - math.floor(math.log10(abs(value))) if value and math.isfinite(value) else FIGURES
     return max(0, min(decimals(sd, value), most))
 
 
@@ -365,5 +364,5 @@ def _scale(estimate: Estimate) -> tuple[float, str, int]:
     """Factor, unit and decimals in which an estimate reads well."""
     share = "share" in estimate.name and estimate.unit == "1"
     factor, text = (100.0, "%") if share else prefixed(np.array([estimate.value, *estimate.interval]), estimate.unit)
-    digits = _digits(factor * _sd(estimate), factor * estimate.value)
+    digits = _digits(factor * estimate.spread, factor * estimate.value)
     return factor, "" if text == "1" else f" {text}", digits

@@ -313,7 +313,9 @@ def _bins(step: float, centre: float, reach: float, count: int) -> slice:
 
 
 def _centre(power: Array, step: float, low: float, high: float) -> float:
-    """Mean frequency by power of the line between two, where it stands out."""
+    """Mean frequency by power of the line between two, where it stands out; the middle where there is no power."""
     part = _bins(step, (low + high) / 2, (high - low) / 2, len(power))
     weights = np.where(power[part] > power[part].max() / 100, power[part], 0.0)
+    if not weights.any():
+        return (low + high) / 2
     return float(np.average(np.arange(part.start, part.stop), weights=weights) * step)

@@ -225,7 +225,7 @@ function redraw() {
   legend();
 }
 
-// Whether Den Hartog's boundary of 1930 holds for what is drawn: rigid friction alone, stops counted.
+// Whether Den Hartog's boundary of 1931 holds for what is drawn: rigid friction alone, stops counted.
 function bounded() {
   const { system, law = {}, drive = {} } = wanted.state;
   const rigid = law.name === "Coulomb" && !("static" in law) && !system.damping;
@@ -244,7 +244,7 @@ function boundary() {
     xs.forEach((x, j) => { pen.beginPath(); pen.arc(plan.x(x), plan.y(ys[j]), 3, 0, 7); pen.fill(); });
     pen.font = "12px system-ui, sans-serif";
     pen.textAlign = "left";
-    pen.fillText("Den Hartog 1930", plan.x(1.35 * natural), plan.y(0.675 * force) + 22);
+    pen.fillText("Den Hartog 1931", plan.x(1.35 * natural), plan.y(0.675 * force) + 22);
   });
 }
 // Draw within the axes alone.
