@@ -1,4 +1,4 @@
-# make demo | lab | test | lint | docs | bench | smoke | clean
+# make demo | lab | test | lint | docs | bench | smoke | package | clean
 # Set-up is part of every target: the environment lives in .venv and is made when it is missing or out of date.
 PYTHON ?= python3
 VENV := .venv
@@ -9,7 +9,7 @@ ifneq ($(wildcard ../shared/data),)
 export STICKSLIP_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: demo lab test lint docs bench smoke clean
+.PHONY: demo lab test lint docs bench smoke package clean
 
 demo: $(VENV)/.user
 	$(BIN)/stickslip demo --output stickslip-demo
@@ -54,6 +54,11 @@ bench: $(VENV)/.dev
 
 smoke: $(VENV)/.dev
 	$(BIN)/python tests/smoke.py
+
+package: $(VENV)/.dev
+	rm -rf dist
+	$(BIN)/python -m build
+	$(BIN)/python -m twine check --strict dist/*
 
 clean:
 	rm -rf $(VENV) dist build docs/_build stickslip-demo

@@ -1,19 +1,24 @@
-"""The wheel alone, outside the checkout: nothing that it needs may hide in the source tree.
+"""The wheel alone, outside the checkout: nothing that it needs may hide in the source tree, no stated bound may lie.
 
-Builds the wheel, installs it with its required packages into a new environment, and runs the main job there.
+Builds the wheel and installs it into new environments: with its required packages alone, where the main job is run, and
+with its extras twice, at the newest releases and at the lowest that pyproject.toml allows, where smoke_jobs.py is run.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import subprocess
 import sys
 import tempfile
 import venv
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+JOBS = ROOT / "tests" / "smoke_jobs.py"
+OLDEST = "3.11"  # the Python of the lowest releases: for a later one not all of them were built
 STEPS = (
     "import stickslip, pathlib; print(pathlib.Path(stickslip.__file__).parent)",
     "from stickslip import datasets; print(len(datasets.names()), 'public sets,', datasets.demo())",
@@ -30,22 +35,55 @@ def run(*command: str | Path, folder: Path) -> str:
 
 
 def main() -> None:
+    if importlib.util.find_spec("uv") is None:
+        sys.exit("smoke: uv, which finds the lowest releases, is not installed: pip install '.[dev]' brings it")
     with tempfile.TemporaryDirectory(prefix="stickslip-smoke-") as name:
         folder = Path(name)
         run(sys.executable, "-m", "build", "--wheel", "--outdir", folder, ROOT, folder=folder)
         (wheel,) = folder.glob("stickslip-*.whl")
-        venv.create(folder / "env", with_pip=True)
-        binaries = folder / "env" / ("Scripts" if os.name == "nt" else "bin")
-        run(binaries / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel, folder=folder)
-        place = run(binaries / "python", "-c", STEPS[0], folder=folder).strip()
-        if not Path(place).resolve().is_relative_to((folder / "env").resolve()):
-            sys.exit(f"smoke: stickslip was imported from {place}, not from the wheel")
-        print(run(binaries / "python", "-c", STEPS[1], folder=folder).strip())
-        if "analyze" not in run(binaries / "stickslip", "--help", folder=folder):
-            sys.exit("smoke: stickslip --help does not offer analyze")
-        print(run(binaries / "stickslip", "demo", "--output", "out", folder=folder).strip())
-        check(folder / "out")
-        print(f"smoke: {wheel.name} works outside the checkout")
+        required_alone(wheel, folder)
+        with_extras(wheel, folder)
+        print(f"smoke: {wheel.name} works outside the checkout, at the newest and at the lowest releases")
+
+
+def binaries(env: Path) -> Path:
+    return env / ("Scripts" if os.name == "nt" else "bin")
+
+
+def required_alone(wheel: Path, folder: Path) -> None:
+    """The main job, with the required packages alone."""
+    env = binaries(folder / "env")
+    venv.create(env.parent, with_pip=True)
+    run(env / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel, folder=folder)
+    place = run(env / "python", "-c", STEPS[0], folder=folder).strip()
+    if not Path(place).resolve().is_relative_to(env.parent.resolve()):
+        sys.exit(f"smoke: stickslip was imported from {place}, not from the wheel")
+    print(run(env / "python", "-c", STEPS[1], folder=folder).strip())
+    if "analyze" not in run(env / "stickslip", "--help", folder=folder):
+        sys.exit("smoke: stickslip --help does not offer analyze")
+    print(run(env / "stickslip", "demo", "--output", "out", folder=folder).strip())
+    check(folder / "out")
+
+
+def with_extras(wheel: Path, folder: Path) -> None:
+    """Every job at the newest and at the lowest releases, side by side: most of their time is compiling."""
+    same = sys.version_info[:2] == tuple(map(int, OLDEST.split(".")))
+    with ThreadPoolExecutor() as pool:
+        ends = [pool.submit(jobs, wheel, folder / "highest", sys.executable),
+                pool.submit(jobs, wheel, folder / "lowest-direct", sys.executable if same else OLDEST)]  # fmt: skip
+        for end in ends:
+            print(end.result())
+
+
+def jobs(wheel: Path, env: Path, python: str) -> str:
+    """What smoke_jobs.py says in an environment with releases chosen as the folder is called."""
+    uv = (sys.executable, "-m", "uv")
+    out = env.with_suffix(".out")
+    out.mkdir()
+    run(*uv, "venv", "--quiet", "--python", python, env, folder=out)
+    run(*uv, "pip", "install", "--quiet", "--python", binaries(env) / "python", "--resolution", env.name,
+        f"{wheel}[io,lab,maps,sound]", folder=out)  # fmt: skip
+    return f"{env.name} releases:\n" + run(binaries(env) / "python", JOBS, out, folder=out)
 
 
 def check(out: Path) -> None:

@@ -1,4 +1,4 @@
-"""Chapter 2: the comparison of direct and indirect friction signals."""
+"""Chapter 2: friction measured two ways, by a load cell and from the forces that balance it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from thesis.sketches import apparatus
 
 Array = NDArray[np.float64]
 
-TITLE = "The comparison of direct and indirect friction signals"
+TITLE = "Friction measured two ways, by a load cell and from the forces that balance it"
 STARTS_FROM = ("rig",)  # sections of given.toml
 SETTLED = 40.0  # s: the air track hardly damps
 

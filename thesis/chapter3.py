@@ -1,4 +1,4 @@
-"""Chapter 3: the effects of tangential contact stiffness on a harmonically forced oscillator, pure sliding."""
+"""Chapter 3: a contact that gives before it slides: sliding without stops."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-TITLE = "The effects of tangential contact stiffness on a harmonically forced oscillator: pure sliding"
+TITLE = "A contact that gives before it slides: sliding without stops"
 STARTS_FROM = ("sliding", "schematic")  # sections of given.toml
 CASES = (0, 1, 2)  # 5.61, 8.7 and 11.1 Hz
 

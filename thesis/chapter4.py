@@ -1,4 +1,4 @@
-"""Chapter 4: the effects of tangential contact stiffness on a harmonically forced oscillator, stick-slip."""
+"""Chapter 4: the same contact where it sticks, and laws with a memory."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from thesis.sketches import contact_with_inertia
 
 Array = NDArray[np.float64]
 
-TITLE = "The effects of tangential contact stiffness on a harmonically forced oscillator: stick-slip"
+TITLE = "The same contact where it sticks, and laws with a memory"
 STARTS_FROM = ("stick_slip", "state_variable", "inertial")  # sections of given.toml
 FRICTIONS = (1.06, 1.10, 1.28)  # Table 3.2's, for the map of micro-slips
 DAMPINGS = np.linspace(0, 400, 81)

@@ -1,4 +1,4 @@
-"""Chapter 5: wavelet analysis of stick-slip in an oscillator with dry friction."""
+"""Chapter 5: stick-slip in time and frequency, by wavelets."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from thesis.printed import Given, Ours
 
 Array = NDArray[np.float64]
 
-TITLE = "Wavelet analysis of stick-slip in an oscillator with dry friction"
+TITLE = "Stick-slip in time and frequency, by wavelets"
 STARTS_FROM = ("wavelet", "stick_slip")  # sections of given.toml
 CYCLES = 4
 

@@ -1,4 +1,4 @@
-"""Chapter 6: estimating Coulomb and viscous friction from free-vibration decrements."""
+"""Chapter 6: dry and viscous damping from a ring-down."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from thesis.sketches import system_i, system_ii
 
 Array = NDArray[np.float64]
 
-TITLE = "Estimating Coulomb and viscous friction from free-vibration decrements"
+TITLE = "Dry and viscous damping from a ring-down"
 STARTS_FROM = ("decay", "errors", "paper", "bearing")  # sections of given.toml
 KINDS = ("random", "quantisation", "sampling")
 COUNT = 12  # extremes in Table 6.1

@@ -1,4 +1,4 @@
-"""Chapter 7: squeak mechanism of a rubber-on-steel contact."""
+"""Chapter 7: why rubber on wet steel squeals."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from thesis.sketches import transducers
 
 Array = NDArray[np.float64]
 
-TITLE = "Squeak mechanism of a rubber-on-steel contact"
+TITLE = "Why rubber on wet steel squeals"
 STARTS_FROM = ("squeak", "bearing")  # sections of given.toml
 CONDITIONS = (("dry", "heavy"), ("wet", "heavy"), ("dry", "light"), ("wet", "light"))
 SIGNALS = {

@@ -31,8 +31,8 @@ def figure(number: str, drawn: Figure | Axes, words: str, *, title: str = "") ->
     return plate(f"figure-{number}", lambda: drawn, title or f"Figure {number}", words)
 
 
-def printed_caption(drawn: Plate) -> str:
-    """What the thesis says under it; empty under a figure of ours."""
+def caption_of(drawn: Plate) -> str:
+    """What it shows; empty under a figure that the thesis does not have."""
     return captions().get(drawn.title.removeprefix("Figure "), "")
 
 

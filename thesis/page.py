@@ -14,7 +14,7 @@ from stickslip import __version__
 from stickslip.plot.plate import Plate
 from stickslip.reports.folder import check_folder, results_folder, write_figures
 from stickslip.reports.page import templates
-from thesis.drawing import printed_caption
+from thesis.drawing import caption_of
 from thesis.printed import CHANGED, CORRECTED, NOT_REPRODUCIBLE, SAME, Given, Number, Ours, Table, given, judged, tables
 from thesis.starting import starts
 
@@ -122,7 +122,7 @@ def results(chapters: Sequence[Chapter]) -> dict[str, Any]:
 def render(chapters: Sequence[Chapter]) -> str:
     """The page as text."""
     environment = templates(Path(__file__).parent)
-    environment.filters.update(printed_caption=printed_caption)
+    environment.filters.update(caption_of=caption_of)
     environment.globals.update(digits_of=digits_of, reasons=reasons, starts=starts)
     total = sum((chapter.counts for chapter in chapters), Counter())
     return environment.get_template(TEMPLATE).render(

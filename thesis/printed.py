@@ -106,7 +106,7 @@ def given() -> dict[str, dict[str, Any]]:
 
 @functools.cache
 def captions() -> Mapping[str, str]:
-    """The figures' captions, as printed."""
+    """What each of the thesis's figures shows, in our words."""
     return _read("captions.toml")
 
 

@@ -196,7 +196,7 @@ async def open_data(limits: Limits | None = None, **sizes: int) -> AsyncIterator
 
 def remove_left() -> None:
     """Remove the folders of labs that were killed: those of ours whose process is gone."""
-    if os.name != "posix":  # where asking whether a process is there would end it
+    if not hasattr(os, "getuid"):  # Windows, where asking whether a process is there would end it
         return
     for place in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
         number = place.name.removeprefix(PREFIX).partition("-")[0]

@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from stickslip.lab.bounds import bound
+
 ASK, ANSWER = "ask.json", "answer.json"
 # What a page's analysis has no use for, and a file that takes over its reader would.
 FORBIDDEN = (
@@ -40,16 +42,7 @@ def main() -> int:
 def limit(*, memory: int, processor: float, written: int) -> None:
     """Bound what this process may take, and what it may do: no network, no other program."""
     sys.addaudithook(_forbid)
-    try:
-        import resource
-    except ImportError:  # where there is none, the clock alone bounds the analysis
-        return
-    for what, most in (
-        (resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, int(processor)), (resource.RLIMIT_FSIZE, written),
-        (resource.RLIMIT_CORE, 0),
-    ):  # fmt: skip
-        hard = resource.getrlimit(what)[1]
-        resource.setrlimit(what, (most if hard < 0 else min(most, hard), hard))
+    bound(RLIMIT_AS=memory, RLIMIT_CPU=int(processor), RLIMIT_FSIZE=written, RLIMIT_CORE=0)
 
 
 def _forbid(event: str, arguments: tuple[Any, ...]) -> None:

@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 
 import stickslip as ss
 from stickslip.lab import drawn, explored, forms
+from stickslip.lab.bounds import bound
 from stickslip.lab.frames import frame
 from stickslip.lab.workers import ANSWER, HEAD
 
@@ -136,10 +137,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
 
 def main() -> None:
     """Serve on this process's own pipes; what else is printed goes to the error stream."""
-    if os.name == "posix":
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    bound(RLIMIT_DATA=MEMORY)
     warnings.simplefilter(
         "ignore", RuntimeWarning
     )  # what overflows is refused in a sentence; the terminal is the user's

@@ -197,10 +197,12 @@ class Store(AbstractContextManager["Store"]):
 
 def _locked(path: Path) -> int:
     """The folder, opened and locked: the lock goes with the process, however that ends."""
-    handle = os.open(path, os.O_RDONLY)
     try:
         import fcntl
-
+    except ImportError:  # Windows locks no folder, and opens none
+        return os.open(os.devnull, os.O_RDONLY)
+    handle = os.open(path, os.O_RDONLY)
+    try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         os.close(handle)
