@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 from starlette.exceptions import HTTPException
 
+import stickslip as ss
 from stickslip import Record, StickslipError, read_record, whole, write_record
 from stickslip.lab.jobs import Jobs
 from stickslip.lab.uploads import Uploads
@@ -518,3 +519,37 @@ def test_an_analysis_that_can_not_be_written_down_is_refused_and_leaves_nothing(
         except HTTPException as refused:
             require_room(refused, folder)
     assert last > 2
+
+
+# The store of a map
+
+
+@pytest.mark.parametrize("kill", [False, True])
+def test_a_map_goes_on_after_a_fault_at_any_step(steps: Steps, tmp_path: Path, kill: bool) -> None:
+    pytest.importorskip("zarr")
+    pytest.importorskip("pyarrow")
+    slider = ss.scenarios.forced(0.8, 0.5)
+
+    def run(folder: Path) -> None:
+        settings: dict[str, Any] = {"measures": ["events"], "settle": 1, "cycles": 1, "engine": "serial"}
+        ss.sweep(slider, {"kinetic": [0.3]}, store=folder / "map.zarr", **settings)
+
+    calm = tmp_path / "calm"
+    calm.mkdir()
+    run(calm)
+    whole_ = contents(calm)
+    last, through = 0, False
+    while not through:
+        last += 1
+        folder = tmp_path / str(last)
+        folder.mkdir()
+        (folder / "notes.txt").write_text("mine")
+        try:
+            with faulty(steps, folder, last, kill=kill):
+                run(folder)
+            through = steps.count < last
+        except (StickslipError, Killed):
+            pass
+        run(folder)
+        assert contents(folder) == {**whole_, "notes.txt": b"mine"}, steps.tried[-1]
+    assert last > 50

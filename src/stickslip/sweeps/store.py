@@ -46,7 +46,7 @@ class Store(AbstractContextManager["Store"]):
     def __init__(self, path: str | Path, plan: Plan) -> None:
         self.path, self.plan = Path(path), plan
         self._zarr = required("zarr")
-        self._done = np.zeros(len(plan.blocks), dtype=bool)
+        self._done, self._tried = np.zeros(len(plan.blocks), dtype=bool), False
         layout = self._layout()
         with self._on_disk():
             self._new = not self.path.exists() and self._lay_out(layout)
@@ -69,7 +69,7 @@ class Store(AbstractContextManager["Store"]):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         with self._lock, self._on_disk():
-            if error is not None and self._new and not self._done.any():
+            if error is not None and self._new and not self._tried:
                 self._take_back()
             elif error is None:
                 for folder in (self.path, self.events):
@@ -85,7 +85,7 @@ class Store(AbstractContextManager["Store"]):
         self, number: int, arrays: Mapping[str, NDArray[Any]], events: Mapping[str, NDArray[Any]] | None = None
     ) -> None:
         """Write a block, and then its seal."""
-        place = self.plan.slices(number)
+        place, self._tried = self.plan.slices(number), True
         with self._on_disk():
             for path in (*self._files(number), self._seal_of(number)):
                 _free(path)
@@ -190,11 +190,11 @@ class Store(AbstractContextManager["Store"]):
                     _replace(place / NEW / name, self.path / name)
 
     def _take_back(self) -> None:
-        """Remove a group without blocks: a sweep that could not begin leaves nothing, and nobody else's file goes."""
+        """Remove what was laid out and no more: a sweep that could not begin leaves nothing."""
         for name in self._layout():
             (self.path / name).unlink(missing_ok=True)
         within = sorted((path for path in self.path.rglob("*") if path.is_dir()), reverse=True)
-        for folder in (*within, self.path, self.events):
+        for folder in (*within, self.path):
             with suppress(OSError):  # it is not empty, or not there
                 folder.rmdir()
 
