@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from stickslip import Coulomb, HarmonicForce, Oscillator, StickslipError, sweep
+from stickslip import Coulomb, HarmonicForce, ModelError, Oscillator, StickslipError, sweep
 
 pytest.importorskip("zarr")
 pytest.importorskip("pyarrow")
@@ -85,3 +87,51 @@ def test_a_folder_of_notes_in_a_files_place_is_left_alone(whole: Path, tmp_path:
         run(tmp_path / "harmed")
     assert str(told.value).count(".\n") == 0
     assert (tmp_path / "harmed" / name / "notes.txt").read_text() == "mine"
+
+
+def test_a_system_without_locks_and_open_folders_keeps_the_same_map(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    monkeypatch.delattr(os, "O_DIRECTORY")
+    run(tmp_path)
+    assert contents(tmp_path) == contents(whole)
+    assert sorted(os.listdir(tmp_path)) == [MAP, EVENTS]
+
+
+def test_a_map_laid_out_by_another_process_at_the_same_time_is_taken_up(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between the look whether it is there and the rename: the other's stays."""
+    rename = os.rename
+
+    def late(draft: Path, path: Path) -> None:
+        if path == tmp_path / MAP:
+            monkeypatch.setattr(os, "rename", rename)
+            shutil.copytree(whole / MAP, tmp_path / MAP)
+        rename(draft, path)
+
+    monkeypatch.setattr(os, "rename", late)
+    run(tmp_path)
+    assert contents(tmp_path) == contents(whole)
+
+
+def test_nobody_elses_file_in_a_map_is_touched(whole: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole, tmp_path / "harmed")
+    mine = tmp_path / "harmed" / MAP / "thesis.partial.txt"
+    other = tmp_path / "harmed" / MAP / "half.of.partial"
+    mine.write_text("mine")
+    other.write_text("mine")
+    for name in (f"{MAP}/zarr.json", f"{MAP}/amplitude/zarr.json"):
+        delete(tmp_path / "harmed" / name)
+    run(tmp_path / "harmed")
+    assert mine.read_text() == other.read_text() == "mine"
+
+
+def test_the_map_of_another_plan_is_refused_also_where_its_metadata_are_gone(whole: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole, tmp_path / "harmed")
+    delete(tmp_path / "harmed" / MAP / "zarr.json")
+    before = contents(tmp_path / "harmed")
+    with pytest.raises(ModelError, match=r"is not a map of ours, or its zarr\.json is damaged"):
+        sweep(SLIDER, GRID, store=tmp_path / "harmed" / MAP, **{**SETTINGS, "cycles": 3})
+    assert contents(tmp_path / "harmed") == before

@@ -24,7 +24,7 @@ from stickslip.whole import NEW, locked, sync_all, workshop
 DONE = "done"
 """Name of the array of the seals: of each block the checksum of its files, 0 where it is not finished."""
 ROOT = "zarr.json"
-PARTIAL = re.compile(r".+\.([0-9a-f]{32}\.)?partial")  # what zarr, or this module, has not finished writing
+PARTIAL = re.compile(r"(.+\.[0-9a-f]{32}|\d{8,})\.partial")  # what zarr, or this module, has not finished writing
 
 
 class Store(AbstractContextManager["Store"]):
