@@ -101,8 +101,9 @@ class Jobs:
             (job.folder / ASK).write_text(json.dumps({**ask, "names": dict(names), "limits": told}), encoding="utf-8")
         except OSError as error:
             shutil.rmtree(job.folder, ignore_errors=True)
-            words = f"The question can not be written down ({error.strerror}); make room on the disk."
-            raise HTTPException(507, words) from error
+            raise HTTPException(
+                507, f"The question can not be written down ({error.strerror}); make room on the disk."
+            ) from error
         self._jobs[key] = job
         job.task = asyncio.create_task(self._attend(job))
         return job
