@@ -330,8 +330,9 @@ WELCOME = HALVES["a body that nobody wants"].replace("Content", "Authorization: 
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """The port of a lab's protocol, which waits a fifth of a second, for eight connections."""
+    """The port of a lab's protocol, which waits a fifth of a second for eight connections, half of that for more."""
     monkeypatch.setattr(patience.PatientProtocol, "patience", 0.2)
+    monkeypatch.setattr(patience.PatientProtocol, "hurry", 0.1)
     monkeypatch.setattr(patience.PatientProtocol, "most", 8)
     monkeypatch.setattr(security, "SILENCE", 0.2)
 
@@ -382,7 +383,8 @@ def test_one_byte_now_and_then_keeps_no_half_request_open(impatient: int) -> Non
                 door.sendall(b"a")
 
 
-def test_a_body_that_stops_coming_is_answered_so_and_closed(impatient: int) -> None:
+def test_a_body_that_stops_coming_is_answered_so_and_closed(impatient: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(patience.PatientProtocol, "patience", 5.0)
     with socket.create_connection(("127.0.0.1", impatient)) as door:
         door.sendall(WELCOME.format(port=impatient).encode())
         said = everything_of(door)
@@ -390,7 +392,10 @@ def test_a_body_that_stops_coming_is_answered_so_and_closed(impatient: int) -> N
     assert b"send it again" in said
 
 
-def test_a_sender_that_goes_in_the_middle_is_no_fault(impatient: int, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_sender_that_goes_in_the_middle_is_no_fault(
+    impatient: int, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(patience.PatientProtocol, "patience", 600.0)
     for _ in range(3):
         with socket.create_connection(("127.0.0.1", impatient)) as door:
             door.sendall(WELCOME.format(port=impatient).encode())
@@ -398,20 +403,32 @@ def test_a_sender_that_goes_in_the_middle_is_no_fault(impatient: int, caplog: py
     assert not [told for told in caplog.records if told.levelname == "ERROR"]
 
 
-def test_of_too_many_half_requests_the_oldest_are_closed_and_others_served(
+def test_of_too_many_half_requests_most_are_closed_soon_and_others_served(
     impatient: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(patience.PatientProtocol, "patience", 600.0)
+    monkeypatch.setattr(patience.PatientProtocol, "hurry", 2.0)
     with ExitStack() as all_:
         halves = [all_.enter_context(socket.create_connection(("127.0.0.1", impatient))) for _ in range(40)]
         for door in halves:
             door.sendall(b"GET /al")
         assert alive(impatient)
-        for door in halves[:30]:
+        for door in halves[9:]:
             everything_of(door)
-        assert len(patience.PatientProtocol.waiting) <= 8
-        halves[-1].sendall(b"ive HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
-        assert halves[-1].recv(12) == b"HTTP/1.1 400"
+        assert len(patience.PatientProtocol.waiting) <= 9  # and that of who asked whether it is alive
+        halves[0].sendall(b"ive HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert halves[0].recv(12) == b"HTTP/1.1 400"
+
+
+def test_none_is_closed_before_what_it_sent_was_read(impatient: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many come at once, who sends a request is answered."""
+    monkeypatch.setattr(patience.PatientProtocol, "patience", 600.0)
+    monkeypatch.setattr(patience.PatientProtocol, "hurry", 20.0)
+    with ExitStack() as many:
+        for _ in range(100):
+            many.enter_context(socket.create_connection(("127.0.0.1", impatient)))
+        with ThreadPoolExecutor(8) as users:
+            assert all(users.map(alive, [impatient] * 40))
 
 
 def alive(port: int) -> bool:

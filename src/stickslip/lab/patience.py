@@ -8,19 +8,20 @@ from typing import Any, ClassVar
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 PATIENCE = 10.0  # s from a connection's opening, or its last answer, to the end of the next request's head
-MOST = 256  # connections without a request at work; a page keeps six at most, so some forty pages
+MOST = 256  # connections without a request at work that may take that long; a page keeps six, so some forty pages
+HURRY = 1.0  # s for those that come when there are more: an honest one sends its head as soon as it is open
 
 
 class PatientProtocol(H11Protocol):
-    """HTTP of which a connection without a request at work is closed: after a time, or when there are too many of them.
+    """HTTP of which a connection without a request at work is closed after a time, a short one if there are many.
 
     Such a connection is one that has sent nothing, a part of a head, or goes on with a body that was answered already.
-    Of too many the one that has waited longest goes; a browser opens another when it needs one. While a request is at
-    work, what answers it decides how long it waits for the body.
+    None is closed at once: what an honest one sent may not have been read yet. While a request is at work, what
+    answers it decides how long it waits for the body.
     """
 
-    waiting: ClassVar[dict[PatientProtocol, asyncio.TimerHandle]] = {}  # who waits longest stands first
-    most, patience = MOST, PATIENCE
+    waiting: ClassVar[dict[PatientProtocol, asyncio.TimerHandle]] = {}
+    most, patience, hurry = MOST, PATIENCE, HURRY
 
     def connection_made(self, transport: Any) -> None:
         """Wait for a head."""
@@ -50,9 +51,8 @@ class PatientProtocol(H11Protocol):
         if at_work or upgraded or self.transport.is_closing():
             self._leave()
         elif self not in self.waiting:
-            self.waiting[self] = self.loop.call_later(self.patience, self._give_up)
-            if len(self.waiting) > self.most:
-                next(iter(self.waiting))._give_up()
+            time = self.patience if len(self.waiting) < self.most else self.hurry
+            self.waiting[self] = self.loop.call_later(time, self._give_up)
 
     def _leave(self) -> None:
         timer = self.waiting.pop(self, None)
