@@ -14,6 +14,7 @@ import json
 import random
 import re
 import socket
+import ssl
 import sys
 import time
 from collections import Counter, defaultdict
@@ -41,6 +42,7 @@ HALVES = (
     b"POST /jobs HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 900\r\n\r\nabc",
 )  # fmt: skip
 HALVES_AT_ONCE = 400
+CONTEXT = ssl.create_default_context()  # made once: a client that makes its own stands still meanwhile
 
 
 class Tally:
@@ -112,12 +114,21 @@ async def fetched(client: httpx.AsyncClient, chance: random.Random) -> None:
 
 
 async def user(lab: Lab, number: int, until: float, tally: Tally) -> None:
+    """Somebody who comes, stays, and comes again if the door was shut."""
     chance = random.Random(number)
+    await asyncio.sleep(chance.uniform(0, PAUSE))
+    while time.monotonic() < until:
+        try:
+            await visit(lab, chance, until, tally)
+        except Exception as error:  # noqa: BLE001  # as below
+            tally.errors[f"open: {type(error).__name__}: {error}"[:200]] += 1
+
+
+async def visit(lab: Lab, chance: random.Random, until: float, tally: Tally) -> None:
     sockets = f"ws://127.0.0.1:{lab.port}"
     options: dict[str, Any] = {"additional_headers": lab.headers, "max_size": None, "open_timeout": 120}
-    await asyncio.sleep(chance.uniform(0, PAUSE))
     async with (
-        httpx.AsyncClient(base_url=lab.base, headers=lab.headers, timeout=300) as client,
+        httpx.AsyncClient(base_url=lab.base, headers=lab.headers, timeout=300, verify=CONTEXT) as client,
         connect(f"{sockets}/play", **options) as play,
         connect(f"{sockets}/map", **options) as map_,
     ):

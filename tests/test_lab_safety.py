@@ -384,7 +384,7 @@ def test_one_byte_now_and_then_keeps_no_half_request_open(impatient: int) -> Non
 
 
 def test_a_body_that_stops_coming_is_answered_so_and_closed(impatient: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(patience.PatientProtocol, "patience", 5.0)
+    monkeypatch.setattr(patience.PatientProtocol, "patience", 2.0)
     with socket.create_connection(("127.0.0.1", impatient)) as door:
         door.sendall(WELCOME.format(port=impatient).encode())
         said = everything_of(door)

@@ -9,7 +9,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 PATIENCE = 10.0  # s from a connection's opening, or its last answer, to the end of the next request's head
 MOST = 256  # connections without a request at work that may take that long; a page keeps six, so some forty pages
-HURRY = 1.0  # s for those that come when there are more: an honest one sends its head as soon as it is open
+HURRY = 3.0  # s for those that come when there are more: an honest one sends its head as soon as it is open,
+# but on a busy machine even that was seen to take more than a second
 
 
 class PatientProtocol(H11Protocol):
