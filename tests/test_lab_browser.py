@@ -75,9 +75,9 @@ def is_ours(address: str, lab: Lab) -> bool:
     return address.startswith((lab.base, f"ws://127.0.0.1:{lab.port}", "data:", "blob:"))
 
 
-def link(lab: Lab, state: dict[str, Any]) -> str:
+def link(page: Page, state: dict[str, Any]) -> str:
     text = base64.urlsafe_b64encode(json.dumps(state).encode()).decode().rstrip("=")
-    return f"{lab.base}/#{text}"
+    return f"{page.url.partition('#')[0]}#{text}"
 
 
 def state_of(page: Page) -> dict[str, Any]:
@@ -208,7 +208,7 @@ def test_a_curve_is_asked_without_mass_and_spring_where_friction_is_measured(pag
 
 def show(page: Page, lab: Lab) -> None:
     """Open the link of the state, and wait for what the library says of it."""
-    page.goto(link(lab, STATE))
+    page.goto(link(page, STATE))
     page.wait_for_function(SHOWN, arg=printed(STATE))
 
 

@@ -11,10 +11,11 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +24,14 @@ import numpy as np
 import pytest
 import schemathesis
 import soundfile
+import uvicorn
 from click.testing import CliRunner
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
@@ -34,7 +39,7 @@ from websockets.sync.client import connect
 import stickslip as ss
 from labs import Lab, running_lab
 from stickslip.cli.program import main
-from stickslip.lab import data
+from stickslip.lab import data, patience, security
 from stickslip.lab.server import lab_app
 
 ENDED = ("done", "refused", "broken", "cancelled")
@@ -309,6 +314,126 @@ def test_bytes_that_are_no_request_harm_nobody(lab: Lab, client: httpx.Client) -
             lab, b"POST /files HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nContent-Length: %d\r\n\r\nabc" % (lab.port, 10**number)
         )
     assert client.get("/alive").status_code == 200
+
+
+HALVES = {
+    "nothing": "",
+    "a part of a line": "GET /al",
+    "a part of a head": "GET /alive HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nAuth",
+    "a socket's half": "GET /play HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n",
+    "a body that nobody wants": "POST /jobs HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: 900\r\n\r\nabc",
+    "a second request's half": "GET /alive HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\nGET /al",
+}
+
+WELCOME = HALVES["a body that nobody wants"].replace("Content", "Authorization: Bearer t\r\nContent")
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """The port of a lab's protocol, which waits a fifth of a second for eight connections, half of that for more."""
+    monkeypatch.setattr(patience.PatientProtocol, "patience", 0.2)
+    monkeypatch.setattr(patience.PatientProtocol, "hurry", 0.1)
+    monkeypatch.setattr(patience.PatientProtocol, "most", 8)
+    monkeypatch.setattr(security, "SILENCE", 0.2)
+
+    async def reads(request: Request) -> Response:
+        return PlainTextResponse(str(len(await request.body())))
+
+    with socket.socket() as door:
+        door.bind(("127.0.0.1", 0))
+        door.listen()
+        port = door.getsockname()[1]
+        app = Starlette(routes=[Route("/alive", reads), Route("/jobs", reads, methods=["POST"])],
+                        middleware=[Middleware(security.Guard, token="t", port=port)],
+                        exception_handlers=lab_app(token="t", port=port).exception_handlers)  # fmt: skip
+        server = uvicorn.Server(uvicorn.Config(app, http=patience.PatientProtocol, lifespan="off", log_config=None))
+        serving = threading.Thread(target=server.run, kwargs={"sockets": [door]})
+        serving.start()
+        try:
+            yield port
+        finally:
+            server.should_exit = True
+            serving.join()
+    assert not patience.PatientProtocol.waiting
+
+
+def everything_of(door: socket.socket) -> bytes:
+    """What comes until the other side closes, which it does."""
+    door.settimeout(30)
+    said = b""
+    with suppress(ConnectionError):
+        while some := door.recv(4096):
+            said += some
+    return said
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_half_a_request_is_closed_after_a_while(impatient: int, half: str) -> None:
+    with socket.create_connection(("127.0.0.1", impatient)) as door:
+        door.sendall(HALVES[half].format(port=impatient).encode())
+        everything_of(door)
+
+
+def test_one_byte_now_and_then_keeps_no_half_request_open(impatient: int) -> None:
+    for half in ("a part of a head", "a body that nobody wants"):
+        with socket.create_connection(("127.0.0.1", impatient)) as door, suppress(ConnectionError):
+            door.sendall(HALVES[half].format(port=impatient).encode())
+            while True:  # ends when the other side has closed
+                time.sleep(0.02)
+                door.sendall(b"a")
+
+
+def test_a_body_that_stops_coming_is_answered_so_and_closed(impatient: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(patience.PatientProtocol, "patience", 2.0)
+    with socket.create_connection(("127.0.0.1", impatient)) as door:
+        door.sendall(WELCOME.format(port=impatient).encode())
+        said = everything_of(door)
+    assert said.startswith(b"HTTP/1.1 408")
+    assert b"send it again" in said
+
+
+def test_a_sender_that_goes_in_the_middle_is_no_fault(
+    impatient: int, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(patience.PatientProtocol, "patience", 600.0)
+    for _ in range(3):
+        with socket.create_connection(("127.0.0.1", impatient)) as door:
+            door.sendall(WELCOME.format(port=impatient).encode())
+    assert alive(impatient)
+    assert not [told for told in caplog.records if told.levelname == "ERROR"]
+
+
+def test_of_too_many_half_requests_most_are_closed_soon_and_others_served(
+    impatient: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(patience.PatientProtocol, "patience", 600.0)
+    monkeypatch.setattr(patience.PatientProtocol, "hurry", 2.0)
+    with ExitStack() as all_:
+        halves = [all_.enter_context(socket.create_connection(("127.0.0.1", impatient))) for _ in range(40)]
+        for door in halves:
+            door.sendall(b"GET /al")
+        assert alive(impatient)
+        for door in halves[9:]:
+            everything_of(door)
+        assert len(patience.PatientProtocol.waiting) <= 9  # and that of who asked whether it is alive
+        halves[0].sendall(b"ive HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert halves[0].recv(12) == b"HTTP/1.1 400"
+
+
+def test_none_is_closed_before_what_it_sent_was_read(impatient: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many come at once, who sends a request is answered."""
+    monkeypatch.setattr(patience.PatientProtocol, "patience", 600.0)
+    monkeypatch.setattr(patience.PatientProtocol, "hurry", 20.0)
+    with ExitStack() as many:
+        for _ in range(100):
+            many.enter_context(socket.create_connection(("127.0.0.1", impatient)))
+        with ThreadPoolExecutor(8) as users:
+            assert all(users.map(alive, [impatient] * 40))
+
+
+def alive(port: int) -> bool:
+    answer = httpx.get(f"http://127.0.0.1:{port}/alive", headers={"Authorization": "Bearer t"}, timeout=30)
+    return answer.status_code == 200
 
 
 def test_an_upload_that_breaks_off_leaves_nothing(lab: Lab, client: httpx.Client) -> None:

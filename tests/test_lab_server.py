@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
+import threading
 from collections.abc import Iterator
+from email.message import Message
+from http.cookiejar import CookieJar
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from types import SimpleNamespace
 from typing import Any
+from urllib.request import HTTPCookieProcessor, Request, build_opener
 
 import pytest
 
@@ -31,19 +38,68 @@ def client() -> Iterator[TestClient]:
 
 def test_the_address_with_its_token_is_exchanged_for_a_cookie(client: TestClient) -> None:
     answer = client.get(f"/?token={TOKEN}", follow_redirects=False)
-    assert (answer.status_code, answer.headers["location"]) == (303, "/")
+    inside = answer.headers["location"]
+    assert answer.status_code == 303
+    assert re.fullmatch(r"/[\w-]{22}/", inside)
     cookie = answer.headers["set-cookie"].lower()
     assert "httponly" in cookie
     assert "samesite=lax" in cookie
-    page = client.get("/")
-    assert "stickslip lab" in page.text
+    assert f"path={inside.lower()}" in cookie
+    for address in (inside, f"{inside}alive"):
+        assert client.get(address).status_code == 200
+    assert "stickslip lab" in client.get(inside).text
+    assert client.get("/", headers={"cookie": answer.headers["set-cookie"]}).status_code == 401
     client.cookies.clear()
-    assert client.get("/").status_code == 401
+    assert client.get(inside).status_code == 401
+
+
+def test_a_browser_without_the_secret_path_is_told_and_led_to_where_it_knows(client: TestClient) -> None:
+    answer = client.get("/", headers={"accept": "text/html,*/*"})
+    assert answer.status_code == 401
+    assert '<script src="/enter.js">' in answer.text
+    assert "script-src 'self'" in answer.headers["content-security-policy"]
+    assert "location.replace" in client.get("/enter.js").text
+    assert client.get("/enter.js", headers={"host": "evil.example"}).status_code == 400
+
+
+def test_another_port_of_this_host_gets_no_cookie_of_the_lab(client: TestClient) -> None:
+    """A browser sends a cookie to every port of its host: ours is for a path that no other program knows."""
+    jar = CookieJar()
+    with HTTPServer(("127.0.0.1", 0), Listener) as other:
+        answering = threading.Thread(target=other.serve_forever)
+        answering.start()
+        try:
+            said = client.get(f"/?token={TOKEN}", follow_redirects=False).headers["set-cookie"]
+            message = Message()
+            message["Set-Cookie"] = said
+            jar.extract_cookies(SimpleNamespace(info=lambda: message), Request(f"{HOME}/?token={TOKEN}"))
+            assert len(jar) == 1
+            browser = build_opener(HTTPCookieProcessor(jar))
+            for path in ("/", "/files", "/play", "/?token=guess"):
+                with browser.open(f"http://127.0.0.1:{other.server_port}{path}") as answer:
+                    assert answer.read() == b"None"
+        finally:
+            other.shutdown()
+            answering.join()
+
+
+class Listener(BaseHTTPRequestHandler):
+    """Another program on this machine, which says what cookie it got."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.end_headers()
+        self.wfile.write(str(self.headers.get("cookie")).encode())
+
+    def log_message(self, *_: Any) -> None:
+        """Nothing."""
 
 
 @pytest.mark.parametrize("foreign", ['a={"x": 1}; ', "foo; ", "a[b]=1; "])
 def test_cookies_of_other_programs_on_this_machine_lock_nobody_out(client: TestClient, foreign: str) -> None:
-    assert client.get("/alive", headers={"cookie": f"{foreign}stickslip-{PORT}={TOKEN}"}).status_code == 200
+    inside = client.get(f"/?token={TOKEN}", follow_redirects=False).headers["location"]
+    client.cookies.clear()
+    assert client.get(f"{inside}alive", headers={"cookie": f"{foreign}stickslip-{PORT}={TOKEN}"}).status_code == 200
 
 
 @pytest.mark.parametrize("path", ["/", "/alive", "/catalog", "/lab.js", "/openapi.json", "/nothing"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip import whole
 from stickslip.analysis.comparison import compare
 from stickslip.analysis.findings import Findings
 from stickslip.analysis.questions import analyze
@@ -259,16 +261,17 @@ def test_nothing_stays_of_a_folder_that_was_not_finished(
 def test_earlier_results_come_back_when_the_new_ones_can_not_take_their_place(
     light: Findings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
 ) -> None:
-    rename = Path.rename
+    rename = os.rename
 
-    def fails(path: Path, target: Path) -> Path:
-        if path.name == "new":
+    def fails(path: Path, target: Path) -> None:
+        if (path.name, target.name) == (whole.WHOLE, "results"):
             raise trouble
-        return rename(path, target)
+        rename(path, target)
 
     place = publish(light, folder=tmp_path / "results")
     before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
-    monkeypatch.setattr(Path, "rename", fails)
+    monkeypatch.setattr(whole, "exchange", lambda one, other: False)
+    monkeypatch.setattr(os, "rename", fails)
     with pytest.raises((StickslipError, KeyboardInterrupt)):
         publish(replace(light, name="later"), folder=place)
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before

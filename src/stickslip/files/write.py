@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +14,7 @@ from stickslip.errors import FormatError
 from stickslip.files.table import optional
 from stickslip.record.metadata import KEY, record_to_metadata, time_column
 from stickslip.record.record import Record
+from stickslip.whole import whole_file
 
 Array = NDArray[np.float64]
 
@@ -64,32 +64,41 @@ def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -
             f"a record is written as {', '.join(WRITERS)}",
             "choose one of these endings",
         )
-    if not overwrite and path.exists():
-        raise FormatError(
-            f"'{path.name}' is there already", "no file is replaced unasked", "choose another name, or overwrite=True"
-        )
+    if not overwrite:
+        require_free(path)
     columns = {time_column(record): ("s", record.time)}
     columns |= {name: (record.channels[name].unit, values) for name, values in record.samples.items()}
-    with whole(path) as part:
+    with whole(path, replace=overwrite) as part:
         writer(part, columns, json.dumps(record_to_metadata(record)))
     return path
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def whole(path: Path, *, replace: bool = True) -> Iterator[Path]:
     """A path to write to that becomes `path` when all went well, and vanishes when not."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        yield part
-        os.replace(part, path)
+        with whole_file(path, replace=replace) as draft:
+            yield draft
+    except FileExistsError as error:
+        raise _taken(path) from error
     except OSError as error:
         raise FormatError(
             f"'{path.name}' can not be written ({error.strerror or error})",
             "the folder exists and may be written to",
             "choose another place",
         ) from error
-    finally:
-        part.unlink(missing_ok=True)
+
+
+def require_free(path: Path) -> None:
+    """Refuse to replace a file that is there."""
+    if path.exists():
+        raise _taken(path)
+
+
+def _taken(path: Path) -> FormatError:
+    return FormatError(
+        f"'{path.name}' is there already", "no file is replaced unasked", "choose another name, or overwrite=True"
+    )
 
 
 Columns = dict[str, tuple[str, Array]]

@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Route
 
@@ -243,13 +243,11 @@ def _of(request: Request) -> Data:
 async def send_file(request: Request) -> Response:
     """Keep a file; its own name is a label."""
     stated = request.headers.get("content-length", "")
-    with suppress(ClientDisconnect):
-        upload = await _of(request).uploads.receive(
-            request.stream(), label=request.query_params.get("name", ""),
-            stated=int(stated) if stated.isascii() and stated.isdigit() else 0,
-        )  # fmt: skip
-        return JSONResponse({"id": upload.key, "name": upload.label, "size": upload.size}, status_code=201)
-    return Response(status_code=400)
+    upload = await _of(request).uploads.receive(
+        request.stream(), label=request.query_params.get("name", ""),
+        stated=int(stated) if stated.isascii() and stated.isdigit() else 0,
+    )  # fmt: skip
+    return JSONResponse({"id": upload.key, "name": upload.label, "size": upload.size}, status_code=201)
 
 
 @described("Keep the bundled record as if it had been sent", answer=FILE, status=201)

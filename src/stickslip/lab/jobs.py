@@ -95,9 +95,15 @@ class Jobs:
             raise HTTPException(503, f"{self.limits.waiting} analyses are waiting already; try again in a minute.")
         key = secrets.token_hex(16)
         job = Job(self.folder / key, names)
-        job.folder.mkdir()
         told = {"memory": self.limits.memory, "processor": self.limits.processor, "written": self.limits.written}
-        (job.folder / ASK).write_text(json.dumps({**ask, "names": dict(names), "limits": told}), encoding="utf-8")
+        try:
+            job.folder.mkdir()
+            (job.folder / ASK).write_text(json.dumps({**ask, "names": dict(names), "limits": told}), encoding="utf-8")
+        except OSError as error:
+            shutil.rmtree(job.folder, ignore_errors=True)
+            raise HTTPException(
+                507, f"The question can not be written down ({error.strerror}); make room on the disk."
+            ) from error
         self._jobs[key] = job
         job.task = asyncio.create_task(self._attend(job))
         return job

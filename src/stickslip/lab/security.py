@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import cookie_parser
-from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
@@ -17,6 +18,8 @@ from stickslip.lab.uploads import LARGEST
 HOSTS = ("127.0.0.1", "localhost")
 LIMIT = 2**20  # bytes of a request
 LIMITS = {"/files": LARGEST}  # by how the path begins: records are large
+SILENCE = 60.0  # seconds without a byte of a body after which its sender is given up
+ENTRANCE = "/enter.js"  # what leads a copied link to the page; it holds no secret
 VIOLATION = 1008  # RFC 6455: against the policy
 HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -34,6 +37,9 @@ HEADERS = {
 class Guard:
     """The door: every request states our host, comes from no other page and knows the token; none is too large.
 
+    A browser's cookies go to every port of a host. The page's own is therefore for a path that is secret too, and of
+    this start: at another port the browser does not know that it has it.
+
     Parameters
     ----------
     app : ASGI application
@@ -46,6 +52,7 @@ class Guard:
 
     def __init__(self, app: ASGIApp, *, token: str, port: int) -> None:
         self.app, self.token, self.cookie = app, token, f"stickslip-{port}"
+        self.inside = f"/{secrets.token_urlsafe(16)}"
         self.hosts = {f"{host}:{port}" for host in HOSTS}
         self.origins = {f"http://{host}" for host in self.hosts}
         sockets = " ".join(f"ws://{host}" for host in sorted(self.hosts))
@@ -55,7 +62,10 @@ class Guard:
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
             return
-        answer = self._refused(scope) or self._welcomed(scope)
+        inside = scope["path"].startswith(f"{self.inside}/")
+        if inside:
+            scope = {**scope, "path": scope["path"].removeprefix(self.inside)}
+        answer = self._refused(scope) or self._welcomed(scope, inside)
         if scope["type"] == "websocket":
             await (WebSocketClose(VIOLATION, "not from this page") if answer else self.app)(scope, receive, send)
             return
@@ -70,20 +80,24 @@ class Guard:
             return _told(403, "Another page may not use this lab; open the address that it printed.")
         return None
 
-    def _welcomed(self, scope: Scope) -> Response | None:
-        """Nothing for who knows the token; the page's address with it is exchanged for a cookie."""
+    def _welcomed(self, scope: Scope, inside: bool) -> Response | None:
+        """Nothing for who knows the token; the page's address with it is exchanged for a cookie and the way inside."""
         headers = Headers(scope=scope)
         told = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
         if scope["type"] == "http" and scope["path"] == "/" and self._known(told):
-            page = RedirectResponse("/", status_code=303)
-            page.set_cookie(self.cookie, self.token, httponly=True, samesite="lax", path="/")
+            page = RedirectResponse(f"{self.inside}/", status_code=303)
+            page.set_cookie(self.cookie, self.token, httponly=True, samesite="lax", path=f"{self.inside}/")
             return page
         scheme, _, bearer = headers.get("authorization", "").partition(" ")
-        if self._known(cookie_parser(headers.get("cookie", "")).get(self.cookie, "")) or (
-            scheme.lower() == "bearer" and self._known(bearer)
-        ):
+        cookie = cookie_parser(headers.get("cookie", "")).get(self.cookie, "") if inside else ""
+        if self._known(cookie) or (scheme.lower() == "bearer" and self._known(bearer)):
             return None
-        return _told(401, "The token is missing or of another start; open the address that 'stickslip lab' printed.")
+        if scope["path"] == ENTRANCE:
+            return None
+        sentence = "The token is missing or of another start; open the address that 'stickslip lab' printed."
+        if scope["path"] == "/" and "text/html" in headers.get("accept", ""):
+            return HTMLResponse(f'<!doctype html><script src="{ENTRANCE}"></script><p>{sentence}', 401)
+        return _told(401, sentence)
 
     def _known(self, told: str) -> bool:
         return secrets.compare_digest(told.encode("utf-8", "surrogateescape"), self.token.encode())
@@ -102,13 +116,18 @@ class Guard:
 
 
 def _counted(scope: Scope, receive: Receive) -> Receive:
-    """`receive`, ended where more comes than the path takes, whatever length was stated."""
+    """`receive`, ended where more comes than the path takes, whatever length was stated, or nothing for long."""
     limit = next((most for start, most in LIMITS.items() if scope["path"].startswith(start)), LIMIT)
-    taken = 0
+    taken, coming = 0, True
 
     async def receiving() -> Message:
-        nonlocal taken
-        message = await receive()
+        nonlocal taken, coming
+        try:
+            async with asyncio.timeout(SILENCE if coming else None):
+                message = await receive()
+        except TimeoutError as error:
+            raise HTTPException(408, f"Nothing came for {SILENCE:g} s: the request ended; send it again.") from error
+        coming = message.get("more_body", False)
         taken += len(message.get("body", b""))
         if taken > limit:
             raise HTTPException(413, f"The request is larger than the {limit / 2**20:g} MB taken here; send less.")

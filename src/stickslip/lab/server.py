@@ -11,7 +11,7 @@ from typing import Any
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
@@ -44,7 +44,12 @@ def lab_app(*, token: str, port: int) -> Starlette:
     return Starlette(
         routes=[*_routes(), Mount("/", StaticFiles(directory=PAGE, html=True))],
         middleware=[Middleware(Guard, token=token, port=port)],
-        exception_handlers={HTTPException: _refusal, ss.StickslipError: _unanswered, Exception: _broken},
+        exception_handlers={
+            HTTPException: _refusal,
+            ClientDisconnect: _gone,
+            ss.StickslipError: _unanswered,
+            Exception: _broken,
+        },
         lifespan=_lifespan,
     )
 
@@ -95,6 +100,10 @@ async def _refusal(request: Request, error: Any) -> Response:
             "Method Not Allowed": f"{request.method} has no meaning at that address."}  # fmt: skip
     sentence = bare.get(error.detail, error.detail)
     return JSONResponse({"error": str(sentence)}, error.status_code, headers=error.headers)
+
+
+async def _gone(request: Request, error: Exception) -> Response:
+    return Response(status_code=400)  # to nobody
 
 
 async def _unanswered(request: Request, error: Exception) -> Response:

@@ -61,6 +61,7 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) ->
     try:
         import uvicorn
 
+        from stickslip.lab.patience import PatientProtocol
         from stickslip.lab.server import lab_app
     except ImportError as error:
         raise ss.ModelError(
@@ -77,8 +78,8 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) ->
 
     app = lab_app(token=token, port=door.getsockname()[1])
     settings = uvicorn.Config(
-        app, log_level="warning", access_log=False, ws_max_size=LARGEST_MESSAGE, server_header=False, date_header=False,
-        timeout_graceful_shutdown=2, ws_per_message_deflate=False,
+        app, http=PatientProtocol, log_level="warning", access_log=False, ws_max_size=LARGEST_MESSAGE,
+        server_header=False, date_header=False, timeout_graceful_shutdown=2, ws_per_message_deflate=False,
     )  # fmt: skip
     server = Server(settings)
     if hasattr(signal, "SIGHUP"):

@@ -14,7 +14,6 @@ from starlette.exceptions import HTTPException
 LARGEST = 2 << 30  # bytes of one file
 ALTOGETHER = 8 << 30  # bytes of all that are kept at a time
 AT_ONCE = 1 << 20  # bytes written in one go, away from the event loop
-SILENCE = 60.0  # seconds without a byte after which a sender is given up
 UNUSED = 3600.0  # seconds after which a file that nobody asks about is removed
 LONGEST_LABEL = 120
 
@@ -121,14 +120,10 @@ class Uploads:
 
 
 async def _in_pieces(chunks: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
-    """The chunks in pieces worth a write; given up where nothing comes for long."""
+    """The chunks in pieces worth a write."""
     piece = bytearray()
     while True:
-        try:
-            async with asyncio.timeout(SILENCE):
-                chunk = await anext(chunks, None)
-        except TimeoutError as error:
-            raise HTTPException(408, f"Nothing came for {SILENCE:g} s: the upload ended; send it again.") from error
+        chunk = await anext(chunks, None)
         piece += chunk or b""
         if piece and (chunk is None or len(piece) >= AT_ONCE):
             yield bytes(piece)

@@ -28,6 +28,7 @@ from stickslip.plot.style import (
 )
 from stickslip.plot.trajectory import MASSES, contacts_of, curve, kinds_of, last_cycles, numbered_words, sampled
 from stickslip.structure import Structure
+from stickslip.whole import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,9 +92,9 @@ def animate(run: Trajectory, path: str | Path, *, tell: Callable[[int, int], Non
     require_writer(path.suffix)
     images = frames(run, tell=tell)
     try:
-        (_write_gif if path.suffix == ".gif" else _write_mp4)(images, path)
+        with whole_file(path) as draft:
+            (_write_gif if path.suffix == ".gif" else _write_mp4)(images, draft)
     except OSError as error:
-        path.unlink(missing_ok=True)
         raise RecordError(
             f"{path.name} can not be written ({error.strerror or error})", "the folder may be written to",
             "choose another place",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ from stickslip.plot.plate import Plate
 from stickslip.printing import printable
 from stickslip.reports.page import Asked, render, sections_of
 from stickslip.squeak.listening import Clip
+from stickslip.whole import whole_folder
 
 PROGRAM = "stickslip"
 NUMBERS = "results.json"
@@ -28,8 +28,9 @@ def publish(
 ) -> Path:
     """Write ``report.html``, ``results.json``, the figures as SVG and PNG, and the bursts as WAV into a folder.
 
-    The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
-    is left alone.
+    The folder appears when all is written, and is on the disk itself then. An earlier one of ours is replaced in one
+    step where the system can do that (Linux, macOS); a folder that holds anything else is left alone. A file that
+    somebody puts there meanwhile stays.
 
     Parameters
     ----------
@@ -52,6 +53,7 @@ def publish(
 
     Examples
     --------
+    >>> import tempfile
     >>> import stickslip as ss
     >>> record = ss.datasets.demo()
     >>> rig = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
@@ -83,7 +85,7 @@ def _write_sounds(folder: Path, prefix: str, clips: Sequence[Clip]) -> None:
 def results_folder(folder: Path, results: Mapping[str, Any]) -> Iterator[Path]:
     """A folder to fill; with `results` and the list of its files in ``results.json`` it appears at the end, whole."""
     check_folder(folder)
-    with _whole_folder(folder) as draft:
+    with _written(folder) as draft:
         yield draft
         files = sorted(str(path.relative_to(draft).as_posix()) for path in draft.rglob("*") if path.is_file())
         told = {"program": PROGRAM, "version": __version__, "files": [*files, NUMBERS], **results}
@@ -117,24 +119,11 @@ def _strangers(folder: Path) -> list[str]:
 
 
 @contextmanager
-def _whole_folder(folder: Path) -> Iterator[Path]:
-    """A folder to fill that takes the place of `folder` at the end; an error or Ctrl-C removes it."""
+def _written(folder: Path) -> Iterator[Path]:
+    """A folder to fill that takes the place of `folder` at the end; what else came there meanwhile stays there."""
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(
-            dir=folder.parent, prefix=f".{folder.name}-", suffix=".part", ignore_cleanup_errors=True
-        ) as place:
-            draft = Path(place) / "new"
-            draft.mkdir()
+        with whole_folder(folder, strangers=_strangers) as draft:
             yield draft
-            earlier = Path(place) / "old"
-            try:
-                if folder.exists():
-                    folder.rename(earlier)
-                draft.rename(folder)
-            finally:
-                if earlier.exists() and not folder.exists():
-                    earlier.rename(folder)
     except OSError as error:
         raise RecordError(
             f"{folder} can not be written ({error.strerror or error})",

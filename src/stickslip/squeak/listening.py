@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, RecordError
-from stickslip.files.write import whole
+from stickslip.files.write import require_free, whole
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import Squeak, Squeaks, chosen_channel
 from stickslip.squeak.hearing import filtered
@@ -102,10 +102,8 @@ def write_sound(
     path = Path(path)
     if path.suffix.lower() != ".wav":
         raise FormatError(f"'{path.name}'", "a sound is written as .wav", "choose this ending")
-    if not overwrite and path.exists():
-        raise FormatError(
-            f"'{path.name}' is there already", "no file is replaced unasked", "choose another name, or overwrite=True"
-        )
+    if not overwrite:
+        require_free(path)
     name = chosen_channel(record, channel)
     record.require_clean(name, question="writing a sound")
     peak = float(np.max(np.abs(record[name])))
@@ -115,7 +113,7 @@ def write_sound(
             f"{name} reaches {peak:g} {record.channels[name].unit} of a full scale of {scale:g}",
             "a sound is written between zero and its full scale", "choose another channel= or a larger full_scale=",
         )  # fmt: skip
-    with whole(path) as part:
+    with whole(path, replace=overwrite) as part:
         part.write_bytes(wav_bytes(record[name], record.fs, scale))
     return scale
 

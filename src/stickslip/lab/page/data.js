@@ -94,7 +94,7 @@ function dropping(place) {
 
 async function add(chosen) {
   if (!ready().length) told = nothing();
-  const { largest } = await lab.ask("/files");
+  const { largest } = await lab.ask("files");
   for (const file of chosen) {
     const entry = { name: file.name, size: file.size, sent: 0, id: null, error: "" };
     files.push(entry);
@@ -120,7 +120,7 @@ function send(file, entry) {
   return new Promise((resolve, reject) => {
     const request = entry.request = new XMLHttpRequest();
     request.onabort = () => reject(new Error("removed before it was sent"));
-    request.open("POST", `/files?name=${encodeURIComponent(file.name)}`);
+    request.open("POST", `files?name=${encodeURIComponent(file.name)}`);
     request.setRequestHeader("Content-Type", "application/octet-stream");
     request.upload.onprogress = (event) => { entry.sent = event.loaded; entry.bar?.setAttribute("value", event.loaded); };
     request.onload = () => {
@@ -134,7 +134,7 @@ function send(file, entry) {
 }
 
 async function useExample() {
-  const told = await lab.ask("/files/example", { method: "POST" });
+  const told = await lab.ask("files/example", { method: "POST" });
   files.push({ ...told, sent: told.size, error: "" });
   showFiles();
   await describe();
@@ -173,14 +173,14 @@ async function forget(entry) {
   if (entry === ready()[0]) told = nothing(); // what was said of its columns
   files = files.filter((each) => each !== entry);
   entry.request?.abort();
-  if (entry.id) await lab.ask(`/files/${entry.id}`, { method: "DELETE" });
+  if (entry.id) await lab.ask(`files/${entry.id}`, { method: "DELETE" });
   showFiles();
   await describe();
 }
 
 function leave() {
-  for (const id of [job, parts.job]) if (id) fetch(`/jobs/${id}`, { method: "DELETE", keepalive: true });
-  for (const { id } of ready()) fetch(`/files/${id}`, { method: "DELETE", keepalive: true });
+  for (const id of [job, parts.job]) if (id) fetch(`jobs/${id}`, { method: "DELETE", keepalive: true });
+  for (const { id } of ready()) fetch(`files/${id}`, { method: "DELETE", keepalive: true });
 }
 
 function ready() {
@@ -419,25 +419,25 @@ async function run(question, said) {
   const mine = ++asked;
   const before = [job, parts.job].filter(Boolean);
   job = parts.job = null;
-  for (const id of before) await lab.ask(`/jobs/${id}`, { method: "DELETE" }).catch(() => {}); // it may be gone already
+  for (const id of before) await lab.ask(`jobs/${id}`, { method: "DELETE" }).catch(() => {}); // it may be gone already
   if (mine !== asked) return null;
   const body = JSON.stringify({ question, records: records(), reading: reading(), options: said });
-  const { id } = await lab.ask("/jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body });
+  const { id } = await lab.ask("jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body });
   if (mine !== asked) {
-    await lab.ask(`/jobs/${id}`, { method: "DELETE" });
+    await lab.ask(`jobs/${id}`, { method: "DELETE" });
     return null;
   }
   job = id;
   const bar = make("progress", { max: 1, "aria-label": "How far it is" });
   const words = make("span", { class: "data-words" }, "starting");
   const stop = make("button", { type: "button", id: "data-cancel" }, "Cancel");
-  stop.addEventListener("click", () => guarded(() => lab.ask(`/jobs/${id}`, { method: "DELETE" })));
+  stop.addEventListener("click", () => guarded(() => lab.ask(`jobs/${id}`, { method: "DELETE" })));
   parts.progress.replaceChildren(bar, " ", words, " ", stop);
   await ended(id, (told) => {
     words.textContent = told.words;
     if (told.state === "running") bar.value = told.share;
   });
-  const { state, message, answer } = await lab.ask(`/jobs/${id}`);
+  const { state, message, answer } = await lab.ask(`jobs/${id}`);
   if (mine !== asked) return null;
   job = null;
   parts.progress.replaceChildren();
@@ -451,7 +451,7 @@ async function run(question, said) {
 
 function ended(id, watch) {
   return new Promise((resolve) => {
-    const source = new EventSource(`/jobs/${id}/events`);
+    const source = new EventSource(`jobs/${id}/events`);
     source.onmessage = (event) => {
       const told = JSON.parse(event.data);
       watch(told);
@@ -480,14 +480,14 @@ async function guarded(work) {
 // ---- the answer
 
 function showAnswer(answer, command) {
-  const link = (path, text) => make("a", { href: `/jobs/${parts.job}/${path}`, download: "", class: "button" }, text);
+  const link = (path, text) => make("a", { href: `jobs/${parts.job}/${path}`, download: "", class: "button" }, text);
   const rows = answer.lines.map((line) => make("tr", {}, make("th", { scope: "row" }, line[0]),
     ...line.slice(1, 3).map((cell) => make("td", {}, cell)), make("td", { title: line[3] }, sure(answer, line[3]))));
   const head = ["Quantity", "Value", "95 % interval", "How sure"].map((text) => make("th", { scope: "col" }, text));
   const table = make("div", { class: "data-scroll", tabindex: "0", role: "region", "aria-label": "Results" },
     make("table", { id: "data-results" }, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows)));
   const overlay = make("div", { class: "data-overlay" });
-  const page = make("iframe", { src: `/jobs/${parts.job}/report`, title: `Report of ${answer.title}`, sandbox: "",
+  const page = make("iframe", { src: `jobs/${parts.job}/report`, title: `Report of ${answer.title}`, sandbox: "",
     class: "data-report" });
   parts.answer.replaceChildren(make("article", { class: "card" },
     make("h2", {}, answer.title),
@@ -496,7 +496,7 @@ function showAnswer(answer, command) {
     ...(rows.length ? [table] : []), overlay,
     make("p", { class: "data-downloads" }, link("report?keep=1", "Report (HTML)"), link("results.json", "Numbers (JSON)"),
       link("results.zip", "All with figures (ZIP)"),
-      make("a", { href: `/jobs/${parts.job}/report`, target: "_blank", rel: "noopener", class: "button" }, "Report in a tab")),
+      make("a", { href: `jobs/${parts.job}/report`, target: "_blank", rel: "noopener", class: "button" }, "Report in a tab")),
     ...(answer.state ? [playIt(answer.state)] : []),
     make("details", {}, make("summary", {}, "The same on the command line"), make("pre", {}, command)),
     ...(answer.notes.length ? [make("details", {}, make("summary", {}, "Notes"),

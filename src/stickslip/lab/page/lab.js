@@ -2,6 +2,7 @@
 import { tick } from "./canvas.js";
 import { start as startPlay } from "./play.js";
 
+if (location.pathname !== "/") localStorage.setItem("inside", location.pathname); // for enter.js; other ports do not see it
 const $ = (id) => document.getElementById(id);
 const TABS = ["play", "map", "data"];
 const LEADS = {

@@ -22,7 +22,7 @@ export function start(root, given) {
   lab = given;
   root.innerHTML = form();
   canvas = $("map-canvas");
-  conversation = new Conversation("/map", heard);
+  conversation = new Conversation("map", heard);
   listen();
   lab.onTheme(redraw);
   new ResizeObserver(redraw).observe(canvas);

@@ -24,13 +24,13 @@ export async function start(given) {
   lab.openInPlay = (opened) => { own(); use(opened); lab.show("play"); };
   stage = new Stage($("stage"), moved);
   const lost = () => lab.say("The lab does not answer; is 'stickslip lab' still running?", true);
-  conversation = new Conversation("/play", heard, lost);
+  conversation = new Conversation("play", heard, lost);
   conversation.again = () => { if (state) ask(performance.now(), true); };
   for (const [words, pace] of PACES) $("pace").add(new Option(words, pace ?? ""));
   buttons();
   const shared = fromLink();
   const slow = setTimeout(() => lab.say("The lab is starting …"), 700);
-  const catalog = await lab.ask("/catalog").catch((error) => lab.say(error.message, true));
+  const catalog = await lab.ask("catalog").catch((error) => lab.say(error.message, true));
   clearTimeout(slow);
   if (!catalog) return;
   lab.boundary = catalog.boundary;
@@ -92,7 +92,7 @@ function presets(offered, chosen) {
   $("preset").addEventListener("change", async () => {
     told();
     const name = $("preset").value;
-    if (name) await lab.ask(`/scenarios/${encodeURIComponent(name)}`).then(({ state }) => use(state), failed);
+    if (name) await lab.ask(`scenarios/${encodeURIComponent(name)}`).then(({ state }) => use(state), failed);
   });
 }
 const failed = (error) => lab.say(error.message, true);
@@ -474,7 +474,7 @@ function textButtons() {
   $("share").addEventListener("click", async () => {
     history.replaceState(null, "", link());
     const words = "The link is copied: it opens this very system in any lab at this address.";
-    await copied(location.origin + location.pathname + link(), words);
+    await copied(`${location.origin}/${link()}`, words);
   });
   $("python").addEventListener("click", () => texts("python", "The Python that does this", "lab.py"));
   $("toml").addEventListener("click", () => texts("toml", "The system's file", "system.toml"));
@@ -488,7 +488,7 @@ async function openFile() {
   if (!file) return;
   const headers = { "content-type": "text/plain" };
   try {
-    use((await lab.ask("/open", { method: "POST", body: await file.text(), headers })).state);
+    use((await lab.ask("open", { method: "POST", body: await file.text(), headers })).state);
     $("preset").value = "";
     lab.say(`${file.name} is open.`);
   } catch (error) { failed(error); }
@@ -505,7 +505,7 @@ function resized() {
 async function texts(form, title, file) {
   try {
     const headers = { "content-type": "application/json" };
-    const held = await lab.ask("/export", { method: "POST", body: JSON.stringify(state), headers });
+    const held = await lab.ask("export", { method: "POST", body: JSON.stringify(state), headers });
     $("text-title").textContent = title;
     $("text-body").textContent = held[form];
     $("text").dataset.file = file;

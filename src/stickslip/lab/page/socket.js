@@ -19,7 +19,7 @@ export class Conversation {
     this.open();
   }
   open() {
-    this.socket = new WebSocket(`ws://${location.host}${this.path}`);
+    this.socket = new WebSocket(`ws://${location.host}${location.pathname}${this.path}`);
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => {
       for (const text of this.waiting.values()) this.socket.send(text);
