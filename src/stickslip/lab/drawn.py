@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.lab.forms import Answer, catalog
+from stickslip.settings import parse_toml
 
 Array = NDArray[np.float64]
 GoOn = Callable[[float], None]
@@ -117,11 +117,7 @@ def export(request: Mapping[str, Any], go_on: GoOn) -> Answer:
 
 def opened(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """The state of a system's file."""
-    try:
-        tables = tomllib.loads(str(request["text"]))
-    except tomllib.TOMLDecodeError as error:
-        raise ss.ModelError(f"the text is no TOML ({error})", "a system is a TOML file", "correct that line") from error
-    return _state(read_case(tables)), {}
+    return _state(read_case(parse_toml(str(request["text"]), source="the text"))), {}
 
 
 ANSWERS: dict[str, Callable[[Mapping[str, Any], GoOn], Answer]] = {
