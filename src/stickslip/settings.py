@@ -48,10 +48,10 @@ def read_toml(path: Path, *, what: str) -> tuple[dict[str, Any], list[str]]:
         raise ModelError(f"{path.name} can not be read ({reason})", rule, "check the path") from error
     if len(data) > LARGEST:
         raise ModelError(f"{path.name} is larger than {LARGEST / 1e6:g} MB", rule, "name a file of settings")
-    return parse_toml(text, source=path.name), text.splitlines()
+    return _parsed(text, source=path.name), text.splitlines()
 
 
-def parse_toml(text: str, *, source: str) -> dict[str, Any]:
+def _parsed(text: str, *, source: str) -> dict[str, Any]:
     """The values of a text in TOML; ModelError names the line of `source` that is none."""
     try:
         return tomllib.loads(text)

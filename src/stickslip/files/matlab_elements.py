@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
@@ -115,14 +114,13 @@ def check_version_5(path: Path) -> list[str]:
     return walk.objects
 
 
-@dataclass
 class _Walk:
-    """Through all arrays of a file: the byte order, the names of objects and the cells that came so far."""
+    """Through all arrays of a file: the names of objects and the cells that came so far."""
 
-    order: str
-    budget: Budget
-    objects: list[str] = field(default_factory=list)
-    cells: int = 0
+    def __init__(self, order: str, budget: Budget) -> None:
+        self.order, self.budget = order, budget
+        self.objects: list[str] = []
+        self.cells = 0
 
     def tag(self, stream: _Plain | _Inflated) -> tuple[int, int, bytes]:
         """Type of the next element, bytes that follow its tag, and the data that a small element has inside it."""

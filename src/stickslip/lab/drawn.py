@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.lab.forms import Answer, catalog
-from stickslip.settings import parse_toml
 
 Array = NDArray[np.float64]
 GoOn = Callable[[float], None]
@@ -117,7 +117,14 @@ def export(request: Mapping[str, Any], go_on: GoOn) -> Answer:
 
 def opened(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """The state of a system's file."""
-    return _state(read_case(parse_toml(str(request["text"]), source="the text"))), {}
+    try:
+        tables = tomllib.loads(str(request["text"]))
+    except (ValueError, RecursionError) as error:  # no TOML, a number of thousands of digits, or nested as deeply
+        reason = str(error)[:80]
+        raise ss.ModelError(
+            f"the text is no TOML ({reason})", "a system is a TOML file", "correct that line"
+        ) from error
+    return _state(read_case(tables)), {}
 
 
 ANSWERS: dict[str, Callable[[Mapping[str, Any], GoOn], Answer]] = {
