@@ -143,6 +143,7 @@ class _Walk:
         plain += complex_part and not nested and array_class != 4
         left, number = count - 16, -1 if array_class == OPAQUE else -2  # dimensions, name; an object has no dimensions
         texts: dict[int, bytes] = {}
+        size = 0
         while left > 0:
             kind, follows, small = self.tag(stream)
             padded = follows + (-follows % 8)
@@ -155,10 +156,11 @@ class _Walk:
                 raise _Damaged(f"holds an element of the unknown type {kind}")
             elif number < 0 or nested:
                 texts[number] = small + _short(stream, follows, padded)
-                if number == -2:
-                    self._count(self._size(texts[-2]) if array_class != SPARSE else 0)
+                if number == -2 and array_class != SPARSE:
+                    size = self._size(texts[-2])
+                    self._count(size)
             else:
-                self._count(follows // BYTES[kind])
+                self._count(max(0, follows // BYTES[kind] - size))
                 stream.skip(padded)
             number += 1
         if number < plain or (number > plain and not nested):

@@ -69,7 +69,7 @@ def read_record(
     Raises
     ------
     FormatError
-        The file is missing, empty, damaged, or of no known format.
+        The file is missing, empty, damaged, of no known format, or would become out of proportion to its size.
     RecordError
         A column, unit or clock is missing or contradicts the others.
 
