@@ -308,6 +308,16 @@ def test_other_formats_that_hold_less_than_they_state(tmp_path: Path) -> None:
         assert words in fault.message
 
 
+def test_more_than_a_file_states_is_no_cut(tmp_path: Path) -> None:
+    path = tmp_path / "rig.uff"
+    write_uff(path)
+    path.write_text(path.read_text().replace("       400", "       398"))
+    record = ss.read_record(path)
+    assert len(record) == 398
+    assert "promises 398 values but its lines hold 400" in record.history[-1].outcome
+    assert not [fault for fault in record.check() if fault.kind == "cut"]
+
+
 def test_a_record_that_was_written_remembers_what_its_file_lacked(tmp_path: Path) -> None:
     (tmp_path / "rig.csv").write_text(text_of([*FIXED, "0.0"]))
     kept = ss.read_record(ss.write_record(ss.read_record(tmp_path / "rig.csv"), tmp_path / "kept.h5"))

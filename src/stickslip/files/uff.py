@@ -74,7 +74,8 @@ def read(path: Path, options: Options) -> Table:
         if reason is not None:
             left_out.append(f"set {index + 1} '{values.get('id1', '')}' ({reason})")
             continue
-        cut += _check_length(path, index, values)
+        fewer = len(values["data"]) < values["num_pts"]
+        (cut if fewer else notes).extend(_check_length(path, index, values))
         values["ordinate_axis_units_lab"] = _unit_label(values, data_set.header)
         kept.append(values)
     if left_out:
