@@ -500,7 +500,7 @@ def test_tdms_never_closed_by_its_writer_is_read_with_a_note(tmp_path: Path) -> 
     data[12:20] = b"\xff" * 8  # LabVIEW states the length when it closes the segment
     path.write_bytes(bytes(data[:-80]))
     table = read(path)
-    assert "without closing" in table.notes[0]
+    assert "without closing" in table.cut
     assert np.array_equal(whole(table)["g/x"], np.arange(90.0))
 
 
@@ -543,7 +543,7 @@ def test_awkward_uff_files(dataset: Formats) -> None:
     assert whole(ragged)["1x"][-1] == -5.84096
     excerpt = read(folder / "dataset_milestone_in_header.uff")  # its sender kept 42 of 2.5 million values
     assert (excerpt.columns[0].name, excerpt.columns[0].rows, excerpt.columns[0].fs) == ("PWL Mic", 42, 51_200.0)
-    assert "promises 2508876 values" in excerpt.notes[0]
+    assert "promises 2508876 values" in excerpt.cut
 
 
 @pytest.mark.parametrize(
@@ -608,7 +608,7 @@ def test_wav_of_a_recorder_that_did_not_close_it_is_read_with_a_note(small: Form
     path = tmp_path / "open.wav"
     path.write_bytes(bytes(data))
     table = read(path)
-    assert "did not close" in table.notes[1]
+    assert "did not close" in table.cut
     assert len(whole(table)["ch1"]) == 400
 
 

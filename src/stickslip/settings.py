@@ -14,8 +14,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from stickslip.errors import ModelError, RecordError
 from stickslip.units import parse_value
 
-LONGEST = 200  # characters of a value in a message
 STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+LARGEST = 1_000_000  # bytes of a file of settings; the longest of ours has twenty thousand
+SHOWN = 80  # characters of a line or value in a message
 Settings = TypeVar("Settings", bound=BaseModel)
 
 
@@ -35,14 +36,37 @@ def quantity(unit: str) -> BeforeValidator:
 
 def read_toml(path: Path, *, what: str) -> tuple[dict[str, Any], list[str]]:
     """The values of a TOML file, and its lines, so that a message can name one; `what` it holds is for the message."""
+    rule = f"{what} a TOML file"
     try:
-        text = path.read_text(encoding="utf-8-sig")
-        return tomllib.loads(text), text.splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        if path.exists() and not path.is_file():  # a pipe would be waited for
+            raise ModelError(f"{path.name} is no file of its own", rule, "write the settings into a file")
+        with path.open("rb") as file:
+            data = file.read(LARGEST + 1)
+        text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise ModelError(f"{path.name} can not be read ({reason})", f"{what} a TOML file", "check the path") from error
+        raise ModelError(f"{path.name} can not be read ({reason})", rule, "check the path") from error
+    if len(data) > LARGEST:
+        raise ModelError(f"{path.name} is larger than {LARGEST / 1e6:g} MB", rule, "name a file of settings")
+    return _parsed(text, source=path.name), text.splitlines()
+
+
+def _parsed(text: str, *, source: str) -> dict[str, Any]:
+    """The values of a text in TOML; ModelError names the line of `source` that is none."""
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise _not_toml(path.name, text, str(error)) from error
+        raise _not_toml(source, text, str(error)) from error
+    except RecursionError as error:
+        raise ModelError(
+            f"{source} is nested too deeply", "settings are tables of a few levels", "write [TABLE] and KEY = VALUE"
+        ) from error
+    except ValueError as error:  # Python reads no whole number of more digits than a person would write
+        raise ModelError(
+            f"{source} holds a whole number of thousands of digits",
+            "a number is written with at most a few hundred",
+            "correct it",
+        ) from error
 
 
 def checked(
@@ -102,7 +126,7 @@ def checked(
         kind = model.model_fields[path[0]].annotation if path[0] in model.model_fields else None
         if first["type"] == "missing" and len(inner) < len(path):
             raise ModelError(
-                f"{where} sets {key} = {_brief(_inside(values, inner))}",
+                f"{where} sets {key} = {_shown(_inside(values, inner))}",
                 f"{int(path[-1]) + 1} values are needed at least",
                 f"correct {key}",
             ) from error
@@ -111,7 +135,7 @@ def checked(
             step = f"add {path[0]} = {value if 'dict' in str(kind) else 'VALUE'}"
             raise ModelError(f"{where} has no {key}", f"{key} is needed", step) from error
         raise ModelError(
-            f"{where} sets {key} = {_brief(first['input'])}",
+            f"{where} sets {key} = {_shown(first['input'])}",
             _said(first["msg"]),
             f"correct {key}",
         ) from error
@@ -133,10 +157,10 @@ def _inside(values: Mapping[str, Any], path: Sequence[str]) -> Any:
     return values
 
 
-def _brief(value: object) -> str:
-    """A value as it was written; the beginning of one that is longer than a sentence bears."""
+def _shown(value: object) -> str:
+    """A value as Python writes it, not more of it than a sentence bears."""
     text = repr(value)
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
 def _said(message: str) -> str:
@@ -180,7 +204,7 @@ def _not_toml(name: str, text: str, reason: str) -> ModelError:
     found = re.search(r"line (\d+)", reason)
     lines = text.splitlines()
     number = int(found[1]) if found else len(lines)
-    line = lines[number - 1].strip() if 0 < number <= len(lines) else ""
+    line = lines[number - 1].strip()[:SHOWN] if 0 < number <= len(lines) else ""
     bare_point = re.search(r"(?:^|[=\[,\s])([-+]?)\.(\d+)", line)
     if bare_point:
         sign, digits = bare_point.groups()

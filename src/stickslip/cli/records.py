@@ -82,9 +82,11 @@ def groups_of(argument: str) -> list[list[Path]]:
         )
     if Path(argument).exists():
         return [[Path(argument)]]
-    parts = []
+    parts: list[list[Path]] = []
     for part in argument.split("+"):
-        fits = [Path(part)] if Path(part).exists() else sorted(Path(path) for path in glob.glob(part))
+        fits = _fitting(part)
+        if not fits and parts:  # a name without a folder may stand beside the part before it
+            fits = _fitting(part, parts[-1][0].parent)
         if not fits:
             raise click.BadParameter(f"no file is called, or fits, '{part}'", param_hint="FILES")
         parts.append(fits)
@@ -94,6 +96,12 @@ def groups_of(argument: str) -> list[list[Path]]:
             f"the parts of '{argument}' fit {counts} files; each record needs one of each", param_hint="FILES"
         )
     return [list(files) for files in zip(*parts, strict=True)]
+
+
+def _fitting(pattern: str, folder: Path = Path()) -> list[Path]:
+    if (folder / pattern).exists():
+        return [folder / pattern]
+    return sorted(folder / path for path in glob.glob(pattern, root_dir=folder))
 
 
 def require_fits(normal: Sequence[str], groups: Sequence[Sequence[Path]]) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.errors import FormatError
-from stickslip.files.table import Block, Column, Options, Table, optional, reading
+from stickslip.files.table import FREE, Block, Column, Options, Table, optional, reading
 
 NAME = "sound (WAV, FLAC, OGG)"
 SUFFIXES = (".wav", ".flac", ".ogg", ".oga")
@@ -26,7 +26,7 @@ def recognise(path: Path, head: bytes) -> bool:
 def read(path: Path, options: Options) -> Table:
     """One column a channel: "sound" where there is one, else "ch1", "ch2" ..., in units of full scale."""
     soundfile = optional("soundfile")
-    notes = [UNCALIBRATED, *_check_container(path)]
+    cut = _check_container(path)
     with reading(path, NAME), path.open("rb") as handle, soundfile.SoundFile(handle) as file:
         frames, rate, count = int(file.frames), float(file.samplerate), int(file.channels)
     if not (0 < frames < 2**62 and rate > 0):
@@ -38,7 +38,7 @@ def read(path: Path, options: Options) -> Table:
     names = ["sound"] if count == 1 else [f"ch{number + 1}" for number in range(count)]
 
     def blocks(wanted: Sequence[str], size: int) -> Iterator[Block]:
-        rows = 0
+        rows, size = 0, max(1, min(size, frames, FREE // count))  # a block is set up whole, with all channels
         with reading(path, NAME), path.open("rb") as handle, soundfile.SoundFile(handle) as file:
             for samples in file.blocks(blocksize=size, dtype="float64", always_2d=True):
                 rows += len(samples)
@@ -50,31 +50,31 @@ def read(path: Path, options: Options) -> Table:
                 "copy it again from its source",
             )
 
-    return Table(tuple(Column(name, "FS", frames, rate) for name in names), blocks, notes=tuple(notes))
+    return Table(tuple(Column(name, "FS", frames, rate) for name in names), blocks, notes=(UNCALIBRATED,), cut=cut)
 
 
-def _check_container(path: Path) -> list[str]:
-    """Refuse a file that ends before its container says; the decoders shorten it without a word."""
+def _check_container(path: Path) -> str:
+    """Refuse a file that ends before its container says, which the decoders shorten; what else may be missing."""
     size = path.stat().st_size
     with path.open("rb") as file:
         kind = file.read(4)
         if kind == b"OggS":
-            whole, notes = _ogg_ends(path, size), list[str]()
+            whole, cut = _ogg_ends(path, size), ""
         elif kind in (b"RIFF", b"RF64", b"RIFX"):
-            whole, notes = _wav_ends(path, size, ">" if kind == b"RIFX" else "<")
+            whole, cut = _wav_ends(path, size, ">" if kind == b"RIFX" else "<")
         else:
-            return []
+            return ""
     if not whole:
         raise FormatError(
             f"'{path.name}' is cut off at {size} bytes",
             "a sound file is read whole or not at all",
             "copy it again from its source",
         )
-    return notes
+    return cut
 
 
-def _wav_ends(path: Path, size: int, order: str) -> tuple[bool, list[str]]:
-    """Whether the chunk of samples lies within the file."""
+def _wav_ends(path: Path, size: int, order: str) -> tuple[bool, str]:
+    """Whether the chunk of samples lies within the file, and what may be missing behind it."""
     position, long_size = 12, 0
     with path.open("rb") as file:
         while position + 8 <= size:
@@ -83,11 +83,11 @@ def _wav_ends(path: Path, size: int, order: str) -> tuple[bool, list[str]]:
             if name == b"ds64":
                 long_size = int.from_bytes(file.read(16)[8:16], "little")
             if name == b"data" and length == 0xFFFFFFFF and not long_size:
-                return True, ["the recorder did not close the file: it states no length, all that is there was read"]
+                return True, "the recorder did not close the file: it states no length, all that is there was read"
             if name == b"data":
-                return position + 8 + (long_size if length == 0xFFFFFFFF else length) <= size, []
+                return position + 8 + (long_size if length == 0xFFFFFFFF else length) <= size, ""
             position += 8 + length + length % 2
-    return False, []
+    return False, ""
 
 
 def _ogg_ends(path: Path, size: int) -> bool:

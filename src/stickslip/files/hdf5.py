@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import FormatError
-from stickslip.files.table import Array, Block, Column, Options, Table, optional, reading
+from stickslip.files.table import FREE, Array, Block, Column, Options, Table, optional, reading
 from stickslip.record.metadata import KEY, parse_metadata
 
 NAME = "HDF5"
@@ -19,6 +20,7 @@ SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5", ".nc")
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 WIDEST = 512  # a matrix wider than this both ways is an image, not a table of channels
 COMPRESSION = 2000  # no filter of HDF5 shrinks numbers further; a larger claim was never written
+LARGEST_CHUNK = 8 * FREE  # bytes: a chunk is unpacked whole
 CHUNK_CACHE = 2**25  # bytes: columns of one matrix share its chunks
 
 UNIT_WORDS = ("unit", "units", "Unit", "Units", "unit_string")
@@ -145,6 +147,8 @@ def refusal(dataset: Any) -> str | None:
         return f"has {dataset.ndim} dimensions"
     if dataset.ndim == 2 and min(dataset.shape) > WIDEST:
         return f"is a matrix of {dataset.shape[0]} x {dataset.shape[1]}"
+    if dataset.chunks and math.prod(dataset.chunks) * dataset.dtype.itemsize > LARGEST_CHUNK:
+        return f"is stored in chunks of {' x '.join(map(str, dataset.chunks))}, larger than {LARGEST_CHUNK} bytes"
     if dataset.nbytes > COMPRESSION * dataset.id.get_storage_size() + 2**20:
         return f"claims {dataset.size} values but stores {dataset.id.get_storage_size()} bytes"
     return None

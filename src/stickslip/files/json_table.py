@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
-from stickslip.files.table import Column, Options, Table, slices, unique
+from stickslip.files.table import Budget, Column, Options, Table, slices, unique
 
 NAME = "JSON"
 SUFFIXES = (".json",)
@@ -38,7 +38,7 @@ def read(path: Path, options: Options) -> Table:
     if _is_sep005(contents):
         return _sep005(contents)
     about = contents if isinstance(contents, Mapping) else {}
-    arrays = _columns(contents, about)
+    arrays = _columns(contents, about, Budget.of(path))
     if not arrays:
         raise FormatError(
             f"'{path.name}' holds no columns of numbers",
@@ -56,21 +56,23 @@ def read(path: Path, options: Options) -> Table:
     constants = {
         key: float(value) for key, value in about.items() if type(value) in (int, float) and abs(value) < 1e300
     }
-    return Table(tuple(columns), slices(arrays), constants, notes)
+    return Table(tuple(columns), slices(arrays), constants, notes, cut=_cut(about, arrays))
 
 
-def _columns(contents: Any, about: Mapping[str, Any]) -> dict[str, Array]:
+def _columns(contents: Any, about: Mapping[str, Any], budget: Budget) -> dict[str, Array]:
     """Arrays by name, whatever way round they stand."""
     if isinstance(contents, Mapping):
         arrays = _arrays({str(key): value for key, value in contents.items()})
         inner = contents.get("data")
-        return arrays if arrays or inner is None or isinstance(inner, str) else _columns(inner, about)
+        return arrays if arrays or inner is None or isinstance(inner, str) else _columns(inner, about, budget)
     if not isinstance(contents, Sequence) or isinstance(contents, str) or not contents:
         return {}
     if all(isinstance(row, Mapping) for row in contents):
         keys = dict.fromkeys(str(key) for row in contents for key in row)
+        budget.require(len(keys) * len(contents))
         return _arrays({key: [row.get(key) for row in contents] for key in keys})
     if all(isinstance(row, list) for row in contents):
+        budget.require(len(contents) * max(map(len, contents)))
         columns = list(zip_longest(*contents))
         titles = about.get("columns") or about.get("names") or about.get("channels")
         if not isinstance(titles, list) or len(titles) != len(columns):
@@ -108,6 +110,16 @@ def _rate(about: Mapping[str, Any]) -> float | None:
         if word in ("dt", "deltat", "samplinginterval", "timestep"):
             return 1.0 / float(value)
     return None
+
+
+def _cut(about: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
+    """What is missing where the object states more samples than it holds."""
+    longest = max(map(len, arrays.values()))
+    for key, value in about.items():
+        word = re.sub(r"[^a-z]", "", key.lower())
+        if word in ("samples", "nsamples", "numsamples", "rows", "nrows") and type(value) is int and value > longest:
+            return f"{key} states {value} samples and {longest} are there"
+    return ""
 
 
 def _is_sep005(contents: Any) -> bool:

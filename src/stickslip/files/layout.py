@@ -90,7 +90,7 @@ def encoding_of(head: bytes) -> tuple[str, int] | None:
         return ("latin-1", 0) if high < len(head) / 5 else None
 
 
-def _lines_of(body: bytes, encoding: str, *, whole: bool) -> list[str]:
+def lines_of(body: bytes, encoding: str, *, whole: bool) -> list[str]:
     """The lines of a text, each with its end; of a beginning alone those that are complete."""
     body = body[: len(body) // 2 * 2] if encoding.startswith("utf-16") else body
     text = codecs.getincrementaldecoder(encoding)("replace").decode(body)
@@ -121,7 +121,7 @@ def find_layout(head: bytes, whole: bool, options: Options, name: str) -> Layout
     if found is None:
         raise FormatError(f"'{name}' is not text", "rows of numbers are needed", "check the file")
     encoding, mark = found
-    lines = _lines_of(head[mark:], encoding, whole=whole)[:LONGEST_HEADER]
+    lines = lines_of(head[mark:], encoding, whole=whole)[:LONGEST_HEADER]
     cells, delimiter, decimal = _best_split(lines, options)
     widths = Counter(len(row) for row in cells if row)
     if not widths:

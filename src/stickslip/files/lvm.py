@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from stickslip.errors import FormatError
-from stickslip.files.table import Column, Options, Table, optional, reading, slices, unique
+from stickslip.files.ending import judged
+from stickslip.files.table import Budget, Column, Options, Table, optional, reading, slices, unique
 
 NAME = "LabVIEW measurement"
 SUFFIXES = (".lvm",)
+LONGEST_HEADER = 22  # lines among which lvm_read looks for the separator
 
 
 def recognise(path: Path, head: bytes) -> bool:
@@ -24,12 +26,26 @@ def read(path: Path, options: Options) -> Table:
     """The columns of a file with one segment."""
     lvm_read = optional("lvm_read")
     with reading(path, NAME):
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
+        lines = text.splitlines(keepends=True)
+        separator, decimal = _stated(lines, "Separator", "\t"), _stated(lines, "Decimal_Separator\t", ".")
+        Budget.of(path).require(len(lines) * (1 + max(line.count(separator) for line in lines)))  # the widest fills all
+        end = judged(lines[_heading(lines) :], separator, decimal)
         # not lvm_read.read: even with read_from_pickle=False it loads FILE.lvm.pkl where there is one
-        contents = lvm_read.read_str(path.read_text(encoding="utf-8-sig", errors="replace"))
-        return _table(path, contents)
+        return _table(path, lvm_read.read_str("".join(lines[:-1]) if end.torn else text), end.cut)
 
 
-def _table(path: Path, contents: Mapping[Any, Any]) -> Table:
+def _stated(lines: Sequence[str], key: str, usual: str) -> str:
+    """The sign that follows a key of the header."""
+    return next((line[len(key)] for line in lines[:LONGEST_HEADER] if line.startswith(key) and line[len(key) :]), usual)
+
+
+def _heading(lines: Sequence[str]) -> int:
+    """Number of the line behind the columns' titles."""
+    return next((number for number, line in enumerate(lines, 1) if line.startswith("X_Value")), len(lines))
+
+
+def _table(path: Path, contents: Mapping[Any, Any], cut: str) -> Table:
     if contents["Segments"] != 1:
         raise FormatError(
             f"'{path.name}' has {contents['Segments']} segments",
@@ -51,4 +67,9 @@ def _table(path: Path, contents: Mapping[Any, Any]) -> Table:
         reading = index - 1 if with_time else index
         unit = "s" if with_time and index == 0 else (units[reading] if 0 <= reading < len(units) else "")
         columns.append(Column(name, str(unit).strip() or None, len(data), fs, starts[0] if starts else 0.0))
-    return Table(tuple(columns), slices({name: data[:, index] for name, index in zip(names, kept, strict=True)}))
+    promised = max((int(count) for count in segment.get("Samples", []) if count == count), default=0)
+    if promised > len(data):
+        fewer = f"the header states {promised} samples of each channel and {len(data)} are there"
+        cut = f"{fewer}; {cut}" if cut else fewer
+    arrays = {name: data[:, index] for name, index in zip(names, kept, strict=True)}
+    return Table(tuple(columns), slices(arrays), cut=cut)

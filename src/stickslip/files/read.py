@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from stickslip.errors import FormatError, RecordError
 from stickslip.files.reading import ROWS_AT_ONCE, Reading, quietly
 from stickslip.files.select import Columns, Source, TimeColumn, Wanted
-from stickslip.files.table import Options
+from stickslip.files.table import Budget, Options
 from stickslip.files.titles import titled
 from stickslip.record.record import Record
 
@@ -70,7 +69,7 @@ def read_record(
     Raises
     ------
     FormatError
-        The file is missing, empty, damaged, or of no known format.
+        The file is missing, empty, damaged, of no known format, or would become out of proportion to its size.
     RecordError
         A column, unit or clock is missing or contradicts the others.
 
@@ -198,8 +197,6 @@ def _source(path: Path, options: Options) -> Source:
         size = path.stat().st_size
         with path.open("rb") as file:
             head = file.read(HEAD)
-            file.seek(0)
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
     except (OSError, ValueError) as error:
         raise FormatError(
             f"'{path}' can not be opened ({error})", "the file can be read", "check path and rights"
@@ -210,7 +207,9 @@ def _source(path: Path, options: Options) -> Source:
         room = importlib.import_module(f"stickslip.files.{name}")
         if room.recognise(path, head):
             with quietly(path):
-                return Source(path, room.NAME, titled(room.read(path, options)), digest, size)
+                table = room.read(path, options)
+                Budget.of(path).require_columns(len(table.columns))
+                return Source(path, room.NAME, titled(table), size)
     raise FormatError(
         f"'{path.name}' is of no known format",
         f"these are read: {', '.join(_room(name).NAME for name in FORMATS)}",

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, RecordError
 from stickslip.files.select import Source, TimeColumn, Wanted
-from stickslip.files.table import Block, supplied
+from stickslip.files.table import FREE, Block, Budget, supplied
 from stickslip.record.channels import Channel
 from stickslip.record.clock import Clock, fit_clock, resolution
 from stickslip.record.metadata import (
@@ -31,7 +31,7 @@ from stickslip.record.record import DETAILS, Record, Step
 
 Array = NDArray[np.float64]
 
-ROWS_AT_ONCE = 1_000_000
+ROWS_AT_ONCE = 1_000_000  # of a few columns; of many so many fewer that a block stays within what any file may become
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,11 @@ class Reading:
     def whole(self) -> Record:
         """All rows at once."""
         parts: dict[tuple[int, str], list[Array]] = {}
-        for block in self._raw(ROWS_AT_ONCE):
+        self._require_budget()
+        rows = 0
+        for block in self._raw(max(1, min(ROWS_AT_ONCE, FREE // max(1, sum(map(len, self._needed)))))):
+            rows += len(next(iter(block.values())))
+            self._require_budget(rows)
             for key, values in block.items():
                 parts.setdefault(key, []).append(values)
         data = {key: arrays[0] if len(arrays) == 1 else np.concatenate(arrays) for key, arrays in parts.items()}
@@ -88,6 +92,7 @@ class Reading:
     def blocks(self, size: int) -> Iterator[Record]:
         """Block after block."""
         first, fs, digests = 0, None, Digests()
+        self._require_budget(most=size)
         for data in self._raw(size):
             if self.restores:
                 digests.add(_by_column(data))
@@ -108,6 +113,13 @@ class Reading:
                 )
         if not first:
             raise RecordError(f"{self.names} has no rows", "at least one is needed", "check the file")
+
+    def _require_budget(self, rows: int = 0, most: int | None = None) -> None:
+        """Refuse more rows than each file is good for: those that it states, at most so many of them, or those read."""
+        for source, names in zip(self.sources, self._needed, strict=True):
+            stated = [column.rows or 0 for column in source.table.columns if column.name in set(names)]
+            rows = max([rows, *stated])
+            Budget.of(source.path).require_rows(rows if most is None else min(rows, most), len(names))
 
     @property
     def names(self) -> str:
@@ -201,7 +213,8 @@ class Reading:
         outcome += "" if clock.stamps is None else ", the time stamps not uniform and kept"
         outcome += f", the time stamps within {clock.wander:.2g} s of uniform" if clock.wander else ""
         outcome += "; changed since write_record wrote it" if self.told else ""
-        step = Step(action, arguments, "; ".join([outcome, *self.notes]))
+        cut = [f"'{source.path.name}': {source.table.cut}" for source in self.sources if source.table.cut]
+        step = Step(action, arguments, "; ".join([outcome, *cut, *self.notes]))
         told = self.sources[0].table.record if len(self.sources) == 1 else {}
         channels = {wanted.channel.name: _detailed(wanted, channels_told(told)) for wanted in self.wanted}
         return Record(samples, channels, clock.fs, clock.start, (*history_of(told), step), clock.stamps)

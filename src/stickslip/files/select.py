@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from stickslip.errors import RecordError
 from stickslip.files.expression import Linear, Spec, apply_sensitivity, channel_unit, linear, split_spec, unknown
-from stickslip.files.table import Column, Table, unique
+from stickslip.files.table import Column, Table, supplied, unique
 from stickslip.files.titles import last_part
 from stickslip.printing import printable
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
@@ -29,12 +31,23 @@ class Source:
     path: Path
     format: str
     table: Table
-    sha256: str
     bytes: int
+
+    @cached_property
+    def sha256(self) -> str:
+        """Of the file's bytes: asked last, of what could be read, since a large file takes a while."""
+        with supplied(self.path), self.path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
 
     def to_dict(self) -> dict[str, str | int]:
         """Plain data for the history: the name without its folder."""
-        return {"name": printable(self.path.name), "sha256": self.sha256, "bytes": self.bytes, "format": self.format}
+        entry: dict[str, str | int] = {
+            "name": printable(self.path.name),
+            "sha256": self.sha256,
+            "bytes": self.bytes,
+            "format": self.format,
+        }
+        return entry | ({"cut": self.table.cut} if self.table.cut else {})
 
 
 Key = tuple[int, str]  # the file's number and the column's name
@@ -138,7 +151,8 @@ class Columns:
         taken = {time.key for time in times.values()}
         keys = [key for key, column in self.columns.items() if key not in taken and not is_time(column)]
         kept = self._on_one_clock(keys, times)
-        notes = [f"left out {self.columns[key].name} (another length or rate)" for key in keys if key not in kept]
+        others = dict.fromkeys(keys).keys() - dict.fromkeys(kept).keys()
+        notes = [f"left out {self.columns[key].name} (another length or rate)" for key in keys if key in others]
         titles = unique([self._title(key) for key in kept])
         wanted = []
         for name, key in zip(titles, kept, strict=True):
@@ -258,13 +272,12 @@ def _word_of(title: str) -> str:
 
 def is_time(column: Column) -> bool:
     """Whether a column is time by its name, and its unit does not contradict."""
-    if column.unit is not None:
-        try:
-            if parse_unit(column.unit).si != "s":
-                return False
-        except RecordError:
-            return False
-    return _word(column) in TIME_WORDS
+    if _word(column) not in TIME_WORDS:
+        return False
+    try:
+        return column.unit is None or parse_unit(column.unit).si == "s"
+    except RecordError:
+        return False
 
 
 def _word(column: Column) -> str:

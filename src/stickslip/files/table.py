@@ -19,6 +19,55 @@ Array = NDArray[np.float64]
 Block = dict[str, Array]
 
 
+FREE = 1 << 24  # cells, 134 MB as numbers: what a file of any size may become
+PER_BYTE = 8  # cells that each byte of a larger file may become; speech in OGG, the tightest of honest files, has 4
+A_COLUMN = 1 << 14  # cells that a column counts as at least: what its name, unit and check-up cost
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How many cells may be made of one file at once: asked before they are allocated, by whoever allocates them.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    cells : int
+        ``max(FREE, PER_BYTE * bytes of the file)``.
+    """
+
+    path: Path
+    cells: int
+
+    @classmethod
+    def of(cls, path: Path) -> Budget:
+        """The budget of a file that is there."""
+        return cls(path, max(FREE, PER_BYTE * path.stat().st_size))
+
+    @property
+    def bytes(self) -> int:
+        """The same, of numbers in double precision."""
+        return 8 * self.cells
+
+    def require(self, cells: int, remedy: str = "save it again without compression, or as CSV") -> None:
+        """Refuse what is out of all proportion to the file."""
+        if cells > self.cells:
+            raise FormatError(
+                f"'{self.path.name}' has {self.path.stat().st_size} bytes and would become {cells} cells or more",
+                f"{FREE} are held of any file at once, and {PER_BYTE} for each byte of a larger one, where a column "
+                f"counts as {A_COLUMN} at least",
+                remedy,
+            )
+
+    def require_columns(self, columns: int) -> None:
+        """Refuse a file of so many columns."""
+        self.require(columns * A_COLUMN, "keep fewer columns in a file")
+
+    def require_rows(self, rows: int, columns: int) -> None:
+        """Refuse so many rows at once of columns that are read in blocks."""
+        self.require(rows * columns, "go through it with read_blocks() in a smaller size=, or name fewer channels=")
+
+
 @dataclass(frozen=True)
 class Options:
     """What the user said about a text file; None where it is to be found out."""
@@ -69,6 +118,8 @@ class Table:
         What the reader met and decided, in words, for the history.
     record : mapping
         The metadata that write_record left, of a file that it wrote; empty otherwise.
+    cut : str
+        What of the file is known to be missing, in words, where it was cut; empty otherwise.
     """
 
     columns: tuple[Column, ...]
@@ -76,6 +127,7 @@ class Table:
     constants: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     record: Mapping[str, Any] = field(default_factory=dict)
+    cut: str = ""
 
 
 def slices(arrays: Mapping[str, Array]) -> Callable[[Sequence[str], int], Iterator[Block]]:
@@ -91,14 +143,15 @@ def slices(arrays: Mapping[str, Array]) -> Callable[[Sequence[str], int], Iterat
 
 def unique(names: Sequence[str]) -> list[str]:
     """The names with "_2", "_3" ... after those that came before."""
-    taken: set[str] = set()
+    last: dict[str, int] = {}  # the number that a name had when it came last: thousands may be alike
     result = []
     for name in names:
-        candidate, number = name, 1
-        while candidate in taken:
+        candidate, number = name, last.get(name, 1)
+        while candidate in last:
             number += 1
             candidate = f"{name}_{number}"
-        taken.add(candidate)
+        last[name] = number
+        last.setdefault(candidate, 1)
         result.append(candidate)
     return result
 

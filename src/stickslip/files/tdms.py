@@ -33,7 +33,8 @@ def recognise(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: Options) -> Table:
     """The numeric channels, with the clock and unit that their waveform properties state."""
-    notes = [NOT_CLOSED] if _check_segments(path) else []
+    notes: list[str] = []
+    cut = NOT_CLOSED if _check_segments(path) else ""
     kept: dict[str, tuple[str, str]] = {}
     columns: list[Column] = []
     left_out: list[str] = []
@@ -72,7 +73,7 @@ def read(path: Path, options: Options) -> Table:
                     _require(path, name, len(part[name]) == count)
                 yield part
 
-    return Table(tuple(columns), blocks, notes=tuple(notes))
+    return Table(tuple(columns), blocks, notes=tuple(notes), cut=cut)
 
 
 def _column(name: str, channel: Any) -> Column:

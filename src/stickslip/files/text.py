@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
+from stickslip.files.ending import ending
 from stickslip.files.layout import (
     CLOCK,
     NOT_NUMBERS,
@@ -26,7 +27,7 @@ from stickslip.files.layout import (
     is_number,
     split,
 )
-from stickslip.files.table import Block, Column, Options, Table
+from stickslip.files.table import FREE, Block, Column, Options, Table
 from stickslip.record.metadata import KEY, parse_metadata
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ Array = NDArray[np.float64]
 
 HEAD = 1 << 18  # bytes looked at to find the layout
 LONGEST_COMMENT = 1 << 26  # bytes of a record's own description
+LONGEST_ROW = 1 << 24  # bytes; the parser holds a whole row, and a disk that was full leaves holes of any length
 DAY = 86400.0
 _OURS = f"# {KEY} ".encode()
 
@@ -62,18 +64,20 @@ def read(path: Path, options: Options) -> Table:
     notes = [f"decimal sign '{layout.decimal}'"] if layout.decimal != "." else []
     notes += [f"clock times in {layout.names[index]} as seconds since the first" for index in sorted(layout.clocks)]
 
+    stop, cut = ending(path, layout)
+
     def blocks(names: Sequence[str], size: int) -> Iterator[Block]:
-        return _blocks(path, layout, names, size)
+        return _blocks(path, layout, stop, names, size)
 
-    return Table(columns, blocks, {}, tuple(notes), parse_metadata(described) if described else {})
+    return Table(columns, blocks, {}, tuple(notes), parse_metadata(described) if described else {}, cut)
 
 
-def _blocks(path: Path, layout: Layout, names: Sequence[str], size: int) -> Iterator[Block]:
+def _blocks(path: Path, layout: Layout, stop: int, names: Sequence[str], size: int) -> Iterator[Block]:
     indexes = {name: layout.names.index(name) for name in names}
     clocks = {index: _Seconds(path.name, layout.names[index]) for index in indexes.values() if index in layout.clocks}
     with path.open("rb") as file, _explained(path, layout, sorted(set(indexes.values()))):
         file.seek(layout.offset)
-        for frame in _frames(file, layout, sorted(set(indexes.values())), size):
+        for frame in _frames(file, layout, stop, sorted(set(indexes.values())), size):
             if frame[str(len(layout.names))].notna().any():
                 raise ValueError(f"a row has more than {len(layout.names)} cells")
             values = {
@@ -85,7 +89,7 @@ def _blocks(path: Path, layout: Layout, names: Sequence[str], size: int) -> Iter
             yield {name: values[index] for name, index in indexes.items()}
 
 
-def _frames(file: BinaryIO, layout: Layout, indexes: Sequence[int], size: int) -> Iterator[pd.DataFrame]:
+def _frames(file: BinaryIO, layout: Layout, stop: int, indexes: Sequence[int], size: int) -> Iterator[pd.DataFrame]:
     import pandas as pd
 
     width = len(layout.names)
@@ -97,7 +101,7 @@ def _frames(file: BinaryIO, layout: Layout, indexes: Sequence[int], size: int) -
     between = " " if layout.delimiter == WHITESPACE else layout.delimiter
     titles = between.join(map(str, range(width + 1))) + "\n"
     with pd.read_csv(
-        io.BufferedReader(_Headed(titles.encode(layout.encoding), file)),
+        io.BufferedReader(_Headed(titles.encode(layout.encoding), file, stop)),
         sep=layout.delimiter,
         decimal=layout.decimal,
         comment=layout.comment,
@@ -110,24 +114,29 @@ def _frames(file: BinaryIO, layout: Layout, indexes: Sequence[int], size: int) -
         encoding=layout.encoding,
         encoding_errors="replace",
         engine="c",
-        chunksize=size,
+        chunksize=max(1, min(size, FREE // width)),
         **exact,
     ) as frames:
         yield from frames
 
 
 class _Headed(io.RawIOBase):
-    """A file with a header line of one cell more than its rows have, by which rows that are too long are seen."""
+    """A file up to byte `stop` with a header line of one cell more than its rows have: rows too long are seen by it."""
 
-    def __init__(self, header: bytes, file: BinaryIO) -> None:
-        self.header, self.file = header, file
+    def __init__(self, header: bytes, file: BinaryIO, stop: int) -> None:
+        self.header, self.file, self.stop = header, file, stop
+        self.row = 0  # bytes since the last end of a line
 
     def readable(self) -> bool:
         return True
 
     def readinto(self, buffer: Any) -> int:
-        piece = self.header[: len(buffer)] or self.file.read(len(buffer))
+        piece = self.header[: len(buffer)] or self.file.read(max(0, min(len(buffer), self.stop - self.file.tell())))
         self.header = self.header[len(buffer) :]
+        ended = max(piece.rfind(b"\n"), piece.rfind(b"\r"))
+        self.row = self.row + len(piece) if ended < 0 else len(piece) - ended
+        if self.row > LONGEST_ROW:
+            raise ValueError(f"a row has more than {LONGEST_ROW} bytes")
         buffer[: len(piece)] = piece
         return len(piece)
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import FormatError, RecordError
-from stickslip.files.table import Array, Column, Options, Table, optional, reading, slices, unique
+from stickslip.files.table import Array, Budget, Column, Options, Table, optional, reading, slices, unique
 from stickslip.record.clock import roundest
 from stickslip.units import parse_unit
 
@@ -51,6 +51,7 @@ def read(path: Path, options: Options) -> Table:
     """
     pyuff = optional("pyuff")
     found = list(_data_sets(path, path.read_bytes()))
+    Budget.of(path).require_columns(len(found))  # each set is opened and parsed by itself
     with reading(path, NAME):
         file = pyuff.UFF(str(path))
         numbers = [int(number) for number in file.get_set_types()]
@@ -63,6 +64,7 @@ def read(path: Path, options: Options) -> Table:
     kept: list[dict[str, Any]] = []
     left_out: list[str] = []
     notes: list[str] = []
+    cut: list[str] = []
     for index, data_set in enumerate(found):
         if data_set.number != 58:
             continue
@@ -72,7 +74,8 @@ def read(path: Path, options: Options) -> Table:
         if reason is not None:
             left_out.append(f"set {index + 1} '{values.get('id1', '')}' ({reason})")
             continue
-        notes += _check_length(path, index, values)
+        fewer = len(values["data"]) < values["num_pts"]
+        (cut if fewer else notes).extend(_check_length(path, index, values))
         values["ordinate_axis_units_lab"] = _unit_label(values, data_set.header)
         kept.append(values)
     if left_out:
@@ -89,7 +92,7 @@ def read(path: Path, options: Options) -> Table:
         for column, samples in _columns(name, values):
             columns.append(column)
             arrays[column.name] = samples
-    return Table(tuple(columns), slices(arrays), notes=tuple(notes))
+    return Table(tuple(columns), slices(arrays), notes=tuple(notes), cut="; ".join(cut))
 
 
 def _columns(name: str, values: dict[str, Any]) -> Iterator[tuple[Column, Array]]:

@@ -119,8 +119,11 @@ def opened(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """The state of a system's file."""
     try:
         tables = tomllib.loads(str(request["text"]))
-    except tomllib.TOMLDecodeError as error:
-        raise ss.ModelError(f"the text is no TOML ({error})", "a system is a TOML file", "correct that line") from error
+    except (ValueError, RecursionError) as error:  # no TOML, a number of thousands of digits, or nested as deeply
+        reason = str(error)[:80]
+        raise ss.ModelError(
+            f"the text is no TOML ({reason})", "a system is a TOML file", "correct that line"
+        ) from error
     return _state(read_case(tables)), {}
 
 

@@ -33,7 +33,7 @@ class Fault:
     ----------
     kind : str
         "short", "unit", "clock", "rate", "backwards", "repeated stamps", "jitter", "gap", "missing", "constant",
-        "clipped", "frozen", "spike", "drift" or "coarse".
+        "clipped", "frozen", "spike", "drift", "coarse" or "cut".
     channel : str or None
         The channel it is in; None for the clock, and for three or more channels that are all constant.
     rows : tuple of (first, last)
@@ -69,10 +69,11 @@ class Fault:
 def find_faults(record: Record) -> list[Fault]:
     """What is wrong with a record; empty when nothing is.
 
-    A unit that nobody stated is told with what the channel spans in the one taken. The clock is checked for stamps that
-    stand still and jump, go back, repeat, jitter, are lost, or leave gaps; each channel for values that are no numbers,
-    a constant, clipping, frozen samples, spikes, drift, and too few levels. A plateau of a stuck mass, a friction
-    force's square wave, a sensor's steps, and rest at the end of a decay are no faults.
+    A unit that nobody stated is told with what the channel spans in the one taken, and what a file was found to lack
+    when it was read. The clock is checked for stamps that stand still and jump, go back, repeat, jitter, are lost, or
+    leave gaps; each channel for values that are no numbers, a constant, clipping, frozen samples, spikes, drift, and
+    too few levels. A plateau of a stuck mass, a friction force's square wave, a sensor's steps, and rest at the end of
+    a decay are no faults.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def find_faults(record: Record) -> list[Fault]:
     >>> [fault.kind for fault in find_faults(Record.of({"x": [1.0] * 100}, fs=50.0))]
     ['constant']
     """
-    faults = [*_short(record), *_unstated(record)]
+    faults = [*_short(record), *_unstated(record), *_cut(record)]
     if record.stamps is not None and not is_uniform(record.stamps):
         faults += _clock_faults(record.stamps)
     with np.errstate(over="ignore", invalid="ignore"):  # a damaged file holds 1e300: its square is no news
@@ -131,6 +132,13 @@ def _short(record: Record) -> list[Fault]:
         return []
     message = f"the record has {len(record)} samples, too few for any question about friction; record for longer."
     return [Fault("short", None, ((0, len(record) - 1),), message, "error")]
+
+
+def _cut(record: Record) -> list[Fault]:
+    """What the files that were read were found to lack."""
+    last = len(record) - 1
+    told = [file for step in record.history for file in step.arguments.get("files", ()) if file.get("cut")]
+    return [Fault("cut", None, ((last, last),), f"'{file['name']}': {file['cut']}.") for file in told]
 
 
 # ---- the clock
