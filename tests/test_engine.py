@@ -191,7 +191,7 @@ def test_the_closed_integral_of_friction_vanishes(name: str) -> None:
     nodes, weights = np.polynomial.legendre.leggauss(12)
     for j, (begin, length) in enumerate(zip(orbit.starts, orbit.durations, strict=True)):
         flow = table.flow[orbit.modes[j]]
-        rows = [table.friction[orbit.modes[j]], flow[1] @ flow + w**2 * flow[0]]
+        rows = [table.friction[orbit.modes[j], 0], flow[1] @ flow + w**2 * flow[0]]
         parts = max(4, math.ceil(2 * length / table.cell[orbit.modes[j]]))
         for part in range(parts):
             times = begin + length * (part + (nodes + 1) / 2) / parts

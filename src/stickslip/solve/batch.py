@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import DEGREE, Array, automaton
-from stickslip.solve.fleet import fleet_of, fleet_tables, kind_of_drive, kind_of_law, opened
 from stickslip.solve.kernel import CHATTER, march, measure, settle
+from stickslip.solve.phasors import phasors_of
 from stickslip.solve.simulate import opening
+from stickslip.solve.tables import DEGREE, Array, kind_of_drive, kind_of_law, opened, systems_of, tables_of
 
 TIRELESS = 2**62  # cells: a batch is not interrupted
 LAP = 64  # pieces remembered of each oscillator, a power of two; a lap of the drive with more has no fast path
@@ -104,18 +104,17 @@ def simulate_batch(
     starts = list(starts) if starts is not None else [{}] * len(systems)
     if len(systems) not in (1, len(starts)):
         raise ModelError(f"{len(systems)} systems for {len(starts)} starts", "one for all, or one each", "match them")
-    fleet = fleet_of(systems)
-    if len({kind_of_law(law) for law in fleet.laws}) > 1 or len({kind_of_drive(drive) for drive in fleet.drives}) > 1:
+    laws, drives = {kind_of_law(system.law) for system in systems}, {kind_of_drive(system.drive) for system in systems}
+    if len(laws) > 1 or len(drives) > 1:
         raise ModelError("the systems have different modes", "a batch has one kind of law and drive", "split it")
-    if kind_of_law(fleet.laws[0]) is None or kind_of_drive(fleet.drives[0]) is None:
+    if None in laws or None in drives:
         raise ModelError("a law is curved, or a drive has knots or several tones",
                          "a batch runs through linear modes without stops", "run them one by one")  # fmt: skip
-    tables = fleet_tables(fleet)
+    tables = tables_of(systems_of(systems))
     size, count = len(tables.names), len(starts)
     which = np.zeros(count, np.int64) if len(systems) == 1 else np.arange(count)
-    single = [automaton(system) for system in systems] if any(starts) else []
-    if single:
-        begun = [opening(single[j], start) for j, start in zip(which, starts, strict=True)]
+    if any(starts):
+        begun = [opening(tables.of(int(j)), start) for j, start in zip(which, starts, strict=True)]
         states, modes = np.array([state for state, _ in begun]), np.array([mode for _, mode in begun])
     else:
         states, modes = (part[which] for part in opened(tables, {}))
@@ -126,7 +125,7 @@ def simulate_batch(
         ends[j] = laps, (cycles - laps) * unit
     if not np.all(np.isfinite(ends)):
         raise ModelError(f"cycles = {cycles}", "a system without period has no cycles", "give it a drive or a spring")
-    given = which, modes, states, tables.period, ends, tables.arrays, tables.phasors.tables
+    given = which, modes, states, tables.period, ends, tables.linear, phasors_of(tables).tables
     out = Batch(
         np.zeros(count, np.int64), np.zeros(count, np.int64), np.empty((count, room), np.int32),
         np.empty((count, room)), np.empty((count, room), np.int16), np.empty((count, room)),

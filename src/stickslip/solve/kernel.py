@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 
 from stickslip.compiled import OPTIONS, compiled
-from stickslip.solve.automaton import SPLITTER
 from stickslip.solve.phasors import glide
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise, opening_order
+from stickslip.solve.tables import SPLITTER
 
 DONE, FULL, CHATTER, LOST, UNPROVED = 0, 1, 2, 3, 4
 CHAIN = 64  # transitions without time in between before a run is given up
@@ -62,7 +62,7 @@ def multiply(matrix, state, out):
 def leap(hop, state, tail, work):
     """state + tail = exp(A cell) (state + tail), in twice the digits: a long piece has thousands of cells.
 
-    `hop` is (3, N, N), see :func:`stickslip.solve.automaton.halved`; `tail` is what rounding took from the state.
+    `hop` is (3, N, N), see :func:`stickslip.solve.tables.halved`; `tail` is what rounding took from the state.
     """
     n = state.shape[0]
     for i in range(n):
@@ -202,7 +202,7 @@ def march(tables, fast, clock, state, mode, limit, period, past, out, work, pati
     Parameters
     ----------
     tables : tuple of arrays
-        See :class:`stickslip.solve.automaton.Automaton`.
+        See :class:`stickslip.solve.tables.Linear`.
     fast : tuple of arrays
         See :class:`stickslip.solve.phasors.Phasors`; with an empty table of nodes there is no fast path.
     clock : ndarray (3,)
@@ -402,7 +402,7 @@ def sample(tables, begin, modes, states, times, rows, piece, out, work, c):
     Parameters
     ----------
     tables : tuple of arrays
-        See :class:`stickslip.solve.automaton.Automaton`.
+        See :class:`stickslip.solve.tables.Linear`.
     begin, modes, states : ndarray
         Start [s], mode and state of each piece.
     times : ndarray (T,)

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.compiled import FAST, OPTIONS, compiled
-from stickslip.solve.automaton import Array, Automaton
+from stickslip.compiled import FAST, compiled
 from stickslip.solve.roots import NOISE
+from stickslip.solve.tables import Array, Tables, distinct
 
 KEEPS, STOPS, CARRIES = 0.0, 1.0, 2.0  # what an exit does to velocity and memory
 HALF_STEP = 0.09  # rad between a node and the edge of its polynomial; degree 9 leaves 1e-17
@@ -29,7 +29,6 @@ LONGEST = 8192  # nodes of one table
 HISTORY = 4096  # pieces remembered; the guess is one lap old
 SLIDING, HELD = 1.0, 0.0
 SPLITS = 64
-NEAR = 256  # different rows among which an equal one is looked for
 LOOK = 0.4  # rad between two looks for an exit of which the lap before tells nothing
 
 
@@ -77,7 +76,7 @@ class Phasors:
         return (*own, self.nodes[begin:end])
 
 
-def phasors(
+def _phasors(
     flow: Array, rows: Array, reset: Array, tones: Array, *, first: NDArray[np.int64], physical: int
 ) -> Phasors:
     """The tables of the fast path of B systems.
@@ -143,10 +142,16 @@ def phasors(
 
 
 @lru_cache(maxsize=32)
-def fast_tables(table: Automaton) -> tuple[Array, ...]:
+def fast_tables(table: Tables) -> tuple[Array, ...]:
     """The arrays of the fast path of one system; with no nodes at all where it has none."""
     one = (part[None] for part in (table.flow, table.series[:, 0], table.reset, table.tones))
-    return phasors(*one, first=table.first, physical=table.physical).of(0)
+    return _phasors(*one, first=table.first, physical=table.physical).of(0)
+
+
+def phasors_of(tables: Tables) -> Phasors:
+    """The tables of the fast path of many systems."""
+    own = (tables.flow, tables.series[:, :, 0], tables.reset, tables.tones)
+    return _phasors(*own, first=tables.first, physical=tables.physical)
 
 
 def _without(count: int) -> Phasors:
@@ -179,26 +184,6 @@ def _all_nodes(turns: NDArray[np.complex128], able: NDArray[np.bool_]) -> tuple[
     spans = spans[which]
     spans[~able] = 0
     return spans, offsets[which], np.ascontiguousarray(np.concatenate(parts))
-
-
-@compiled(**OPTIONS)
-def distinct(rows, where, which):
-    """Where each different row stands first, and which of them each row is; how many there are. Rows that are far apart
-    may count as different though they are equal."""
-    count, width = 0, rows.shape[1]
-    for r in range(rows.shape[0]):
-        which[r] = -1
-        for u in range(count - 1, max(-1, count - 1 - NEAR), -1):
-            j = 0
-            while j < width and rows[where[u], j] == rows[r, j]:
-                j += 1
-            if j == width:
-                which[r] = u
-                break
-        if which[r] < 0:
-            where[count], which[r] = r, count
-            count += 1
-    return count
 
 
 def blank_past() -> tuple[NDArray[Any], ...]:
@@ -369,7 +354,7 @@ def glide(fast, tables, clock, state, mode, limit, period, past, out, begun, wor
     fast : tuple of arrays
         See :class:`Phasors`.
     tables : tuple of arrays
-        See :class:`stickslip.solve.automaton.Automaton`.
+        See :class:`stickslip.solve.tables.Linear`.
     clock, state, mode, limit, period, out
         As in :func:`stickslip.solve.kernel.march`.
     past : tuple of arrays

@@ -16,9 +16,9 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
-from stickslip.solve.automaton import DEGREE, Array, Automaton, System, automaton
 from stickslip.solve.phasors import blank_past, fast_tables
 from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
+from stickslip.solve.tables import DEGREE, Array, System, Tables, table_of
 from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def simulate(
         raise ModelError(f"budget = {budget}", "a period has room for at least one event", "raise budget=")
     if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
         return _simulate_curved(system, (duration, cycles), start or {}, budget, rtol, progress)
-    table = automaton(system)
+    table = table_of(system)
     span = _end(system, table, duration, cycles)
     state, mode = opening(table, start or {})
     return run(system, table, state, mode, span=span, budget=budget, tell=paced(progress))
@@ -130,7 +130,7 @@ def paced(progress: Callable[[float], object] | None) -> Callable[[float], None]
     return tell
 
 
-def _end(system: System, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
+def _end(system: System, table: Tables, duration: float | None, cycles: float | None) -> tuple[float, float]:
     """The time to simulate, as full periods of the drive and a rest [s]."""
     if (duration is None) == (cycles is None):
         raise ModelError(f"duration = {duration}, cycles = {cycles}", "one of the two is given", "give one of them")
@@ -152,7 +152,7 @@ def _end(system: System, table: Automaton, duration: float | None, cycles: float
     return 0.0, given / system.frequency
 
 
-def opening(table: Automaton | Tape, start: Mapping[str, float | str]) -> tuple[Array, int]:
+def opening(table: Tables | Tape, start: Mapping[str, float | str]) -> tuple[Array, int]:
     """The state at time 0 and its mode, before any exit that is due at once."""
     state = np.zeros(len(table.names))
     state[table.names.index("1")] = 1.0
@@ -178,7 +178,7 @@ def opening(table: Automaton | Tape, start: Mapping[str, float | str]) -> tuple[
     return state, table.entry[int(np.sign(table.outputs["slip"] @ state)) + 1]
 
 
-def _require_fit(table: Automaton | Tape, state: Array, mode: int) -> None:
+def _require_fit(table: Tables | Tape, state: Array, mode: int) -> None:
     """Refuse the rigid contact of one mass that starts held while it slides, or slides against its mode."""
     part = table.modes[mode]
     slip = float(np.max(table.outputs["slip"] @ state)) if getattr(table, "degrees", 1) == 1 else 0.0
@@ -193,7 +193,7 @@ def _require_fit(table: Automaton | Tape, state: Array, mode: int) -> None:
 
 def run(
     system: System,
-    table: Automaton,
+    table: Tables,
     state: Array,
     mode: int,
     *,
@@ -222,14 +222,14 @@ def run(
             kernel.measure(table.tones, state, work[3], 1.0)
             cell = min(table.cell[mode], total)
             mode = kernel.settle(
-                table.tables, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]
+                table.linear, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]
             )
             _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
             outcome = kernel.FULL
             while outcome == kernel.FULL:
                 before = clock.copy()
                 outcome, count, mode = kernel.march(
-                    table.tables, fast, clock, state, mode, at, period, past, pieces.room(), work, CELLS
+                    table.linear, fast, clock, state, mode, at, period, past, pieces.room(), work, CELLS
                 )
                 passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
                 pieces.keep(count, passed, total)
@@ -290,7 +290,7 @@ def _columns(room: int, size: int) -> tuple[NDArray[Any], ...]:
     )  # fmt: skip
 
 
-def stops_of(table: Automaton | Tape, laps: float, offset: float) -> Any:
+def stops_of(table: Tables | Tape, laps: float, offset: float) -> Any:
     """The times to which the march goes in turn, with the signals that take new values at each start."""
     knots, end = table.motion.knots, table.motion.end
     if offset > end * (1 + 1e-12):
@@ -306,11 +306,11 @@ def stops_of(table: Automaton | Tape, laps: float, offset: float) -> Any:
             yield (0.0, min(end, offset)), (places, row[1:])
 
 
-def _at_rest(table: Automaton, state: Array, mode: int) -> bool:
+def _at_rest(table: Tables, state: Array, mode: int) -> bool:
     return bool(np.all(table.flow[mode] @ state == 0.0))
 
 
-def _refuse(outcome: int, table: Automaton, state: Array, clock: Array) -> None:
+def _refuse(outcome: int, table: Tables, state: Array, clock: Array) -> None:
     place = f"lap {clock[0]:g}, {clock[1]:g} s, at {named(table.names[: table.physical], state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
         raise chatter(place)

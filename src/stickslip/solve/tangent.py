@@ -16,7 +16,7 @@ def carry_tangents(tables, leap, modes, states, durations, exits, after, tangent
     Parameters
     ----------
     tables, leap
-        Of :class:`stickslip.solve.automaton.Automaton`.
+        Of :class:`stickslip.solve.tables.Linear`.
     modes, states, durations, exits : ndarray
         The pieces.
     after : int
