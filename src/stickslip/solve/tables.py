@@ -44,6 +44,7 @@ PART = 4  # a cell turns one radian; its exponential is summed over a fourth of 
 TERMS = 40  # of that sum at most: it ends where a term changes nothing
 SETTLED = 16  # terms of an exponential after which one that changes nothing is followed by none that does
 ROOM = 2**17  # numbers of the flows whose exponentials are summed together
+MOST_KNOWN = 512  # flows of single systems whose exponentials are kept
 NEAR = 256  # different rows among which an equal one is looked for
 
 
@@ -742,22 +743,37 @@ def _cells(flow: Array, constant: int) -> tuple[Array, Array]:
     core[:, :, constant] = 0.0
     where, which = np.empty((2, len(core)), np.int64)
     where = where[: distinct(core.reshape(len(core), -1), where, which)]
-    core = np.ascontiguousarray(core[where])
-    known = _turned if count == 1 else _turned.__wrapped__  # a fit's systems have most of their cores in common
-    cell, turned, integral = known(core.tobytes(), size, (where % modes).tobytes())
+    cell, turned, integral = _one_by_one(core[where]) if count == 1 else _turned(core[where], where % modes)
     hop = np.ascontiguousarray(np.moveaxis(halved(turned), 0, 1))[which]
     pushed = np.einsum("bij,bj->bi", integral[which], whole[:, :, constant].astype(np.longdouble))
     hop[:, :, :, constant] = np.moveaxis(halved(turned[:, :, constant][which] + pushed), 0, 1)
     return cell[which].reshape(count, modes), hop.reshape(count, modes, 3, size, size)
 
 
-@lru_cache(maxsize=64)
-def _turned(cores: bytes, size: int, modes: bytes) -> tuple[Array, Any, Any]:
-    """Cells of flows without their constant column, the flows' exponentials over them and the integrals of those."""
-    core, mode = np.frombuffer(cores).reshape(-1, size, size), np.frombuffer(modes, np.int64)
+_known_turns: dict[bytes, tuple[Any, ...]] = {}
+
+
+def _one_by_one(core: Array) -> tuple[Any, ...]:
+    """As :func:`_turned`, of flows some of which are known: the systems of a fit have most of theirs in common."""
+    keys = [flow.tobytes() for flow in core]
+    new = [j for j, key in enumerate(keys) if key not in _known_turns]
+    if new:
+        if len(_known_turns) > MOST_KNOWN:
+            _known_turns.clear()
+        made = zip(*_turned(core[new], np.arange(len(new))), strict=True)
+        _known_turns.update(zip([keys[j] for j in new], made, strict=True))
+    return tuple(np.array(part) for part in zip(*(_known_turns[key] for key in keys), strict=True))
+
+
+def _turned(core: Array, modes: Index) -> tuple[Array, Any, Any]:
+    """Cells of flows without their constant column, the flows' exponentials over them and the integrals of those.
+
+    Flows of one mode have their strongly connected parts in common.
+    """
+    size = core.shape[1]
     rate = np.zeros(len(core))
-    for j in range(np.max(mode) + 1):
-        own = mode == j
+    for mode in range(np.max(modes) + 1):
+        own = modes == mode
         if np.any(own):
             rate[own] = _fastest(core[own])
     cell = np.divide(1.0, rate, out=np.full(len(core), np.inf), where=rate > 0)
