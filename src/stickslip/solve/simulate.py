@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import finite
@@ -16,9 +15,10 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
-from stickslip.solve.phasors import blank_past, fast_tables
+from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
+from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
-from stickslip.solve.tables import DEGREE, Array, System, Tables, table_of
+from stickslip.solve.tables import Array, System, Tables, table_of
 from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -208,30 +208,25 @@ def run(
     """
     laps, offset = span
     size = len(table.names)
-    work = np.zeros((16, max(size, DEGREE + 1)))
-    fast, past = fast_tables(table), blank_past()
-    clock, state = np.zeros(3), state.copy()
     period = table.motion.period
+    model, past, work = Model(table.linear, fast_tables(table), period), blank_past(), kernel.scratch(size)
+    clock, state = Clock(0.0, 0.0, 0.0), state.copy()
     total = offset + (laps * period if math.isfinite(period) else 0.0)
     scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
-    pieces = _Pieces(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
+    pieces = _Log(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
     try:
         for at, (signals, values) in stops_of(table, laps, offset):
             state[signals] = values
-            kernel.measure(table.tones, state, work[3], 1.0)
-            cell = min(table.cell[mode], total)
-            mode = kernel.settle(
-                table.linear, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]
-            )
+            mode = kernel.begin(model.linear, mode, state, total, 1.0, work)
             _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
             outcome = kernel.FULL
             while outcome == kernel.FULL:
-                before = clock.copy()
-                outcome, count, mode = kernel.march(
-                    table.linear, fast, clock, state, mode, at, period, past, pieces.room(), work, CELLS
+                before = clock
+                outcome, count, mode, clock = kernel.march(
+                    model, before, state, mode, Clock(float(at[0]), float(at[1]), 0.0), past, pieces.room(), work, CELLS
                 )
-                passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
+                passed = until(before, clock, period)
                 pieces.keep(count, passed, total)
                 _refuse(outcome, table, state, clock)
                 require_budget(
@@ -255,36 +250,36 @@ def run(
     return Trajectory(system, table, laps_, offsets, modes, durations, states, exits, total, status)
 
 
-class _Pieces:
+class _Log:
     """Room for the pieces of a run; grows by what the run so far foretells."""
 
     def __init__(self, size: int, room: int) -> None:
         self.count, self.passed, self.least = 0, 0.0, room
         self.columns = _columns(256, size)
 
-    def room(self) -> tuple[NDArray[Any], ...]:
+    def room(self) -> Pieces:
         """The part that is free, at most one chunk."""
-        return tuple(column[self.count : self.count + self.least] for column in self.columns)
+        return self.columns.part(self.count, self.count + self.least)
 
     def keep(self, count: int, passed: float, total: float) -> None:
         """Take the pieces just written, and make room for those to come."""
         self.count += count
         self.passed += passed
-        if self.count < len(self.columns[0]):
+        if self.count < len(self.columns.laps):
             return
         foretold = self.count * min(64.0, 1.05 * total / self.passed) if self.passed > 0 else 0.0
-        grown = _columns(max(int(foretold), self.count + self.least), self.columns[4].shape[1])
-        for new, old in zip(grown, self.columns, strict=True):
-            new[: self.count] = old[: self.count]
+        grown = _columns(max(int(foretold), self.count + self.least), self.columns.states.shape[1])
+        for name in Pieces._fields:
+            getattr(grown, name)[: self.count] = getattr(self.columns, name)[: self.count]
         self.columns = grown
 
-    def done(self) -> tuple[NDArray[Any], ...]:
+    def done(self) -> Pieces:
         """The pieces alone."""
-        return tuple(column[: self.count] for column in self.columns)
+        return self.columns.part(0, self.count)
 
 
-def _columns(room: int, size: int) -> tuple[NDArray[Any], ...]:
-    return (
+def _columns(room: int, size: int) -> Pieces:
+    return Pieces(
         np.empty(room, np.int32), np.empty(room), np.empty(room, np.int16), np.empty(room), np.empty((room, size)),
         np.empty(room, np.int16),
     )  # fmt: skip
@@ -310,8 +305,8 @@ def _at_rest(table: Tables, state: Array, mode: int) -> bool:
     return bool(np.all(table.flow[mode] @ state == 0.0))
 
 
-def _refuse(outcome: int, table: Tables, state: Array, clock: Array) -> None:
-    place = f"lap {clock[0]:g}, {clock[1]:g} s, at {named(table.names[: table.physical], state)}"
+def _refuse(outcome: int, table: Tables, state: Array, clock: Clock) -> None:
+    place = f"lap {clock.laps:g}, {clock.time:g} s, at {named(table.names[: table.physical], state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
         raise chatter(place)
     if outcome == kernel.UNPROVED:

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
+from stickslip.solve.batch import pasts
+from stickslip.solve.glide import Model, Pieces
+from stickslip.solve.kernel import scratch
 from stickslip.solve.phasors import phasors_of
 from stickslip.solve.tables import (
-    DEGREE,
     Array,
     Systems,
     Tables,
@@ -29,10 +31,21 @@ from stickslip.sweeps import tally as log
 from stickslip.sweeps.grid import START
 from stickslip.sweeps.measures import FAILED, LOG, NO_SYSTEM, ORDERS
 from stickslip.sweeps.plan import BLOCK, Arrays, Plan
-from stickslip.sweeps.watch import CONSTANT, LAP, MARK, ROOM, VARIES, repeats, watch_all
+from stickslip.sweeps.watch import (
+    CONSTANT,
+    MARK,
+    ROOM,
+    VARIES,
+    Counted,
+    Given,
+    Look,
+    Rooms,
+    repeats,
+    watch_all,
+)
 
 Index = NDArray[np.int64]
-Watch = Callable[[Any, Any, int, int], None]  # march what is given into what is left; modes and physical entries
+Watch = Callable[[Given, Counted, int, int], None]  # march what is given into what is left; modes and physical entries
 KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
 PARTS = ("law", "drive")
 PATHS = {"micro_slips", "transition_speed", "energy"}  # measures of how far and how fast the contact slips
@@ -142,25 +155,23 @@ def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch
     leaps = table.leap if tangents else np.zeros((count, 1, 1, 1, 1))
     weights = np.ones((count, physical))
     weights[:, 1] = rest
-    wants = np.array([plan.settle, plan.cycles, grown, turned], dtype=np.int64)
-    look = _look(table, asked)
-    given = (states, modes, table.period, units, table.linear, phasors_of(table).tables, look, wants, leaps, weights)
-    out = (
+    wants = np.array([plan.settle, plan.cycles, grown, turned, physical, bool(asked & PATHS)], dtype=np.int64)
+    models = Model(table.linear, phasors_of(table), table.period)
+    given = Given(states, modes, units, models, _look(table, asked), wants, leaps, weights)
+    out = Counted(
         np.full(count, FAILED, np.int64), np.zeros((count, log.ENTRIES)), np.zeros((count, rows, physical)),
         np.zeros(count), np.full((count, physical, physical), np.nan),
     )  # fmt: skip
     watch(given, out, states.shape[1], physical)
     found = _answers(plan, out, units, table.period)
-    lost = out[0] == FAILED
+    lost = out.statuses == FAILED
     for name, values in found.items():
         values[lost] = plan.variables[name].fill if name in plan.variables else 0
-    return {"status": out[0], **found}
+    return {"status": out.statuses, **found}
 
 
-def _look(table: Tables, asked: set[str]) -> tuple[NDArray[Any], ...]:
-    """What the watch looks at in each mode: kind, side, whether the mass may turn within, what friction does there,
-    whether nothing moves; slip, displacement from the counter-face and friction as linear forms; the entry of the
-    constant, and whether it matters how far the contact slips."""
+def _look(table: Tables, asked: set[str]) -> Look:
+    """What the watch looks at."""
     fixed = np.arange(len(table.names)) != 0
     gap = np.eye(len(table.names))[0] - table.outputs["face"]  # of the mass from the counter-face
     still_face = not np.any(gap[:, fixed])
@@ -174,25 +185,23 @@ def _look(table: Tables, asked: set[str]) -> tuple[NDArray[Any], ...]:
         works.append(0 if "energy" not in asked or mode.friction is None else CONSTANT if constant else VARIES)
         still.append(rests)
     kinds = [KINDS.get(mode.kind, log.SLIP) for mode in table.modes]
-    return (
+    return Look(
         np.array(kinds, dtype=np.int64), np.array([float(mode.side) for mode in table.modes]), np.array(inner),
         np.array(works, dtype=np.int64), np.array(still), table.outputs["slip"], gap,
         np.ascontiguousarray(table.friction[:, :, 0]),
-        np.array([table.physical, bool(asked & PATHS)]),
     )  # fmt: skip
 
 
-def _answers(plan: Plan, out: Sequence[NDArray[Any]], units: Array, period: Array) -> Arrays:
+def _answers(plan: Plan, out: Counted, units: Array, period: Array) -> Arrays:
     """The variables from what was counted."""
-    _, sums, sections, growths, jacobians = out
-    cycles = plan.cycles
+    sums, sections, jacobians, cycles = out.sums, out.sections, out.jacobians, plan.cycles
     with np.errstate(invalid="ignore"):
         found = {
             "normal_stops": sums[:, log.NORMAL] / cycles, "abnormal_stops": sums[:, log.ABNORMAL] / cycles,
             "stick_share": sums[:, log.HELD] / (units * cycles), "micro_slips": sums[:, log.SHORT] / cycles,
             "transition_speed": np.where(sums[:, log.FASTEST] > 0, sums[:, log.FASTEST], np.nan),
             "amplitude": sums[:, log.REACH], "energy": sums[:, log.WORK] / cycles,
-            "lyapunov": np.where(np.isfinite(period), growths / (units * cycles), np.nan),
+            "lyapunov": np.where(np.isfinite(period), out.growths / (units * cycles), np.nan),
         }  # fmt: skip
     found["order"] = np.zeros(len(sums))
     if sections.shape[1]:
@@ -206,16 +215,16 @@ def _answers(plan: Plan, out: Sequence[NDArray[Any]], units: Array, period: Arra
     return found
 
 
-def on_cpu(given: Any, out: Any, size: int, physical: int) -> None:
+def on_cpu(given: Given, out: Counted, size: int, physical: int) -> None:
     """One motion after another, in one scratch."""
-    watch_all(given, out, scratch(1, size, physical))
+    watch_all(given, out, rooms(1, size, physical))
 
 
-def scratch(rows: int, size: int, physical: int) -> Any:
+def rooms(count: int, size: int, physical: int) -> Rooms:
     """Room for what so many motions need while they are marched."""
-    wide = max(size, DEGREE + 1, 16)
-    room = (np.zeros((rows, ROOM), np.int32), np.zeros((rows, ROOM)), np.zeros((rows, ROOM), np.int16),
-            np.zeros((rows, ROOM)), np.zeros((rows, ROOM, size)), np.zeros((rows, ROOM), np.int16))  # fmt: skip
-    return (np.zeros((rows, 17, wide)), np.zeros((2, rows, LAP), np.int64), np.zeros((rows, LAP)),
-            np.zeros((rows, LAP), np.int64), np.zeros((rows, 3), np.int64), np.zeros((rows, 3)), room,
-            np.zeros((rows, physical, size)), np.zeros((rows, 4, max(size + MARK + 1, log.ENTRIES))))  # fmt: skip
+    pieces = Pieces(
+        np.zeros((count, ROOM), np.int32), np.zeros((count, ROOM)), np.zeros((count, ROOM), np.int16),
+        np.zeros((count, ROOM)), np.zeros((count, ROOM, size)), np.zeros((count, ROOM), np.int16),
+    )  # fmt: skip
+    return Rooms(np.zeros((count, *scratch(size, 17).shape)), pasts(count), pieces, np.zeros((count, physical, size)),
+                 np.zeros((count, 4, max(size + MARK + 1, log.ENTRIES))))  # fmt: skip
