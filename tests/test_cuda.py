@@ -46,7 +46,7 @@ def solve(name: str, *, gpu: bool) -> Batch:
 
 def packed(batch: Batch) -> dict[str, np.ndarray]:
     """The arrays by name, with nothing after the last piece of a row."""
-    arrays = {key: value.copy() for key, value in vars(batch).items()}
+    arrays = {key: value.copy() for key, value in batch._asdict().items()}
     late = np.arange(batch.modes.shape[1]) >= batch.counts[:, None]
     for key in ("laps", "offsets", "modes", "durations", "states", "exits"):
         arrays[key][late] = 0

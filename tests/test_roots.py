@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.solve.automaton import automaton
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise, opening_order
+from stickslip.solve.tables import table_of
 
 
 def rise(roots: list[float], *, lead: float = 1.0, low: int = 0, limit: float = 1.0) -> float:
@@ -163,6 +163,6 @@ def test_repeated_and_zero_eigenvalues_are_exact(stiffness: float, damping: floa
     if known is None:
         from scipy.linalg import expm
 
-        flow = automaton(system).flow[run.modes[0]]
+        flow = table_of(system).flow[run.modes[0]]
         known = float((expm(4.0 * flow) @ run.states[0])[0])
     assert x == pytest.approx(known, rel=1e-11 if damping > 2 else 1e-13)

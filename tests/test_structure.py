@@ -24,10 +24,10 @@ from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.tabulated import Tabulated
 from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import automaton
 from stickslip.solve.energy import energy
 from stickslip.solve.periodic import steady_state
 from stickslip.solve.simulate import simulate
+from stickslip.solve.tables import table_of
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Contact, Structure
 
@@ -140,7 +140,7 @@ def test_without_contact_it_is_the_matrix_exponential() -> None:
 
 def sliding(structure: Structure, *modes: str) -> np.ndarray:
     """A of the modes in which contacts slide, without drive and constant."""
-    table = automaton(structure)
+    table = table_of(structure)
     return table.flow[table.index(" + ".join(modes))][: table.physical, : table.physical]
 
 

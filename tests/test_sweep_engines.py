@@ -16,8 +16,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
-from stickslip.solve.automaton import automaton
-from stickslip.solve.fleet import fleet_of, fleet_tables
+from stickslip.solve.tables import systems_of, table_of, tables_of
 from stickslip.sweeps.block import _alone, run_block
 from stickslip.sweeps.measures import LOG, MEASURES
 from stickslip.sweeps.sweep import planned
@@ -50,16 +49,16 @@ CASES: dict[str, tuple[ss.Oscillator, dict[Any, Any], int, int]] = {
     ],
     ids=["rigid", "compliant", "belt", "position"],
 )
-def test_a_fleet_has_the_tables_of_its_oscillators(systems: list[ss.Oscillator]) -> None:
-    table = fleet_tables(fleet_of(systems))
+def test_systems_together_have_the_tables_of_each_alone(systems: list[ss.Oscillator]) -> None:
+    together = tables_of(systems_of(systems))
     for row, system in enumerate(systems):
-        one = automaton(system)
-        for name in ("flow", "cell", "series", "reset", "friction", "tones", "opening"):
-            assert np.allclose(getattr(table, name)[row], getattr(one, name), rtol=1e-14, atol=0), name
-        hop, known = (np.sum(part.astype(np.longdouble), axis=1) for part in (table.hop[row], one.hop))
-        assert np.allclose(hop, known, rtol=1e-17, atol=1e-19 * float(np.max(np.abs(known))))
-        assert np.array_equal(table.target, one.target)
-        assert table.entry == one.entry
+        own, alone = together.of(row), table_of(system)
+        for name in (*own.linear._fields, "friction", "opening", "begin", "period"):
+            one, other = (np.asarray(getattr(table, name)) for table in (own, alone))
+            assert np.array_equal(one, other), name
+        assert own.outputs.keys() == alone.outputs.keys()
+        assert all(np.array_equal(own.outputs[name], alone.outputs[name]) for name in alone.outputs)
+        assert (own.entry, own.names, own.motion) == (alone.entry, alone.names, alone.motion)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -18,8 +18,8 @@ import pytest
 import stickslip as ss
 from stickslip.errors import ModelError
 from stickslip.scenarios import forced, grid
-from stickslip.solve.automaton import automaton
 from stickslip.solve.batch import simulate_batch
+from stickslip.solve.tables import table_of
 
 pytest.importorskip("xarray")
 CIRCLE = 2 * math.pi
@@ -229,7 +229,7 @@ def test_a_simulated_gpu_tells_the_truths(simulated: dict[str, dict[str, Any]]) 
     assert stops["HL-1"].tolist() == [2, 2 + 4j, 2 + 2j, 2]
     assert stops["DH-2"].tolist() == [0, 2]
     bistable(simulated["SHAW"])
-    stuck = [mode.kind == "stick" for mode in automaton(CHAOS).modes]
+    stuck = [mode.kind == "stick" for mode in table_of(CHAOS).modes]
     places = simulated["FM-1"]["places"][np.array(stuck)[simulated["FM-1"]["modes"]]]
     assert places[: len(STUCK)] == pytest.approx(STUCK, rel=1e-10)
     assert simulated["FM-1"]["exponent"] == pytest.approx(exponent("serial"), rel=1e-6)

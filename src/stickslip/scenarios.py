@@ -42,11 +42,11 @@ from stickslip.laws.stribeck import FrictionCurve, Stribeck
 from stickslip.laws.tabulated import Tabulated
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import System, automaton
 from stickslip.solve.orbit import SteadyState
 from stickslip.solve.periodic import steady_state
 from stickslip.solve.simulate import simulate
 from stickslip.solve.sliding import steady_sliding
+from stickslip.solve.tables import System, table_of
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Contact, Structure
 
@@ -289,7 +289,7 @@ def _fastest_growing(system: System) -> complex:
     """Of steady sliding on a belt, the eigenvalue with the largest real part [1/s]."""
     if isinstance(system, Oscillator):
         return complex(steady_sliding(system).eigenvalues[0])
-    table = automaton(system)
+    table = table_of(system)
     sides = ["forward" if np.sign(contact.carried) < 0 else "back" for contact in system.contacts]
     flow = table.flow[table.index(" + ".join(sides))][: table.physical, : table.physical]
     values = np.linalg.eigvals(flow)

@@ -27,8 +27,8 @@ from stickslip.oscillator import Oscillator
 from stickslip.parameters import PARTS, UNITS, changed, find, places
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
-from stickslip.solve.automaton import System
-from stickslip.solve.product import numbered
+from stickslip.solve.joint import numbered
+from stickslip.solve.tables import System
 from stickslip.structure import Contact, Structure
 
 # The unit of each parameter of a law or drive; a test holds them to the docstrings.

@@ -37,7 +37,7 @@ from stickslip.regimes.basins import Basins
 from stickslip.regimes.bifurcation import Bifurcation
 from stickslip.regimes.boundary import Boundary
 from stickslip.regimes.dither import Dither, dithered_friction
-from stickslip.solve.automaton import Array, System
+from stickslip.solve.tables import Array, System
 from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from stickslip.identify.sliding_balance import Slider
 from stickslip.oscillator import Oscillator
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import BLUE, INK, ORANGE, Array, axes_of, axis_label, plain_decades, prefixed, styled
-from stickslip.solve.automaton import System
+from stickslip.solve.tables import System
 from stickslip.sweeps.measures import UNKNOWN
 
 if TYPE_CHECKING:

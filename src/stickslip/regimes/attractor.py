@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from stickslip.errors import ModelError
 from stickslip.parameters import PARTS
-from stickslip.solve.automaton import Array, System
 from stickslip.solve.orbit import SteadyState, alike
 from stickslip.solve.periodic import steady_state
 from stickslip.solve.poincare import Table, end_of, lap, tables
 from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, System
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Structure
 

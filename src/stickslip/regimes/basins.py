@@ -14,9 +14,9 @@ from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.record.exchange import labelled_arrays
 from stickslip.regimes.attractor import Attractor, Start, as_start, numbers, require_period, same, settled
-from stickslip.solve.automaton import Array, System
 from stickslip.solve.poincare import Table, end_of, extent, lap, tables
 from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, System
 
 if TYPE_CHECKING:
     import xarray as xr

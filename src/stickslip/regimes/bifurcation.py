@@ -15,8 +15,8 @@ from stickslip.errors import ModelError
 from stickslip.parameters import find
 from stickslip.record.exchange import labelled_arrays
 from stickslip.regimes.attractor import Attractor, Start, numbers, onward, require_number, require_period, same, settled
-from stickslip.solve.automaton import Array, System
 from stickslip.solve.continuation import Branch, continue_orbit
+from stickslip.solve.tables import Array, System
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,7 @@ from stickslip.errors import ModelError, SolveError
 from stickslip.parameters import find
 from stickslip.record.exchange import labelled_arrays
 from stickslip.regimes.attractor import Attractor, Start, numbers, require_number, require_period, settled
-from stickslip.solve.automaton import Array, System
+from stickslip.solve.tables import Array, System
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,9 +15,9 @@ from stickslip.estimate import Estimate, Result
 from stickslip.identify.transition import Transition
 from stickslip.oscillator import Oscillator
 from stickslip.regimes.attractor import Start
-from stickslip.solve.automaton import Array
 from stickslip.solve.poincare import tables
 from stickslip.solve.simulate import simulate
+from stickslip.solve.tables import Array
 from stickslip.solve.trajectory import Trajectory
 
 FAST = 20.0  # dither periods in one of the slow motion, at least, where no frequency is given

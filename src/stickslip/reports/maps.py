@@ -12,7 +12,7 @@ from stickslip.plot.maps import plates_of
 from stickslip.reports import page
 from stickslip.reports.folder import check_folder, results_folder, write_figures
 from stickslip.reports.summary import Summary
-from stickslip.solve.automaton import System
+from stickslip.solve.tables import System
 
 LOST = ("not run", "failed")  # outcomes that leave holes in a map
 

@@ -29,10 +29,10 @@ from stickslip.plot.trajectory import (
     sampled,
 )  # fmt: skip
 from stickslip.reports.folder import check_folder, results_folder, write_figures
-from stickslip.solve.automaton import Automaton
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.energy import energy
 from stickslip.solve.simulate import simulate
+from stickslip.solve.tables import Tables
 from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.squeak.listening import write_sound
 from stickslip.squeak.sound import sound_pressure, squeak_record
@@ -301,7 +301,7 @@ def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
             (load,) = sampled(run, (("load", c),), times)
             words = numbered_words(run, "normal load", "load", c)
             values[f"{words}, from"], values[f"{words}, to"] = (float(load.min()), "N"), (float(load.max()), "N")
-    if len(run.modes) <= MOST_PIECES and isinstance(run.table, Automaton):  # a closed form to integrate
+    if len(run.modes) <= MOST_PIECES and isinstance(run.table, Tables):  # a closed form to integrate
         work = energy(run)
         values["work against friction"] = (work.friction, "J")
         values["energy unaccounted for, relative"] = (work.residual, "1")

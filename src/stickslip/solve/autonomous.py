@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.solve.automaton import Array, System
 from stickslip.solve.poincare import Table, closes, derivative, end_of, stretch
 from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, System
 from stickslip.solve.trajectory import Trajectory
 
 ROUNDS = 16

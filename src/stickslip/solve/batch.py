@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +12,17 @@ from numpy.typing import NDArray
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import DEGREE, Array, automaton
-from stickslip.solve.fleet import fleet_of, fleet_tables, kind_of_drive, kind_of_law, opened
-from stickslip.solve.kernel import CHATTER, march, measure, settle
+from stickslip.solve.glide import Clock, Model, Past, Pieces
+from stickslip.solve.kernel import CHATTER, begin, march, scratch
+from stickslip.solve.phasors import Phasors, phasors_of
 from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, Linear, kind_of_drive, kind_of_law, opened, systems_of, tables_of
 
 TIRELESS = 2**62  # cells: a batch is not interrupted
 LAP = 64  # pieces remembered of each oscillator, a power of two; a lap of the drive with more has no fast path
 
 
-@dataclass(frozen=True, eq=False)
-class Batch:
+class Batch(NamedTuple):
     """The pieces of many motions; row i belongs to motion i.
 
     Attributes
@@ -51,12 +50,6 @@ class Batch:
     states: Array
     exits: NDArray[np.int16]
     final: Array
-
-    @property
-    def arrays(self) -> tuple[NDArray[Any], ...]:
-        """Everything the march writes."""
-        return (self.counts, self.statuses, self.laps, self.offsets, self.modes, self.durations, self.states,
-                self.exits, self.final)  # fmt: skip
 
 
 def simulate_batch(
@@ -104,18 +97,17 @@ def simulate_batch(
     starts = list(starts) if starts is not None else [{}] * len(systems)
     if len(systems) not in (1, len(starts)):
         raise ModelError(f"{len(systems)} systems for {len(starts)} starts", "one for all, or one each", "match them")
-    fleet = fleet_of(systems)
-    if len({kind_of_law(law) for law in fleet.laws}) > 1 or len({kind_of_drive(drive) for drive in fleet.drives}) > 1:
+    laws, drives = {kind_of_law(system.law) for system in systems}, {kind_of_drive(system.drive) for system in systems}
+    if len(laws) > 1 or len(drives) > 1:
         raise ModelError("the systems have different modes", "a batch has one kind of law and drive", "split it")
-    if kind_of_law(fleet.laws[0]) is None or kind_of_drive(fleet.drives[0]) is None:
+    if None in laws or None in drives:
         raise ModelError("a law is curved, or a drive has knots or several tones",
                          "a batch runs through linear modes without stops", "run them one by one")  # fmt: skip
-    tables = fleet_tables(fleet)
+    tables = tables_of(systems_of(systems))
     size, count = len(tables.names), len(starts)
     which = np.zeros(count, np.int64) if len(systems) == 1 else np.arange(count)
-    single = [automaton(system) for system in systems] if any(starts) else []
-    if single:
-        begun = [opening(single[j], start) for j, start in zip(which, starts, strict=True)]
+    if any(starts):
+        begun = [opening(tables.of(int(j)), start) for j, start in zip(which, starts, strict=True)]
         states, modes = np.array([state for state, _ in begun]), np.array([mode for _, mode in begun])
     else:
         states, modes = (part[which] for part in opened(tables, {}))
@@ -126,67 +118,89 @@ def simulate_batch(
         ends[j] = laps, (cycles - laps) * unit
     if not np.all(np.isfinite(ends)):
         raise ModelError(f"cycles = {cycles}", "a system without period has no cycles", "give it a drive or a spring")
-    given = which, modes, states, tables.period, ends, tables.arrays, tables.phasors.tables
+    given = Given(which, modes, states, ends, Model(tables.linear, phasors_of(tables), tables.period))
     out = Batch(
         np.zeros(count, np.int64), np.zeros(count, np.int64), np.empty((count, room), np.int32),
         np.empty((count, room)), np.empty((count, room), np.int16), np.empty((count, room)),
         np.empty((count, room, size)), np.empty((count, room), np.int16), np.empty((count, size)),
     )  # fmt: skip
-    scratch = (np.zeros((count, 16, max(size, DEGREE + 1, 16))), np.full((2, count, LAP), -1), np.zeros((count, LAP)),
-               np.ones((count, LAP), np.int64), np.zeros((count, 3), np.int64), np.zeros((count, 3)))  # fmt: skip
-    (_on_gpu if gpu else _on_cpu)(given, out.arrays, scratch)
+    works = np.zeros((count, *scratch(size).shape))
+    (_on_gpu if gpu else _on_cpu)(given, out, Rooms(works, pasts(count)))
     return out
 
 
-@compiled(**OPTIONS)
-def slow_of(slow, j):
-    """The tables of system j as :func:`stickslip.solve.kernel.march` reads them."""
-    return (slow[0][j], slow[1][j], slow[2][j], slow[3][j], slow[4], slow[5], slow[6][j], slow[7], slow[8][j])
+class Given(NamedTuple):
+    """What a batch is asked: of each motion its system, mode and state at the start, of each system the laps and time
+    within the lap at its end, and what moves, with a leading axis."""
+
+    which: NDArray[np.int64]
+    modes: NDArray[np.int64]
+    states: Array
+    ends: Array
+    models: Model
+
+
+class Rooms(NamedTuple):
+    """Scratch and past of each motion that is under way, with a leading axis."""
+
+    works: Array
+    pasts: Past
+
+
+def pasts(count: int) -> Past:
+    """The rings of motions before their first pieces."""
+    none = np.full((2, count, LAP), -1, np.int64)
+    return Past(none[0], none[1], np.zeros((count, LAP)), np.ones((count, LAP), np.int64),
+                np.zeros((count, 3), np.int64))  # fmt: skip
 
 
 @compiled(**OPTIONS)
-def fast_of(fast, j):
-    """The tables of system j as :func:`stickslip.solve.phasors.glide` reads them."""
-    return fast[0][j], fast[1][j], fast[2][j], fast[3][j], fast[4][j], fast[5][fast[6][j, 0] : fast[6][j, 1]]
+def model_of(models, j):
+    """One of many systems, as :func:`stickslip.solve.kernel.march` reads it."""
+    linear, fast = models.linear, models.fast
+    nodes = fast.nodes[fast.span[j, 0] : fast.span[j, 1]]
+    return Model(
+        Linear(linear.flow[j], linear.cell[j], linear.hop[j], linear.series[j], linear.target, linear.crossing,
+               linear.reset[j], linear.first, linear.tones[j]),
+        Phasors(fast.drive[j], fast.mode[j], fast.level[j], fast.exit[j], fast.rest[j], nodes, fast.span[j]),
+        models.period[j],
+    )  # fmt: skip
 
 
 @compiled(**OPTIONS)
-def march_one(i, given, out, scratch):
+def past_of(pasts, i):
+    """The ring of one motion."""
+    return Past(pasts.modes[i], pasts.exits[i], pasts.times[i], pasts.parts[i], pasts.places[i])
+
+
+@compiled(**OPTIONS)
+def march_one(i, given, out, rooms):
     """Settle motion i and march it to its end."""
-    which, modes, opened, periods, ends, slow, fast = given
-    counts, statuses, laps, offsets, entered, durations, states, exits, final = out
-    works, names, times, parts, rings, clocks = scratch
-    j = which[i]
-    tables, quick = slow_of(slow, j), fast_of(fast, j)
-    past = (names[0, i], names[1, i], times[i], parts[i], rings[i])
-    room = (laps[i], offsets[i], entered[i], durations[i], states[i], exits[i])
-    work, state = works[i], final[i]
-    n, degree = state.shape[0], tables[3].shape[1]
-    limit = (ends[j, 0], ends[j, 1])
-    total = limit[1] + (limit[0] * periods[j] if limit[0] > 0.0 else 0.0)
-    for k in range(n):
-        state[k] = opened[i, k]
-    measure(tables[8], state, work[3], 0.0)
-    cell = min(tables[1][modes[i]], total)
-    mode = settle(tables, modes[i], state, work[3, :n], cell, work[:2, :n], work[4, :degree], work[5, :degree])
-    status, count = CHATTER, 0
+    j = given.which[i]
+    model, past, work, state = model_of(given.models, j), past_of(rooms.pasts, i), rooms.works[i], out.final[i]
+    pieces = Pieces(out.laps[i], out.offsets[i], out.modes[i], out.durations[i], out.states[i], out.exits[i])
+    limit = Clock(given.ends[j, 0], given.ends[j, 1], 0.0)
+    total = limit.time + (limit.laps * model.period if limit.laps > 0.0 else 0.0)
+    for k in range(state.shape[0]):
+        state[k] = given.states[i, k]
+    status, count, mode = CHATTER, 0, begin(model.linear, given.modes[i], state, total, 0.0, work)
     if mode >= 0:
-        clock, period = clocks[i], periods[j]
-        status, count, mode = march(tables, quick, clock, state, mode, limit, period, past, room, work, TIRELESS)
-    statuses[i], counts[i] = status, count
+        clock = Clock(0.0, 0.0, 0.0)
+        status, count, mode, clock = march(model, clock, state, mode, limit, past, pieces, work, TIRELESS)
+    out.statuses[i], out.counts[i] = status, count
 
 
 @compiled(**OPTIONS)
-def _on_cpu(given, out, scratch):
-    for i in range(given[0].shape[0]):
-        march_one(i, given, out, scratch)
+def _on_cpu(given, out, rooms):
+    for i in range(given.which.shape[0]):
+        march_one(i, given, out, rooms)
 
 
-def _on_gpu(given: Any, out: Any, scratch: Any) -> None:
+def _on_gpu(given: Given, out: Batch, rooms: Rooms) -> None:
     try:
         from stickslip.solve.gpu import march_all
     except ImportError as absent:
         raise SolveError(
             "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install ".[gpu]" in the checkout'
         ) from absent
-    march_all(given, out, scratch)
+    march_all(given, out, rooms)

@@ -10,11 +10,11 @@ import numpy as np
 
 from stickslip.errors import ModelError
 from stickslip.parameters import find, places
-from stickslip.solve.automaton import Array, System
 from stickslip.solve.orbit import SteadyState, cycle_of
 from stickslip.solve.periodic import judged
 from stickslip.solve.poincare import closes, derivative, end_of, extent, lap, tables
 from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, System
 
 NUDGE = 1e-6  # of the parameter, relative to the way ahead: the map is differenced across twice this
 FLOOR = 1e-11  # a step shorter than this, relative to the way ahead, has met a jump of the map

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.solve.automaton import Array
+from stickslip.solve.tables import Array
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Structure
 

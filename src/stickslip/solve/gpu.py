@@ -11,32 +11,32 @@ from numba import cuda
 from numba.cuda.cudadrv.driver import CudaAPIError
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.solve.batch import march_one
+from stickslip.solve.batch import Batch, Given, Rooms, march_one
 
 THREADS = 64  # of a block
 FLOAT64 = (1, 3)  # compute capability with which NVIDIA's GPUs have it
 
 
 @cuda.jit
-def each(given, out, scratch):
+def each(given, out, rooms):
     """March the motion of this thread."""
     i = cuda.grid(1)
-    if i < given[0].shape[0]:
-        march_one(i, given, out, scratch)
+    if i < given.which.shape[0]:
+        march_one(i, given, out, rooms)
 
 
-def march_all(given: tuple[Any, ...], out: tuple[Any, ...], scratch: tuple[Any, ...]) -> None:
+def march_all(given: Given, out: Batch, rooms: Rooms) -> None:
     """March every motion on the GPU and bring home what was written."""
     require_gpu("gpu=False")
     written = carried(out)
-    each[math.ceil(len(given[0]) / THREADS), THREADS](carried(given), written, carried(scratch))
-    for array, found in zip(out, written, strict=True):
-        array[...] = found.copy_to_host()
+    each[math.ceil(len(given.which) / THREADS), THREADS](carried(given), written, carried(rooms))
+    for name in Batch._fields:
+        getattr(out, name)[...] = getattr(written, name).copy_to_host()
 
 
-def carried(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Arrays, however nested, on the GPU."""
-    return tuple(carried(v) if isinstance(v, tuple) else cuda.to_device(v) for v in values)
+def carried(values: Any) -> Any:
+    """Arrays, however nested by name, on the GPU."""
+    return type(values)(*(carried(v) if isinstance(v, tuple) else cuda.to_device(v) for v in values))
 
 
 @contextmanager

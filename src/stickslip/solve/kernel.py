@@ -6,14 +6,43 @@ The same functions run on the CPU and, called from a CUDA kernel, on a GPU.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from stickslip.compiled import OPTIONS, compiled
-from stickslip.solve.automaton import SPLITTER
-from stickslip.solve.phasors import glide
+from stickslip.solve.glide import Clock, glide, later, new_lap, remember, until
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise, opening_order
+from stickslip.solve.tables import DEGREE, SPLITTER, Array
 
 DONE, FULL, CHATTER, LOST, UNPROVED = 0, 1, 2, 3, 4
 CHAIN = 64  # transitions without time in between before a run is given up
+UNTOLD = -2  # an exit that could neither be found nor excluded
+
+
+class Scratch(NamedTuple):
+    """What a march writes on: two states, the state within a piece and what rounding took from it, what the rounding of
+    each entry is measured by, the coefficients of an exit with the noise of each, and room for the fast path."""
+
+    pair: Array
+    held: Array
+    tail: Array
+    scale: Array
+    c: Array
+    noise: Array
+    fast: Array
+
+
+def scratch(size: int, rows: int = 16) -> Array:
+    """Scratch for the march of a state of so many entries."""
+    return np.zeros((rows, max(size, DEGREE + 1, 16)))
+
+
+@compiled(**OPTIONS)
+def parts_of(work, size):
+    """Scratch by name."""
+    c, noise = work[4, : DEGREE + 1], work[5, : DEGREE + 1]
+    return Scratch(work[:2, :size], work[2, :size], work[15, :size], work[3, :size], c, noise, work[6:15])
 
 
 @compiled(**OPTIONS)
@@ -62,7 +91,7 @@ def multiply(matrix, state, out):
 def leap(hop, state, tail, work):
     """state + tail = exp(A cell) (state + tail), in twice the digits: a long piece has thousands of cells.
 
-    `hop` is (3, N, N), see :func:`stickslip.solve.automaton.halved`; `tail` is what rounding took from the state.
+    `hop` is (3, N, N), see :func:`stickslip.solve.tables.halved`; `tail` is what rounding took from the state.
     """
     n = state.shape[0]
     for i in range(n):
@@ -133,208 +162,207 @@ def expand(series, state, scale, cell, c, noise):
 
 
 @compiled(**OPTIONS)
-def settle(tables, mode, state, scale, cell, work, c, noise):
+def settle(linear, mode, state, cell, work):
     """Take every exit that is due at once; returns the mode in which time passes, or -1 if the chain does not end."""
-    _, _, _, series, target, crossing, reset, first, _ = tables
     for _ in range(CHAIN):
         fired = -1
-        for e in range(first[mode], first[mode + 1]):
-            if crossing[e]:
+        for e in range(linear.first[mode], linear.first[mode + 1]):
+            if linear.crossing[e]:
                 continue
-            expand(series[e], state, scale, cell, c, noise)
-            order = opening_order(c, noise, c.shape[0])
-            if order < c.shape[0] and c[order] > 0.0:
+            expand(linear.series[e], state, work.scale, cell, work.c, work.noise)
+            order = opening_order(work.c, work.noise, work.c.shape[0])
+            if order < work.c.shape[0] and work.c[order] > 0.0:
                 fired = e
                 break
         if fired < 0:
             return mode
-        multiply(reset[fired], state, work[0])
+        multiply(linear.reset[fired], state, work.pair[0])
         for i in range(state.shape[0]):
-            state[i] = work[0, i]
-        mode = target[fired]
+            state[i] = work.pair[0, i]
+        mode = linear.target[fired]
     return -1
 
 
 @compiled(**OPTIONS)
-def next_exit(tables, mode, state, scale, opened, armed, span, c, noise):
-    """The first exit within `span` [s] of the cell ahead: (time, exit, armed), or (-1, -1, armed); -2 if unproved.
+def begin(linear, mode, state, span, faded, work):
+    """Enter the motion at a state: measure its rounding, where `faded` of what it was before counts, and settle it; the
+    mode in which time passes, -1 where there is none. `span` is the time [s] ahead, `work` :func:`scratch`."""
+    room = parts_of(work, state.shape[0])
+    measure(linear.tones, state, room.scale, faded)
+    return settle(linear, mode, state, min(linear.cell[mode], span), room)
 
-    `opened` is true in the first cell of a piece, where roots at the very start are the way in, not the way out.
-    `armed` has a bit for each exit that has been below zero, so that a crossing at the seam of two cells is seen.
+
+@compiled(**OPTIONS)
+def next_exit(linear, mode, opened, armed, span, work):
+    """The first exit within `span` [s] of the cell ahead of the state `work.held`: (time, exit, armed).
+
+    The exit is -1 where there is none, UNTOLD where that is not proved. `opened` is true in the first cell of a piece,
+    where roots at the very start are the way in, not the way out. `armed` has a bit for each exit that has been below
+    zero, so that a crossing at the seam of two cells is seen.
     """
-    _, cells, _, series, _, crossing, _, first, _ = tables
-    cell = min(cells[mode], span)
+    c, noise = work.c, work.noise
+    cell = min(linear.cell[mode], span)
     best, which = NONE, -1
     count = c.shape[0]
-    for e in range(first[mode], first[mode + 1]):
-        expand(series[e], state, scale, cell, c, noise)
+    for e in range(linear.first[mode], linear.first[mode + 1]):
+        expand(linear.series[e], work.held, work.scale, cell, c, noise)
         low = opening_order(c, noise, count) if opened else 0
         if low == count:
             continue
         limit = min(1.0, best)
         start = 0.0
-        bit = 1 << (e - first[mode])
+        bit = 1 << (e - linear.first[mode])
         if c[low] < -noise[low]:
             armed |= bit
         elif c[low] > 0.0:
-            if opened or (crossing[e] and not armed & bit):
+            if opened or (linear.crossing[e] and not armed & bit):
                 # above zero by the rule of the crossing, or by rounding on the tie: wait for it to fall first
                 start = first_rise(c, noise, count, low, -1.0, 0.0, limit)
                 if start == NONE:
                     continue
                 if start == UNSURE:
-                    return -1.0, -2, armed
+                    return -1.0, UNTOLD, armed
                 start = min(limit, start + 1e-12)
             elif c[low] > noise[low]:
                 return 0.0, e, armed
         root = first_rise(c, noise, count, low, 1.0, start, limit)
         if root == UNSURE:
-            return -1.0, -2, armed
+            return -1.0, UNTOLD, armed
         if root < best:
             best, which = root, e
     return (best * cell, which, armed) if which >= 0 else (-1.0, -1, armed)
 
 
 @compiled(**OPTIONS)
-def march(tables, fast, clock, state, mode, limit, period, past, out, work, patience):
+def _polished(linear, mode, leaving, dt, work):
+    """Newton's last step, to where the state itself, not the polynomial, has the exit at zero: its length [s]."""
+    g, d = 0.0, 0.0
+    for j in range(work.held.shape[0]):
+        g += linear.series[leaving, 0, j] * work.held[j]
+        d += linear.series[leaving, 1, j] * work.held[j]
+    if not (d > 0.0 and abs(g) < 1e-9 * d * min(linear.cell[mode], dt)):
+        return 0.0
+    advance(linear.flow[mode], work.held, work.tail, -g / d, work.pair)
+    return -g / d
+
+
+@compiled(**OPTIONS)
+def _crossed(model, mode, clock, left, patience, work):
+    """Take the state `work.held` through a mode until an exit ends it, the time that is left is over, or `patience`
+    cells are gone through: the time [s], the exit (-1: none) and the cells."""
+    linear, held, tail = model.linear, work.held, work.tail
+    cell, gone, armed, cells = linear.cell[mode], 0.0, 0, 0
+    while True:
+        span = left - gone
+        dt, leaving, armed = next_exit(linear, mode, cells == 0, armed, span, work)
+        if leaving == UNTOLD:
+            return gone, leaving, cells
+        if leaving >= 0:
+            advance(linear.flow[mode], held, tail, dt, work.pair)
+            gone += dt
+            gone += _polished(linear, mode, leaving, dt, work)
+            return gone, leaving, cells
+        if span <= cell:
+            advance(linear.flow[mode], held, tail, span, work.pair)
+            return left, leaving, cells
+        # in twice the digits: a long piece has thousands of cells
+        leap(linear.hop[mode], held, tail, work.pair)
+        for i in range(held.shape[0]):
+            work.scale[i] = max(work.scale[i], abs(held[i]))
+        cells += 1
+        gone = cells * cell
+        if linear.tones.shape[0] == 1:
+            set_tones(linear.tones, held, clock.time + gone)
+            tail[int(linear.tones[0, 0])], tail[int(linear.tones[0, 1])] = 0.0, 0.0
+        if gone > 2.0 * model.period and _rests(linear.flow[mode], linear.tones):
+            return left, leaving, cells  # held through two periods of the drive: held for good
+        if cells >= patience:
+            return gone, leaving, cells
+
+
+@compiled(**OPTIONS)
+def march(model, clock, state, mode, limit, past, out, work, patience):
     """March until `limit`, until the buffers are full, or until a piece is longer than `patience` cells.
 
     Parameters
     ----------
-    tables : tuple of arrays
-        See :class:`stickslip.solve.automaton.Automaton`.
-    fast : tuple of arrays
-        See :class:`stickslip.solve.phasors.Phasors`; with an empty table of nodes there is no fast path.
-    clock : ndarray (3,)
-        Laps of the drive, time [s] within the lap, its compensation; updated.
+    model : Model
+        What moves; with an empty table of nodes there is no fast path.
+    clock : Clock
+        When the march begins.
     state : ndarray (N,)
         Updated.
     mode : int
         Mode in which time passes (settled).
-    limit : tuple of (float, float)
-        Laps and time within the lap at which the march ends.
-    period : float
-        Period of the drive [s]; infinite where there is none.
-    past : tuple of arrays
-        Ring of pieces gone by, see :func:`stickslip.solve.phasors.glide`.
-    out : tuple of arrays
-        Laps, times, modes, durations, states, exits of the pieces; of the state as many entries as there is room.
-    work : ndarray (16, N or more)
-        Scratch.
+    limit : Clock
+        When the march ends.
+    past : Past
+        Pieces gone by, updated.
+    out : Pieces
+        Where the pieces are written; of the state as many entries as there is room.
+    work : ndarray
+        :func:`scratch`.
     patience : int
         Cells after which a march ends FULL: at the next event, or by cutting a piece that is longer itself (exit -1),
         so that the caller hears of a long run while it lasts.
 
     Returns
     -------
-    tuple of int
-        Status, number of pieces, mode.
+    tuple of (int, int, int, Clock)
+        Status, number of pieces, mode, and the clock.
     """
-    flow, cells, hop, series, target, _, reset, _, tones = tables
-    laps, times, modes, durations, states, exits = out
-    n = state.shape[0]
-    c, noise = work[4], work[5]
-    scratch = work[:2, :n]
-    held, scale, tail = work[2, :n], work[3, :n], work[15, :n]
-    count, capacity, spent = 0, laps.shape[0], 0
-    quick = fast[5].shape[0] > 0
-    past_mode, past_exit, past_time, past_parts, ring = past
+    n, linear, count, spent = state.shape[0], model.linear, 0, 0
+    room, held = parts_of(work, n), parts_of(work, n).held
+    capacity, quick = out.laps.shape[0], model.fast.nodes.shape[0] > 0
     while True:
         if quick:
-            count, came, settled = glide(fast, tables, clock, state, mode, limit, period, past, out, count, work[6:])
-            mode = came if settled else settle(tables, came, state, scale, cells[came], scratch, c, noise)
+            # as far as two phasors tell it; the piece in doubt is the general march's
+            count, came, settled, clock = glide(model, clock, state, mode, limit, past, out, count, room.fast)
+            mode = came if settled else settle(linear, came, state, linear.cell[came], room)
             if mode < 0:
-                return CHATTER, count, came
+                return CHATTER, count, came, clock
         if count == capacity or spent >= patience:
-            return FULL, count, mode
-        left = (limit[0] - clock[0]) * period if limit[0] != clock[0] else 0.0
-        left += limit[1] - clock[1]
-        if left <= 4e-16 * limit[1]:
-            return DONE, count, mode
-        set_tones(tones, state, clock[1])
-        laps[count], times[count], modes[count] = clock[0], clock[1], mode
-        for i in range(states.shape[1]):
-            states[count, i] = state[i]
+            return FULL, count, mode, clock
+        left = until(clock, limit, model.period)
+        if left <= 4e-16 * limit.time:
+            return DONE, count, mode, clock
+        set_tones(linear.tones, state, clock.time)
+        out.laps[count], out.offsets[count], out.modes[count] = clock.laps, clock.time, mode
+        for i in range(out.states.shape[1]):
+            out.states[count, i] = state[i]
         for i in range(n):
-            held[i], tail[i] = state[i], 0.0
-        gone, leaving, armed, begun = 0.0, -1, 0, spent
-        opened = True
-        while True:
-            span = left - gone
-            cell = cells[mode]
-            dt, leaving, armed = next_exit(tables, mode, held, scale, opened, armed, span, c, noise)
-            opened = False
-            if leaving == -2:
-                return UNPROVED, count, mode
-            if leaving >= 0:
-                advance(flow[mode], held, tail, dt, scratch)
-                gone += dt
-                # the last digits: where the state itself, not the polynomial, has the exit at zero
-                g, d = 0.0, 0.0
-                for j in range(n):
-                    g += series[leaving, 0, j] * held[j]
-                    d += series[leaving, 1, j] * held[j]
-                if d > 0.0 and abs(g) < 1e-9 * d * min(cell, dt):
-                    advance(flow[mode], held, tail, -g / d, scratch)
-                    gone -= g / d
-                break
-            if span <= cell:
-                advance(flow[mode], held, tail, span, scratch)
-                gone = left
-                break
-            leap(hop[mode], held, tail, scratch)
-            for i in range(n):
-                scale[i] = max(scale[i], abs(held[i]))
-            spent += 1
-            gone = (spent - begun) * cell
-            if tones.shape[0] == 1:
-                set_tones(tones, held, clock[1] + gone)
-                tail[int(tones[0, 0])], tail[int(tones[0, 1])] = 0.0, 0.0
-            if gone > 2.0 * period and _rests(flow[mode], tones):
-                gone = left  # held through two periods of the drive: held for good
-                break
-            if spent - begun == patience:
-                break
-        durations[count] = gone
-        exits[count] = leaving
+            held[i], room.tail[i] = state[i], 0.0
+        gone, leaving, cells = _crossed(model, mode, clock, left, patience, room)
+        spent += cells
+        if leaving == UNTOLD:
+            return UNPROVED, count, mode, clock
+        out.durations[count], out.exits[count] = gone, leaving
         count += 1
-        slot = ring[0]
-        past_mode[slot], past_exit[slot], past_time[slot], past_parts[slot] = mode, leaving, gone, 1
-        ring[0] = (slot + 1) & (past_mode.shape[0] - 1)
-        ring[1] = (ring[1] + 1) & (past_mode.shape[0] - 1)
-        # compensated clock, wrapped at the period
-        step = gone - clock[2]
-        now = clock[1] + step
-        clock[2] = (now - clock[1]) - step
-        if now >= period:
-            whole = math.floor(now / period)
-            now -= whole * period
-            clock[0] += whole
-            ring[1] = ring[2]
-            ring[2] = ring[0]
-        clock[1] = now
+        remember(past, mode, leaving, gone, 1)
+        over = leaving < 0 and gone >= left
+        now = Clock(limit.laps, limit.time, 0.0) if over else later(clock, gone, model.period)
+        if now.laps > clock.laps:
+            new_lap(past)
+        clock = now
         for i in range(n):
             state[i] = held[i]
-        if leaving < 0 and gone < left:
-            return FULL, count, mode
+        if over:
+            set_tones(linear.tones, state, clock.time)
+            return DONE, count, mode, clock
         if leaving < 0:
-            if clock[0] < limit[0]:
-                ring[1] = ring[2]
-                ring[2] = ring[0]
-            clock[0], clock[1], clock[2] = limit[0], limit[1], 0.0
-            set_tones(tones, state, clock[1])
-            return DONE, count, mode
-        set_tones(tones, state, now)
-        multiply(reset[leaving], state, held)
+            return FULL, count, mode, clock
+        # the event: carry the state over, and take what is due at once
+        set_tones(linear.tones, state, clock.time)
+        multiply(linear.reset[leaving], state, held)
         for i in range(n):
             state[i] = held[i]
-        measure(tones, state, scale, 0.5)
-        cell = cells[target[leaving]]
-        mode = settle(tables, target[leaving], state, scale, min(cell, left), scratch, c, noise)
+        measure(linear.tones, state, room.scale, 0.5)
+        came = linear.target[leaving]
+        mode = settle(linear, came, state, min(linear.cell[came], left), room)
         if mode < 0:
-            return CHATTER, count, target[leaving]
+            return CHATTER, count, came, clock
         if gone <= 0.0:
-            return LOST, count, mode
+            return LOST, count, mode, clock
 
 
 @compiled(**OPTIONS)
@@ -351,16 +379,15 @@ def _rests(flow, tones):
 
 
 @compiled(**OPTIONS)
-def follow(tables, mode, state, time, work):
+def follow(linear, mode, state, time, work):
     """state = exp(A time) state, however long the time; `work` is (3, N)."""
-    flow, cells, hop, _, _, _, _, _, _ = tables
-    cell, tail, count = cells[mode], work[2], 0
+    cell, tail, count = linear.cell[mode], work[2], 0
     for i in range(state.shape[0]):
         tail[i] = 0.0
     while (time - count * cell if count else time) > cell:
-        leap(hop[mode], state, tail, work)
+        leap(linear.hop[mode], state, tail, work)
         count += 1
-    advance(flow[mode], state, tail, time - count * cell if count else time, work)
+    advance(linear.flow[mode], state, tail, time - count * cell if count else time, work)
 
 
 @compiled(**OPTIONS)
@@ -396,13 +423,12 @@ def outputs(flow, state, tail, rows, cell, c, work):
 
 
 @compiled(**OPTIONS)
-def sample(tables, begin, modes, states, times, rows, piece, out, work, c):
+def sample(linear, begin, modes, states, times, rows, piece, out, work, c):
     """Values of linear forms at increasing `times` [s], one polynomial of time for each cell.
 
     Parameters
     ----------
-    tables : tuple of arrays
-        See :class:`stickslip.solve.automaton.Automaton`.
+    linear : Linear
     begin, modes, states : ndarray
         Start [s], mode and state of each piece.
     times : ndarray (T,)
@@ -418,7 +444,6 @@ def sample(tables, begin, modes, states, times, rows, piece, out, work, c):
     c : ndarray (R, DEGREE + 1)
         Scratch.
     """
-    flow, cells, hop, _, _, _, _, _, _ = tables
     n, last = states.shape[1], begin.shape[0] - 1
     scratch, held, tail = work[:2], work[2], work[3]
     j, count, known = -1, 0, 0
@@ -431,15 +456,15 @@ def sample(tables, begin, modes, states, times, rows, piece, out, work, c):
             for i in range(n):
                 held[i], tail[i] = states[j, i], 0.0
         mode = modes[j]
-        cell = cells[mode]
+        cell = linear.cell[mode]
         time = times[t] - begin[j]
         while time - count * cell > cell:
-            leap(hop[mode], held, tail, scratch)
+            leap(linear.hop[mode], held, tail, scratch)
             count += 1
             known = 0
         unit = cell if cell < math.inf else 1.0
         if known == 0:
-            known = outputs(flow[mode], held, tail, rows[mode], unit, c, scratch)
+            known = outputs(linear.flow[mode], held, tail, rows[mode], unit, c, scratch)
         share = (time - count * cell if count else time) / unit
         piece[t] = j
         for r in range(rows.shape[1]):

@@ -9,10 +9,10 @@ import numpy as np
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Estimate
-from stickslip.solve.automaton import Array, System
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.poincare import carried, end_of, extent, lap, tables
 from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, System
 from stickslip.solve.tape import Tape
 from stickslip.solve.trajectory import Trajectory
 

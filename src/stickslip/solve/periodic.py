@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.solve.automaton import Array, System, exponential
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.orbit import SteadyState, alike
 from stickslip.solve.poincare import CLOSED, Table, closes, derivative, end_of, extent, lap, tables
 from stickslip.solve.self_excited import self_excited
 from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, System
 from stickslip.solve.tape import Tape
 from stickslip.solve.trajectory import Trajectory
 
@@ -192,9 +192,11 @@ def _repeats_freely(table: Table) -> bool:
     """Whether free motion in every slip mode repeats after one period of the drive: b = 1/2n without damping."""
     if isinstance(table, Tape):
         return False
+    from scipy.linalg import expm
+
     own = 2 * table.degrees
     free = [flow[:own, :own] for flow, mode in zip(table.flow, table.modes, strict=True) if mode.kind == "slip"]
-    turns = [exponential(flow, table.motion.period) for flow in free]
+    turns = [expm(flow * table.motion.period) for flow in free]
     return bool(turns) and all(np.allclose(turn, np.eye(own), rtol=0, atol=1e-9) for turn in turns)
 
 

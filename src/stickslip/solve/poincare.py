@@ -15,15 +15,15 @@ from stickslip.errors import ModelError
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import Array, Automaton, System, automaton
 from stickslip.solve.curved import CurvedTrajectory, run_curved
 from stickslip.solve.kernel import follow
 from stickslip.solve.simulate import run, stops_of
+from stickslip.solve.tables import Array, System, Tables, table_of
 from stickslip.solve.tangent import carry_tangents
 from stickslip.solve.tape import Tape, tape
 from stickslip.solve.trajectory import Trajectory
 
-Table = Automaton | Tape
+Table = Tables | Tape
 
 FINE = 1e-14  # tolerance of the runs that the map is made of
 STEP = 1e-4  # of the size of an entry of the state: what its neighbours are apart
@@ -35,7 +35,7 @@ CLOSED = 1e-12  # an orbit closes when it returns this close, relative to its ow
 def tables(system: System) -> Table:
     """The flat tables of a system."""
     if not (isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw)):
-        return automaton(system)
+        return table_of(system)
     if isinstance(system.law, TimeDelay):
         raise ModelError(
             "the law has a time lag",
@@ -67,7 +67,7 @@ def end_of(orbit: Trajectory) -> tuple[Array, int]:
         last[:physical] = orbit.sample([orbit.duration], ("state",))[0][:, 0]
         return last, mode if leaving < 0 else int(orbit.table.exits[1][leaving])  # type: ignore[attr-defined]
     end = orbit.states[-1].copy()
-    follow(table.tables, mode, end, float(orbit.durations[-1]), np.empty((3, len(last))))
+    follow(table.linear, mode, end, float(orbit.durations[-1]), np.empty((3, len(last))))
     if leaving >= 0:
         end, mode = table.reset[leaving] @ end, int(table.target[leaving])
     last[:physical] = end[:physical]
@@ -100,7 +100,7 @@ def derivative(orbit: Trajectory, after: int) -> tuple[Array, float]:
     size = len(table.names)
     tangents = np.eye(size)[:physical].copy()
     slowest = carry_tangents(
-        table.tables, table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
+        table.linear, table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
         np.empty((9, size)),
     )  # fmt: skip
     return tangents[:, :physical].T, slowest
@@ -116,7 +116,7 @@ def carried(orbit: Trajectory, after: int, difference: Array) -> Array:
     tangents = np.zeros((1, size))
     tangents[0, : len(difference)] = difference
     carry_tangents(
-        orbit.table.tables, orbit.table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
+        orbit.table.linear, orbit.table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
         np.empty((9, size)),
     )  # fmt: skip
     return tangents[0, : len(difference)]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stickslip.errors import SolveError
-from stickslip.solve.automaton import Array
+from stickslip.solve.tables import Array
 
 
 def named(names: Sequence[str], state: Array) -> str:

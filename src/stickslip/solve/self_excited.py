@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import SolveError
-from stickslip.solve.automaton import Array, System
 from stickslip.solve.autonomous import settled_cycle
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.orbit import SteadyState
 from stickslip.solve.poincare import Table, derivative, stretch
 from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, System
 from stickslip.solve.tape import Tape
 from stickslip.solve.trajectory import Trajectory
 

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import finite
@@ -16,9 +15,10 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
-from stickslip.solve.automaton import DEGREE, Array, Automaton, System, automaton
-from stickslip.solve.phasors import blank_past, fast_tables
+from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
+from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
+from stickslip.solve.tables import Array, System, Tables, table_of
 from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def simulate(
         raise ModelError(f"budget = {budget}", "a period has room for at least one event", "raise budget=")
     if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
         return _simulate_curved(system, (duration, cycles), start or {}, budget, rtol, progress)
-    table = automaton(system)
+    table = table_of(system)
     span = _end(system, table, duration, cycles)
     state, mode = opening(table, start or {})
     return run(system, table, state, mode, span=span, budget=budget, tell=paced(progress))
@@ -130,7 +130,7 @@ def paced(progress: Callable[[float], object] | None) -> Callable[[float], None]
     return tell
 
 
-def _end(system: System, table: Automaton, duration: float | None, cycles: float | None) -> tuple[float, float]:
+def _end(system: System, table: Tables, duration: float | None, cycles: float | None) -> tuple[float, float]:
     """The time to simulate, as full periods of the drive and a rest [s]."""
     if (duration is None) == (cycles is None):
         raise ModelError(f"duration = {duration}, cycles = {cycles}", "one of the two is given", "give one of them")
@@ -152,7 +152,7 @@ def _end(system: System, table: Automaton, duration: float | None, cycles: float
     return 0.0, given / system.frequency
 
 
-def opening(table: Automaton | Tape, start: Mapping[str, float | str]) -> tuple[Array, int]:
+def opening(table: Tables | Tape, start: Mapping[str, float | str]) -> tuple[Array, int]:
     """The state at time 0 and its mode, before any exit that is due at once."""
     state = np.zeros(len(table.names))
     state[table.names.index("1")] = 1.0
@@ -178,7 +178,7 @@ def opening(table: Automaton | Tape, start: Mapping[str, float | str]) -> tuple[
     return state, table.entry[int(np.sign(table.outputs["slip"] @ state)) + 1]
 
 
-def _require_fit(table: Automaton | Tape, state: Array, mode: int) -> None:
+def _require_fit(table: Tables | Tape, state: Array, mode: int) -> None:
     """Refuse the rigid contact of one mass that starts held while it slides, or slides against its mode."""
     part = table.modes[mode]
     slip = float(np.max(table.outputs["slip"] @ state)) if getattr(table, "degrees", 1) == 1 else 0.0
@@ -193,7 +193,7 @@ def _require_fit(table: Automaton | Tape, state: Array, mode: int) -> None:
 
 def run(
     system: System,
-    table: Automaton,
+    table: Tables,
     state: Array,
     mode: int,
     *,
@@ -208,30 +208,25 @@ def run(
     """
     laps, offset = span
     size = len(table.names)
-    work = np.zeros((16, max(size, DEGREE + 1)))
-    fast, past = fast_tables(table), blank_past()
-    clock, state = np.zeros(3), state.copy()
     period = table.motion.period
+    model, past, work = Model(table.linear, fast_tables(table), period), blank_past(), kernel.scratch(size)
+    clock, state = Clock(0.0, 0.0, 0.0), state.copy()
     total = offset + (laps * period if math.isfinite(period) else 0.0)
     scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
-    pieces = _Pieces(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
+    pieces = _Log(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
     try:
         for at, (signals, values) in stops_of(table, laps, offset):
             state[signals] = values
-            kernel.measure(table.tones, state, work[3], 1.0)
-            cell = min(table.cell[mode], total)
-            mode = kernel.settle(
-                table.tables, mode, state, work[3, :size], cell, work[:2, :size], *work[4:6, : DEGREE + 1]
-            )
+            mode = kernel.begin(model.linear, mode, state, total, 1.0, work)
             _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
             outcome = kernel.FULL
             while outcome == kernel.FULL:
-                before = clock.copy()
-                outcome, count, mode = kernel.march(
-                    table.tables, fast, clock, state, mode, at, period, past, pieces.room(), work, CELLS
+                before = clock
+                outcome, count, mode, clock = kernel.march(
+                    model, before, state, mode, Clock(float(at[0]), float(at[1]), 0.0), past, pieces.room(), work, CELLS
                 )
-                passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
+                passed = until(before, clock, period)
                 pieces.keep(count, passed, total)
                 _refuse(outcome, table, state, clock)
                 require_budget(
@@ -255,42 +250,42 @@ def run(
     return Trajectory(system, table, laps_, offsets, modes, durations, states, exits, total, status)
 
 
-class _Pieces:
+class _Log:
     """Room for the pieces of a run; grows by what the run so far foretells."""
 
     def __init__(self, size: int, room: int) -> None:
         self.count, self.passed, self.least = 0, 0.0, room
         self.columns = _columns(256, size)
 
-    def room(self) -> tuple[NDArray[Any], ...]:
+    def room(self) -> Pieces:
         """The part that is free, at most one chunk."""
-        return tuple(column[self.count : self.count + self.least] for column in self.columns)
+        return self.columns.part(self.count, self.count + self.least)
 
     def keep(self, count: int, passed: float, total: float) -> None:
         """Take the pieces just written, and make room for those to come."""
         self.count += count
         self.passed += passed
-        if self.count < len(self.columns[0]):
+        if self.count < len(self.columns.laps):
             return
         foretold = self.count * min(64.0, 1.05 * total / self.passed) if self.passed > 0 else 0.0
-        grown = _columns(max(int(foretold), self.count + self.least), self.columns[4].shape[1])
-        for new, old in zip(grown, self.columns, strict=True):
-            new[: self.count] = old[: self.count]
+        grown = _columns(max(int(foretold), self.count + self.least), self.columns.states.shape[1])
+        for name in Pieces._fields:
+            getattr(grown, name)[: self.count] = getattr(self.columns, name)[: self.count]
         self.columns = grown
 
-    def done(self) -> tuple[NDArray[Any], ...]:
+    def done(self) -> Pieces:
         """The pieces alone."""
-        return tuple(column[: self.count] for column in self.columns)
+        return self.columns.part(0, self.count)
 
 
-def _columns(room: int, size: int) -> tuple[NDArray[Any], ...]:
-    return (
+def _columns(room: int, size: int) -> Pieces:
+    return Pieces(
         np.empty(room, np.int32), np.empty(room), np.empty(room, np.int16), np.empty(room), np.empty((room, size)),
         np.empty(room, np.int16),
     )  # fmt: skip
 
 
-def stops_of(table: Automaton | Tape, laps: float, offset: float) -> Any:
+def stops_of(table: Tables | Tape, laps: float, offset: float) -> Any:
     """The times to which the march goes in turn, with the signals that take new values at each start."""
     knots, end = table.motion.knots, table.motion.end
     if offset > end * (1 + 1e-12):
@@ -306,12 +301,12 @@ def stops_of(table: Automaton | Tape, laps: float, offset: float) -> Any:
             yield (0.0, min(end, offset)), (places, row[1:])
 
 
-def _at_rest(table: Automaton, state: Array, mode: int) -> bool:
+def _at_rest(table: Tables, state: Array, mode: int) -> bool:
     return bool(np.all(table.flow[mode] @ state == 0.0))
 
 
-def _refuse(outcome: int, table: Automaton, state: Array, clock: Array) -> None:
-    place = f"lap {clock[0]:g}, {clock[1]:g} s, at {named(table.names[: table.physical], state)}"
+def _refuse(outcome: int, table: Tables, state: Array, clock: Clock) -> None:
+    place = f"lap {clock.laps:g}, {clock.time:g} s, at {named(table.names[: table.physical], state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
         raise chatter(place)
     if outcome == kernel.UNPROVED:

@@ -7,7 +7,7 @@ from stickslip.solve.kernel import follow, multiply
 
 
 @compiled(**OPTIONS)
-def carry_tangents(tables, leap, modes, states, durations, exits, after, tangents, work):
+def carry_tangents(linear, leap, modes, states, durations, exits, after, tangents, work):
     """Carry small differences of the state through pieces and the events between them.
 
     At an event the difference jumps by the saltation matrix R + (f' - R f) q / (q f), where f = A S before and
@@ -15,8 +15,9 @@ def carry_tangents(tables, leap, modes, states, durations, exits, after, tangent
 
     Parameters
     ----------
-    tables, leap
-        Of :class:`stickslip.solve.automaton.Automaton`.
+    linear : Linear
+    leap : ndarray (M, M, N, N)
+        Of :class:`stickslip.solve.tables.Tables`.
     modes, states, durations, exits : ndarray
         The pieces.
     after : int
@@ -32,20 +33,20 @@ def carry_tangents(tables, leap, modes, states, durations, exits, after, tangent
         Smallest speed of an exit through zero relative to its terms: near zero, the motion grazes and the derivative
         means nothing.
     """
-    flow, _, _, series, target, _, reset, _, _ = tables
+    flow, series, target, reset = linear.flow, linear.series, linear.target, linear.reset
     n = states.shape[1]
     least = 1.0
     scratch, end, begin, before, carried, fresh = work[:3], work[3], work[4], work[5], work[6], work[7]
     for j in range(modes.shape[0]):
         mode, e = modes[j], exits[j]
         for k in range(tangents.shape[0]):
-            follow(tables, mode, tangents[k], durations[j], scratch)
+            follow(linear, mode, tangents[k], durations[j], scratch)
         if e < 0:
             continue
         following = modes[j + 1] if j + 1 < modes.shape[0] else after
         for i in range(n):
             end[i] = states[j, i]
-        follow(tables, mode, end, durations[j], scratch)
+        follow(linear, mode, end, durations[j], scratch)
         multiply(reset[e], end, scratch[0])
         multiply(leap[target[e], following], scratch[0], begin)
         multiply(flow[mode], end, before)

@@ -17,7 +17,7 @@ from stickslip.errors import ModelError
 from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
 from stickslip.oscillator import Oscillator
 from stickslip.solve import taylor
-from stickslip.solve.automaton import by_value
+from stickslip.solve.tables import by_value
 
 Array = NDArray[np.float64]
 Form = tuple[dict[int, float], float]  # weights of nodes, and a constant

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import SolveError
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
-from stickslip.solve.automaton import DEGREE, Array, Automaton, System
 from stickslip.solve.kernel import sample
+from stickslip.solve.tables import DEGREE, Array, System, Tables
 
 UNITS = {
     "x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N",
@@ -52,7 +52,7 @@ class Trajectory:
     ----------
     system : Oscillator or Structure
         What moved.
-    table : Automaton
+    table : Tables
         Its flat mode tables.
     laps, offsets : ndarray (n,)
         Start of each piece: full periods of the drive, and time [s] within the period. Kept apart, so that long runs
@@ -72,7 +72,7 @@ class Trajectory:
     """
 
     system: System
-    table: Automaton
+    table: Tables
     laps: NDArray[np.int32]
     offsets: Array
     modes: NDArray[np.int16]
@@ -216,7 +216,7 @@ class Trajectory:
         rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
         out, piece = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
         work, c = np.empty((4, self.states.shape[1])), np.empty((len(out), DEGREE + 1))
-        sample(self.table.tables, self.starts, self.modes, self.states, times, rows, piece, out, work, c)
+        sample(self.table.linear, self.starts, self.modes, self.states, times, rows, piece, out, work, c)
         return out, piece
 
     @property
@@ -263,7 +263,7 @@ class Trajectory:
         if name == "a":
             return table.flow[:, degrees : 2 * degrees]
         if name == "friction":
-            return table.friction.reshape(count, -1, size)
+            return table.friction
         if name in table.outputs:
             forms = np.atleast_2d(table.outputs[name])
             return np.broadcast_to(forms, (count, *forms.shape[-2:]))

@@ -32,8 +32,8 @@ def run_block(
     found: Arrays = {name: np.full(len(points), v.fill, v.dtype) for name, v in plan.variables.items()}
     left = set(range(len(points)))
     logs: list[list[Any]] = []
-    for rows, fleet, known in crowds(plan, number):
-        values = known if fleet is None else watched(plan, fleet, known, watch)
+    for rows, systems, known in crowds(plan, number):
+        values = known if systems is None else watched(plan, systems, known, watch)
         for name in found.keys() & values.keys():
             found[name][rows] = values[name]
         left -= set(rows.tolist())

@@ -12,25 +12,49 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
-from stickslip.solve.automaton import DEGREE, Array, by_value, leaps_between
-from stickslip.solve.fleet import Fleet, Tables, fleet_tables, kind_of_drive, kind_of_law, opened
+from stickslip.solve.batch import pasts
+from stickslip.solve.glide import Model, Pieces
+from stickslip.solve.kernel import scratch
+from stickslip.solve.phasors import phasors_of
+from stickslip.solve.tables import (
+    Array,
+    Systems,
+    Tables,
+    by_value,
+    kind_of_drive,
+    kind_of_law,
+    opened,
+    oscillators,
+    tables_of,
+)
 from stickslip.sweeps import tally as log
 from stickslip.sweeps.grid import START
 from stickslip.sweeps.measures import FAILED, LOG, NO_SYSTEM, ORDERS
 from stickslip.sweeps.plan import BLOCK, Arrays, Plan
-from stickslip.sweeps.watch import CONSTANT, LAP, MARK, ROOM, VARIES, repeats, watch_all
+from stickslip.sweeps.watch import (
+    CONSTANT,
+    MARK,
+    ROOM,
+    VARIES,
+    Counted,
+    Given,
+    Look,
+    Rooms,
+    repeats,
+    watch_all,
+)
 
 Index = NDArray[np.int64]
-Watch = Callable[[Any, Any, int, int], None]  # march what is given into what is left; modes and physical entries
+Watch = Callable[[Given, Counted, int, int], None]  # march what is given into what is left; modes and physical entries
 KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
 PARTS = ("law", "drive")
 PATHS = {"micro_slips", "transition_speed", "energy"}  # measures of how far and how fast the contact slips
 
 
-def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[str, Any]]]:
-    """The fleets of a block: which of its points, the fleet, and the start by name.
+def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Systems | None, dict[str, Any]]]:
+    """The systems of one kind in a block: which of its points, the systems, and the start by name.
 
-    Points with no system come with the status of it and without a fleet; those that only a run on its own can tell
+    Points with no system come with the status of it and without systems; those that only a run on its own can tell
     of come not at all.
     """
     named = {f"{START}{name}" for name in plan.start} | {name for axis in plan.axes for name in axis.names}
@@ -51,12 +75,12 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Fleet | None, dict[
         rows = np.flatnonzero(np.all(which == pair[:, None], axis=0))
         used, its = np.unique(law[rows], return_inverse=True)
         moved, whose = np.unique(drive[rows], return_inverse=True)
-        mass, stiffness, damping, base = values[own[rows]].T
-        fleet = Fleet(
-            tuple(laws[j].law for j in used), tuple(drives[j].drive for j in moved), its, whose,
-            mass, stiffness, damping, base == 1.0,
+        *numbers, base = values[own[rows]].T
+        systems = oscillators(
+            [laws[j].law for j in used], its, [drives[j].drive for j in moved], whose, numbers=np.array(numbers),
+            on_base=base == 1.0,
         )  # fmt: skip
-        yield rows, fleet, {**plan.start, **_starts(plan, steps[rows])}
+        yield rows, systems, {**plan.start, **_starts(plan, steps[rows])}
 
 
 def _numbers(kinds: Sequence[Any]) -> Index:
@@ -114,72 +138,70 @@ def _starts(plan: Plan, steps: Index) -> dict[str, Array]:
     }
 
 
-def watched(plan: Plan, fleet: Fleet, start: Mapping[str, Any], watch: Watch) -> Arrays:
-    """The measures of a fleet."""
-    table = fleet_tables(fleet)
+def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch) -> Arrays:
+    """The measures of systems of one kind."""
+    table = tables_of(systems)
     asked = {measure for measure in plan.measures if isinstance(measure, str)}
     states, modes = opened(table, start)
     count, physical = len(states), table.physical
     driven = bool(np.all(np.isfinite(table.period)))
-    natural = np.sqrt(fleet.stiffness / fleet.mass)
+    natural = np.sqrt(systems.stiffness / systems.mass)[:, 0, 0]
     with np.errstate(divide="ignore"):
         units = np.where(np.isfinite(table.period), table.period, 2 * np.pi / natural)
         rest = np.where(natural > 0, 1 / natural, table.period)
     tangents = asked & {"multipliers", "lyapunov"}
     grown, turned = driven and "lyapunov" in asked, driven and "multipliers" in asked
     rows = min(2 * ORDERS, plan.cycles) if driven and asked & {"period", "multipliers"} else 0
-    leaps = leaps_between(table.first, table.target, table.reset) if tangents else np.zeros((count, 1, 1, 1, 1))
+    leaps = table.leap if tangents else np.zeros((count, 1, 1, 1, 1))
     weights = np.ones((count, physical))
     weights[:, 1] = rest
-    wants = np.array([plan.settle, plan.cycles, grown, turned], dtype=np.int64)
-    look = _look(table, asked)
-    given = (states, modes, table.period, units, table.arrays, table.phasors.tables, look, wants, leaps, weights)
-    out = (
+    wants = np.array([plan.settle, plan.cycles, grown, turned, physical, bool(asked & PATHS)], dtype=np.int64)
+    models = Model(table.linear, phasors_of(table), table.period)
+    given = Given(states, modes, units, models, _look(table, asked), wants, leaps, weights)
+    out = Counted(
         np.full(count, FAILED, np.int64), np.zeros((count, log.ENTRIES)), np.zeros((count, rows, physical)),
         np.zeros(count), np.full((count, physical, physical), np.nan),
     )  # fmt: skip
     watch(given, out, states.shape[1], physical)
     found = _answers(plan, out, units, table.period)
-    lost = out[0] == FAILED
+    lost = out.statuses == FAILED
     for name, values in found.items():
         values[lost] = plan.variables[name].fill if name in plan.variables else 0
-    return {"status": out[0], **found}
+    return {"status": out.statuses, **found}
 
 
-def _look(table: Tables, asked: set[str]) -> tuple[NDArray[Any], ...]:
-    """What the watch looks at in each mode: kind, side, whether the mass may turn within, what friction does there,
-    whether nothing moves; slip, displacement from the counter-face and friction as linear forms; the entry of the
-    constant, and whether it matters how far the contact slips."""
+def _look(table: Tables, asked: set[str]) -> Look:
+    """What the watch looks at."""
     fixed = np.arange(len(table.names)) != 0
-    still_face = not np.any(table.gap[:, fixed])
+    gap = np.eye(len(table.names))[0] - table.outputs["face"]  # of the mass from the counter-face
+    still_face = not np.any(gap[:, fixed])
     inner, works, still = [], [], []
     for j, mode in enumerate(table.modes):
         rests = not np.any(table.flow[:, j, : table.physical])
         quantities = table.series[:, table.first[j] : table.first[j + 1], 0]
         stops = np.any(np.all(np.delete(quantities, 1, axis=2) == 0, axis=(0, 2))) and still_face
-        constant = not np.any(np.delete(table.friction[:, j], table.physical, axis=1))
+        constant = not np.any(np.delete(table.friction[:, j, 0], table.physical, axis=1))
         inner.append("amplitude" in asked and not rests and not stops)
         works.append(0 if "energy" not in asked or mode.friction is None else CONSTANT if constant else VARIES)
         still.append(rests)
     kinds = [KINDS.get(mode.kind, log.SLIP) for mode in table.modes]
-    return (
+    return Look(
         np.array(kinds, dtype=np.int64), np.array([float(mode.side) for mode in table.modes]), np.array(inner),
-        np.array(works, dtype=np.int64), np.array(still), table.slip, table.gap, table.friction,
-        np.array([table.physical, bool(asked & PATHS)]),
+        np.array(works, dtype=np.int64), np.array(still), table.outputs["slip"], gap,
+        np.ascontiguousarray(table.friction[:, :, 0]),
     )  # fmt: skip
 
 
-def _answers(plan: Plan, out: Sequence[NDArray[Any]], units: Array, period: Array) -> Arrays:
+def _answers(plan: Plan, out: Counted, units: Array, period: Array) -> Arrays:
     """The variables from what was counted."""
-    _, sums, sections, growths, jacobians = out
-    cycles = plan.cycles
+    sums, sections, jacobians, cycles = out.sums, out.sections, out.jacobians, plan.cycles
     with np.errstate(invalid="ignore"):
         found = {
             "normal_stops": sums[:, log.NORMAL] / cycles, "abnormal_stops": sums[:, log.ABNORMAL] / cycles,
             "stick_share": sums[:, log.HELD] / (units * cycles), "micro_slips": sums[:, log.SHORT] / cycles,
             "transition_speed": np.where(sums[:, log.FASTEST] > 0, sums[:, log.FASTEST], np.nan),
             "amplitude": sums[:, log.REACH], "energy": sums[:, log.WORK] / cycles,
-            "lyapunov": np.where(np.isfinite(period), growths / (units * cycles), np.nan),
+            "lyapunov": np.where(np.isfinite(period), out.growths / (units * cycles), np.nan),
         }  # fmt: skip
     found["order"] = np.zeros(len(sums))
     if sections.shape[1]:
@@ -193,16 +215,16 @@ def _answers(plan: Plan, out: Sequence[NDArray[Any]], units: Array, period: Arra
     return found
 
 
-def on_cpu(given: Any, out: Any, size: int, physical: int) -> None:
+def on_cpu(given: Given, out: Counted, size: int, physical: int) -> None:
     """One motion after another, in one scratch."""
-    watch_all(given, out, scratch(1, size, physical))
+    watch_all(given, out, rooms(1, size, physical))
 
 
-def scratch(rows: int, size: int, physical: int) -> Any:
+def rooms(count: int, size: int, physical: int) -> Rooms:
     """Room for what so many motions need while they are marched."""
-    wide = max(size, DEGREE + 1, 16)
-    room = (np.zeros((rows, ROOM), np.int32), np.zeros((rows, ROOM)), np.zeros((rows, ROOM), np.int16),
-            np.zeros((rows, ROOM)), np.zeros((rows, ROOM, size)), np.zeros((rows, ROOM), np.int16))  # fmt: skip
-    return (np.zeros((rows, 17, wide)), np.zeros((2, rows, LAP), np.int64), np.zeros((rows, LAP)),
-            np.zeros((rows, LAP), np.int64), np.zeros((rows, 3), np.int64), np.zeros((rows, 3)), room,
-            np.zeros((rows, physical, size)), np.zeros((rows, 4, max(size + MARK + 1, log.ENTRIES))))  # fmt: skip
+    pieces = Pieces(
+        np.zeros((count, ROOM), np.int32), np.zeros((count, ROOM)), np.zeros((count, ROOM), np.int16),
+        np.zeros((count, ROOM)), np.zeros((count, ROOM, size)), np.zeros((count, ROOM), np.int16),
+    )  # fmt: skip
+    return Rooms(np.zeros((count, *scratch(size, 17).shape)), pasts(count), pieces, np.zeros((count, physical, size)),
+                 np.zeros((count, 4, max(size + MARK + 1, log.ENTRIES))))  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any
 
 from stickslip.errors import ModelError
 from stickslip.sweeps.block import run_block
-from stickslip.sweeps.crowd import scratch
+from stickslip.sweeps.crowd import rooms
 from stickslip.sweeps.measures import LOG
 from stickslip.sweeps.plan import Keep, Plan
 
@@ -43,11 +43,11 @@ def cuda(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = N
     def watch(given: Any, out: Any, size: int, physical: int) -> None:
         with driven(INSTEAD):
             written = carried(out)
-            each[math.ceil(len(given[0]) / THREADS), THREADS](
-                carried(given), written, carried(scratch(len(given[0]), size, physical))
+            each[math.ceil(len(given.states) / THREADS), THREADS](
+                carried(given), written, carried(rooms(len(given.states), size, physical))
             )
-            for array, found in zip(out, written, strict=True):
-                array[...] = found.copy_to_host()
+            for name in out._fields:
+                getattr(out, name)[...] = getattr(written, name).copy_to_host()
 
     for number in numbers:
         keep(number, *run_block(plan, number, watch, alone=_refused))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.parameters import UNITS, changed, find, places
-from stickslip.solve.automaton import System
+from stickslip.solve.tables import System
 
 MOST = 10_000_000  # values along an axis; more fit no memory
 START = "start."  # before the name of an entry of the start: "start.x", "start.mode"

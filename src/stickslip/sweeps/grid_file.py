@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 
 from stickslip.errors import ModelError, RecordError
 from stickslip.settings import STRICT, checked, line_of, read_toml
-from stickslip.solve.automaton import System
+from stickslip.solve.tables import System
 from stickslip.sweeps.grid import MOST, unit
 from stickslip.system_file import Case, read_system, scenario_case
 from stickslip.units import parse_value

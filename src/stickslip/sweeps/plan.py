@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from stickslip import __version__
 from stickslip.errors import ModelError
-from stickslip.solve.automaton import System
+from stickslip.solve.tables import System
 from stickslip.sweeps.grid import Axis, coordinates, placed
 from stickslip.sweeps.measures import Measure, Variable, own_name, variables
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.solve.automaton import System
+from stickslip.solve.tables import System
 from stickslip.sweeps.grid import START, read_grid, unit
 from stickslip.sweeps.measures import COUNTS, NO_SYSTEM, STATUS, variables
 from stickslip.sweeps.plan import required

@@ -15,11 +15,11 @@ import numpy as np
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
-from stickslip.solve.automaton import System
 from stickslip.solve.lyapunov import BATCHES
 from stickslip.solve.poincare import tables
 from stickslip.solve.refusal import Endless
 from stickslip.solve.simulate import opening, simulate
+from stickslip.solve.tables import System
 from stickslip.structure import Structure
 from stickslip.sweeps.engines import read_engine
 from stickslip.sweeps.grid import Grid, apart, read_grid

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.solve.automaton import Array, Automaton, System
 from stickslip.solve.lyapunov import lyapunov
 from stickslip.solve.poincare import derivative, end_of, lap, tables
+from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.sweeps import tally as log
 from stickslip.sweeps.measures import AT_REST, EVENTS, MOVING, ORDERS, own_name
@@ -136,7 +136,7 @@ def order(run: Trajectory, settle: int) -> int:
 def outcome(run: Trajectory) -> int:
     """Whether the run still moves at its end: not where it is held through a whole period of the drive, or for good."""
     table, mode = run.table, int(run.modes[-1])
-    still = not np.any(table.flow[mode][: table.physical]) if isinstance(table, Automaton) else False
+    still = not np.any(table.flow[mode][: table.physical]) if isinstance(table, Tables) else False
     held = still and math.isfinite(table.motion.period) and run.durations[-1] >= (1 - 1e-9) * table.motion.period
     return AT_REST if held or run.status == "at rest" else MOVING
 

@@ -8,18 +8,22 @@ through the laps in which it only repeats: they are skipped, and counted as the 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from stickslip.compiled import OPTIONS, compiled
-from stickslip.solve.batch import fast_of, slow_of
-from stickslip.solve.kernel import DONE, FULL, advance, follow, march, measure, set_tones, settle
+from stickslip.solve.batch import LAP, TIRELESS, model_of, past_of
+from stickslip.solve.glide import Clock, Model, Past, Pieces
+from stickslip.solve.kernel import DONE, FULL, advance, begin, follow, march, set_tones
+from stickslip.solve.tables import Array
 from stickslip.solve.tangent import carry_tangents
 from stickslip.sweeps.measures import AT_REST, CLOSE, FAILED, MOVING, ORDERS
 from stickslip.sweeps.tally import ABNORMAL, ENTRIES, HELD, NORMAL, REACH, SHORT, SLIP, WORK, note
 
 ROOM = 16  # pieces written before they are counted
-LAP = 64  # pieces remembered for the fast path, a power of two
 BUDGET = 10_000  # events in a period; more is taken for chatter
-TIRELESS = 2**62
 PARTS = 256  # steps of a run, a lap each where it is short: what moves less than STILL in a step or more is steady,
 STILL = 4e-15  # and would not move by more than PARTS times as much, some 1e-12, in the rest
 STEPS = 4  # after which a mark is made anew
@@ -39,109 +43,172 @@ WEIGHTS = (
 )  # fmt: skip
 
 
+class Look(NamedTuple):
+    """What is looked at: of each mode its kind, side, whether the mass may turn within, what friction does there and
+    whether nothing moves; of each motion slip, displacement from the counter-face and, by mode, friction as linear
+    forms."""
+
+    kinds: NDArray[np.int64]
+    sides: Array
+    inner: NDArray[np.bool_]
+    works: NDArray[np.int64]
+    still: NDArray[np.bool_]
+    slip: Array
+    gap: Array
+    friction: Array
+
+
+class Given(NamedTuple):
+    """What a watch is asked: of each motion its state and mode at the start, unit of time [s] and what moves, with a
+    leading axis; what is looked at and wanted; what carries tangents, and what each entry is measured by."""
+
+    states: Array
+    modes: NDArray[np.int64]
+    units: Array
+    models: Model
+    look: Look
+    wants: NDArray[np.int64]
+    leaps: Array
+    weights: Array
+
+
+SETTLE, CYCLES, GROWTH, TURNS, ONE, PATHS = range(6)  # wants: periods before and while it is counted, exponents,
+# multipliers, the entry that is constant, and whether it matters how far the contact slips
+
+
+class Counted(NamedTuple):
+    """What a watch leaves of each motion: status, sums, states at phase zero, growth of a small difference, derivative
+    over the laps after which it repeats."""
+
+    statuses: NDArray[np.int64]
+    sums: Array
+    sections: Array
+    growths: Array
+    jacobians: Array
+
+
+class Rooms(NamedTuple):
+    """Scratch of each motion that is under way, with a leading axis."""
+
+    works: Array
+    pasts: Past
+    pieces: Pieces
+    tangents: Array
+    marks: Array
+
+
+class Motion(NamedTuple):
+    """One motion under way."""
+
+    model: Model
+    state: Array
+    unit: float
+    past: Past
+    pieces: Pieces
+    work: Array
+    marks: Array
+
+
 @compiled(**OPTIONS)
-def watch_one(i, s, given, out, scratch):
+def watch_one(i, s, given, out, rooms):
     """March motion i with scratch s, and leave its status, what is counted, and its last states at phase zero."""
-    opened, modes, periods, units, slow, fast, look, wants, leaps, weights = given
-    statuses, sums, sections, growths, jacobians = out
-    works, names, times, parts, rings, clocks, room, tangents, marks = scratch
-    n, physical, period = opened.shape[1], sections.shape[2], periods[i]
-    state, work = works[s, 16, :n], works[s]
-    past = (names[0, s], names[1, s], times[s], parts[s], rings[s])
-    pieces = (room[0][s], room[1][s], room[2][s], room[3][s], room[4][s], room[5][s])
-    motion = (slow_of(slow, i), fast_of(fast, i), clocks[s], state, period, units[i], past, pieces, work, marks[s])
-    settled, total, rows = wants[0], wants[0] + wants[1], sections.shape[1]
-    each, driven = wants[2] == 1, math.isfinite(period)
-    mode = _begin(motion, opened[i], modes[i], total)
-    tangent = tangents[s, :1]
+    n, physical, wants = given.states.shape[1], out.sections.shape[2], given.wants
+    room, marks, tangents = rooms.pieces, rooms.marks[s], rooms.tangents[s]
+    pieces = Pieces(room.laps[s], room.offsets[s], room.modes[s], room.durations[s], room.states[s], room.exits[s])
+    state, model = rooms.works[s, 16, :n], model_of(given.models, i)
+    motion = Motion(model, state, given.units[i], past_of(rooms.pasts, s), pieces, rooms.works[s], marks)
+    settled, total, rows = wants[SETTLE], wants[SETTLE] + wants[CYCLES], out.sections.shape[1]
+    each, driven = wants[GROWTH] == 1, math.isfinite(model.period)
+    mode, clock = _begin(motion, given.states[i], given.modes[i], total), Clock(0.0, 0.0, 0.0)
+    tangent = tangents[:1]
     for k in range(n):
-        tangent[0, k] = (1.0 - 0.5 * k / max(1, physical - 1)) / weights[i, k] if k < physical else 0.0
-    growths[i] = 0.0
-    _unmarked(marks[s], math.ceil(total / PARTS) if driven and not each else 0.0)
+        tangent[0, k] = (1.0 - 0.5 * k / max(1, physical - 1)) / given.weights[i, k] if k < physical else 0.0
+    out.growths[i] = 0.0
+    _unmarked(marks, math.ceil(total / PARTS) if driven and not each else 0.0)
     lap, last, lasted = 0, 0, 0.0
     while lap < total and mode >= 0:
         until = total - max(0, rows - 1)
         if each or lap >= until:
             until = lap + 1
-        mode, last, lasted = _to(i, lap, until, motion, mode, settled, look, each, leaps, tangent, sums[i])
+        mode, last, lasted, clock = _to(i, lap, until, motion, mode, clock, given, tangent, out.sums[i])
         lap = until
-        if each and mode >= 0 and not _grown(i, tangent[0], weights, lap > settled, growths):
+        if each and mode >= 0 and not _grown(i, tangent[0], given.weights, lap > settled, out.growths):
             break
         if lap > total - rows:
             for k in range(physical):
-                sections[i, lap - (total - rows) - 1, k] = state[k]
+                out.sections[i, lap - (total - rows) - 1, k] = state[k]
     if driven:
-        rests = look[4][last] and lasted >= (1.0 - 1e-9) * period
+        rests = given.look.still[last] and lasted >= (1.0 - 1e-9) * model.period
     else:
-        rests = mode >= 0 and _stands(motion[0][0][mode], state)
-    statuses[i] = FAILED if mode < 0 else AT_REST if rests else MOVING
-    if mode >= 0 and wants[3] == 1:
-        _differentiate(i, total, motion, mode, leaps, tangents[s], sections[i], jacobians[i])
+        rests = mode >= 0 and _stands(model.linear.flow[mode], state)
+    out.statuses[i] = FAILED if mode < 0 else AT_REST if rests else MOVING
+    if mode >= 0 and wants[TURNS] == 1:
+        _differentiate(i, total, motion, mode, given.leaps, tangents, out.sections[i], out.jacobians[i])
 
 
 @compiled(**OPTIONS)
 def _begin(motion, opened, mode, total):
     """Set the state and forget the motion before; the mode in which time passes, -1 where there is none."""
-    tables, _, clock, state, _, unit, past, _, work, _ = motion
-    n, degree = state.shape[0], tables[3].shape[1]
-    for k in range(n):
-        state[k] = opened[k]
+    past = motion.past
+    for k in range(motion.state.shape[0]):
+        motion.state[k] = opened[k]
     for k in range(LAP):
-        past[0][k], past[1][k], past[2][k], past[3][k] = -1, -1, 0.0, 1
+        past.modes[k], past.exits[k], past.times[k], past.parts[k] = -1, -1, 0.0, 1
     for k in range(3):
-        clock[k], past[4][k] = 0.0, 0
-    measure(tables[8], state, work[3], 0.0)
-    cell = min(tables[1][mode], total * unit)
-    return settle(tables, mode, state, work[3, :n], cell, work[:2, :n], work[4, :degree], work[5, :degree])
+        past.places[k] = 0
+    return begin(motion.model.linear, mode, motion.state, total * motion.unit, 0.0, motion.work)
 
 
 @compiled(**OPTIONS)
-def _to(i, lap, until, motion, mode, settled, look, each, leaps, tangent, sums):
-    """March to a lap and count; the mode there (-1: the march failed), that of the last piece, and how long it lasted
-    where nothing ended it."""
-    tables, quick, clock, state, period, unit, past, pieces, work, marks = motion
-    driven = math.isfinite(period)
-    limit = (float(until), 0.0) if driven else (0.0, until * unit)
+def _to(i, lap, until, motion, mode, clock, given, tangent, sums):
+    """March to a lap and count; the mode there (-1: the march failed), that of the last piece, how long it lasted
+    where nothing ended it, and the clock."""
+    model, pieces, marks, settled = motion.model, motion.pieces, motion.marks, given.wants[SETTLE]
+    limit = Clock(float(until), 0.0, 0.0) if math.isfinite(model.period) else Clock(0.0, until * motion.unit, 0.0)
     outcome, events, last, lasted = FULL, 0, mode, 0.0
     while outcome == FULL:
-        outcome, count, mode = march(tables, quick, clock, state, mode, limit, period, past, pieces, work, TIRELESS)
+        outcome, count, mode, clock = march(
+            model, clock, motion.state, mode, limit, motion.past, pieces, motion.work, TIRELESS
+        )
         events += count
-        if (outcome != FULL and outcome != DONE) or not math.isfinite(state[0]) or events > BUDGET * (until - lap):
-            return -1, last, 0.0
+        if outcome != FULL and outcome != DONE:
+            return -1, last, 0.0, clock
+        if not math.isfinite(motion.state[0]) or events > BUDGET * (until - lap):
+            return -1, last, 0.0, clock
         if count > 0:
-            last, lasted = pieces[2][count - 1], pieces[3][count - 1] if pieces[5][count - 1] < 0 else 0.0
-        _count(i, count, motion, settled, look, sums)
+            last, lasted = pieces.modes[count - 1], pieces.durations[count - 1] if pieces.exits[count - 1] < 0 else 0.0
+        _count(i, count, motion, clock, settled, given, sums)
         if marks[0, SPAN] > 0.0 and outcome == FULL:
-            _skip(clock, marks, settled, until, sums)
-        if each:
-            _carry(i, count, motion, mode, leaps, tangent)
-    return mode, last, lasted
+            clock = _skip(clock, marks, settled, until, sums)
+        if given.wants[GROWTH] == 1:
+            _carry(i, count, motion, mode, given.leaps, tangent)
+    return mode, last, lasted, clock
 
 
 @compiled(**OPTIONS)
 def _carry(i, count, motion, mode, leaps, tangents):
     """Carry small differences through the pieces just written."""
-    tables, pieces, work = motion[0], motion[7], motion[8]
+    linear, pieces = motion.model.linear, motion.pieces
     for p in range(count):
-        set_tones(tables[8], pieces[4][p], pieces[1][p])
+        set_tones(linear.tones, pieces.states[p], pieces.offsets[p])
     carry_tangents(
-        tables, leaps[i], pieces[2][:count], pieces[4][:count], pieces[3][:count], pieces[5][:count], mode, tangents,
-        work[7:16, : motion[3].shape[0]],
+        linear, leaps[i], pieces.modes[:count], pieces.states[:count], pieces.durations[:count], pieces.exits[:count],
+        mode, tangents, motion.work[7:16, : motion.state.shape[0]],
     )  # fmt: skip
 
 
 @compiled(**OPTIONS)
 def _differentiate(i, total, motion, mode, leaps, tangents, section, jacobian):
     """The derivative of the motion over the laps after which it repeats, where it does."""
-    tables, quick, clock, state, period, _, past, pieces, work, _ = motion
     physical, order, outcome = jacobian.shape[0], repeats(section), FULL
     for a in range(physical):
-        for k in range(state.shape[0]):
+        for k in range(motion.state.shape[0]):
             tangents[a, k] = 1.0 if a == k else 0.0
-    clock[0], clock[1], clock[2] = float(total), 0.0, 0.0
-    limit = (float(total + order), 0.0)
+    clock, limit = Clock(float(total), 0.0, 0.0), Clock(float(total + order), 0.0, 0.0)
     while outcome == FULL and order > 0:
-        outcome, count, mode = march(tables, quick, clock, state, mode, limit, period, past, pieces, work, TIRELESS)
+        outcome, count, mode, clock = march(
+            motion.model, clock, motion.state, mode, limit, motion.past, motion.pieces, motion.work, TIRELESS
+        )
         _carry(i, count, motion, mode, leaps, tangents)
     for a in range(physical):
         for k in range(physical):
@@ -210,43 +277,45 @@ def _read(row, state, tones, time):
 
 
 @compiled(**OPTIONS)
-def _count(i, count, motion, settled, look, sums):
+def _count(i, count, motion, clock, settled, given, sums):
     """Count the pieces just written."""
-    tables, _, clock, state, period, unit, _, pieces, work, marks = motion
-    laps, offsets, modes, durations, states, _ = pieces
-    kinds, sides, inner, works, _, slip, gap, friction, fixed = look
-    paths = fixed[1] == 1
-    n, tones = state.shape[0], tables[8]
-    held = work[6, :n]
+    linear, period, state, unit, pieces = (
+        motion.model.linear, motion.model.period, motion.state, motion.unit, motion.pieces,
+    )  # fmt: skip
+    look, paths, one = given.look, given.wants[PATHS] == 1, given.wants[ONE]
+    n, tones = state.shape[0], linear.tones
+    held = motion.work[6, :n]
     if count == 0:
         return
-    place, after, speed = _read(gap[i], states[0], tones, offsets[0]) if paths else 0.0, 0.0, 0.0
+    place, after, speed = _read(look.gap[i], pieces.states[0], tones, pieces.offsets[0]) if paths else 0.0, 0.0, 0.0
     for p in range(count):
-        m, length = modes[p], durations[p]
-        if laps[p] >= marks[0, NEXT]:
-            _mark(laps[p], offsets[p] / period, m, states[p], tones, settled, sums, marks)
-        begin = (laps[p] - settled) * period + offsets[p] if math.isfinite(period) else offsets[p] - settled * unit
+        m, length, lap, offset = pieces.modes[p], pieces.durations[p], pieces.laps[p], pieces.offsets[p]
+        if lap >= motion.marks[0, NEXT]:
+            _mark(lap, offset / period, m, pieces.states[p], tones, settled, sums, motion.marks)
+        begun = (lap - settled) * period + offset if math.isfinite(period) else offset - settled * unit
         last = p == count - 1
-        x = state[0] if last else states[p + 1, 0]
+        x = state[0] if last else pieces.states[p + 1, 0]
         if paths:
-            follows, then = (state, clock[1]) if last else (states[p + 1], offsets[p + 1])
-            after = _read(gap[i], follows, tones, then)
-            speed = abs(_read(slip[i], states[p], tones, offsets[p])) if kinds[m] == SLIP else 0.0
-        note(kinds[m], sides[m], begin, length, abs(after - place), speed, sums)
-        if begin + length > 0.0:
-            first, span = begin >= 0.0, min(length, begin + length)
-            if inner[m] or works[m] == VARIES or not first:
+            follows, then = (state, clock.time) if last else (pieces.states[p + 1], pieces.offsets[p + 1])
+            after = _read(look.gap[i], follows, tones, then)
+            speed = abs(_read(look.slip[i], pieces.states[p], tones, offset)) if look.kinds[m] == SLIP else 0.0
+        note(look.kinds[m], look.sides[m], begun, length, abs(after - place), speed, sums)
+        if begun + length > 0.0:
+            first, span = begun >= 0.0, min(length, begun + length)
+            varies = look.works[m] == VARIES
+            if look.inner[m] or varies or not first:
                 for k in range(n):
-                    held[k] = states[p, k]
-                set_tones(tones, held, offsets[p])
+                    held[k] = pieces.states[p, k]
+                set_tones(tones, held, offset)
                 if not first:
-                    follow(tables, m, held, -begin, work[7:10, :n])
-                    place = _read(gap[i], held, tones, offsets[p] - begin)
-            sums[REACH] = max(sums[REACH], abs(x), abs(states[p, 0] if first else held[0]))
-            if works[m] == CONSTANT:
-                sums[WORK] += friction[i, m, fixed[0]] * (after - place)
-            if inner[m] or works[m] == VARIES:
-                _inside(tables, m, held, span, inner[m], works[m] == VARIES, friction[i, m], slip[i], sums, work)
+                    follow(linear, m, held, -begun, motion.work[7:10, :n])
+                    place = _read(look.gap[i], held, tones, offset - begun)
+            sums[REACH] = max(sums[REACH], abs(x), abs(pieces.states[p, 0] if first else held[0]))
+            if look.works[m] == CONSTANT:
+                sums[WORK] += look.friction[i, m, one] * (after - place)
+            if look.inner[m] or varies:
+                friction, slip = look.friction[i, m], look.slip[i]
+                _inside(linear, m, held, span, look.inner[m], varies, friction, slip, sums, motion.work)
         place = after
 
 
@@ -285,24 +354,24 @@ def _mark(lap, place, mode, state, tones, settled, sums, marks):
 
 @compiled(**OPTIONS)
 def _skip(clock, marks, settled, until, sums):
-    """Leave out the laps in which a motion repeats: all but the last that is not measured, or the last."""
+    """Leave out the laps in which a motion repeats: all but the last that is not measured, or the last. The clock."""
     here, gains = marks[0], marks[3]
     span, measured = here[SPAN], here[BEGUN] >= settled
     end = until if measured else min(settled, until)
-    times = max(0.0, math.floor((end - 1.0 - clock[0]) / span))
+    times = max(0.0, math.floor((end - 1.0 - clock.laps) / span))
     if measured:
         for k in (NORMAL, ABNORMAL, HELD, SHORT, WORK):
             sums[k] += times * gains[k]
-    clock[0] += times * span
     here[BEGUN], here[NEXT], here[SPAN] = -1.0, end, 0.0
+    return Clock(clock.laps + times * span, clock.time, clock.rest)
 
 
 @compiled(**OPTIONS)
-def _inside(tables, mode, held, span, turns, varies, friction, slip, sums, work):
+def _inside(linear, mode, held, span, turns, varies, friction, slip, sums, work):
     """The farthest turn within a piece, and the work of a friction that changes in it, cell by cell."""
-    flow, n = tables[0][mode], held.shape[0]
+    flow, n = linear.flow[mode], held.shape[0]
     scratch, here, tail = work[7:9, :n], work[9, :n], work[10, :n]
-    steps = 1 + int(2.0 * span / tables[1][mode])
+    steps = 1 + int(2.0 * span / linear.cell[mode])
     step = span / steps
     for _ in range(steps):
         before, reached = held[1], 0.0
@@ -339,7 +408,7 @@ def _inside(tables, mode, held, span, turns, varies, friction, slip, sums, work)
 
 
 @compiled(**OPTIONS, nogil=True)
-def watch_all(given, out, scratch):
+def watch_all(given, out, rooms):
     """One motion after another, in one scratch."""
-    for i in range(given[0].shape[0]):
-        watch_one(i, 0, given, out, scratch)
+    for i in range(given.states.shape[0]):
+        watch_one(i, 0, given, out, rooms)

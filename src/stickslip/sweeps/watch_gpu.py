@@ -10,8 +10,8 @@ THREADS = 64  # of a block
 
 
 @cuda.jit
-def each(given, out, scratch):
+def each(given, out, rooms):
     """March and count the motion of this thread."""
     i = cuda.grid(1)
-    if i < given[0].shape[0]:
-        watch_one(i, i, given, out, scratch)
+    if i < given.states.shape[0]:
+        watch_one(i, i, given, out, rooms)
