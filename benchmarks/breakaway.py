@@ -21,18 +21,18 @@ CASES = (("xz", "smoother"), ("xz", "fusion"), ("xza", "smoother"), ("all", "fus
 RATIOS = (1.0, 1.3)
 
 
-def motion(ratio: float, rigid: bool) -> ss.Trajectory:
+def motion(ratio: float, rigid: bool) -> ss.solve.Trajectory:
     amplitude, kinetic = MOTIONS[2.5]
-    law: ss.Coulomb | ss.CompliantContact = (
-        ss.Coulomb(kinetic, static=ratio * kinetic)
+    law: ss.laws.Coulomb | ss.laws.CompliantContact = (
+        ss.laws.Coulomb(kinetic, static=ratio * kinetic)
         if rigid
-        else ss.CompliantContact(kinetic, stiffness=192000.0, damping=23.9, static=ratio * kinetic)
+        else ss.laws.CompliantContact(kinetic, stiffness=192000.0, damping=23.9, static=ratio * kinetic)
     )
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=2.5), **RIG)
+    slider = ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(amplitude, frequency=2.5), **RIG)
     return ss.simulate(slider, duration=SETTLED + SECONDS)
 
 
-def found(run: ss.Trajectory, seed: int, names: str, method: str) -> ss.Estimate | None:
+def found(run: ss.solve.Trajectory, seed: int, names: str, method: str) -> ss.Estimate | None:
     """The ratio by some sensors, or None where it is refused."""
     record = ss.Rig().measure(run, fs=FS, rng=seed, start=SETTLED)
     if names == "stated":
@@ -40,7 +40,7 @@ def found(run: ss.Trajectory, seed: int, names: str, method: str) -> ss.Estimate
     elif names != "all":
         record = ss.Record.of({name: record[name] for name in names}, fs=FS)
     try:
-        return ss.breakaway(ss.friction_force(record, method=method, **RIG)).ratio
+        return ss.cycle.breakaway(ss.friction_force(record, method=method, **RIG)).ratio
     except EstimateError:
         return None
 

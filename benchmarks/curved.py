@@ -20,13 +20,13 @@ from scipy.integrate import DOP853, LSODA, solve_ivp
 import stickslip as ss
 
 M, K, CYCLES, GOAL = 2.42, 2310.0, 100, 1e-8
-SLIDER = ss.Oscillator(mass=M, stiffness=K, law=ss.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
-                       drive=ss.HarmonicBase(0.6e-3, 2.5))  # fmt: skip
+SLIDER = ss.Oscillator(mass=M, stiffness=K, law=ss.laws.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
+                       drive=ss.drives.HarmonicBase(0.6e-3, 2.5))  # fmt: skip
 CASES = {
     "state variable, 2.5 Hz": SLIDER,
-    "LuGre, 2.5 Hz": SLIDER.having(law=ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4)),
+    "LuGre, 2.5 Hz": SLIDER.having(law=ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4)),
     "Stribeck, 8.7 Hz": SLIDER.having(
-        law=ss.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4), frequency=8.7, amplitude=1.5e-3
+        law=ss.laws.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4), frequency=8.7, amplitude=1.5e-3
     ),
 }
 TOLERANCES = {"stickslip": (1e-5, 1e-6, 1e-7, 1e-8, 1e-9), "scipy LSODA": (1e-8, 1e-9, 1e-10, 1e-11, 1e-12),
@@ -45,14 +45,14 @@ def rates(system: ss.Oscillator) -> Callable[[float, np.ndarray, float], list[fl
     """The equations written out by hand, as a user of a general solver would."""
     law, w, z = system.law, 2 * math.pi * system.drive.frequency, system.drive.amplitude
     cos, exp, tanh = math.cos, math.exp, math.tanh
-    if isinstance(law, ss.SmoothStateVariable):
+    if isinstance(law, ss.laws.SmoothStateVariable):
         f, pull, steep = law.kinetic, law.kinetic * law.rate, law.steepness
         return lambda t, s, side: [
             s[1],
             (K * (z * cos(w * t) - s[0]) - s[2]) / M,
             -pull * (s[2] - f * tanh(steep * s[1])),
         ]
-    if isinstance(law, ss.LuGre):
+    if isinstance(law, ss.laws.LuGre):
         stiff, loss, oil = law.stiffness, law.damping, law.viscous
 
         def bristles(t: float, s: np.ndarray, side: float) -> list[float]:
@@ -74,8 +74,8 @@ def rates(system: ss.Oscillator) -> Callable[[float, np.ndarray, float], list[fl
 def general(method: type) -> Solver:
     def solve(system: ss.Oscillator, tolerance: float) -> tuple[float, np.ndarray]:
         slope, end = rates(system), CYCLES / system.drive.frequency
-        size = 2 if isinstance(system.law, ss.Stribeck) else 3
-        kink = not isinstance(system.law, ss.SmoothStateVariable)
+        size = 2 if isinstance(system.law, ss.laws.Stribeck) else 3
+        kink = not isinstance(system.law, ss.laws.SmoothStateVariable)
 
         def turn(t: float, s: np.ndarray, side: float) -> float:
             return s[1] if t > since[0] else side  # a zero at the very start of a step breaks solve_ivp
@@ -105,12 +105,12 @@ def heyoka(system: ss.Oscillator, tolerance: float) -> tuple[float, np.ndarray]:
         x, v, b = hy.make_vars("x", "v", "b")
         side = hy.par[0]
         pull = K * (z * hy.cos(w * hy.time) - x)
-        if isinstance(law, ss.SmoothStateVariable):
+        if isinstance(law, ss.laws.SmoothStateVariable):
             rate = -law.kinetic * law.rate * (b - law.kinetic * hy.tanh(law.steepness * v))
             equations, force = [(b, rate)], b
         else:
             level = law.kinetic + (law.static - law.kinetic) * hy.exp(-(v * v) / law.speed**2)
-            if isinstance(law, ss.LuGre):
+            if isinstance(law, ss.laws.LuGre):
                 rate = v - law.stiffness * side * v * b / level
                 equations, force = [(b, rate)], law.stiffness * b + law.damping * rate + law.viscous * v
             else:
@@ -121,7 +121,7 @@ def heyoka(system: ss.Oscillator, tolerance: float) -> tuple[float, np.ndarray]:
             ta.state[1] = 1e-14 * ta.pars[0]  # a step from exactly zero under an event ends in NaN
             return True
 
-        smooth = isinstance(law, ss.SmoothStateVariable)
+        smooth = isinstance(law, ss.laws.SmoothStateVariable)
         extra = {} if smooth else {"t_events": [hy.t_event(v, callback=turned)], "pars": [1.0]}
         COMPILED[key] = hy.taylor_adaptive([(x, v), (v, (pull - force) / M), *equations],
                                            [0.0] * (2 + len(equations)), tol=tolerance, **extra)  # fmt: skip

@@ -20,7 +20,7 @@ RIGS = {"6.4, case 1": (0.0269, 0.1309e-3), "6.4, case 2": (0.0632, 0.1086e-3), 
 def twin(ratio: float, dry: float, rng: np.random.Generator) -> ss.Record:
     """One release as the rig's displacement sensor would have written it."""
     damping = 2 * ratio * float(np.sqrt(MASS * STIFFNESS))
-    rig = ss.Oscillator(mass=MASS, stiffness=STIFFNESS, damping=damping, law=ss.Coulomb(dry * STIFFNESS))
+    rig = ss.Oscillator(mass=MASS, stiffness=STIFFNESS, damping=damping, law=ss.laws.Coulomb(dry * STIFFNESS))
     run = ss.simulate(rig, duration=4.0, start={"x": FIRST})
     hold = rng.uniform(0.1, 0.4)
     times = np.arange(0, hold + 3.5, 1 / FS) - hold

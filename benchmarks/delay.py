@@ -33,14 +33,14 @@ BEGIN = 0.1  # s: before, the mounts have not yet rung out
 
 
 @cache
-def moved(name: str) -> ss.Trajectory:
+def moved(name: str) -> ss.solve.Trajectory:
     """The motion, from its periodic orbit on where it is driven."""
     frequency, amplitude, friction, seconds = RUNS[name]
-    law = ss.CompliantContact(friction, stiffness=192000, damping=23.9) if friction else ss.Coulomb(0.0)
+    law = ss.laws.CompliantContact(friction, stiffness=192000, damping=23.9) if friction else ss.laws.Coulomb(0.0)
     if not frequency:
         slider = ss.Oscillator(law=law, **BALANCE)
         return ss.simulate(slider, duration=seconds + BEGIN, start={"x": amplitude})
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **BALANCE)
+    slider = ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(amplitude, frequency=frequency), **BALANCE)
     if friction:
         settled = ss.simulate(slider, cycles=60)
         start = {key: value for key, value in settled.state(settled.duration).items() if key in ("x", "v")}
@@ -94,7 +94,7 @@ def row(names: tuple[str, ...], draws: int, *, mount: bool) -> str:
     errors, inside, sds, resonance = [], 0, [], []
     for seed in range(draws):
         runs = [record(name, RIG, 1000 * j + seed, mount=mount) for j, name in enumerate(names)]
-        found = ss.sensor_delay(runs)
+        found = ss.balance.sensor_delay(runs)
         errors.append(found.delay.value + LAG)
         sds.append(found.delay.sd)
         inside += found.delay.includes(-LAG)
@@ -117,10 +117,10 @@ def lags(draws: int) -> None:
     for part in np.arange(0, 1.01, 0.1):
         lag = (5 + part) / FS
         rig = RIG.having("x", lag=lag)
-        phase = [ss.sensor_delay(record(name, rig, s, mount=True)).delay.value + lag for s in range(draws)]
+        phase = [ss.balance.sensor_delay(record(name, rig, s, mount=True)).delay.value + lag for s in range(draws)]
         few = [record(name, rig, s, mount=True) for s in range(2)]
         mounted = 2 * MOUNT[1] / (2 * math.pi * MOUNT[0])  # what the mount adds to a delay that knows none
-        residual = [ss.sensor_delay(each, method="residual").delay.value + lag - mounted for each in few]
+        residual = [ss.balance.sensor_delay(each, method="residual").delay.value + lag - mounted for each in few]
         print(
             f"{name}, lag {5 + part:.1f} samples: mean {np.mean(phase) * 1e6:+6.2f} us -+ "
             f"{least / math.sqrt(draws) * 1e6:.2f}, rms/bound {np.sqrt(np.mean(np.square(phase))) / least:.2f}; "

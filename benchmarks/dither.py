@@ -37,17 +37,17 @@ def random_system(number: int) -> ss.Oscillator:
     natural = kinetic / math.sqrt(stiffness * mass)  # m/s: the speed at which friction acts
     kind = rng.integers(4)
     if kind == 0:
-        law: Any = ss.Coulomb(kinetic, static=ratio * kinetic)
-        drive: Any = ss.Belt(natural * 10 ** rng.uniform(-1.3, -0.2))
+        law: Any = ss.laws.Coulomb(kinetic, static=ratio * kinetic)
+        drive: Any = ss.drives.Belt(natural * 10 ** rng.uniform(-1.3, -0.2))
     elif kind == 1:
-        law = ss.Coulomb(kinetic, static=ratio * kinetic)
-        drive = ss.Ramp(natural * 10 ** rng.uniform(-1.3, -0.2))
+        law = ss.laws.Coulomb(kinetic, static=ratio * kinetic)
+        drive = ss.drives.Ramp(natural * 10 ** rng.uniform(-1.3, -0.2))
     elif kind == 2:
-        law = ss.Coulomb(kinetic)
-        drive = ss.HarmonicForce(kinetic / rng.uniform(0.6, 0.95), frequency * rng.uniform(0.2, 0.8))
+        law = ss.laws.Coulomb(kinetic)
+        drive = ss.drives.HarmonicForce(kinetic / rng.uniform(0.6, 0.95), frequency * rng.uniform(0.2, 0.8))
     else:
-        law = ss.CompliantContact(kinetic, stiffness=stiffness * 10 ** rng.uniform(1.3, 2.3), damping=damping)
-        drive = ss.HarmonicBase(kinetic / stiffness / rng.uniform(0.5, 0.9), frequency * rng.uniform(0.2, 0.8))
+        law = ss.laws.CompliantContact(kinetic, stiffness=stiffness * 10 ** rng.uniform(1.3, 2.3), damping=damping)
+        drive = ss.drives.HarmonicBase(kinetic / stiffness / rng.uniform(0.5, 0.9), frequency * rng.uniform(0.2, 0.8))
     return ss.Oscillator(mass, stiffness, law, drive, damping=damping)
 
 
@@ -64,13 +64,13 @@ class Line:
 
 def looked_at(number: int) -> Line:
     """The dither of one system, checked and compared with the smallest."""
-    from stickslip.regimes.dither import FORGET, longest_stick
+    from stickslip.maps.dither import FORGET, longest_stick
 
     system = random_system(number)
     kind = f"{type(system.law).__name__} on {type(system.drive).__name__}"
     try:
         found = ss.dither(system)
-    except ss.SolveError as refusal:
+    except ss.errors.SolveError as refusal:
         if "never sticks" in str(refusal) or "held all the time" in str(refusal):
             return Line(number, False, kind=kind)
         return Line(number, True, False, kind=kind)
@@ -78,7 +78,7 @@ def looked_at(number: int) -> Line:
     span = 40 * max(1 / system.frequency, slow if math.isfinite(slow) else 0.0)
 
     def removes(amplitude: float, longer: float, starts: Sequence[Mapping[str, float]]) -> bool:
-        dithered = system.having(drive=ss.Dithered(system.drive, amplitude, found.frequency, on=found.on))
+        dithered = system.having(drive=ss.drives.Dithered(system.drive, amplitude, found.frequency, on=found.on))
         runs = (ss.simulate(dithered, duration=longer * span, start=start) for start in starts)
         return all(longest_stick(run, FORGET * span * longer) * found.frequency < 1 for run in runs)
 

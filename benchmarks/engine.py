@@ -28,16 +28,16 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import stickslip as ss
-from stickslip.solve.energy import energy
+from stickslip.solve.energies import energy
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-ffp-contract=fast", "-shared", "-fPIC")
 MASS, SPRING = 2.42, 2310.0
 RIGID = ss.Oscillator(
-    mass=MASS, stiffness=SPRING, damping=2 * 0.0008 * math.sqrt(MASS * SPRING), law=ss.Coulomb(1.1),
-    drive=ss.HarmonicBase(0.65e-3, 2.5),
+    mass=MASS, stiffness=SPRING, damping=2 * 0.0008 * math.sqrt(MASS * SPRING), law=ss.laws.Coulomb(1.1),
+    drive=ss.drives.HarmonicBase(0.65e-3, 2.5),
 )  # fmt: skip
-CONTACT = ss.CompliantContact(1.1, 192000, 2 * 0.0174 * math.sqrt(MASS * (SPRING + 192000)))
+CONTACT = ss.laws.CompliantContact(1.1, 192000, 2 * 0.0174 * math.sqrt(MASS * (SPRING + 192000)))
 CASES = {
     "W1a rigid 5.61 Hz": RIGID.having(frequency=5.61, amplitude=0.6e-3),
     "W1b rigid 2.5 Hz": RIGID,
@@ -70,7 +70,7 @@ def dop853(system: ss.Oscillator, cycles: int, tolerance: float = 1e-10) -> Run:
     At 5.61 Hz its free steps jump over a stick on the rigid contact (it looks for one sign change in a step), so there
     a step is held below a twentieth of the period.
     """
-    jumps = isinstance(system.law, ss.Coulomb) and system.drive.frequency == 5.61
+    jumps = isinstance(system.law, ss.laws.Coulomb) and system.drive.frequency == 5.61
     longest = 0.05 / system.drive.frequency if jumps else math.inf
     m, k, c, w = system.mass, system.stiffness, system.damping, 2 * math.pi * system.drive.frequency
     z, level = system.drive.amplitude, system.law.kinetic
@@ -138,7 +138,7 @@ def taylor_integrators(system: ss.Oscillator, tolerance: float) -> dict[int, Any
         )
         for side in (1, -1)
     }  # fmt: skip
-    compliant = isinstance(system.law, ss.CompliantContact)
+    compliant = isinstance(system.law, ss.laws.CompliantContact)
     force = system.law.stiffness * (x - hy.par[0]) + system.law.damping * v if compliant else pull
     field = [(x, v), (v, (pull - c * v - force) / m)] if compliant else [(x, 0.0 * v), (v, 0.0 * v)]
     exits = [hy.t_event(force - level, direction=up), hy.t_event(force + level, direction=down)]
@@ -306,7 +306,7 @@ def random_energy(count: int) -> None:
         system, start, duration = random_case(seed)
         try:
             residuals[seed] = energy(ss.simulate(system, duration=duration, start=start)).residual
-        except ss.SolveError as error:
+        except ss.errors.SolveError as error:
             refused.append((seed, str(error)))
         progress("random energy", seed + 1, count)
     above = np.flatnonzero(residuals >= 1e-12)

@@ -23,7 +23,7 @@ import numpy as np
 from rig import FS, LAG, MOTIONS, RIG, SECONDS, SETTLED, measured, motion, rms
 
 import stickslip as ss
-from stickslip.identify.sticks import StickEvent
+from stickslip.cycle.sticks import StickEvent
 
 NEAR = 3e-3  # s: an onset that is further from every true one is false
 ENDS = 0.05  # s at the record's ends that do not count
@@ -65,7 +65,7 @@ def compared(ours: list[tuple[float, float]], true: np.ndarray) -> Figures:
     }
 
 
-def told(record: ss.Record, run: ss.Trajectory, method: str) -> Figures:
+def told(record: ss.Record, run: ss.solve.Trajectory, method: str) -> Figures:
     """Friction and onsets by a method, against the run's own."""
     found = ss.friction_force(record, method=method, **RIG)
     inside = slice(200, -200)

@@ -52,8 +52,8 @@ finally:
 
 def parts(minutes: int) -> Iterator[ss.Record]:
     """Minute after minute: whole cycles, so that each goes on where the one before ended."""
-    contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    slider = ss.Oscillator(law=contact, drive=ss.HarmonicBase(0.65e-3, frequency=2.5), **RIG)
+    contact = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    slider = ss.Oscillator(law=contact, drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5), **RIG)
     run = ss.simulate(slider, duration=8.0 + PART + 0.01)
     quiet = ss.Rig()
     for name in ("x", "z", "a", "load"):
@@ -111,12 +111,12 @@ def main() -> None:
         return
     began, used = time.perf_counter(), time.process_time()
 
-    def found() -> Iterator[tuple[ss.Stretch, ss.Sticks]]:
-        for stretch in ss.overlapping(parts(minutes)):
+    def found() -> Iterator[tuple[ss.cycle.Stretch, ss.cycle.Sticks]]:
+        for stretch in ss.cycle.overlapping(parts(minutes)):
             yield stretch, ss.find_sticks(ss.friction_force(stretch.record, method="fusion", **RIG))
             print(f"\r{stretch.last:6.0f} of {60 * minutes} s", end="", file=sys.stderr)
 
-    sticks = ss.join_sticks(found())
+    sticks = ss.cycle.join_sticks(found())
     kinds = [event.kind for event in sticks.events]
     print(sticks)
     print({kind: kinds.count(kind) for kind in sorted(set(kinds))}, sticks.kind, sticks.status, sticks.lost)

@@ -27,7 +27,11 @@ import numpy as np
 import stickslip as ss
 
 SLIDER = ss.Oscillator(
-    mass=2.42, stiffness=2310, damping=0.1196, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(6e-4, frequency=5.6)
+    mass=2.42,
+    stiffness=2310,
+    damping=0.1196,
+    law=ss.laws.Coulomb(1.1),
+    drive=ss.drives.HarmonicBase(6e-4, frequency=5.6),
 )
 MEASURES = ["stops", "amplitude", "stick_share"]
 

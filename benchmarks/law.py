@@ -17,7 +17,7 @@ from rig import DAMPING, MOTIONS, RIG, STIFFNESS, measured
 
 import stickslip as ss
 
-START = ss.CompliantContact(1.3, stiffness=120000, damping=10.0)
+START = ss.laws.CompliantContact(1.3, stiffness=120000, damping=10.0)
 
 
 def draw(frequency: float, rough: float, seed: int) -> dict[str, tuple[float, float, float, float]]:

@@ -73,12 +73,12 @@ def drawn_law(name: str, chance: np.random.Generator) -> Any:
     damping = 2 * 0.0174 * math.sqrt((RIG["stiffness"] + stiffness) * RIG["mass"]) * chance.uniform(0.5, 3)
     follows, steepness = chance.uniform(60, 200), chance.uniform(1600, 6300)
     laws = {
-        "Coulomb": lambda: ss.Coulomb(kinetic),
-        "static": lambda: ss.Coulomb(kinetic, static=static),
-        "Stribeck": lambda: ss.Stribeck(kinetic, static, speed=speed),
-        "CompliantContact": lambda: ss.CompliantContact(kinetic, stiffness=stiffness, damping=damping),
-        "StateVariable": lambda: ss.SmoothStateVariable(kinetic, rate=follows / kinetic, steepness=steepness),
-        "LuGre": lambda: ss.LuGre(kinetic, static, speed=speed, stiffness=stiffness, damping=damping),
+        "Coulomb": lambda: ss.laws.Coulomb(kinetic),
+        "static": lambda: ss.laws.Coulomb(kinetic, static=static),
+        "Stribeck": lambda: ss.laws.Stribeck(kinetic, static, speed=speed),
+        "CompliantContact": lambda: ss.laws.CompliantContact(kinetic, stiffness=stiffness, damping=damping),
+        "StateVariable": lambda: ss.laws.SmoothStateVariable(kinetic, rate=follows / kinetic, steepness=steepness),
+        "LuGre": lambda: ss.laws.LuGre(kinetic, static, speed=speed, stiffness=stiffness, damping=damping),
     }
     return laws[name]()
 
@@ -115,7 +115,7 @@ def measured(law: Any, frequency: float, condition: Condition, rigs: tuple[ss.Ri
     rig, believed = rigs
     chance = np.random.default_rng(seed)
     length = SETTLED + SECONDS
-    drive = ss.HarmonicBase(MOTIONS[frequency], frequency=frequency)
+    drive = ss.drives.HarmonicBase(MOTIONS[frequency], frequency=frequency)
     run = ss.simulate(ss.Oscillator(law=law, drive=drive, **RIG), duration=length, rtol=1e-9)
     record = rig.measure(run, fs=FS, rng=seed, start=SETTLED)
     if condition.roughness:
@@ -124,7 +124,7 @@ def measured(law: Any, frequency: float, condition: Condition, rigs: tuple[ss.Ri
 
 
 def _roughened(
-    even: ss.Trajectory, record: ss.Record, share: float, rig: ss.Rig, chance: np.random.Generator, seed: int
+    even: ss.solve.Trajectory, record: ss.Record, share: float, rig: ss.Rig, chance: np.random.Generator, seed: int
 ) -> ss.Record:
     """The record where the sliding friction fluctuates: an added force while it slips, as a base that trembles."""
     times = np.arange(math.ceil((SETTLED + SECONDS) * KNOTS) + 2) / KNOTS
@@ -134,14 +134,16 @@ def _roughened(
     moving = np.abs(even.sample(inside, ("v",))[0][0]) > SLOWEST if slips.all() else slips
     added = share * wandering(len(times), 1 / KNOTS, chance) * friction[0] * moving
     base = even.sample(inside, ("z",))[0][0] - added / RIG["stiffness"]
-    rough = ss.simulate(even.system.having(drive=ss.RecordedBase(base, fs=KNOTS)), duration=even.duration, rtol=1e-9)
+    rough = ss.simulate(
+        even.system.having(drive=ss.drives.RecordedBase(base, fs=KNOTS)), duration=even.duration, rtol=1e-9
+    )
     lag = {sensor.channel: sensor for sensor in rig.sensors}["load"]
     shaken = rig.measure(rough, fs=FS, rng=seed, start=SETTLED)
     instants = SETTLED + shaken.time - shaken.time[0]
     felt = respond(lambda at: np.interp(at, times, added), breaks=times, times=instants, response=lag.response)
     return shaken.with_samples(
         {**shaken.samples, "z": record["z"][: len(shaken)], "load": shaken["load"] + lag.gain * felt},
-        ss.Step("roughened", {"share": share}),
+        ss.record.Step("roughened", {"share": share}),
     )
 
 
@@ -153,7 +155,7 @@ def draw(name: str, condition: str, seed: int, laws: list[str] | None) -> dict[s
         measured(law, frequency, CONDITIONS[condition], rigs, seed=int(chance.integers(2**31))) for frequency in MOTIONS
     ]
     begun = time.perf_counter()
-    found = ss.compare_laws(records, ss.Oscillator(law=ss.Coulomb(1.0), **RIG), laws=laws)
+    found = ss.compare_laws(records, ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG), laws=laws)
     excess = found.excess
     return {
         "truth": name, "condition": condition, "seed": seed, "law": found.law, "family": found.family,
@@ -168,7 +170,7 @@ def draw(name: str, condition: str, seed: int, laws: list[str] | None) -> dict[s
     }  # fmt: skip
 
 
-def _held(fit: ss.LawFit, law: Any) -> dict[str, list[float]]:
+def _held(fit: ss.law.LawFit, law: Any) -> dict[str, list[float]]:
     """Of each parameter of the law its true value, the fitted one and the ends of its interval."""
     own = {name.removeprefix("law."): each for name, each in fit.parameters.items()}
     return {

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 import stickslip as ss
-from stickslip.identify.contact import branch_slopes
-from stickslip.identify.likely_contact import likely_contact, sliding_level
+from stickslip.balance.likely_contact import likely_contact, sliding_level
+from stickslip.contact.contact import branch_slopes
 
 MOTIONS = {2.5: (0.65e-3, 1.1), 5.61: (0.6e-3, 1.05), 8.7: (1.1e-3, 1.1), 11.1: (2e-3, 1.1)}
 """Frequency [Hz] of the base: its amplitude [m], and the friction [N]."""
@@ -33,12 +33,12 @@ LAG = 0.0389 / 30.91
 
 
 @lru_cache(maxsize=8)
-def motion(frequency: float, rough: float, surface: int) -> ss.Trajectory:
+def motion(frequency: float, rough: float, surface: int) -> ss.solve.Trajectory:
     amplitude, kinetic = MOTIONS[frequency]
-    law: Any = ss.CompliantContact(kinetic, stiffness=STIFFNESS, damping=DAMPING)
+    law: Any = ss.laws.CompliantContact(kinetic, stiffness=STIFFNESS, damping=DAMPING)
     if rough:
-        law = ss.RoughSurface(law, share=rough, length=2e-4, span=2e-3, seed=surface)
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
+        law = ss.laws.RoughSurface(law, share=rough, length=2e-4, span=2e-3, seed=surface)
+    slider = ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(amplitude, frequency=frequency), **RIG)
     return ss.simulate(slider, duration=SETTLED + SECONDS)
 
 

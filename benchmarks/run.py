@@ -173,9 +173,9 @@ def bench_smoothing(rounds: int) -> None:
     fs = 1 / (time_[1] - time_[0])
     window = {order: best_window(noisy, fs, true, order) for order, true in ((1, v), (2, a))}
     peers: dict[str, Callable[[], tuple[Any, Any]]] = {
-        "stickslip smoother": lambda: tuple(ss.differentiate(noisy, fs=fs, order=n).values for n in (1, 2)),
+        "stickslip smoother": lambda: tuple(ss.signals.differentiate(noisy, fs=fs, order=n).values for n in (1, 2)),
         "stickslip five-point": lambda: tuple(
-            ss.differentiate(noisy, fs=fs, order=n, method="five-point").values for n in (1, 2)
+            ss.signals.differentiate(noisy, fs=fs, order=n, method="five-point").values for n in (1, 2)
         ),
         "savgol_filter, window chosen by the truth": lambda: tuple(
             savgol_filter(noisy, window[n], 3, deriv=n, delta=1 / fs) for n in (1, 2)

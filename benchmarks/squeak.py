@@ -54,7 +54,7 @@ def case(number: int) -> tuple[str, float, float]:
     return surface, float(rng.uniform(low, high)), float(rng.uniform(20, 40))
 
 
-def true_bursts(run: ss.Trajectory) -> list[tuple[float, float, float]]:
+def true_bursts(run: ss.solve.Trajectory) -> list[tuple[float, float, float]]:
     """Begin, end [s] and frequency [Hz] of the bursts of a run that squeaks."""
     times = np.arange(0.2, run.duration, 1 / FINE)
     values = sosfiltfilt(butter(2, [250, 1200], "bandpass", fs=FINE, output="sos"), run.sample(times, ("a",))[0][1])
@@ -114,8 +114,8 @@ def measured(count: int, *, snr: float | None = None) -> Score:
 
 def scored(score: Score, surface: str, load: float, snr: float, seed: int, *, squeaks: bool) -> str:
     """What is told of a recording; what is right and wrong of it is added to the score."""
-    run = ss.simulate(ss.squeak_rig(surface, load), duration=END + 0.3)
-    heard = ss.find_squeaks(ss.squeak_record(run, snr=snr, rng=seed).between(BEGIN, END))
+    run = ss.simulate(ss.squeak.squeak_rig(surface, load), duration=END + 0.3)
+    heard = ss.find_squeaks(ss.squeak.squeak_record(run, snr=snr, rng=seed).between(BEGIN, END))
     score.wrong_conditions += heard.squeaking != squeaks
     true = true_bursts(run) if squeaks else []
     found = [b for b in heard.of("squeak", "squeal") if whole(b.start, b.end)]

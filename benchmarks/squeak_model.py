@@ -47,7 +47,7 @@ def clocked(work: Callable[[], Any]) -> tuple[float, Any]:
 
 def main() -> None:
     rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 3
-    rig = ss.squeak_rig("wet", load=6.13)
+    rig = ss.squeak.squeak_rig("wet", load=6.13)
     peer = Rig(rig)
     order, truth = taylor(Rig(rig, np.longdouble), DURATION)
     end = np.asarray(truth[:6], dtype=float)

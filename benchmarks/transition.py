@@ -19,10 +19,10 @@ import math
 import numpy as np
 
 import stickslip as ss
-from stickslip.identify.mechanism import mechanism_of
-from stickslip.identify.microslip import microslips_of
-from stickslip.identify.ringing import Ringing, find_ringing
-from stickslip.identify.transition import transition_of
+from stickslip.contact.frequency_transition import transition_of
+from stickslip.contact.mechanisms import mechanism_of
+from stickslip.contact.microslip import microslips_of
+from stickslip.contact.ringing import Ringing, find_ringing
 
 MASS, SPRING, CONTACT, KINETIC, FS, CYCLES = 2.42, 2310.0, 192000.0, 1.1, 4000.0, 6
 LEVELS = (40, 25)  # dB
@@ -37,14 +37,14 @@ NAMED = {
 DAMPING = {"two micro-slips": 23.8635, "one micro-slip": 200.0, "no micro-slip": 320.0}
 
 
-def simulated(name: str) -> tuple[ss.Record, ss.Trajectory]:
+def simulated(name: str) -> tuple[ss.Record, ss.solve.Trajectory]:
     if name in DAMPING:
-        law = ss.CompliantContact(kinetic=KINETIC, stiffness=CONTACT, damping=DAMPING[name])
+        law = ss.laws.CompliantContact(kinetic=KINETIC, stiffness=CONTACT, damping=DAMPING[name])
     elif name == "rigid":
-        law = ss.Coulomb(kinetic=KINETIC)
+        law = ss.laws.Coulomb(kinetic=KINETIC)
     else:
-        law = ss.SmoothStateVariable(KINETIC, rate=100.0, steepness=3000.0)
-    drive = ss.HarmonicBase(amplitude=0.6e-3 if name == "state variable" else 0.65e-3, frequency=2.5)
+        law = ss.laws.SmoothStateVariable(KINETIC, rate=100.0, steepness=3000.0)
+    drive = ss.drives.HarmonicBase(amplitude=0.6e-3 if name == "state variable" else 0.65e-3, frequency=2.5)
     run = ss.simulate(ss.Oscillator(mass=MASS, stiffness=SPRING, law=law, drive=drive), cycles=6 + CYCLES)
     return run.record(fs=FS).between(2.4, 2.4 + CYCLES / 2.5), run
 
@@ -55,7 +55,7 @@ def noisy(clean: ss.Record, level: float, seed: int) -> ss.Record:
     return ss.Record.of({"a": values + noise}, fs=FS, start=clean.start)
 
 
-def true_slips(run: ss.Trajectory, begin: float, end: float) -> np.ndarray:
+def true_slips(run: ss.solve.Trajectory, begin: float, end: float) -> np.ndarray:
     """Times at which the contact slips within a stick: it holds again before a tenth of a cycle is over."""
     slips = [event.time for event in run.events if event.kind == "slip"]
     sticks = [event.time for event in run.events if event.kind == "microstick"]
@@ -116,7 +116,7 @@ def behind_a_mount(name: str, draws: int) -> str:
     told: dict[str, list[float]] = {}
     for seed in range(draws):
         rng = np.random.default_rng(seed)
-        mount = ss.Mount(80 * 12.5 ** rng.random(), 0.02 * 10 ** rng.random())
+        mount = ss.rig.Mount(80 * 12.5 ** rng.random(), 0.02 * 10 ** rng.random())
         seen = ss.Rig.perfect().having("a", mount=mount).measure(run, fs=FS, start=2.4)
         answer = mechanism_of(find_ringing(noisy(seen, LEVELS[0], seed), "a", question="the bench"))
         told.setdefault(answer.name, []).append(answer.probability)

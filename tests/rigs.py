@@ -17,13 +17,13 @@ SETTLED = 8.0  # s
 
 
 @cache
-def motion(frequency: float, rough: float = 0.0, seconds: float = 1.0) -> ss.Trajectory:
+def motion(frequency: float, rough: float = 0.0, seconds: float = 1.0) -> ss.solve.Trajectory:
     """The slider at one of the thesis's frequencies, settled for 8 s."""
     amplitude, kinetic = CASES[frequency]
-    law: Any = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9)
+    law: Any = ss.laws.CompliantContact(kinetic, stiffness=192000, damping=23.9)
     if rough:
-        law = ss.RoughSurface(law, share=rough, length=2e-4, span=2e-3, seed=4)
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
+        law = ss.laws.RoughSurface(law, share=rough, length=2e-4, span=2e-3, seed=4)
+    slider = ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(amplitude, frequency=frequency), **RIG)
     return ss.simulate(slider, duration=SETTLED + seconds)
 
 

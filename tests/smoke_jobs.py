@@ -185,7 +185,7 @@ def squeak(folder: Path) -> None:
 
 def decay(folder: Path) -> None:
     """Half-cycles that lose a fixed amount each: dry friction alone."""
-    released = ss.Oscillator(mass=1.0, stiffness=400.0, law=ss.Coulomb(0.2))
+    released = ss.Oscillator(mass=1.0, stiffness=400.0, law=ss.laws.Coulomb(0.2))
     run = ss.simulate(released, start={"x": 0.01}, duration=5.0)
     ss.write_record(ss.Record.of({"x": run.record(fs=500.0).samples["x"]}, fs=500.0, units={"x": "m"}),
                     folder / "release.csv")  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.identify.mechanism import UNTOLD
+from stickslip.contact.mechanisms import UNTOLD
 
 RIG = {"mass": 2.42, "stiffness": 2310.0}
 TRUE = 45.0914  # Hz: sqrt((k + K)/m (1 - zeta^2)) / 2 pi
@@ -17,9 +17,9 @@ PERFECT = ss.Rig.perfect()
 
 
 @functools.cache
-def motion() -> ss.Trajectory:
-    contact = ss.CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9)
-    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+def motion() -> ss.solve.Trajectory:
+    contact = ss.laws.CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9)
+    drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     return ss.simulate(ss.Oscillator(law=contact, drive=drive, damping=0.12, **RIG), cycles=11)
 
 
@@ -32,16 +32,16 @@ def measured(rig: ss.Rig, seed: int = 1) -> ss.Record:
     [
         ss.Rig(),
         ss.Rig(tuple(sensor for sensor in ss.Rig().sensors if sensor.channel != "load")),
-        PERFECT.having("a", mount=ss.Mount(125, 0.1)),
-        PERFECT.having("a", mount=ss.Mount(1000, 0.02)),
+        PERFECT.having("a", mount=ss.rig.Mount(125, 0.1)),
+        PERFECT.having("a", mount=ss.rig.Mount(1000, 0.02)),
         PERFECT.having("a", white=0.04),
     ],
     ids=["the thesis's", "without its load cell", "mount of 125 Hz", "mount of 1000 Hz", "noise alone"],
 )
 def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
     record = rig.stated(measured(rig))
-    assert ss.mechanism(record, **RIG).name == "double stick-slip"
-    slips, mode = ss.find_microslips(record, **RIG), ss.transition(record, **RIG)
+    assert ss.contact.mechanism(record, **RIG).name == "double stick-slip"
+    slips, mode = ss.contact.find_microslips(record, **RIG), ss.contact.transition(record, **RIG)
     assert mode.status == "ok"
     assert (slips.status == "ok") == (record.channels["load"].mount is not None if "load" in record else False)
     assert slips.per_stick.value == pytest.approx(2, abs=0.3)
@@ -53,9 +53,13 @@ def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
 @pytest.mark.parametrize(
     ("rig", "told", "why"),
     [
-        (PERFECT.having("a", mount=ss.Mount(125, 0.1)), {}, "a mount of 12[56].* Hz shows in a, and none is stated"),
         (
-            PERFECT.having("a", mount=ss.Mount(1000, 0.02)),
+            PERFECT.having("a", mount=ss.rig.Mount(125, 0.1)),
+            {},
+            "a mount of 12[56].* Hz shows in a, and none is stated",
+        ),
+        (
+            PERFECT.having("a", mount=ss.rig.Mount(1000, 0.02)),
             {},
             "a mount of (999.*|100.) Hz shows in a, and none is stated",
         ),
@@ -65,7 +69,7 @@ def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
     ids=["mount of 125 Hz", "mount of 1000 Hz", "noise", "the thesis's"],
 )
 def test_what_is_not_stated_is_named_and_nothing_told_surely(rig: ss.Rig, told: dict[str, float], why: str) -> None:
-    found = ss.time_frequency(measured(rig), frequencies=np.array([20.0, 40.0, 80.0]), **told)
+    found = ss.answers.time_frequency(measured(rig), frequencies=np.array([20.0, 40.0, 80.0]), **told)
     assert found.mechanism is not None
     assert found.mechanism.name == UNTOLD
     assert np.isnan(found.mechanism.probability)
@@ -76,32 +80,34 @@ def test_what_is_not_stated_is_named_and_nothing_told_surely(rig: ss.Rig, told: 
 
 def test_a_stated_mount_is_not_taken_for_the_contact_where_it_can_not_be_taken_out() -> None:
     record = ss.Rig().stated(measured(ss.Rig()))
-    found = ss.mechanism(record)
+    found = ss.contact.mechanism(record)
     assert found.name == UNTOLD
     assert found.reason.startswith("a stands on a mount of 125 Hz")
-    assert ss.find_microslips(record).per_stick.status.startswith("a stands on a mount of 125 Hz")
+    assert ss.contact.find_microslips(record).per_stick.status.startswith("a stands on a mount of 125 Hz")
 
 
 def test_a_mount_faster_than_the_record_is_none() -> None:
     record = measured(PERFECT)
-    same = ss.transition(record.with_details("a", mount=(3500.0, 0.02)), **RIG)
+    same = ss.contact.transition(record.with_details("a", mount=(3500.0, 0.02)), **RIG)
     assert same.status == "ok"
-    assert same.frequency.value == ss.transition(record, **RIG).frequency.value
+    assert same.frequency.value == ss.contact.transition(record, **RIG).frequency.value
 
 
 def test_an_acceleration_alone_that_swings_may_be_its_mount() -> None:
-    record = measured(PERFECT.having("a", mount=ss.Mount(125, 0.1)))
-    found = ss.mechanism(ss.Record.of({"a": record["a"]}, fs=record.fs))
+    record = measured(PERFECT.having("a", mount=ss.rig.Mount(125, 0.1)))
+    found = ss.contact.mechanism(ss.Record.of({"a": record["a"]}, fs=record.fs))
     assert found.name == UNTOLD or "an accelerometer whose mount rings looks alike" in found.reason
 
 
 def test_a_clean_record_from_rest_on_has_no_mount_and_no_offset() -> None:
-    contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+    contact = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.1196, law=contact, drive=drive)
     clean = ss.simulate(slider, duration=6).record(fs=4000)
-    mode = ss.transition(clean, **RIG).frequency
-    assert ss.mechanism(clean).name == "double stick-slip"
+    mode = ss.contact.transition(clean, **RIG).frequency
+    assert ss.contact.mechanism(clean).name == "double stick-slip"
     assert mode.status == "ok"
     assert mode.value == pytest.approx(TRUE, rel=1e-4)
-    assert ss.find_microslips(clean).per_stick.value == pytest.approx(2, abs=0.1), "its start from rest is no offset"
+    assert ss.contact.find_microslips(clean).per_stick.value == pytest.approx(2, abs=0.1), (
+        "its start from rest is no offset"
+    )

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.analysis.comparison import Comparison, compare
-from stickslip.analysis.findings import Findings, record_name
-from stickslip.analysis.mending import mend
-from stickslip.analysis.questions import analyze
-from stickslip.config import RigSettings
+from stickslip.answers.comparison import Comparison, compare
+from stickslip.answers.findings import Findings, record_name
+from stickslip.answers.mending import mend
+from stickslip.answers.questions import analyze
 from stickslip.errors import EstimateError, ModelError
+from stickslip.rig.settings import RigSettings
 
 FS = 500.0
 TIME = np.arange(5000) / FS
@@ -251,7 +251,7 @@ def test_a_joined_record_bears_the_name_of_the_first(tmp_path: Path) -> None:
         table = np.column_stack([TIME, np.roll(sliding()["x"], shift)])
         np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header="time [s],x [m]", comments="")
     first, second = (ss.read_record(tmp_path / f"{name}.csv") for name in ("first", "second"))
-    assert record_name(ss.synchronise(first, second, on="x")) == "first.csv"
+    assert record_name(ss.signals.synchronise(first, second, on="x")) == "first.csv"
 
 
 def test_mending_is_asked_for_and_logged() -> None:

@@ -30,7 +30,7 @@ def of(*names: str, stated: bool = False, **instead: np.ndarray) -> ss.Record:
     return record
 
 
-def words(found: ss.Findings) -> str:
+def words(found: ss.answers.Findings) -> str:
     told = ss.summary(found)
     return " ".join([*told.headline, *told.cautions, *told.notes])
 
@@ -45,7 +45,7 @@ def test_a_displacement_and_a_load_cell_are_enough() -> None:
 
 def test_a_displacement_that_does_not_change_is_named() -> None:
     still = of("x", "z", "a", "load", x=np.full(len(settled()), 1e-3))
-    with pytest.raises(ss.EstimateError, match=r"x does not change, it reads 0\.001 m throughout"):
+    with pytest.raises(ss.errors.EstimateError, match=r"x does not change, it reads 0\.001 m throughout"):
         ss.analyze(still, **RIG)
 
 
@@ -56,7 +56,7 @@ def test_no_mount_is_told_by_forces_that_differ_from_the_start() -> None:
     assert "z does not change" in words(found)
     assert not [each.name for each in found.estimates if "mount" in each.name]
     assert "wrong sign" not in words(found)
-    assert ss.compare_force(still, **RIG).resonances == ()
+    assert ss.balance.compare_force(still, **RIG).resonances == ()
 
 
 def test_a_contact_that_holds_at_its_turns_alone_does_not_never_stick() -> None:

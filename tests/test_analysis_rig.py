@@ -37,8 +37,8 @@ COLUMNS = ("x=plate [mm]", "z=base [mm]", "a=acc [g]", "load=cell [N]")
 @pytest.fixture(scope="module")
 def readings() -> ss.Record:
     """What the air-track rig reads of five seconds of stick-slip at 2.5 Hz."""
-    contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    slider = ss.Oscillator(2.42, 2310, law=contact, drive=ss.HarmonicBase(0.65e-3, frequency=2.5))
+    contact = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    slider = ss.Oscillator(2.42, 2310, law=contact, drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5))
     return ss.Rig().measure(ss.simulate(slider, cycles=15), fs=4000, rng=1, start=0.8)
 
 
@@ -214,9 +214,9 @@ def test_blocks_tell_what_the_whole_tells(readings: ss.Record) -> None:
     record = record.with_details("a", mount=(125.0, 0.1))
     record = record.with_details("load", mount=(250.0, 0.05), inertia=0.05, discharge=50.0)
     said: list[str] = []
-    rig = ss.rig_settings({"mass": 2.42, "stiffness": 2310, "damping": 0})
+    rig = ss.rig.rig_settings({"mass": 2.42, "stiffness": 2310, "damping": 0})
     halves = (record.rows(first, first + len(record) // 2) for first in (0, len(record) // 2))
-    found = ss.analyze_blocks(halves, rig=rig, progress=said.append)
+    found = ss.answers.analyze_blocks(halves, rig=rig, progress=said.append)
     assert said == ["block 1, from 0 s", f"block 2, from {len(record) // 2 / 4000:.5g} s"]
     assert found.level is not None
     assert found.level.value == pytest.approx(1.1, rel=0.0005)
@@ -242,7 +242,7 @@ def test_blocks_that_were_asked_are_not_kept() -> None:
             alive.append(weakref.ref(block["friction"]))
             yield block
 
-    assert ss.analyze_blocks(blocks()).level is not None
+    assert ss.answers.analyze_blocks(blocks()).level is not None
     assert max(kept) <= 2  # the last one, and the one that the figures show
 
 
@@ -252,7 +252,7 @@ def test_a_block_that_answers_nothing_is_named_and_left_out(readings: ss.Record)
     moving = ss.Record.of(
         {"x": np.sin(20 * time), "friction": np.sign(np.cos(20 * time)) + 0.01 * np.sin(7919.0 * time)}, fs=4000
     )
-    found = ss.analyze_blocks([moving, still])
+    found = ss.answers.analyze_blocks([moving, still])
     assert any("Block 2" in note and "answers nothing" in note for note in found.notes)
-    with pytest.raises(ss.EstimateError, match="none of 1 blocks"):
-        ss.analyze_blocks([still])
+    with pytest.raises(ss.errors.EstimateError, match="none of 1 blocks"):
+        ss.answers.analyze_blocks([still])

@@ -12,9 +12,9 @@ from stickslip.errors import EstimateError, RecordError
 MASS, STIFFNESS, FS = 3.08, 1191.0, 500.0
 
 
-def driven(law: ss.Coulomb | ss.CompliantContact, *, noise: float = 2e-6, fs: float = FS) -> ss.Record:
+def driven(law: ss.laws.Coulomb | ss.laws.CompliantContact, *, noise: float = 2e-6, fs: float = FS) -> ss.Record:
     """A shaken mass that stops twice a cycle, its displacements with noise, its friction balanced from them."""
-    slider = ss.Oscillator(MASS, STIFFNESS, law=law, drive=ss.HarmonicBase(3e-3, frequency=1.0))
+    slider = ss.Oscillator(MASS, STIFFNESS, law=law, drive=ss.drives.HarmonicBase(3e-3, frequency=1.0))
     run = ss.simulate(slider, cycles=20).record(fs=fs).between(2.0, 20.0)
     rng = np.random.default_rng(3)
     noisy = {name: run[name] + rng.normal(0, noise, len(run)) for name in "xz"}
@@ -23,7 +23,7 @@ def driven(law: ss.Coulomb | ss.CompliantContact, *, noise: float = 2e-6, fs: fl
 
 @pytest.mark.parametrize("static", [1.0, 1.1, 1.3])
 def test_static_friction_is_found_whether_it_is_higher_or_not(static: float) -> None:
-    found = ss.breakaway(driven(ss.Coulomb(1.0, static=static)))
+    found = ss.cycle.breakaway(driven(ss.laws.Coulomb(1.0, static=static)))
     assert found.forward is not None
     assert found.back is not None
     for each in (found.forward, found.back, found.ratio):
@@ -33,10 +33,10 @@ def test_static_friction_is_found_whether_it_is_higher_or_not(static: float) -> 
 
 
 def heard(
-    frequency: float, law: ss.Coulomb | ss.CompliantContact, names: str = "x z a load", fs: int = 4000
+    frequency: float, law: ss.laws.Coulomb | ss.laws.CompliantContact, names: str = "x z a load", fs: int = 4000
 ) -> ss.Record:
     """What some sensors of the rig read of a contact, with nothing stated of them."""
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(CASES[frequency][0], frequency=frequency), **RIG)
+    slider = ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(CASES[frequency][0], frequency=frequency), **RIG)
     record = ss.Rig().measure(ss.simulate(slider, duration=SETTLED + 3), fs=4000, rng=3, start=SETTLED)
     return ss.Record.of({name: record[name][:: 4000 // fs] for name in names.split()}, fs=fs)
 
@@ -49,13 +49,13 @@ def test_a_rig_of_which_nothing_is_stated_never_bears_less_than_it_slides(
     names: str, method: str, static: float, rigid: bool
 ) -> None:
     if rigid:
-        law: ss.Coulomb | ss.CompliantContact = ss.Coulomb(1.1, static=1.1 * static)
+        law: ss.laws.Coulomb | ss.laws.CompliantContact = ss.laws.Coulomb(1.1, static=1.1 * static)
     else:
-        law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9, static=1.1 * static)
+        law = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9, static=1.1 * static)
     record = ss.friction_force(heard(2.5, law, names), method=method, **RIG)
     refused = ""
     try:
-        found = ss.breakaway(record)
+        found = ss.cycle.breakaway(record)
     except EstimateError as error:
         refused = str(error)
     if refused:
@@ -69,10 +69,10 @@ def test_a_rig_of_which_nothing_is_stated_never_bears_less_than_it_slides(
 def test_a_pull_on_a_mass_that_rings_on_its_contact_is_flagged() -> None:
     """The true friction is 1.1 N, at rest as in sliding; what pulls when the mass slips is 9 % less."""
     record = told(measured(2.5)[0])
-    pulled = ss.breakaway(ss.friction_force(record, method="F", **RIG))
+    pulled = ss.cycle.breakaway(ss.friction_force(record, method="F", **RIG))
     assert "not at rest while it sticks" in pulled.status
     assert pulled.ratio.includes(1.0)
-    fused = ss.breakaway(ss.friction_force(record, method="fusion", **RIG))
+    fused = ss.cycle.breakaway(ss.friction_force(record, method="fusion", **RIG))
     assert fused.status == "ok"
     assert fused.ratio.value == pytest.approx(1.0, abs=0.01)
     assert fused.ratio.includes(1.0)
@@ -80,51 +80,53 @@ def test_a_pull_on_a_mass_that_rings_on_its_contact_is_flagged() -> None:
 
 
 def test_a_hold_of_two_samples_tells_nothing() -> None:
-    record = heard(8.7, ss.CompliantContact(1.1, stiffness=192000, damping=23.9), fs=500)
+    record = heard(8.7, ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9), fs=500)
     with pytest.raises(EstimateError, match="sample faster"):
-        ss.breakaway(ss.friction_force(told(record), method="fusion", **RIG))
+        ss.cycle.breakaway(ss.friction_force(told(record), method="fusion", **RIG))
 
 
 def test_a_friction_whose_mounts_ring_tells_nothing_of_its_peak() -> None:
-    record = heard(8.7, ss.CompliantContact(1.1, stiffness=192000, damping=23.9), "x z a")
+    record = heard(8.7, ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9), "x z a")
     with pytest.raises(EstimateError, match=r"strays by .* state it"):
-        ss.breakaway(ss.friction_force(record, method="fusion", **RIG))
+        ss.cycle.breakaway(ss.friction_force(record, method="fusion", **RIG))
 
 
 def test_a_sensor_whose_zero_is_off_changes_neither_ratio_nor_presliding() -> None:
-    record = driven(ss.CompliantContact(1.0, stiffness=2e4, damping=20), noise=2e-7)
+    record = driven(ss.laws.CompliantContact(1.0, stiffness=2e4, damping=20), noise=2e-7)
     off = record.with_channel("friction", record["friction"] + 0.3, unit="N")
-    right, wrong = ss.breakaway(record), ss.breakaway(off)
+    right, wrong = ss.cycle.breakaway(record), ss.cycle.breakaway(off)
     assert wrong.ratio.value == pytest.approx(right.ratio.value, rel=2e-3)
     assert wrong.forward is not None
     assert right.forward is not None
     assert wrong.forward.value == pytest.approx(right.forward.value + 0.3, rel=2e-3)
-    assert ss.presliding(off).stiffness.value == pytest.approx(ss.presliding(record).stiffness.value, rel=2e-3)  # type: ignore[union-attr]
+    assert ss.cycle.presliding(off).stiffness.value == pytest.approx(
+        ss.cycle.presliding(record).stiffness.value, rel=2e-3
+    )  # type: ignore[union-attr]
 
 
 def test_a_slip_at_the_end_of_its_stroke_has_no_swing() -> None:
     record = told(measured(8.7, 0.0, 3.0)[0])
-    found = ss.breakaway(ss.friction_force(record, method="motion", **RIG))
+    found = ss.cycle.breakaway(ss.friction_force(record, method="motion", **RIG))
     for swing in (found.swing_forward, found.swing_back):
         assert swing is None or np.isfinite(swing.value)
 
 
 def test_breakaway_does_not_hang_on_units_of_motion_or_on_its_sign() -> None:
-    record = driven(ss.Coulomb(1.0, static=1.2))
+    record = driven(ss.laws.Coulomb(1.0, static=1.2))
     turned = ss.Record.of({name: -record[name] for name in "xz"}, fs=FS)
     turned = ss.friction_force(turned, mass=MASS, stiffness=STIFFNESS)
-    there, here = ss.breakaway(turned), ss.breakaway(record)
+    there, here = ss.cycle.breakaway(turned), ss.cycle.breakaway(record)
     assert there.forward is not None
     assert here.back is not None
     assert there.forward.value == pytest.approx(here.back.value, rel=1e-6)
     heavy = ss.Record.of({name: record[name] for name in "xz"}, fs=FS)
     heavy = ss.friction_force(heavy, mass=10 * MASS, stiffness=10 * STIFFNESS)
-    assert ss.breakaway(heavy).ratio.value == pytest.approx(here.ratio.value, rel=1e-6)
+    assert ss.cycle.breakaway(heavy).ratio.value == pytest.approx(here.ratio.value, rel=1e-6)
 
 
 @pytest.mark.parametrize("stiffness", [2e4, 2e5])
 def test_a_contact_that_gives_way_is_told_with_its_stiffness(stiffness: float) -> None:
-    found = ss.presliding(driven(ss.CompliantContact(1.0, stiffness=stiffness, damping=20), noise=2e-7))
+    found = ss.cycle.presliding(driven(ss.laws.CompliantContact(1.0, stiffness=stiffness, damping=20), noise=2e-7))
     assert found.verdict == "gives way"
     assert found.stiffness is not None
     assert found.stiffness.value == pytest.approx(stiffness, rel=0.15)  # low: smoothing blurs the friction alone
@@ -133,16 +135,16 @@ def test_a_contact_that_gives_way_is_told_with_its_stiffness(stiffness: float) -
 
 
 def test_a_rigid_contact_is_called_rigid() -> None:
-    found = ss.presliding(driven(ss.Coulomb(1.0)))
+    found = ss.cycle.presliding(driven(ss.laws.Coulomb(1.0)))
     assert found.verdict == "rigid"
     assert found.stiffness is None
     assert "would be felt" in found.evidence
 
 
 def test_a_mass_that_moves_against_its_load_leaves_it_open() -> None:
-    record = driven(ss.Coulomb(1.0))
+    record = driven(ss.laws.Coulomb(1.0))
     moved = record["x"] - 3e-5 * record["friction"]  # the sensor's foot gives way, not the contact
-    told = ss.presliding(ss.Record.of({"x": moved, "friction": record["friction"]}, fs=FS))
+    told = ss.cycle.presliding(ss.Record.of({"x": moved, "friction": record["friction"]}, fs=FS))
     assert told.verdict == "can not be told"
     assert "against its load" in told.status
 
@@ -162,7 +164,7 @@ def test_play_is_measured() -> None:
             spring, play = 0.0, -0.5e-3 * np.sign(way)
         friction[row] = spring
     record = ss.Record.of({"x": x, "friction": friction}, fs=1000)
-    found = ss.presliding(record)
+    found = ss.cycle.presliding(record)
     assert found.backlash is not None
     assert found.backlash.value == pytest.approx(1e-3, rel=0.1)
     assert found.stiffness is not None
@@ -176,7 +178,7 @@ def test_ringing_after_each_breakaway_is_named() -> None:
     way = np.sign(v)
     friction = way * (2 + 0.6 * np.exp(-since / 0.1) * np.cos(2 * np.pi * 47 * since))
     friction += np.random.default_rng(0).normal(0, 0.005, time.size)
-    found = ss.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": friction}, fs=1000))
+    found = ss.cycle.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": friction}, fs=1000))
     for each in (found.ringing_forward, found.ringing_back):
         assert each is not None
         assert each.value == pytest.approx(47, rel=0.03)
@@ -186,7 +188,7 @@ def test_a_friction_that_swings_all_the_while_is_flagged() -> None:
     time = np.arange(12000) / 1000
     v = np.cos(np.pi * time)
     shaken = np.sign(v) * (2 + 1.5 * np.sin(2 * np.pi * 23 * time) * (v < 0))
-    found = ss.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": shaken}, fs=1000))
+    found = ss.cycle.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": shaken}, fs=1000))
     assert found.swing_forward is not None
     assert found.swing_forward.status == "ok" or "cycles" in found.swing_forward.status
     assert found.swing_back is not None
@@ -197,9 +199,9 @@ def test_strokes_are_needed() -> None:
     time = np.arange(4000) / 1000
     record = ss.Record.of({"x": time, "friction": np.ones(4000)}, fs=1000)
     with pytest.raises(EstimateError, match=r"cycle|stroke"):
-        ss.breakaway(record)
+        ss.cycle.breakaway(record)
     with pytest.raises(RecordError, match="friction"):
-        ss.presliding(ss.Record.of({"x": np.sin(time)}, fs=1000))
+        ss.cycle.presliding(ss.Record.of({"x": np.sin(time)}, fs=1000))
 
 
 def sawtooth(rate: float, *, period: float = 0.5, noise: float = 1e-3, fs: float = 1000) -> ss.Record:
@@ -210,7 +212,7 @@ def sawtooth(rate: float, *, period: float = 0.5, noise: float = 1e-3, fs: float
 
 @pytest.mark.parametrize("rate", [0.1, 3.0])
 def test_a_pulled_slider_is_loaded_at_the_rate_of_its_spring(rate: float) -> None:
-    found = ss.pulled_slider(sawtooth(rate, noise=1e-3 * rate))
+    found = ss.balance.pulled_slider(sawtooth(rate, noise=1e-3 * rate))
     assert found.regime == "stick-slip"
     assert found.loading_rate.value == pytest.approx(rate, rel=0.02)
     assert found.frequency.value == pytest.approx(2.0, rel=0.01)
@@ -220,7 +222,7 @@ def test_a_pulled_slider_is_loaded_at_the_rate_of_its_spring(rate: float) -> Non
 def test_a_slider_that_swings_is_not_called_stick_slip() -> None:
     time = np.arange(20000) / 1000
     wave = 1 + 0.1 * np.sin(2 * np.pi * 3 * time) + np.random.default_rng(2).normal(0, 1e-3, time.size)
-    found = ss.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
+    found = ss.balance.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
     assert found.regime == "inertial"
     assert found.rise_over_fall.value == pytest.approx(1.0, abs=0.1)
     assert "does not stick" in found.loading_rate.status
@@ -228,13 +230,13 @@ def test_a_slider_that_swings_is_not_called_stick_slip() -> None:
 
 def test_a_force_that_does_not_drop_tells_nothing_of_slips() -> None:
     with pytest.raises(EstimateError, match="three slips"):
-        ss.pulled_slider(ss.Record.of({"load": np.linspace(0, 1, 5000)}, fs=1000))
+        ss.balance.pulled_slider(ss.Record.of({"load": np.linspace(0, 1, 5000)}, fs=1000))
 
 
 def test_a_slip_that_the_end_of_the_record_cuts_is_not_counted() -> None:
     """The last drop is half as far: of a few that would be seen in their mean."""
     time = np.arange(1750) / 1000  # five swings and a quarter beyond the last maximum
     wave = 1 + 0.1 * np.cos(2 * np.pi * 3 * time) + np.random.default_rng(3).normal(0, 1e-4, time.size)
-    found = ss.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
+    found = ss.balance.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
     assert found.drop.value == pytest.approx(0.2, rel=0.02)
     assert len(found.slips) == 4

@@ -15,8 +15,8 @@ from stickslip.errors import EstimateError, RecordError
 def seen(frequency: float, soft: bool, late: bool) -> ss.Record:
     """What the rig reads of a rigid or a compliant contact, by displacement sensors that are late or not."""
     amplitude, kinetic = CASES[frequency]
-    law = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9) if soft else ss.Coulomb(kinetic)
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
+    law = ss.laws.CompliantContact(kinetic, stiffness=192000, damping=23.9) if soft else ss.laws.Coulomb(kinetic)
+    slider = ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(amplitude, frequency=frequency), **RIG)
     rig = ss.Rig()
     for name in ("x", "z"):
         rig = rig.having(name, lag=LAG if late else 0.0)
@@ -28,7 +28,7 @@ def seen(frequency: float, soft: bool, late: bool) -> ss.Record:
 @pytest.mark.parametrize("late", [False, True])
 @pytest.mark.parametrize(("frequency", "soft"), [(2.5, True), (5.61, True), (8.7, True), (8.7, False), (11.1, False)])
 def test_each_cause_is_told_from_the_others(frequency: float, soft: bool, late: bool) -> None:
-    found = ss.lag_or_compliance(seen(frequency, soft, late))
+    found = ss.contact.lag_or_compliance(seen(frequency, soft, late))
     names = {(True, True): "both", (True, False): "contact compliance", (False, True): "sensor lag"}
     assert found.cause == names.get((soft, late), found.cause)
     if not soft and not late:
@@ -41,7 +41,7 @@ def test_each_cause_is_told_from_the_others(frequency: float, soft: bool, late: 
 
 
 def test_a_lag_would_pass_for_a_third_of_the_transition_speed() -> None:
-    found = ss.lag_or_compliance(seen(8.7, True, True))
+    found = ss.contact.lag_or_compliance(seen(8.7, True, True))
     assert 0.22 < found.mimicked < 0.4
     assert "would pass for" in found.reason
 
@@ -50,17 +50,17 @@ def test_a_stated_delay_is_no_lag() -> None:
     record = seen(8.7, True, True)
     for name in ("x", "z"):
         record = record.with_details(name, delay=LAG)
-    assert ss.lag_or_compliance(record).cause == "contact compliance"
+    assert ss.contact.lag_or_compliance(record).cause == "contact compliance"
 
 
 def test_the_friction_alone_tells_it_less_surely() -> None:
     record = seen(8.7, True, True)
     bare = ss.Record.of({name: record[name] for name in ("x", "load")}, fs=4000)
     bare = bare.with_details("load", mount=(250.0, 0.05), inertia=0.05, discharge=50.0)
-    found = ss.lag_or_compliance(bare)
+    found = ss.contact.lag_or_compliance(bare)
     assert found.cause == "both"
     assert found.lag.includes(LAG)
-    assert "mount is not stated" in ss.lag_or_compliance(bare.with_details("load", mount=None)).status
+    assert "mount is not stated" in ss.contact.lag_or_compliance(bare.with_details("load", mount=None)).status
 
 
 @pytest.mark.parametrize("frequency", [2.5, 5.61, 8.7])
@@ -70,7 +70,7 @@ def test_stiffness_and_give_hold_the_truth(frequency: float) -> None:
     record = told(measured(frequency, seconds=2.0)[0])
     fused = ss.friction_force(record, method="fusion", **RIG)
     for each in (record, fused):
-        found = ss.lag_or_compliance(each)
+        found = ss.contact.lag_or_compliance(each)
         assert found.cause == "contact compliance"
         assert found.stiffness is not None
         assert found.stiffness.includes(192000)
@@ -78,28 +78,28 @@ def test_stiffness_and_give_hold_the_truth(frequency: float) -> None:
         assert found.give.includes(found.give.value)
         assert f"{1e6 * found.give.value:.3g} um" in found.reason
     assert found.stiffness == ss.contact_stiffness(fused)
-    assert "a damper in the contact" in ss.lag_or_compliance(record).stiffness.status  # type: ignore[union-attr]
+    assert "a damper in the contact" in ss.contact.lag_or_compliance(record).stiffness.status  # type: ignore[union-attr]
 
 
 def test_the_answer_is_printed() -> None:
-    found = ss.lag_or_compliance(seen(8.7, True, False))
+    found = ss.contact.lag_or_compliance(seen(8.7, True, False))
     assert str(found).startswith(f"{found.cause}: {found.reason}")
 
 
 def test_of_a_long_record_the_middle_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip.identify.cause.MOST", 4000)
-    found = ss.lag_or_compliance(seen(8.7, True, False))
+    monkeypatch.setattr("stickslip.contact.cause.MOST", 4000)
+    found = ss.contact.lag_or_compliance(seen(8.7, True, False))
     assert found.cause == "contact compliance"
     assert "the 1 s in the middle of 2 s" in found.reason
 
 
 def test_a_rigid_contact_that_sticks_tells_nothing() -> None:
-    assert ss.lag_or_compliance(seen(2.5, False, True)).cause == "cannot be told"
+    assert ss.contact.lag_or_compliance(seen(2.5, False, True)).cause == "cannot be told"
 
 
 def test_what_it_needs() -> None:
     record = seen(8.7, True, False)
     with pytest.raises(RecordError, match="friction"):
-        ss.lag_or_compliance(ss.Record.of({"x": record["x"]}, fs=4000))
+        ss.contact.lag_or_compliance(ss.Record.of({"x": record["x"]}, fs=4000))
     with pytest.raises(EstimateError, match="reversals"):
-        ss.lag_or_compliance(record.rows(0, 400))
+        ss.contact.lag_or_compliance(record.rows(0, 400))

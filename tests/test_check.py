@@ -11,10 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from corpus import FS, Damaged, clean_records, damaged_records
-from stickslip import Record, RecordError, read_record, repair_clock
+from stickslip import Record, read_record
+from stickslip.errors import RecordError
 from stickslip.record.check import Fault
 from stickslip.record.clock import fit_clock
 from stickslip.record.flaws import spikes
+from stickslip.signals import repair_clock
 
 SEEDS = (0, 2)
 DAMAGED = [(seed, each) for seed in SEEDS for each in damaged_records(seed)]

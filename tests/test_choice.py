@@ -78,7 +78,7 @@ def test_where_the_record_can_not_tell_the_interval_grows() -> None:
 def test_a_joint_in_micro_slip_is_not_called_coulomb() -> None:
     """By the exact engine, twelve sliders side by side: no dry friction, damping that falls with the amplitude."""
     joint, width = 0.2, 3.0
-    law = ss.ElastoSlip.iwan(joint, width=width, elements=12)
+    law = ss.laws.ElastoSlip.iwan(joint, width=width, elements=12)
     yields = np.array(law.forces) / np.array(law.stiffnesses)
     loaded = {f"anchor{j}": max(0.0, 1.0 - each) for j, each in enumerate(yields)}
     slider = ss.Oscillator(mass=1.0, stiffness=1.0, damping=0.005, law=law)
@@ -125,7 +125,7 @@ def test_white_noise_is_called_white_and_nothing_else() -> None:
 
 def test_what_can_not_be_asked_is_refused() -> None:
     times = np.arange(480) / FS
-    with pytest.raises(ss.EstimateError, match=r"each is one of viscous, dry, both"):
+    with pytest.raises(ss.errors.EstimateError, match=r"each is one of viscous, dry, both"):
         choose(times, times, fs=FS, start=[W, 0, 0, 0, 1, 0], candidates=("coulomb",))
-    with pytest.raises(ss.EstimateError, match="three times as many"):
+    with pytest.raises(ss.errors.EstimateError, match="three times as many"):
         choose(times[:10], times[:10], fs=FS, start=[W, 0, 0, 0, 1, 0])

@@ -14,7 +14,7 @@ from scipy.signal import lsim
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.estimate import Estimate
-from stickslip.fit.choice import Evidence, Misfit, standings
+from stickslip.law.choice import Evidence, Misfit, standings
 
 MASS, SPRING, FS, STEPS = 2.0, 3000.0, 2000, 20
 
@@ -46,7 +46,7 @@ def seen(made: dict[str, np.ndarray], *names: str, seed: int, **noise: float) ->
     return ss.Record.of(channels, fs=FS)
 
 
-def sentences(findings: ss.Findings) -> str:
+def sentences(findings: ss.answers.Findings) -> str:
     return " ".join(ss.summary(findings).headline)
 
 
@@ -83,7 +83,7 @@ def test_an_estimate_that_can_not_be_has_no_value_and_says_why() -> None:
 def test_a_damper_is_no_contact_that_gives_way(damping: float, seed: int) -> None:
     for frequency in (2.0, 5.0):
         record = seen(rig(damping=damping, frequency=frequency), "x", "z", seed=seed, x=2e-7)
-        found = ss.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING))
+        found = ss.cycle.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING))
         assert found.verdict == "can not be told"
         assert found.stiffness is None
         assert not any(each.known for each in found.estimates)
@@ -93,7 +93,7 @@ def test_a_damper_is_no_contact_that_gives_way(damping: float, seed: int) -> Non
 @pytest.mark.parametrize(("elastic", "seed"), [(2e4, 51), (8e4, 52)])
 def test_a_contact_that_gives_way_is_still_told(elastic: float, seed: int) -> None:
     record = seen(rig(elastic=elastic, level=1.2, damping=60.0), "x", "z", seed=seed, x=2e-7)
-    found = ss.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING, damping=60.0))
+    found = ss.cycle.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING, damping=60.0))
     assert found.verdict == "gives way"
     assert found.stiffness is not None
     assert found.stiffness.value == pytest.approx(elastic, rel=0.2)
@@ -102,8 +102,8 @@ def test_a_contact_that_gives_way_is_still_told(elastic: float, seed: int) -> No
 def test_a_build_up_as_fast_as_the_filter_has_no_stiffness() -> None:
     record = seen(rig(elastic=2e6, level=1.2, amplitude=3e-3, frequency=5.0), "x", "z", seed=53, x=2e-6)
     try:
-        found = ss.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING))
-    except ss.EstimateError:
+        found = ss.cycle.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING))
+    except ss.errors.EstimateError:
         return
     assert found.stiffness is None
 
@@ -147,7 +147,7 @@ def test_a_friction_that_drives_is_no_number() -> None:
 
 def test_friction_that_begins_late_is_not_below_zero_without_load() -> None:
     levels = [Estimate.normal("friction", 0.4 * (load - 1), sd=0.005, unit="N", method="") for load in (2, 4, 8)]
-    line = ss.friction_over_load(levels, loads=[2, 4, 8])
+    line = ss.law.friction_over_load(levels, loads=[2, 4, 8])
     assert not line.adhesion.known
     assert line.coefficient.value == pytest.approx(0.4, abs=0.005)
     assert line.friction(6).value == pytest.approx(2.0, abs=0.02)
@@ -156,7 +156,7 @@ def test_friction_that_begins_late_is_not_below_zero_without_load() -> None:
 
 def test_an_adhesion_within_its_scatter_of_zero_is_one_sided() -> None:
     levels = [Estimate.normal("friction", 0.4 * load - 0.01, sd=0.02, unit="N", method="") for load in (2, 4, 8)]
-    line = ss.friction_over_load(levels, loads=[2, 4, 8])
+    line = ss.law.friction_over_load(levels, loads=[2, 4, 8])
     assert line.adhesion.value == 0
     assert line.adhesion.interval[0] == 0
     assert line.adhesion.interval[1] > 0
@@ -166,7 +166,7 @@ def test_an_adhesion_within_its_scatter_of_zero_is_one_sided() -> None:
 def test_records_side_by_side_have_no_friction_below_zero_at_no_load() -> None:
     time, rng = np.arange(4000) / 500, np.random.default_rng(72)
 
-    def slide(load: float) -> ss.Findings:
+    def slide(load: float) -> ss.answers.Findings:
         friction = 0.3 * (load - 1) * np.sign(np.cos(2 * np.pi * time)) + rng.normal(0, 0.01, time.size)
         x = np.sin(2 * np.pi * time) / (2 * np.pi)
         return ss.analyze(ss.Record.of({"x": x, "friction": friction, "normal": np.full(time.size, load)}, fs=500))
@@ -186,7 +186,7 @@ def test_forces_agree_up_to_no_more_than_half_the_sampling_rate() -> None:
     record = seen(
         {**made, "load": made["friction"]}, "x", "z", "a", "load", seed=81, x=1e-9, a=1e-6, load=1e-6
     )  # fmt: skip
-    found = ss.compare_force(record, mass=MASS, stiffness=SPRING).agree_up_to
+    found = ss.balance.compare_force(record, mass=MASS, stiffness=SPRING).agree_up_to
     assert 0 <= found.interval[0] <= found.value <= found.interval[1] <= FS / 2
 
 
@@ -299,7 +299,7 @@ def test_an_accelerometer_s_noise_is_no_swing_of_the_friction(noise: float, seed
     made = rig(elastic=3e5, level=1.2, damping=60.0, amplitude=2e-3)
     record = seen(made, "x", "z", "a", seed=seed, x=2e-7, a=noise)
     record = ss.friction_force(record.with_details("a", noise=noise), mass=MASS, stiffness=SPRING, damping=60.0)
-    found = ss.breakaway(record)
+    found = ss.cycle.breakaway(record)
     for swing in (found.swing_forward, found.swing_back):
         assert swing is not None
         assert swing.interval[0] < 0.3 * MASS * noise / 1.2  # it is told from none by no more than that
@@ -315,7 +315,7 @@ def test_a_swing_that_is_there_is_told_through_the_noise(share: float, seed: int
     tones, phases = rng.uniform(60, 110, 24), rng.uniform(0, 2 * np.pi, 24)
     vibration = np.sin(2 * np.pi * np.outer(time, tones) + phases).sum(axis=1) / math.sqrt(12)
     made["friction"] += share * 1.2 * vibration
-    found = ss.breakaway(seen(made, "x", "friction", seed=seed, x=2e-7, friction=0.05))
+    found = ss.cycle.breakaway(seen(made, "x", "friction", seed=seed, x=2e-7, friction=0.05))
     for swing in (found.swing_forward, found.swing_back):
         assert swing is not None
         assert swing.interval[0] > 0

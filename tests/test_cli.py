@@ -406,7 +406,7 @@ def test_work_that_lasts_is_told_to_who_watches() -> None:
 INTERRUPTED_WHILE_WRITING = """
 import os, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-from stickslip.reports import folder
+from stickslip.story import folder
 write = folder.write_figures
 def interrupted(*arguments):
     write(*arguments)

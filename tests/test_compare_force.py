@@ -15,9 +15,9 @@ from stickslip.signals.response import resonance
 
 
 @cache
-def compared(frequency: float, seconds: float = 3.0) -> ss.ForceComparison:
+def compared(frequency: float, seconds: float = 3.0) -> ss.balance.ForceComparison:
     record = told(measured(frequency, 0.0, seconds)[0])
-    return ss.compare_force(ss.friction_force(record, **RIG))  # the rig is taken from the history
+    return ss.balance.compare_force(ss.friction_force(record, **RIG))  # the rig is taken from the history
 
 
 @pytest.mark.parametrize("frequency", list(CASES))
@@ -35,17 +35,17 @@ def test_the_mounts_intervals_hold() -> None:
     run = measured_run(11.1)
     for seed in range(4):
         record = told(rig.measure(run, fs=4000, rng=seed, start=6.0))
-        first, second = ss.compare_force(record, **RIG).resonances
+        first, second = ss.balance.compare_force(record, **RIG).resonances
         inside += [first.frequency.includes(125.0), first.damping.includes(0.1)]
         inside += [second.frequency.includes(250.0), second.damping.includes(0.05)]
     assert np.mean(inside) > 0.85
 
 
 @cache
-def measured_run(frequency: float) -> ss.Trajectory:
+def measured_run(frequency: float) -> ss.solve.Trajectory:
     amplitude, kinetic = CASES[frequency]
-    law = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9)
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
+    law = ss.laws.CompliantContact(kinetic, stiffness=192000, damping=23.9)
+    slider = ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(amplitude, frequency=frequency), **RIG)
     return ss.simulate(slider, duration=7.5)
 
 
@@ -70,7 +70,7 @@ def test_they_agree_until_the_mounts_swing(frequency: float) -> None:
 def test_sensors_without_fault_agree_everywhere() -> None:
     rig = ss.Rig.perfect().having("x", white=1e-7).having("z", white=1e-7).having("a", white=1e-3)
     record = rig.having("load", white=1e-3).measure(measured_run(8.7), fs=4000, rng=1, start=5.0)
-    found = ss.compare_force(record, **RIG)
+    found = ss.balance.compare_force(record, **RIG)
     assert found.resonances == ()
     assert found.agree_up_to.value > 400
     assert found.difference.value < 0.01
@@ -87,34 +87,34 @@ def test_the_difference_in_time_is_that_of_the_traces() -> None:
 def test_unrelated_forces_have_nothing_in_common() -> None:
     record = told(measured(8.7)[0])
     noise = np.random.default_rng(1).standard_normal(len(record))
-    found = ss.compare_force(record.with_channel("load", noise, unit="N"), **RIG)
+    found = ss.balance.compare_force(record.with_channel("load", noise, unit="N"), **RIG)
     assert sum(band.verdict != "noise" for band in found.bands) <= 2  # of 19, each by chance in one of 100
 
 
 def test_a_wrong_sign_and_a_lag_are_said() -> None:
     record = told(measured(8.7)[0])
-    turned = ss.compare_force(record.with_channel("load", -record["load"], unit="N"), **RIG)
+    turned = ss.balance.compare_force(record.with_channel("load", -record["load"], unit="N"), **RIG)
     assert "opposite signs" in turned.status
     assert turned.agree_up_to.value == 0
-    late = ss.compare_force(measured(8.7)[0], **RIG)
+    late = ss.balance.compare_force(measured(8.7)[0], **RIG)
     assert "no delay is stated" in late.status
 
 
 def test_a_cell_at_the_end_of_its_range_is_said() -> None:
     record = told(measured(8.7, seconds=3.0)[0])
     cut = record.with_channel("load", np.clip(record["load"], -1, 1), unit="N")
-    found = ss.compare_force(cut, **RIG)
+    found = ss.balance.compare_force(cut, **RIG)
     assert "at the end of the range is load in" in found.status
     assert found.difference.status == found.agree_up_to.status != "ok"
 
 
 def test_a_motion_that_does_not_repeat_is_compared_in_windows() -> None:
     rng = np.random.default_rng(2)
-    drive = ss.MultiTone(tuple((1e-3 / n, 2.0 + 1.37 * n, 6.28 * rng.random()) for n in range(1, 6)))
-    slider = ss.Oscillator(law=ss.Coulomb(1.5), drive=drive, **RIG)
+    drive = ss.drives.MultiTone(tuple((1e-3 / n, 2.0 + 1.37 * n, 6.28 * rng.random()) for n in range(1, 6)))
+    slider = ss.Oscillator(law=ss.laws.Coulomb(1.5), drive=drive, **RIG)
     rig = ss.Rig().having("x", lag=0.0).having("z", lag=0.0)
     record = rig.measure(ss.simulate(slider, duration=20.0), fs=1000, rng=1, start=2.0)
-    found = ss.compare_force(record.with_details("load", inertia=0.05), **RIG)
+    found = ss.balance.compare_force(record.with_details("load", inertia=0.05), **RIG)
     assert "windows" in found.agree_up_to.checks[0]
     assert 15 < found.agree_up_to.value < 60
 
@@ -122,16 +122,16 @@ def test_a_motion_that_does_not_repeat_is_compared_in_windows() -> None:
 def test_what_can_not_be_compared_is_refused() -> None:
     record = measured(8.7)[0]
     with pytest.raises(RecordError, match="load"):
-        ss.compare_force(ss.Record.of({"x": record["x"]}, fs=4000), **RIG)
+        ss.balance.compare_force(ss.Record.of({"x": record["x"]}, fs=4000), **RIG)
     with pytest.raises(EstimateError, match="tolerance"):
-        ss.compare_force(record, tolerance=2.0, **RIG)
+        ss.balance.compare_force(record, tolerance=2.0, **RIG)
     with pytest.raises(EstimateError, match="give mass= or stiffness="):
-        ss.compare_force(record)
+        ss.balance.compare_force(record)
 
 
 def test_the_figure_and_the_plain_data() -> None:
     found = compared(8.7)
-    figure = ss.plot_force_comparison(found)
+    figure = ss.plot.plot_force_comparison(found)
     words = [text.get_text() for text in figure.axes[2].texts]
     assert any("accelerometer" in each for each in words)
     told_ = found.to_dict()
@@ -180,7 +180,7 @@ TRUE = {
 
 @pytest.mark.parametrize("mass", [None, "2.42 kg"])
 def test_a_tap_shows_the_contact_and_both_mounts(mass: str | None) -> None:
-    found = ss.impact_test(tap(), mass=mass)
+    found = ss.balance.impact_test(tap(), mass=mass)
     assert [each.name for each in found.resonances] == list(TRUE)
     assert [each.channels for each in found.resonances] == [("a", "load"), ("a",), ("load",)]
     for each in found.resonances:
@@ -194,7 +194,7 @@ def test_a_tap_shows_the_contact_and_both_mounts(mass: str | None) -> None:
 def test_the_intervals_of_a_tap_hold() -> None:
     inside = []
     for seed in range(10):
-        found = ss.impact_test(tap(seed, noise=3.0), mass=2.42)
+        found = ss.balance.impact_test(tap(seed, noise=3.0), mass=2.42)
         inside += [each.frequency.includes(TRUE[each.name][0]) for each in found.resonances]
         inside += [each.damping.includes(TRUE[each.name][1]) for each in found.resonances if "mount" in each.name]
     assert len(inside) == 50
@@ -204,10 +204,10 @@ def test_the_intervals_of_a_tap_hold() -> None:
 def test_without_a_tap_or_a_second_sensor_it_says_so() -> None:
     quiet = np.random.default_rng(1).standard_normal((2, 4000))
     with pytest.raises(EstimateError, match="tap"):
-        ss.impact_test(ss.Record.of({"a": quiet[0], "load": quiet[1]}, fs=4000))
+        ss.balance.impact_test(ss.Record.of({"a": quiet[0], "load": quiet[1]}, fs=4000))
     with pytest.raises(RecordError, match="a, load"):
-        ss.impact_test(ss.Record.of({"x": quiet[0]}, fs=4000))
-    alone = ss.impact_test(ss.Record.of({"a": tap()["a"]}, fs=4000))
+        ss.balance.impact_test(ss.Record.of({"x": quiet[0]}, fs=4000))
+    alone = ss.balance.impact_test(ss.Record.of({"a": tap()["a"]}, fs=4000))
     assert {each.name for each in alone.resonances} == {"seen by a"}
     assert "can not tell" in alone.resonances[0].evidence
 
@@ -216,5 +216,5 @@ def test_a_contact_that_slips_after_the_tap_is_told() -> None:
     record = tap()
     t = record.time
     slipping = record["a"] + np.where((t > 0.13) & (t < 0.145), 1.5, 0.0)
-    found = ss.impact_test(ss.Record.of({"a": slipping, "load": record["load"]}, fs=4000))
+    found = ss.balance.impact_test(ss.Record.of({"a": slipping, "load": record["load"]}, fs=4000))
     assert "no sum of decaying oscillations" in found.status

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip.config import RigSettings, read_rig, rig_settings
 from stickslip.errors import ModelError
+from stickslip.rig.settings import RigSettings, read_rig, rig_settings
 
 WHOLE = """
 mass = "3.0799 kg"

@@ -14,8 +14,8 @@ import pytest
 
 import stickslip as ss
 from rigs import CASES, RIG, measured, told
+from stickslip.consistent.sliding_balance import Slider
 from stickslip.errors import EstimateError, ModelError, RecordError
-from stickslip.identify.sliding_balance import Slider
 
 
 @cache
@@ -26,8 +26,8 @@ def good() -> ss.Record:
 @cache
 def started(frequency: float) -> ss.Record:
     """From rest on, so that the first cycles differ from the later ones."""
-    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(CASES[frequency][0], frequency=frequency), **RIG)
+    law = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    slider = ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(CASES[frequency][0], frequency=frequency), **RIG)
     return told(ss.Rig().measure(ss.simulate(slider, duration=5.0), fs=4000, rng=1))
 
 
@@ -38,7 +38,7 @@ def changed(record: ss.Record, **channels: np.ndarray) -> ss.Record:
 @pytest.mark.parametrize("rough", [0.0, 0.03])
 @pytest.mark.parametrize("frequency", list(CASES))
 def test_a_sound_record_is_consistent(frequency: float, rough: float) -> None:
-    found = ss.consistency(told(measured(frequency, rough, 3.0)[0]), **RIG)
+    found = ss.consistent.consistency(told(measured(frequency, rough, 3.0)[0]), **RIG)
     assert found.status == "ok"
     held = {check.name for check in found.checks if check.verdict == "holds"}
     assert held >= {
@@ -49,21 +49,24 @@ def test_a_sound_record_is_consistent(frequency: float, rough: float) -> None:
 
 
 def test_it_seldom_cries_wolf() -> None:
-    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    run = ss.simulate(ss.Oscillator(law=law, drive=ss.HarmonicBase(1.1e-3, frequency=8.7), **RIG), duration=6.0)
-    failed = [ss.consistency(told(ss.Rig().measure(run, fs=4000, rng=s, start=4.0)), **RIG).failed for s in range(5)]
+    law = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    run = ss.simulate(ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7), **RIG), duration=6.0)
+    failed = [
+        ss.consistent.consistency(told(ss.Rig().measure(run, fs=4000, rng=s, start=4.0)), **RIG).failed
+        for s in range(5)
+    ]
     assert not any(failed)
 
 
 def test_the_rig_comes_from_the_history() -> None:
     record = ss.friction_force(good(), **RIG, method="F")
-    assert ss.consistency(record)["forces balance at the forcing frequency"].verdict == "holds"
-    assert ss.consistency(good())["forces balance at the forcing frequency"].verdict == "can not be told"
+    assert ss.consistent.consistency(record)["forces balance at the forcing frequency"].verdict == "holds"
+    assert ss.consistent.consistency(good())["forces balance at the forcing frequency"].verdict == "can not be told"
 
 
 @pytest.mark.parametrize("name", ["x", "z", "a", "load"])
 def test_a_wrong_sign_is_found(name: str) -> None:
-    found = ss.consistency(changed(good(), **{name: -good()[name]}), **RIG)
+    found = ss.consistent.consistency(changed(good(), **{name: -good()[name]}), **RIG)
     assert found["one slip that explains it"].sentence == f"{name} has the wrong sign"
     assert f"{name} has the wrong sign" in found.status
 
@@ -71,8 +74,8 @@ def test_a_wrong_sign_is_found(name: str) -> None:
 def test_a_velocity_of_the_wrong_sign_is_found() -> None:
     record = good().with_channel("v", np.gradient(good()["x"], 1 / 4000), unit="m/s")
     record = record.with_details("v", delay=good().channels["x"].delay)
-    assert ss.consistency(record, **RIG)["velocity is that of the displacement"].verdict == "holds"
-    turned = ss.consistency(changed(record, v=-record["v"]), **RIG)["velocity is that of the displacement"]
+    assert ss.consistent.consistency(record, **RIG)["velocity is that of the displacement"].verdict == "holds"
+    turned = ss.consistent.consistency(changed(record, v=-record["v"]), **RIG)["velocity is that of the displacement"]
     assert "opposite signs" in turned.sentence
     assert turned.left * turned.right < 0
 
@@ -80,34 +83,34 @@ def test_a_velocity_of_the_wrong_sign_is_found() -> None:
 @pytest.mark.parametrize("pair", [("x", "z"), ("a", "load"), ("x", "a"), ("z", "load"), ("x", "load"), ("z", "a")])
 def test_exchanged_channels_are_found(pair: tuple[str, str]) -> None:
     one, other = pair
-    found = ss.consistency(changed(good(), **{one: good()[other], other: good()[one]}), **RIG)
+    found = ss.consistent.consistency(changed(good(), **{one: good()[other], other: good()[one]}), **RIG)
     assert found["one slip that explains it"].sentence == f"{one} and {other} are exchanged"
 
 
 def test_with_motion_sensors_alone_a_sign_is_still_found() -> None:
     bare = ss.Record.of({name: good()[name] for name in ("x", "z", "a")}, fs=4000)
     for name in ("x", "a"):
-        found = ss.consistency(changed(bare, **{name: -bare[name]}), **RIG)
+        found = ss.consistent.consistency(changed(bare, **{name: -bare[name]}), **RIG)
         assert found["one slip that explains it"].sentence == f"{name} has the wrong sign"
     two = ss.Record.of({name: good()[name] for name in ("x", "z")}, fs=4000)
-    swapped = ss.consistency(changed(two, x=two["z"], z=two["x"]), **RIG)
+    swapped = ss.consistent.consistency(changed(two, x=two["z"], z=two["x"]), **RIG)
     assert "exchanged" in swapped["energy of whole cycles"].sentence
 
 
 def test_a_mistaken_unit_is_found() -> None:
-    in_g = ss.consistency(changed(good(), a=good()["a"] / 9.80665), **RIG)
+    in_g = ss.consistent.consistency(changed(good(), a=good()["a"] / 9.80665), **RIG)
     assert "a is in g" in in_g["one slip that explains it"].sentence
-    in_mm = ss.consistency(changed(good(), a=1e3 * good()["a"]), **RIG)
+    in_mm = ss.consistent.consistency(changed(good(), a=1e3 * good()["a"]), **RIG)
     assert "a is in mm/s^2" in in_mm["one slip that explains it"].sentence
-    in_lb = ss.consistency(changed(good(), load=good()["load"] / 4.4482216152605), **RIG)
+    in_lb = ss.consistent.consistency(changed(good(), load=good()["load"] / 4.4482216152605), **RIG)
     assert "load is in lbf" in in_lb["one slip that explains it"].sentence
 
 
 def test_a_wrong_constant_is_named_with_the_right_one() -> None:
-    heavy = ss.consistency(good(), **{**RIG, "mass": 2.9})["forces balance at the forcing frequency"]
+    heavy = ss.consistent.consistency(good(), **{**RIG, "mass": 2.9})["forces balance at the forcing frequency"]
     assert heavy.verdict == "fails"
     assert "a mass of 2.4" in heavy.sentence
-    stiff = ss.consistency(good(), **{**RIG, "stiffness": 2700.0})
+    stiff = ss.consistent.consistency(good(), **{**RIG, "stiffness": 2700.0})
     assert {"forces balance at the forcing frequency", "energy of whole cycles"} <= {c.name for c in stiff.failed}
     assert "stiffness of 23" in stiff["forces balance at the forcing frequency"].sentence
 
@@ -116,7 +119,7 @@ def test_a_lag_within_a_cycle_is_measured() -> None:
     late = told(measured(8.7, 0.0, 3.0)[0])
     for name in ("x", "z"):
         late = late.with_details(name, delay=0.0)
-    check = ss.consistency(late, **RIG)["acceleration is that of the displacement"]
+    check = ss.consistent.consistency(late, **RIG)["acceleration is that of the displacement"]
     assert check.verdict == "fails"
     assert "a is 1.25 ms ahead of x" in check.sentence
     # the LVDTs come 1.26 ms late (thesis, 2.3)
@@ -130,7 +133,7 @@ def test_a_lag_of_whole_cycles_is_found_where_cycles_differ(frequency: float, na
     whole = len(record) - rows
     mine, others = (record[name][:whole], slice(rows, None)) if cycles > 0 else (record[name][rows:], slice(0, whole))
     samples = {each: mine if each == name else record[each][others] for each in record}
-    found = ss.consistency(dataclasses.replace(record, samples=samples), **RIG)
+    found = ss.consistent.consistency(dataclasses.replace(record, samples=samples), **RIG)
     word = "late" if cycles > 0 else "early"
     assert f"{abs(cycles)} whole cycles {word}" in found[f"{name} is of the same cycle as x"].sentence
     other = "load" if name == "a" else "a"
@@ -138,35 +141,35 @@ def test_a_lag_of_whole_cycles_is_found_where_cycles_differ(frequency: float, na
 
 
 def test_in_a_steady_motion_whole_cycles_leave_no_trace() -> None:
-    check = ss.consistency(good(), **RIG)["a is of the same cycle as x"]
+    check = ss.consistent.consistency(good(), **RIG)["a is of the same cycle as x"]
     assert check.verdict == "can not be told"
 
 
 def test_a_saturated_cell_a_shifted_zero_and_a_low_rate_are_named() -> None:
-    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    run = ss.simulate(ss.Oscillator(law=law, drive=ss.HarmonicBase(1.1e-3, frequency=8.7), **RIG), duration=8.0)
+    law = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    run = ss.simulate(ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7), **RIG), duration=8.0)
     full = told(ss.Rig().having("load", limit=0.9).measure(run, fs=4000, rng=1, start=5.0))
-    assert ss.consistency(full, **RIG)["range of load"].verdict == "fails"
+    assert ss.consistent.consistency(full, **RIG)["range of load"].verdict == "fails"
     off = told(ss.Rig().having("a", offset=0.2).measure(run, fs=4000, rng=1, start=5.0))
-    assert "zero is off by 0.199" in ss.consistency(off, **RIG)["mean force is zero"].sentence
+    assert "zero is off by 0.199" in ss.consistent.consistency(off, **RIG)["mean force is zero"].sentence
     slow = told(ss.Rig().measure(run, fs=400, rng=1, start=5.0))
-    assert "too few to see" in ss.consistency(slow, **RIG)["samples of a reversal"].sentence
+    assert "too few to see" in ss.consistent.consistency(slow, **RIG)["samples of a reversal"].sentence
 
 
 def test_sliding_against_more_than_the_base_can_give_is_no_motion() -> None:
     """Friction doubled in the record: F > pi k Z / 4, and the mass goes on."""
     record = told(measured(5.61, 0.0, 3.0)[0])
-    found = ss.consistency(changed(record, load=1.5 * record["load"]), **RIG)["sliding without stops"]
+    found = ss.consistent.consistency(changed(record, load=1.5 * record["load"]), **RIG)["sliding without stops"]
     assert found.verdict == "fails"
     assert "pi k Z / 4" in found.sentence
 
 
 def test_a_motion_that_does_not_repeat_is_checked_where_it_can_be() -> None:
     rng = np.random.default_rng(2)
-    drive = ss.MultiTone(tuple((1e-3 / n, 2.0 + 1.37 * n, 6.28 * rng.random()) for n in range(1, 6)))
-    run = ss.simulate(ss.Oscillator(law=ss.Coulomb(1.5), drive=drive, **RIG), duration=20.0)
+    drive = ss.drives.MultiTone(tuple((1e-3 / n, 2.0 + 1.37 * n, 6.28 * rng.random()) for n in range(1, 6)))
+    run = ss.simulate(ss.Oscillator(law=ss.laws.Coulomb(1.5), drive=drive, **RIG), duration=20.0)
     record = told(ss.Rig().measure(run, fs=1000, rng=1, start=2.0))
-    found = ss.consistency(record, **RIG)
+    found = ss.consistent.consistency(record, **RIG)
     assert found["mean force is zero"].verdict == "can not be told"
     assert found["acceleration is that of the displacement"].verdict == "holds"
     assert "no cycle is like another" in found["energy of whole cycles"].sentence
@@ -174,19 +177,21 @@ def test_a_motion_that_does_not_repeat_is_checked_where_it_can_be() -> None:
 
 @pytest.mark.parametrize("damper", ["ground", "base"])
 def test_a_mass_that_a_force_drives_is_checked_too(damper: str) -> None:
-    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=5.0, law=law, drive=ss.HarmonicForce(4.0, frequency=6.0))
+    law = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    slider = ss.Oscillator(
+        mass=2.42, stiffness=2310, damping=5.0, law=law, drive=ss.drives.HarmonicForce(4.0, frequency=6.0)
+    )
     record = ss.Rig.perfect().measure(ss.simulate(slider, duration=8.0), fs=4000, rng=1, start=5.0)
     record = record.with_channel("force", 4.0 * np.cos(2 * np.pi * 6.0 * (5.0 + record.time)), unit="N")
-    found = ss.consistency(record, mass=2.42, stiffness=2310, damping=5.0, damper=damper)
+    found = ss.consistent.consistency(record, mass=2.42, stiffness=2310, damping=5.0, damper=damper)
     assert found.status == "ok"
     assert found["energy of whole cycles"].verdict == "holds"
-    without = ss.consistency(record, mass=2.42, stiffness=2310)["energy of whole cycles"]
+    without = ss.consistent.consistency(record, mass=2.42, stiffness=2310)["energy of whole cycles"]
     assert (without.verdict, without.left > without.right) == ("fails", True)
 
 
 def test_plain_data_and_words() -> None:
-    found = ss.consistency(good(), **RIG)
+    found = ss.consistent.consistency(good(), **RIG)
     data = found.to_dict()
     assert data["status"] == "ok"
     assert len(data["checks"]) == len(found.checks)
@@ -199,25 +204,25 @@ def test_plain_data_and_words() -> None:
 
 def test_what_can_not_be_checked_is_refused() -> None:
     with pytest.raises(RecordError, match="x"):
-        ss.consistency(ss.Record.of({"a": good()["a"]}, fs=4000))
+        ss.consistent.consistency(ss.Record.of({"a": good()["a"]}, fs=4000))
     with pytest.raises(EstimateError, match="tolerance"):
-        ss.consistency(good(), tolerance=0.0)
+        ss.consistent.consistency(good(), tolerance=0.0)
 
 
 def test_a_sensor_that_does_not_change_is_named_and_left_out() -> None:
-    still = ss.consistency(changed(good(), a=np.full(len(good()), 0.3)), **RIG)
+    still = ss.consistent.consistency(changed(good(), a=np.full(len(good()), 0.3)), **RIG)
     assert still["a is heard"].verdict == "fails"
     assert "a does not change, it reads 0.3 m/s^2" in still["a is heard"].sentence
     assert still["acceleration is that of the displacement"].verdict == "can not be told"
     assert still["forces balance at the forcing frequency"].verdict == "holds"
     with pytest.raises(RecordError, match="channel x does not change"):
-        ss.consistency(changed(good(), x=np.full(len(good()), 1e-3)), **RIG)
+        ss.consistent.consistency(changed(good(), x=np.full(len(good()), 1e-3)), **RIG)
 
 
 def test_a_sensor_with_gaps_is_named_and_left_out() -> None:
     gaps = good()["a"].copy()
     gaps[500:600] = np.nan
-    found = ss.consistency(changed(good(), a=gaps), **RIG)
+    found = ss.consistent.consistency(changed(good(), a=gaps), **RIG)
     assert found.status == "ok"
     assert "100 values that are not numbers" in found["a is heard"].sentence
     assert found["a is heard"].verdict == "can not be told"
@@ -225,12 +230,14 @@ def test_a_sensor_with_gaps_is_named_and_left_out() -> None:
 
 @pytest.mark.parametrize("frequency", [2.5, 8.7])
 def test_the_rate_that_is_advised_hangs_little_on_the_rate_that_was_taken(frequency: float) -> None:
-    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    drive = ss.HarmonicBase(CASES[frequency][0], frequency=frequency)
+    law = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    drive = ss.drives.HarmonicBase(CASES[frequency][0], frequency=frequency)
     run = ss.simulate(ss.Oscillator(law=law, drive=drive, **RIG), duration=6.0)
     rates = []
     for fs in (100, 250, 500):
-        check = ss.consistency(told(ss.Rig().measure(run, fs=fs, rng=3, start=3.0)), **RIG)["samples of a reversal"]
+        check = ss.consistent.consistency(told(ss.Rig().measure(run, fs=fs, rng=3, start=3.0)), **RIG)[
+            "samples of a reversal"
+        ]
         assert check.verdict == "fails"
         rates.append(float(check.sentence.partition("sample at ")[2].split()[0]))
     assert max(rates) <= 2 * min(rates)
@@ -246,21 +253,21 @@ def test_the_shaken_frame_is_consistent(dataset: Callable[[str], Path]) -> None:
         [folder / "s_b_450g_x.mat", folder / "s_b_450g_y.mat"], channels={"x": "x [mm]", "z": "y [mm]"}
     )
     rig: dict[str, Any] = {"mass": 3.0799, "stiffness": 1191, "damping": 0.669, "damper": "base"}
-    found = ss.consistency(ss.friction_force(record, **rig))
+    found = ss.consistent.consistency(ss.friction_force(record, **rig))
     assert found.status == "ok"
     assert found["energy of whole cycles"].verdict == "holds"
-    exchanged = ss.consistency(changed(record, x=record["z"], z=record["x"]), **rig)
+    exchanged = ss.consistent.consistency(changed(record, x=record["z"], z=record["x"]), **rig)
     assert "exchanged" in exchanged.status
 
 
 def test_of_the_band_brake_it_says_what_can_be_told(dataset: Callable[[str], Path]) -> None:
     path = dataset("band_brake_damper") / "0.5Hz35lbtension.json"
     record = ss.read_record(path, channels={"x": "#2 [in]", "load": "c3 [kip]", "v": "#4 [in/s]"}, time="#1")
-    found = ss.consistency(record)
+    found = ss.consistent.consistency(record)
     assert found["energy of whole cycles"].verdict == "holds"
     assert found["velocity is that of the displacement"].verdict == "holds"
     assert found["forces balance at the forcing frequency"].verdict == "can not be told"
-    turned = ss.consistency(changed(record, load=-record["load"]))
+    turned = ss.consistent.consistency(changed(record, load=-record["load"]))
     assert "friction gives energy" in turned["energy of whole cycles"].sentence
 
 
@@ -285,7 +292,7 @@ def row(frequency: float) -> dict[str, Any]:
 
 
 def test_the_rows_at_5_61_hz_contradict_each_other() -> None:
-    found = ss.consistency(row(5.61))
+    found = ss.consistent.consistency(row(5.61))
     names = {check.name for check in found.failed}
     assert names == {"energy", "friction that base and amplitude ask for", "sliding without stops"}
     needed = found["friction that base and amplitude ask for"]
@@ -296,29 +303,31 @@ def test_the_rows_at_5_61_hz_contradict_each_other() -> None:
 
 @pytest.mark.parametrize("frequency", [8.7, 11.1])
 def test_the_other_rows_hold_within_their_rounding(frequency: float) -> None:
-    assert ss.consistency(row(frequency)).status == "ok"
+    assert ss.consistent.consistency(row(frequency)).status == "ok"
 
 
 def test_stated_numbers_may_be_estimates_or_pairs() -> None:
     sure = row(5.61)
     sure["amplitude"] = (0.49e-3, 0.2e-3)
     sure["sliding friction"] = ss.Estimate.normal("sliding friction", 1.06, sd=0.2, unit="N", method="")
-    assert ss.consistency(sure).status == "ok"  # so unsure that it may be true
-    rounded, exact = ss.consistency(row(8.7), tolerance=1e-6), ss.consistency({**row(8.7), "base amplitude": 1.1e-3},
-                                                                              tolerance=1e-6)  # fmt: skip
+    assert ss.consistent.consistency(sure).status == "ok"  # so unsure that it may be true
+    rounded, exact = (
+        ss.consistent.consistency(row(8.7), tolerance=1e-6),
+        ss.consistent.consistency({**row(8.7), "base amplitude": 1.1e-3}, tolerance=1e-6),
+    )
     name = "friction that base and amplitude ask for"
     assert rounded[name].discrepancy < 0.5 * exact[name].discrepancy
 
 
 def test_stated_numbers_without_meaning_are_refused() -> None:
     with pytest.raises(ModelError, match="colour"):
-        ss.consistency({**row(8.7), "colour": 3.0})
+        ss.consistent.consistency({**row(8.7), "colour": 3.0})
     with pytest.raises(EstimateError, match="amplitude"):
-        ss.consistency({name: value for name, value in row(8.7).items() if name != "amplitude"})
+        ss.consistent.consistency({name: value for name, value in row(8.7).items() if name != "amplitude"})
     with pytest.raises(ModelError, match="positive"):
-        ss.consistency({**row(8.7), "mass": -1.0})
-    with pytest.raises(ss.RecordError):
-        ss.consistency({**row(8.7), "mass": "2 mm"})
+        ss.consistent.consistency({**row(8.7), "mass": -1.0})
+    with pytest.raises(ss.errors.RecordError):
+        ss.consistent.consistency({**row(8.7), "mass": "2 mm"})
 
 
 # ---- the closed forms

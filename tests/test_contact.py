@@ -7,8 +7,8 @@ import pytest
 
 import stickslip as ss
 from rigs import LAG, RIG, measured, told
+from stickslip.contact.contact import branch_slopes
 from stickslip.errors import EstimateError, RecordError
-from stickslip.identify.contact import branch_slopes
 
 STIFFNESS, DAMPING = 192000.0, 23.9
 
@@ -29,8 +29,10 @@ def test_the_likeliest_contact_is_the_true_one(frequency: float, rough: float, w
 
 def test_its_interval_is_neither_too_narrow_nor_too_wide() -> None:
     """Ten records of a second, each with its own noise: the square of error over deviation is 1 in the mean."""
-    contact = ss.CompliantContact(1.1, stiffness=STIFFNESS, damping=DAMPING)
-    run = ss.simulate(ss.Oscillator(law=contact, drive=ss.HarmonicBase(1.1e-3, frequency=8.7), **RIG), duration=5.0)
+    contact = ss.laws.CompliantContact(1.1, stiffness=STIFFNESS, damping=DAMPING)
+    run = ss.simulate(
+        ss.Oscillator(law=contact, drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7), **RIG), duration=5.0
+    )
     records = [told(ss.Rig().measure(run, fs=4000, rng=seed, start=4.0)) for seed in range(10)]
     found = [ss.contact_stiffness(ss.friction_force(record, method="fusion", **RIG)) for record in records]
     strayed = np.mean([((each.value - STIFFNESS) / each.sd) ** 2 for each in found])
@@ -38,15 +40,15 @@ def test_its_interval_is_neither_too_narrow_nor_too_wide() -> None:
 
 
 def test_of_a_long_record_some_stretches_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip.identify.likely_contact.MOST", 6000)
-    monkeypatch.setattr("stickslip.identify.likely_contact.PIECES", 2)
+    monkeypatch.setattr("stickslip.balance.likely_contact.MOST", 6000)
+    monkeypatch.setattr("stickslip.balance.likely_contact.PIECES", 2)
     found = ss.contact_stiffness(balanced(2.5))
     assert found.value == pytest.approx(STIFFNESS, rel=1e-3)
     assert abs(found.value - STIFFNESS) < 3.5 * found.sd
 
 
 def test_its_damping_too() -> None:
-    found = ss.contact_damping(balanced(2.5))
+    found = ss.contact.contact_damping(balanced(2.5))
     assert found.value == pytest.approx(DAMPING, rel=0.02)
     assert abs(found.value - DAMPING) < 3.5 * found.sd
 
@@ -82,9 +84,9 @@ def test_loops_tell_the_slope_of_their_mean_cycle() -> None:
         ss.contact_stiffness(ss.friction_loops(record), method="stick")
 
 
-def _run() -> ss.Trajectory:
-    contact = ss.CompliantContact(1.1, stiffness=STIFFNESS)
-    drive = ss.HarmonicBase(1.1e-3, frequency=8.7)
+def _run() -> ss.solve.Trajectory:
+    contact = ss.laws.CompliantContact(1.1, stiffness=STIFFNESS)
+    drive = ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
     return ss.simulate(ss.Oscillator(law=contact, drive=drive, **RIG), cycles=60)
 
 
@@ -102,30 +104,30 @@ def test_what_it_lacks_is_said() -> None:
 
 def record_of(law: object, frequency: float = 2.5, rig: ss.Rig | None = None, fs: float = 4000.0) -> ss.Record:
     """Two seconds of the thesis's motion on another contact, or by other sensors, taken as told."""
-    drive = ss.HarmonicBase({2.5: 0.65e-3, 8.7: 1.1e-3}[frequency], frequency=frequency)
+    drive = ss.drives.HarmonicBase({2.5: 0.65e-3, 8.7: 1.1e-3}[frequency], frequency=frequency)
     run = ss.simulate(ss.Oscillator(law=law, drive=drive, **RIG), duration=6.0)  # type: ignore[arg-type]
     return told((rig or ss.Rig()).measure(run, fs=fs, rng=3, start=4.0))
 
 
-CONTACT = ss.CompliantContact(1.1, stiffness=STIFFNESS, damping=DAMPING)
+CONTACT = ss.laws.CompliantContact(1.1, stiffness=STIFFNESS, damping=DAMPING)
 
 
 def test_a_rigid_contact_gets_a_lower_bound() -> None:
-    found = ss.contact_stiffness(ss.friction_force(record_of(ss.Coulomb(1.1)), method="fusion", **RIG))
+    found = ss.contact_stiffness(ss.friction_force(record_of(ss.laws.Coulomb(1.1)), method="fusion", **RIG))
     assert found.interval[0] > 1e8
     assert found.interval[1] == np.inf
     assert "not told from a rigid contact" in found.status
 
 
 def test_a_stiff_contact_is_told_while_it_rings_below_half_the_rate() -> None:
-    law = ss.CompliantContact(1.1, stiffness=1e7, damping=200)
+    law = ss.laws.CompliantContact(1.1, stiffness=1e7, damping=200)
     found = ss.contact_stiffness(ss.friction_force(record_of(law), method="fusion", **RIG))
     assert found.value == pytest.approx(1e7, rel=2e-3)
     assert found.status == "ok"
 
 
 def test_in_sliding_a_contact_that_holds_for_no_three_samples_is_refused() -> None:
-    record = ss.friction_force(record_of(ss.Coulomb(1.1), 8.7), method="fusion", **RIG)
+    record = ss.friction_force(record_of(ss.laws.Coulomb(1.1), 8.7), method="fusion", **RIG)
     with pytest.raises(EstimateError, match="rigid"):
         ss.contact_stiffness(record)
 
@@ -152,7 +154,7 @@ def test_a_load_cell_of_the_wrong_sign_is_refused() -> None:
 
 def test_displacement_alone_does_not_pass_for_sure() -> None:
     rig = ss.Rig(ss.Rig().sensors[:2])
-    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+    drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     run = ss.simulate(ss.Oscillator(law=CONTACT, drive=drive, **RIG), duration=6.0)
     record = rig.measure(run, fs=4000, rng=3, start=4.0)
     found = ss.contact_stiffness(ss.friction_force(record, method="motion", **RIG))
@@ -188,7 +190,7 @@ def test_sensors_that_are_not_stated_leave_the_contact_as_unsure_as_it_is() -> N
         if late:
             assert "negative" in found.status
             with pytest.raises(EstimateError, match="state the sensors' lags and mounts"):
-                ss.contact_damping(fused)
+                ss.contact.contact_damping(fused)
 
 
 @pytest.mark.parametrize("name", ["x", "z"])

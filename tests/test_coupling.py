@@ -13,12 +13,12 @@ import stickslip as ss
 
 
 @cache
-def virtual() -> tuple[ss.Record, ss.Coupling]:
-    record = ss.squeak_record(ss.simulate(ss.squeak_rig(), duration=1.6), snr=30, rng=1)
-    return record, ss.coupling(record)
+def virtual() -> tuple[ss.Record, ss.squeak.Coupling]:
+    record = ss.squeak.squeak_record(ss.simulate(ss.squeak.squeak_rig(), duration=1.6), snr=30, rng=1)
+    return record, ss.squeak.coupling(record)
 
 
-def tones(lag: float, *, noise: float = 0.1, seed: int = 0) -> tuple[ss.Record, ss.Squeaks]:
+def tones(lag: float, *, noise: float = 0.1, seed: int = 0) -> tuple[ss.Record, ss.squeak.Squeaks]:
     """Two channels with one tone at 500 Hz between 0.3 and 0.7 s, the second `lag` seconds later, and their noise."""
     t = np.arange(10_000) / 10_000
     rng = np.random.default_rng(seed)
@@ -30,8 +30,8 @@ def tones(lag: float, *, noise: float = 0.1, seed: int = 0) -> tuple[ss.Record, 
     return record, ss.find_squeaks(record)
 
 
-def joined(record: ss.Record, found: ss.Squeaks) -> ss.Coupling:
-    return ss.coupling(record, squeaks=found)
+def joined(record: ss.Record, found: ss.squeak.Squeaks) -> ss.squeak.Coupling:
+    return ss.squeak.coupling(record, squeaks=found)
 
 
 @pytest.mark.parametrize("lag", [-3e-4, 0.0, 2e-4, 8e-4])
@@ -104,7 +104,7 @@ def test_channels_that_have_nothing_to_do_with_each_other_are_not_coupled() -> N
     for seed in range(40):
         noise = np.random.default_rng(seed).standard_normal(len(record))
         coupled.append(
-            ss.coupling(record.with_channel("a", noise, unit="m/s^2"), squeaks=found).of("a", "sound").coupled
+            ss.squeak.coupling(record.with_channel("a", noise, unit="m/s^2"), squeaks=found).of("a", "sound").coupled
         )
     assert sum(coupled) <= 6  # 2 of 40 by chance
 
@@ -161,13 +161,13 @@ def test_it_is_plain_data() -> None:
 
 def test_what_holds_no_coupling_is_refused() -> None:
     record, found = tones(0.0)
-    with pytest.raises(ss.EstimateError, match="between two channels"):
-        ss.coupling(ss.Record.of({"sound": record["sound"]}, fs=record.fs), squeaks=found)
+    with pytest.raises(ss.errors.EstimateError, match="between two channels"):
+        ss.squeak.coupling(ss.Record.of({"sound": record["sound"]}, fs=record.fs), squeaks=found)
     quiet = ss.find_squeaks(ss.Record.of({"sound": np.random.default_rng(0).standard_normal(5000)}, fs=10_000))
-    with pytest.raises(ss.EstimateError, match="no squeak"):
-        ss.coupling(record, squeaks=quiet)
-    with pytest.raises(ss.EstimateError, match="no pair"):
-        ss.coupling(record, squeaks=found).of("x", "v")
+    with pytest.raises(ss.errors.EstimateError, match="no squeak"):
+        ss.squeak.coupling(record, squeaks=quiet)
+    with pytest.raises(ss.errors.EstimateError, match="no pair"):
+        ss.squeak.coupling(record, squeaks=found).of("x", "v")
 
 
 def test_the_work_on_torsion_and_normal_motion_is_that_of_the_closed_form() -> None:
@@ -182,7 +182,7 @@ def test_the_work_on_torsion_and_normal_motion_is_that_of_the_closed_form() -> N
         "torsion_velocity": 0.4 * inside * np.cos(turn + lag), "normal": 6.0 + 1.5 * inside * np.cos(turn),
         "normal_acceleration": -0.02 * 2 * np.pi * frequency * inside * np.sin(turn + lag),
     }  # fmt: skip
-    found = ss.coupling(ss.Record.of(channels, fs=fs), lever="3 mm")
+    found = ss.squeak.coupling(ss.Record.of(channels, fs=fs), lever="3 mm")
     share = float(np.mean([np.mean(inside[(t >= b.start) & (t < b.end)] ** 2) for b in found_bursts(channels, fs)]))
     expected = {
         "energy_per_cycle": -2.0 * 0.01 * math.cos(2.0), "energy_to_torsion": -0.003 * 2.0 * 0.4 * math.cos(lag),
@@ -191,19 +191,19 @@ def test_the_work_on_torsion_and_normal_motion_is_that_of_the_closed_form() -> N
     for name, amplitude in expected.items():
         assert getattr(found, name).value == pytest.approx(0.5 * share * amplitude / frequency, rel=0.02)
     assert found.energy_per_cycle.value > 0 > found.energy_to_torsion.value
-    assert ss.coupling(ss.Record.of(channels, fs=fs)).energy_to_torsion is None
+    assert ss.squeak.coupling(ss.Record.of(channels, fs=fs)).energy_to_torsion is None
 
 
-def found_bursts(channels: dict[str, np.ndarray], fs: float) -> tuple[ss.Squeak, ...]:
+def found_bursts(channels: dict[str, np.ndarray], fs: float) -> tuple[ss.squeak.Squeak, ...]:
     return ss.find_squeaks(ss.Record.of(channels, fs=fs)).of("squeak", "squeal")
 
 
 def test_friction_feeds_the_torsion_of_the_virtual_rig() -> None:
     """The exact work of both contacts, each by its own lever; one lever for the total force is near it."""
-    run = ss.simulate(ss.squeak_rig(), duration=1.6)
-    record = ss.squeak_record(run, snr=40, rng=1)
+    run = ss.simulate(ss.squeak.squeak_rig(), duration=1.6)
+    record = ss.squeak.squeak_record(run, snr=40, rng=1)
     levers = [contact.tangent[2] for contact in run.system.contacts]
-    found = ss.coupling(record, lever=float(np.mean(levers)))
+    found = ss.squeak.coupling(record, lever=float(np.mean(levers)))
     motion, _ = run.sample(record.time, ("v", "friction"))
     bursts = ss.find_squeaks(record).of("squeak", "squeal")
     spinning = motion[2]

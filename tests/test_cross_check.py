@@ -14,17 +14,17 @@ import stickslip as ss
 from stickslip.laws.base import Exit, Law, Mode
 
 LAWS: dict[str, Law] = {
-    "rigid": ss.Coulomb(0.4, static=0.5),
-    "compliant": ss.CompliantContact(0.4, 60.0),
-    "compliant, damped": ss.CompliantContact(0.4, 60.0, damping=0.6, static=0.5),
-    "compliant, consistent": ss.CompliantContact(0.4, 60.0, damping=0.6, rule="consistent"),
-    "slope": ss.LinearSlope(0.4, slope=-0.05, static=0.5),
-    "table": ss.Tabulated([0.0, 0.2, 0.7, 1.5], [0.5, 0.35, 0.3, 0.4]),
-    "state variable": ss.StateVariable(0.4, rate=30.0, steepness=40.0),
-    "inertial": ss.InertialContact(0.4, 60.0, mass=0.05, damping=0.3, static=0.5),
-    "elements": ss.ElastoSlip([20.0, 10.0, 5.0], [0.1, 0.2, 0.15]),
-    "position": ss.PositionLoad(0.4, gradient=0.3),
-    "in series": ss.InSeries(ss.LinearSlope(0.4, slope=0.05, static=0.5), stiffness=60.0, damping=0.4),
+    "rigid": ss.laws.Coulomb(0.4, static=0.5),
+    "compliant": ss.laws.CompliantContact(0.4, 60.0),
+    "compliant, damped": ss.laws.CompliantContact(0.4, 60.0, damping=0.6, static=0.5),
+    "compliant, consistent": ss.laws.CompliantContact(0.4, 60.0, damping=0.6, rule="consistent"),
+    "slope": ss.laws.LinearSlope(0.4, slope=-0.05, static=0.5),
+    "table": ss.laws.Tabulated([0.0, 0.2, 0.7, 1.5], [0.5, 0.35, 0.3, 0.4]),
+    "state variable": ss.laws.StateVariable(0.4, rate=30.0, steepness=40.0),
+    "inertial": ss.laws.InertialContact(0.4, 60.0, mass=0.05, damping=0.3, static=0.5),
+    "elements": ss.laws.ElastoSlip([20.0, 10.0, 5.0], [0.1, 0.2, 0.15]),
+    "position": ss.laws.PositionLoad(0.4, gradient=0.3),
+    "in series": ss.laws.InSeries(ss.laws.LinearSlope(0.4, slope=0.05, static=0.5), stiffness=60.0, damping=0.4),
 }
 FORCE, RATE, PHASE, SPRING, LOSS, MASS = 1.0, 0.7, 0.4, 1.3, 0.05, 1.1
 NUDGE = 1e-6  # s: an exit at the very start of a piece is looked at a little later
@@ -98,7 +98,7 @@ class Replay:
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_moves_as_a_general_solver_has_it(name: str) -> None:
     law = LAWS[name]
-    drive = ss.HarmonicForce(FORCE, RATE / (2 * math.pi), PHASE)
+    drive = ss.drives.HarmonicForce(FORCE, RATE / (2 * math.pi), PHASE)
     system = ss.Oscillator(mass=MASS, stiffness=SPRING, damping=LOSS, law=law, drive=drive)
     end = 25.0
     run = ss.simulate(system, duration=end, start={"x": 0.2})

@@ -17,25 +17,29 @@ from stickslip.solve.batch import Batch, simulate_batch
 
 MASS, SPRING = 2.42, 2310.0
 RIGID = ss.Oscillator(
-    mass=MASS, stiffness=SPRING, damping=0.12, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, 2.5)
+    mass=MASS, stiffness=SPRING, damping=0.12, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(0.65e-3, 2.5)
 )
 DRIVEN = 0.65e-3 * np.array([1.0, 2 * np.pi * 2.5])  # displacement [m] and velocity [m/s] of the base
 
 
 def grazing(gap: float) -> list[ss.Oscillator]:
     """Friction a part `gap` below and above the largest pull of the spring: out for an instant, or not at all."""
-    return [RIGID.having(law=ss.Coulomb(0.65e-3 * SPRING * (1 + d))) for d in (-gap, gap)]
+    return [RIGID.having(law=ss.laws.Coulomb(0.65e-3 * SPRING * (1 + d))) for d in (-gap, gap)]
 
 
 CASES = {
     "rigid, many stops": ([RIGID], 12.0, [{}]),
     "rigid, a map": ([RIGID.having(frequency=f) for f in (2.5, 4.0, 5.61, 8.7, 11.0)], 10.0, None),
     "rigid, a basin": ([RIGID], 6.0, [{"x": x, "v": v} for x in (-1e-3, 2e-3) for v in (-0.05, 0.0, 0.02)]),
-    "compliant": ([RIGID.having(law=ss.CompliantContact(1.1, 192000.0, 20.0), frequency=5.61)], 4.0, [{}, {"x": 1e-4}]),
+    "compliant": (
+        [RIGID.having(law=ss.laws.CompliantContact(1.1, 192000.0, 20.0), frequency=5.61)],
+        4.0,
+        [{}, {"x": 1e-4}],
+    ),
     "sticking for good": ([RIGID.having(amplitude=0.3e-3)], 3.0, [{}, {"x": 1e-4}]),
     "grazing": (grazing(1e-6), 3.0, None),
     "grazing closer": (grazing(1e-9), 3.0, None),
-    "free, no drive": ([ss.Oscillator(mass=1, stiffness=4, law=ss.Coulomb(1.0))], 3.0, [{"x": 1.25}, {"x": 3.7}]),
+    "free, no drive": ([ss.Oscillator(mass=1, stiffness=4, law=ss.laws.Coulomb(1.0))], 3.0, [{"x": 1.25}, {"x": 3.7}]),
 }
 
 
@@ -109,7 +113,7 @@ def test_the_cases_cover_what_they_say() -> None:
 
 def test_a_batch_refuses_what_it_cannot_march() -> None:
     with pytest.raises(ModelError, match="different modes"):
-        simulate_batch([RIGID, RIGID.having(law=ss.CompliantContact(1.1, 1e5, 1.0))], cycles=1)
+        simulate_batch([RIGID, RIGID.having(law=ss.laws.CompliantContact(1.1, 1e5, 1.0))], cycles=1)
     with pytest.raises(ModelError, match="2 systems for 3 starts"):
         simulate_batch([RIGID, RIGID], cycles=1, starts=[{}, {}, {}])
 

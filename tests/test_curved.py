@@ -17,22 +17,22 @@ from stickslip.solve.series import expansion
 from stickslip.solve.tape import tape
 
 HEAVY = 1e30  # kg: whatever friction does, the mass keeps its speed
-LUGRE = ss.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=math.sqrt(1e5), viscous=0.4)
-ROCK = ss.RateState(5e6, friction=0.6, direct=0.010, evolution=0.015, distance=1e-5, reference=1e-6)
-STRIBECK = ss.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
+LUGRE = ss.laws.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=math.sqrt(1e5), viscous=0.4)
+ROCK = ss.laws.RateState(5e6, friction=0.6, direct=0.010, evolution=0.015, distance=1e-5, reference=1e-6)
+STRIBECK = ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
 THESIS = ss.Oscillator(
-    mass=2.42, stiffness=2310, law=ss.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
-    drive=ss.HarmonicBase(0.6e-3, 2.5),
+    mass=2.42, stiffness=2310, law=ss.laws.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
+    drive=ss.drives.HarmonicBase(0.6e-3, 2.5),
 )  # fmt: skip
 
 
-def dragged(law: object, speed: float, duration: float, **options: float) -> ss.Trajectory:
+def dragged(law: object, speed: float, duration: float, **options: float) -> ss.solve.Trajectory:
     """A law under a prescribed speed."""
     system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=law)
     return ss.simulate(system, duration=duration, start={"v": speed}, **options)
 
 
-def upcrossings(run: ss.Trajectory, name: str, level: float, count: int) -> list[float]:
+def upcrossings(run: ss.solve.Trajectory, name: str, level: float, count: int) -> list[float]:
     """When an entry of the state rises through a level."""
     times = np.linspace(0, run.duration, 20001)
     values = run.sample(times, (name,))[0][0] - level
@@ -64,7 +64,7 @@ def test_lugre_presliding_is_a_damped_spring() -> None:
 
 
 def test_lugre_stick_slip_has_the_reference_period() -> None:
-    run = ss.simulate(ss.Oscillator(mass=1, stiffness=2, law=LUGRE, drive=ss.Ramp(0.1)), duration=28)
+    run = ss.simulate(ss.Oscillator(mass=1, stiffness=2, law=LUGRE, drive=ss.drives.Ramp(0.1)), duration=28)
     known = [7.540397463024532, 13.903117284079828, 20.265837105140747, 26.62855692620443]
     found = upcrossings(run, "v", 0.05, 4)
     assert found == pytest.approx(known, rel=1e-9)
@@ -75,15 +75,15 @@ def test_lugre_stick_slip_has_the_reference_period() -> None:
                                              (10.0, 1.3070592115581885), (50.0, 0.852414079639229)])  # fmt: skip
 def test_lugre_breaks_away_at_the_reference_force(rate: float, force: float) -> None:
     soft = 1e-9  # N/m: the spring's force is that of its end alone
-    system = ss.Oscillator(mass=1, stiffness=soft, law=LUGRE, drive=ss.Ramp(rate / soft))
+    system = ss.Oscillator(mass=1, stiffness=soft, law=LUGRE, drive=ss.drives.Ramp(rate / soft))
     at = upcrossings(ss.simulate(system, duration=1.6 / rate), "v", 1e-3, 1)[0]
     assert rate * at == pytest.approx(force, rel=1e-8)
 
 
 def test_dahl_loop_is_the_closed_one() -> None:
     level, stiffness, size = 1.1, 192000.0, 20e-6
-    system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=ss.Dahl(level, stiffness),
-                           drive=ss.MultiTone([(size, 1.0, 0.0)], on="face"))  # fmt: skip
+    system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=ss.laws.Dahl(level, stiffness),
+                           drive=ss.drives.MultiTone([(size, 1.0, 0.0)], on="face"))  # fmt: skip
     run = ss.simulate(system, cycles=None, duration=4.25)
     turns = [event.time for event in run.events][-3:]
     peaks = [abs(run.state(t)["friction"]) for t in turns]
@@ -98,13 +98,13 @@ def test_dahl_loop_is_the_closed_one() -> None:
 
 @pytest.mark.parametrize(("exponent", "force"), [(1.0, 1.0664795276239994), (2.0, 0.85506072874493927)])
 def test_dahl_loads_as_the_closed_form(exponent: float, force: float) -> None:
-    run = dragged(ss.Dahl(1.1, 192000.0, exponent=exponent), 1e-3, 0.02)
+    run = dragged(ss.laws.Dahl(1.1, 192000.0, exponent=exponent), 1e-3, 0.02)
     assert run.state(0.02)["friction"] == pytest.approx(force, rel=1e-13)
 
 
 def test_dahl_with_a_broken_exponent_saturates() -> None:
     level, stiffness, n = 1.1, 192000.0, 0.5
-    run = dragged(ss.Dahl(level, stiffness, exponent=n), 1e-3, 0.02)
+    run = dragged(ss.laws.Dahl(level, stiffness, exponent=n), 1e-3, 0.02)
     way = 5e-6  # (1 - f/f_k)^(1/2) falls in proportion to the way, and reaches zero at 2 f_k / s_0
     assert run.state(way / 1e-3)["friction"] == pytest.approx(level * (1 - (1 - stiffness * way / (2 * level)) ** 2))
     assert run.state(0.02)["friction"] == pytest.approx(level, rel=1e-9)
@@ -116,7 +116,7 @@ def test_dahl_with_a_broken_exponent_saturates() -> None:
 ])  # fmt: skip
 def test_rate_and_state_answers_a_velocity_step_as_the_closed_form(law: str, values: dict[float, float]) -> None:
     system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=ROCK)
-    run = ss.simulate(system.having(law=ss.RateState(5e6, 0.6, 0.010, 0.015, 1e-5, 1e-6, law=law)), duration=60,
+    run = ss.simulate(system.having(law=ss.laws.RateState(5e6, 0.6, 0.010, 0.015, 1e-5, 1e-6, law=law)), duration=60,
                       start={"v": 1e-5})  # fmt: skip
     for time, friction in values.items():
         assert run.state(time)["friction"] / 5e6 == pytest.approx(friction, rel=1e-12)
@@ -130,21 +130,21 @@ def test_rate_and_state_answers_a_velocity_step_as_the_closed_form(law: str, val
 def test_rate_and_state_loses_stability_at_the_critical_stiffness(
     law: str, mass: float, speed: float, stiffness: float, turn: float
 ) -> None:
-    rock = ss.RateState(5e6, 0.6, 0.010, 0.015, 1e-5, 1e-6, law=law)
-    system = ss.Oscillator(mass=mass, stiffness=stiffness, law=rock, drive=ss.Belt(speed))
+    rock = ss.laws.RateState(5e6, 0.6, 0.010, 0.015, 1e-5, 1e-6, law=law)
+    system = ss.Oscillator(mass=mass, stiffness=stiffness, law=rock, drive=ss.drives.Belt(speed))
 
     def growth(value: float) -> float:
-        return float(ss.steady_sliding(system.having(stiffness=value)).eigenvalues[0].real)
+        return float(ss.solve.steady_sliding(system.having(stiffness=value)).eigenvalues[0].real)
 
     found = brentq(growth, 0.9 * stiffness, 1.1 * stiffness, rtol=1e-13)
     assert found == pytest.approx(stiffness, rel=1e-6 if mass < 1 else 1e-10)
-    fastest = ss.steady_sliding(system).eigenvalues[0]
+    fastest = ss.solve.steady_sliding(system).eigenvalues[0]
     assert abs(fastest.imag) == pytest.approx(turn, rel=1e-6 if mass < 1 else 1e-11)
 
 
 def test_rate_and_state_simulation_turns_at_the_critical_frequency() -> None:
-    system = ss.Oscillator(mass=1e3, stiffness=5.25e10, law=ROCK, drive=ss.Belt(0.1))
-    rest = ss.steady_sliding(system).state
+    system = ss.Oscillator(mass=1e3, stiffness=5.25e10, law=ROCK, drive=ss.drives.Belt(0.1))
+    rest = ss.solve.steady_sliding(system).state
     run = ss.simulate(system, duration=9e-3, start={**rest, "v": 1e-6})
     rises = upcrossings(run, "v", 0.0, 20)
     assert len(rises) >= 9
@@ -160,7 +160,7 @@ def test_stribeck_sliding_loses_stability_at_the_threshold(
     system = ss.Oscillator(mass=1, stiffness=1, law=STRIBECK, damping=0.3).having(exponent=exponent)
 
     def growth(speed: float) -> float:
-        return float(ss.steady_sliding(system.having(drive=ss.Belt(speed))).eigenvalues[0].real)
+        return float(ss.solve.steady_sliding(system.having(drive=ss.drives.Belt(speed))).eigenvalues[0].real)
 
     assert brentq(growth, low, high, xtol=1e-16) == pytest.approx(known, rel=1e-12)
 
@@ -172,8 +172,8 @@ def test_stribeck_sliding_loses_stability_at_the_threshold(
 def test_falling_friction_on_a_belt_has_the_reference_limit_cycle(
     speed: float, slip: float, restick: float, stick: float, extrema: tuple[float, float]
 ) -> None:
-    popp = ss.FrictionCurve(lambda v: 10 * (0.3 / (1 + 1.42 * v) + 0.1 + 0.01 * v * v))
-    run = ss.simulate(ss.Oscillator(mass=1, stiffness=1, law=popp, drive=ss.Belt(speed)), duration=60)
+    popp = ss.laws.FrictionCurve(lambda v: 10 * (0.3 / (1 + 1.42 * v) + 0.1 + 0.01 * v * v))
+    run = ss.simulate(ss.Oscillator(mass=1, stiffness=1, law=popp, drive=ss.drives.Belt(speed)), duration=60)
     events = [event for event in run.events if event.time > 20]
     first = next(j for j, event in enumerate(events) if event.kind == "slip")
     begin, rest, again = (event.time for event in events[first : first + 3])
@@ -189,8 +189,8 @@ def test_falling_friction_on_a_belt_has_the_reference_limit_cycle(
 def test_dither_smooths_a_cubic_curve_as_the_closed_form(speed: float, known: float) -> None:
     level, low, knee, swing = 0.4, 0.25, 0.5, 0.3
     k1, k3 = 1.5 * (level - low) / knee, 0.5 * (level - low) / knee**3
-    cubic = ss.FrictionCurve(lambda v: level - k1 * v + k3 * v**3)
-    face = ss.MultiTone([(swing / (2 * math.pi), 1.0, 0.0)], on="face")
+    cubic = ss.laws.FrictionCurve(lambda v: level - k1 * v + k3 * v**3)
+    face = ss.drives.MultiTone([(swing / (2 * math.pi), 1.0, 0.0)], on="face")
     system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=cubic, drive=face)
     run = ss.simulate(system, duration=2, start={"v": speed})
     assert mean_friction(run, 1.0, 2.0) == pytest.approx(known, rel=1e-10)
@@ -199,14 +199,14 @@ def test_dither_smooths_a_cubic_curve_as_the_closed_form(speed: float, known: fl
 @pytest.mark.parametrize(("ratio", "known"), [(0.1, 0.063768560858519848), (0.25, 0.16086124651033249), (0.5, 1 / 3),
                                               (0.9, 0.71286741374258746), (2.0, 1.0)])  # fmt: skip
 def test_dither_smooths_dry_friction_as_the_closed_form(ratio: float, known: float) -> None:
-    dry = ss.FrictionCurve(lambda v: 1.0 + 0.0 * v)
-    face = ss.MultiTone([(1 / (2 * math.pi), 1.0, 0.0)], on="face")
+    dry = ss.laws.FrictionCurve(lambda v: 1.0 + 0.0 * v)
+    face = ss.drives.MultiTone([(1 / (2 * math.pi), 1.0, 0.0)], on="face")
     system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=dry, drive=face)
     run = ss.simulate(system, duration=2, start={"v": ratio})
     assert mean_friction(run, 1.0, 2.0) == pytest.approx(known, rel=1e-11)
 
 
-def mean_friction(run: ss.Trajectory, begin: float, end: float) -> float:
+def mean_friction(run: ss.solve.Trajectory, begin: float, end: float) -> float:
     """Mean over a time, by Gauss's rule from event to event."""
     cuts = [begin, *(event.time for event in run.events if begin < event.time < end), end]
     nodes, weights = np.polynomial.legendre.leggauss(40)
@@ -237,8 +237,8 @@ def test_thesis_state_variable_has_the_reference_amplitudes(
 
 
 @pytest.mark.parametrize("law", [
-    ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4), ss.Dahl(1.1, 192000),
-    ss.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4), ss.Stribeck(1.1, 1.3, speed=1e-3, exponent=0.7),
+    ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4), ss.laws.Dahl(1.1, 192000),
+    ss.laws.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4), ss.laws.Stribeck(1.1, 1.3, speed=1e-3, exponent=0.7),
     THESIS.law,
 ], ids=lambda law: type(law).__name__)  # fmt: skip
 def test_tolerance_is_kept_over_a_hundred_cycles(law: object) -> None:
@@ -254,7 +254,7 @@ def test_tolerance_is_kept_over_a_hundred_cycles(law: object) -> None:
 
 
 def test_lugre_agrees_with_a_general_solver() -> None:
-    law = ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4)
+    law = ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4)
     run = ss.simulate(THESIS.having(law=law), cycles=2)
 
     def slope(t: float, s: np.ndarray) -> list[float]:
@@ -270,16 +270,16 @@ def test_lugre_agrees_with_a_general_solver() -> None:
 
 
 def test_stribeck_with_equal_levels_is_coulomb() -> None:
-    drive = ss.HarmonicBase(0.65e-3, 2.5)
-    base = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=drive)
+    drive = ss.drives.HarmonicBase(0.65e-3, 2.5)
+    base = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=drive)
     exact = ss.simulate(base, cycles=20)
-    run = ss.simulate(base.having(law=ss.Stribeck(1.1, 1.1, speed=1.0)), cycles=20, rtol=1e-13)
+    run = ss.simulate(base.having(law=ss.laws.Stribeck(1.1, 1.1, speed=1.0)), cycles=20, rtol=1e-13)
     assert [(e.kind, e.mode) for e in run.events] == [(e.kind, e.mode) for e in exact.events]
     assert [e.time for e in run.events] == pytest.approx([e.time for e in exact.events], rel=1e-11)
 
 
 def test_events_do_not_hang_on_the_tolerance() -> None:
-    law = ss.Stribeck(0.05, 0.1, speed=0.5)
+    law = ss.laws.Stribeck(0.05, 0.1, speed=0.5)
     run = ss.simulate(ss.Oscillator(mass=1, stiffness=1, law=law), duration=60, start={"x": 1.0}, rtol=1e-6)
     fine = ss.simulate(ss.Oscillator(mass=1, stiffness=1, law=law), duration=60, start={"x": 1.0}, rtol=1e-13)
     assert [e.kind for e in run.events] == [e.kind for e in fine.events]
@@ -287,7 +287,7 @@ def test_events_do_not_hang_on_the_tolerance() -> None:
 
 
 def test_a_run_becomes_a_record_and_pieces() -> None:
-    run = ss.simulate(THESIS.having(law=ss.Stribeck(1.1, 1.2, speed=1e-3)), cycles=2)
+    run = ss.simulate(THESIS.having(law=ss.laws.Stribeck(1.1, 1.2, speed=1e-3)), cycles=2)
     record = run.record(fs=1000)
     assert set(record.channels) == {"x", "v", "a", "friction", "z"}
     assert record["x"][500] == pytest.approx(run.state(0.5)["x"])
@@ -297,26 +297,39 @@ def test_a_run_becomes_a_record_and_pieces() -> None:
     assert all(piece.state["v"] == 0 for piece in stuck)
 
 
-@pytest.mark.parametrize("build", [
-    lambda: ss.Stribeck(1.5, 1.0, speed=0.1), lambda: ss.Stribeck(1.0, 1.5, speed=0.0),
-    lambda: ss.Stribeck(1.0, 1.5, speed=0.1, exponent=-1.0), lambda: ss.Stribeck(math.nan, 1.5, speed=0.1),
-    lambda: ss.Dahl(0.0, 1.0), lambda: ss.Dahl(1.0, -1.0), lambda: ss.LuGre(1.0, 0.5, speed=1.0, stiffness=1.0),
-    lambda: ss.LuGre(1.0, 1.5, speed=1.0, stiffness=math.inf), lambda: ss.RateState(1, 0.6, 1e-9, 0.1, 1e-5, 1e-6),
-    lambda: ss.RateState(1, 0.6, 0.01, 0.1, 1e-5, 1e-6, law="Ruina"), lambda: ss.SmoothStateVariable(1.1, 0.0, 3000.0),
-    lambda: ss.FrictionCurve("1 / (1 + v)"), lambda: ss.FrictionCurve(lambda v: 1.0),
-    lambda: ss.FrictionCurve(lambda v: 1 / (1 + v), static=0.5), lambda: ss.simulate(THESIS, cycles=1, rtol=0.0),
-    lambda: ss.simulate(THESIS, cycles=1, start={"theta": math.nan}), lambda: ss.steady_sliding(THESIS),
-    lambda: ss.steady_state(THESIS, orders=0), lambda: exp(symbol("v")).at(w=1.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda: ss.laws.Stribeck(1.5, 1.0, speed=0.1),
+        lambda: ss.laws.Stribeck(1.0, 1.5, speed=0.0),
+        lambda: ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=-1.0),
+        lambda: ss.laws.Stribeck(math.nan, 1.5, speed=0.1),
+        lambda: ss.laws.Dahl(0.0, 1.0),
+        lambda: ss.laws.Dahl(1.0, -1.0),
+        lambda: ss.laws.LuGre(1.0, 0.5, speed=1.0, stiffness=1.0),
+        lambda: ss.laws.LuGre(1.0, 1.5, speed=1.0, stiffness=math.inf),
+        lambda: ss.laws.RateState(1, 0.6, 1e-9, 0.1, 1e-5, 1e-6),
+        lambda: ss.laws.RateState(1, 0.6, 0.01, 0.1, 1e-5, 1e-6, law="Ruina"),
+        lambda: ss.laws.SmoothStateVariable(1.1, 0.0, 3000.0),
+        lambda: ss.laws.FrictionCurve("1 / (1 + v)"),
+        lambda: ss.laws.FrictionCurve(lambda v: 1.0),
+        lambda: ss.laws.FrictionCurve(lambda v: 1 / (1 + v), static=0.5),
+        lambda: ss.simulate(THESIS, cycles=1, rtol=0.0),
+        lambda: ss.simulate(THESIS, cycles=1, start={"theta": math.nan}),
+        lambda: ss.solve.steady_sliding(THESIS),
+        lambda: ss.steady_state(THESIS, orders=0),
+        lambda: exp(symbol("v")).at(w=1.0),
+    ],
+)
 def test_bad_input_is_named(build: object) -> None:
-    with pytest.raises(ss.ModelError) as error:
+    with pytest.raises(ss.errors.ModelError) as error:
         build()  # type: ignore[operator]
     assert all((error.value.value, error.value.rule, error.value.next_step))
 
 
 def test_stiff_bristles_move_as_an_implicit_solver_says() -> None:
     stiffness, damping = 1e9, math.sqrt(1e9 * 2.42)
-    law = ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=stiffness, damping=damping, viscous=0.4)
+    law = ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=stiffness, damping=damping, viscous=0.4)
     run = ss.simulate(THESIS.having(law=law), cycles=1, rtol=1e-9)
     assert len(run.reach) > 20
     assert len(run.step_starts) < 5000  # a million for an explicit method
@@ -333,9 +346,14 @@ def test_stiff_bristles_move_as_an_implicit_solver_says() -> None:
         assert own == pytest.approx(other, abs=3e-8 * np.max(np.abs(other)))
 
 
-@pytest.mark.parametrize("law", [
-    ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=1e8, damping=1e4, viscous=0.4), ss.Dahl(1.1, 1e8),
-], ids=lambda law: type(law).__name__)  # fmt: skip
+@pytest.mark.parametrize(
+    "law",
+    [
+        ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=1e8, damping=1e4, viscous=0.4),
+        ss.laws.Dahl(1.1, 1e8),
+    ],
+    ids=lambda law: type(law).__name__,
+)
 def test_leaps_change_no_event(law: object, monkeypatch: pytest.MonkeyPatch) -> None:
     run = ss.simulate(THESIS.having(law=law), cycles=1, rtol=1e-9)
     monkeypatch.setattr(march, "PATIENCE", math.inf)
@@ -350,8 +368,8 @@ def test_leaps_change_no_event(law: object, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_stiff_creep_comes_to_steady_sliding() -> None:
-    light = ss.Oscillator(mass=1.0, stiffness=2.6e9, law=ROCK, drive=ss.Belt(1e-6))
-    rest = ss.steady_sliding(light).state
+    light = ss.Oscillator(mass=1.0, stiffness=2.6e9, law=ROCK, drive=ss.drives.Belt(1e-6))
+    rest = ss.solve.steady_sliding(light).state
     run = ss.simulate(light, duration=100, start={**rest, "v": 1e-8}, rtol=1e-9)
     assert len(run.step_starts) < 5000
     assert run.state(100)["x"] == pytest.approx(rest["x"], rel=1e-12)
@@ -361,8 +379,8 @@ def test_a_stiff_creep_comes_to_steady_sliding() -> None:
 @pytest.mark.parametrize(("short", "crossings"), [(1e-6, 2), (1e-9, 2), (-1e-9, 0), (-1e-12, 0)])
 def test_two_crossings_within_a_step_are_two(short: float, crossings: int) -> None:
     fastest = 1e-3 * 2 * math.pi
-    system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=ss.Dahl(1.0, stiffness=100.0),
-                           drive=ss.MultiTone([(1e-3, 1.0, 0.0)], on="face"))  # fmt: skip
+    system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=ss.laws.Dahl(1.0, stiffness=100.0),
+                           drive=ss.drives.MultiTone([(1e-3, 1.0, 0.0)], on="face"))  # fmt: skip
     run = ss.simulate(system, duration=0.95, start={"v": fastest * (1 - short)})
     assert len(run.events) == crossings
     if crossings:
@@ -373,7 +391,7 @@ def test_two_crossings_within_a_step_are_two(short: float, crossings: int) -> No
 
 
 def test_every_function_moves_as_a_general_solver_says() -> None:
-    curve = ss.FrictionCurve(
+    curve = ss.laws.FrictionCurve(
         lambda v: 1 + 0.1 * tanh(5 * v) + 0.2 * log(1 + v) - 0.1 * sqrt(1 + v * v) + 0.1 * asinh(3 * v)
         + 0.3 * exp(-v) + 0.1 / (1 + v) ** 1.5 + v**3
     )  # fmt: skip
@@ -387,7 +405,7 @@ def test_every_function_moves_as_a_general_solver_says() -> None:
 
 
 def test_laws_that_differ_by_numbers_share_their_code() -> None:
-    laws = (ss.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5), ss.LuGre(2.0, 2.5, speed=3e-3, stiffness=2e5))
+    laws = (ss.laws.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5), ss.laws.LuGre(2.0, 2.5, speed=3e-3, stiffness=2e5))
     codes = [expansion(t.nodes, t.kept, 1)[0] for t in (tape(THESIS.having(law=law)) for law in laws)]
     assert codes[0] is codes[1]
 

@@ -13,11 +13,11 @@ from scipy.optimize import brentq
 
 import stickslip as ss
 
-DRIVE = ss.HarmonicBase(0.6e-3, 2.5)
+DRIVE = ss.drives.HarmonicBase(0.6e-3, 2.5)
 SMOOTH = ss.Oscillator(
-    mass=2.42, stiffness=2310, law=ss.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0), drive=DRIVE
+    mass=2.42, stiffness=2310, law=ss.laws.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0), drive=DRIVE
 )
-LUGRE = SMOOTH.having(law=ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4))
+LUGRE = SMOOTH.having(law=ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4))
 
 
 def smooth_flow(t: float, s: np.ndarray) -> tuple[list[float], np.ndarray]:
@@ -60,13 +60,13 @@ def test_multipliers_are_those_of_the_variational_equations(system: ss.Oscillato
     known = np.linalg.eigvals(begin[3:].reshape(3, 3))
     known = known[np.argsort(-np.abs(known))]
     assert orbit.multipliers == pytest.approx(known, abs=2e-7)
-    assert ss.energy(orbit.orbit).residual < 1e-12
+    assert ss.solve.energy(orbit.orbit).residual < 1e-12
 
 
 @pytest.mark.parametrize("frequency", [2.5, 8.7])
 @pytest.mark.parametrize(("curved", "linear"), [
-    (ss.Stribeck(1.1, 1.1, speed=1.0), ss.Coulomb(1.1)),
-    (ss.FrictionCurve(lambda v: 1.1 - 2.0 * v, static=1.2), ss.LinearSlope(1.1, slope=-2.0, static=1.2)),
+    (ss.laws.Stribeck(1.1, 1.1, speed=1.0), ss.laws.Coulomb(1.1)),
+    (ss.laws.FrictionCurve(lambda v: 1.1 - 2.0 * v, static=1.2), ss.laws.LinearSlope(1.1, slope=-2.0, static=1.2)),
 ])  # fmt: skip
 def test_a_curve_without_curvature_has_the_exact_engines_orbit(
     curved: object, linear: object, frequency: float
@@ -81,38 +81,40 @@ def test_a_curve_without_curvature_has_the_exact_engines_orbit(
 
 def test_sliding_without_stops_keeps_its_complex_multipliers() -> None:
     """An orbit that never sticks: the determinant of the map is that of the damping and the slope alone."""
-    system = ss.Oscillator(mass=1, stiffness=1, law=ss.Stribeck(0.3, 0.3, speed=1.0), drive=ss.HarmonicForce(1.0, 0.1))
+    system = ss.Oscillator(
+        mass=1, stiffness=1, law=ss.laws.Stribeck(0.3, 0.3, speed=1.0), drive=ss.drives.HarmonicForce(1.0, 0.1)
+    )
     orbit = ss.steady_state(system)
-    known = ss.steady_state(system.having(law=ss.Coulomb(0.3)))
+    known = ss.steady_state(system.having(law=ss.laws.Coulomb(0.3)))
     assert orbit.multipliers == pytest.approx(known.multipliers, abs=1e-8)
     assert np.prod(orbit.multipliers) == pytest.approx(np.prod(known.multipliers), abs=1e-8)
 
 
 def test_a_belt_under_falling_friction_has_its_stick_slip_cycle() -> None:
-    popp = ss.FrictionCurve(lambda v: 10 * (0.3 / (1 + 1.42 * v) + 0.1 + 0.01 * v * v))
-    system = ss.Oscillator(mass=1, stiffness=1, law=popp, drive=ss.Belt(0.5))
+    popp = ss.laws.FrictionCurve(lambda v: 10 * (0.3 / (1 + 1.42 * v) + 0.1 + 0.01 * v * v))
+    system = ss.Oscillator(mass=1, stiffness=1, law=popp, drive=ss.drives.Belt(0.5))
     orbit = ss.steady_state(system)
     run = ss.simulate(system, duration=60)
     ends = [event.time for event in run.events if event.kind == "slip"]
     assert (orbit.status, orbit.stops) == ("unique", (0, 1))
     assert orbit.period == pytest.approx(ends[-1] - ends[-2], rel=1e-11)
-    assert ss.energy(orbit.orbit).residual < 1e-12
+    assert ss.solve.energy(orbit.orbit).residual < 1e-12
     assert orbit.orbit.state(orbit.period / 3)["x"] == pytest.approx(run.state(ends[-2] + orbit.period / 3)["x"])
 
 
 def test_a_belt_under_a_law_that_never_holds_has_its_cycle_too() -> None:
-    law = ss.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=math.sqrt(1e5), viscous=0.4)
-    system = ss.Oscillator(mass=1, stiffness=2, law=law, drive=ss.Belt(0.1))
+    law = ss.laws.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=math.sqrt(1e5), viscous=0.4)
+    system = ss.Oscillator(mass=1, stiffness=2, law=law, drive=ss.drives.Belt(0.1))
     orbit = ss.steady_state(system, transient=16)
     assert (orbit.status, orbit.period) == ("unique", pytest.approx(6.36271982, abs=1e-8))
     assert np.max(np.abs(orbit.multipliers)) < 1e-6
-    assert ss.energy(orbit.orbit).residual < 1e-12
-    assert ss.steady_state(system.having(drive=ss.Ramp(0.1)), transient=4).status == "not periodic"
+    assert ss.solve.energy(orbit.orbit).residual < 1e-12
+    assert ss.steady_state(system.having(drive=ss.drives.Ramp(0.1)), transient=4).status == "not periodic"
 
 
 def test_what_is_put_off_a_belts_cycle_returns_by_its_multiplier() -> None:
-    law = ss.LuGre(1.0, 1.2, speed=0.5, stiffness=400.0, damping=5.0)
-    system = ss.Oscillator(mass=1, stiffness=2, law=law, drive=ss.Belt(0.6))
+    law = ss.laws.LuGre(1.0, 1.2, speed=0.5, stiffness=400.0, damping=5.0)
+    system = ss.Oscillator(mass=1, stiffness=2, law=law, drive=ss.drives.Belt(0.6))
     orbit = ss.steady_state(system)
     x, _, bristle = orbit.orbit.states[0, :3]
     mode = orbit.orbit.table.modes[orbit.orbit.modes[0]].name
@@ -131,26 +133,26 @@ def test_what_is_put_off_a_belts_cycle_returns_by_its_multiplier() -> None:
 
 
 def test_a_branch_of_a_curved_law_ends_at_the_orbit_found_there() -> None:
-    system = SMOOTH.having(law=ss.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4))
-    branch = ss.continue_orbit(ss.steady_state(system), "frequency", to=2.6, step=0.5)
+    system = SMOOTH.having(law=ss.laws.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4))
+    branch = ss.solve.continue_orbit(ss.steady_state(system), "frequency", to=2.6, step=0.5)
     assert branch.status == "complete"
     there = ss.steady_state(system.having(frequency=2.6))
     assert branch.amplitudes[-1] == pytest.approx(there.amplitude, rel=1e-9)
 
 
 def test_the_exponent_of_a_stable_orbit_is_the_logarithm_of_its_multiplier() -> None:
-    system = SMOOTH.having(law=ss.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4), frequency=8.7)
-    found = ss.lyapunov(system, cycles=50, transient=20)
+    system = SMOOTH.having(law=ss.laws.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4), frequency=8.7)
+    found = ss.solve.lyapunov(system, cycles=50, transient=20)
     multiplier = abs(ss.steady_state(system).multipliers[0])
     assert found.value == pytest.approx(math.log(multiplier) * 8.7, rel=1e-6)
 
 
 def test_starts_that_lead_to_one_orbit_find_it_once() -> None:
-    assert len(ss.attractors(LUGRE, starts=[{}, {"x": 3e-4}])) == 1
+    assert len(ss.solve.attractors(LUGRE, starts=[{}, {"x": 3e-4}])) == 1
 
 
-@pytest.mark.parametrize("question", [ss.steady_state, ss.lyapunov])
+@pytest.mark.parametrize("question", [ss.steady_state, ss.solve.lyapunov])
 def test_a_law_with_a_lag_is_refused_in_words(question: object) -> None:
-    law = ss.TimeDelay(ss.LinearSlope(1.0, slope=1.0), lag=0.1)
-    with pytest.raises(ss.ModelError, match="time lag"):
+    law = ss.laws.TimeDelay(ss.laws.LinearSlope(1.0, slope=1.0), lag=0.1)
+    with pytest.raises(ss.errors.ModelError, match="time lag"):
         question(SMOOTH.having(law=law))  # type: ignore[operator]

@@ -7,17 +7,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from stickslip import (
-    EstimateError,
-    LinearSlope,
-    Record,
-    RecordError,
-    Stribeck,
-    fill_missing,
-    fit_curve,
-    friction_loops,
-)
+from stickslip import Record, fit_curve, friction_loops
+from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import NORMAL_95
+from stickslip.laws import LinearSlope, Stribeck
+from stickslip.signals import fill_missing
 
 FS, CYCLES = 1000, 12
 STRIBECK = {"kinetic": 1.0, "static": 1.4, "viscous": 0.5, "speed": 0.02, "exponent": 1.3, "offset": 0.05}

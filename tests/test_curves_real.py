@@ -63,7 +63,9 @@ def seal(dataset: Sets, bar: int) -> ss.Record:
     area = np.pi * (0.0250 / 2) ** 2
     channels = {"x": "#5 [mm]", "friction": f"(#7 - #6 * 1e5 * {area}) [N]"}
     path = dataset("rubber_seal") / f"O-ring_{bar}bar.csv"
-    return ss.fill_missing(ss.fill_gaps(ss.read_record(path, channels=channels, time="#1 [ms]", rows=(15, None))))
+    return ss.signals.fill_missing(
+        ss.signals.fill_gaps(ss.read_record(path, channels=channels, time="#1 [ms]", rows=(15, None)))
+    )
 
 
 def test_a_rubber_seal_rubs_more_under_pressure(dataset: Sets) -> None:
@@ -80,7 +82,7 @@ def test_a_rubber_seal_rubs_more_under_pressure(dataset: Sets) -> None:
 def test_a_seals_friction_under_a_third_pressure(dataset: Sets) -> None:
     """Pressure in the place of load: 1 and 5 bar foretell 3 bar, and each pressure the line through the other two."""
     levels = {bar: ss.fit_curve(seal(dataset, bar), curve="coulomb").parameters["kinetic"] for bar in (1, 3, 5)}
-    line = ss.friction_over_load([levels[1], levels[5]], loads=[1.0, 5.0])
+    line = ss.law.friction_over_load([levels[1], levels[5]], loads=[1.0, 5.0])
     assert line.friction(3.0).value == pytest.approx(levels[3].value, rel=0.05)
     assert line.friction(3.0).includes(levels[3].value)
     assert line.adhesion.interval[0] > 0  # the seal's own squeeze: no Amontons's law
@@ -98,6 +100,6 @@ def test_the_frames_friction_is_nearly_in_proportion_to_the_load(dataset: Sets) 
         assert found.value == pytest.approx(level, rel=0.05)
     foretold = levels[0].value * loads[1] / loads[0]
     assert 0.88 < foretold / levels[1].value < 0.97
-    line = ss.friction_over_load(levels, loads=loads)
+    line = ss.law.friction_over_load(levels, loads=loads)
     assert line.coefficient.value == pytest.approx(0.3, abs=0.05)
     assert line.adhesion.value < 0  # where Amontons's law would have none

@@ -9,7 +9,7 @@ import pytest
 
 import stickslip as ss
 from motions import free_decay
-from stickslip.analysis.decay_comparison import _apart
+from stickslip.answers.decay_comparison import _apart
 
 
 def record(seed, **motion):
@@ -30,7 +30,7 @@ def width(estimate):
 
 def test_alike_records_share_friction_and_narrow_the_static_bracket():
     each = [findings(seed, amplitude=start, static=0.02) for seed, start in enumerate((0.98, 0.94, 0.9, 0.88))]
-    together = ss.compare_decays(each)
+    together = ss.answers.compare_decays(each)
     assert not together.apart
     assert together.joint is not None
     assert together.joint.damping_ratio.includes(0.0316)
@@ -49,7 +49,7 @@ def test_alike_records_share_friction_and_narrow_the_static_bracket():
 @pytest.mark.parametrize("method", ["waveform", "thesis"])
 def test_unlike_records_are_told_and_their_mean_holds_the_scatter(method):
     each = [findings(seed, method=method, dry=dry) for seed, dry in enumerate((0.020, 0.024, 0.028))]
-    together = ss.compare_decays(each)
+    together = ss.answers.compare_decays(each)
     assert together.joint is None
     assert together.apart["dry friction displacement"] > 5
     mean = next(one for one in together.means if one.name == "dry friction displacement")
@@ -69,18 +69,18 @@ def test_records_of_one_oscillator_are_seldom_called_unlike():
 def test_displacement_and_velocity_are_not_fitted_together():
     values, fs, _ = free_decay(order=1)
     velocity = ss.analyze_decay(ss.Record.of({"v": values}, fs=fs), method="thesis")
-    together = ss.compare_decays([findings(1, method="thesis"), velocity])
+    together = ss.answers.compare_decays([findings(1, method="thesis"), velocity])
     assert together.joint is None
     assert "channel is x and v" in together.notes[0]
 
 
 def test_one_record_is_no_comparison():
-    with pytest.raises(ss.EstimateError, match="two or more"):
-        ss.compare_decays([findings(1, method="thesis")])
+    with pytest.raises(ss.errors.EstimateError, match="two or more"):
+        ss.answers.compare_decays([findings(1, method="thesis")])
 
 
 def test_records_together_have_a_page_and_figures(tmp_path):
-    together = ss.compare_decays([findings(1), findings(2, amplitude=0.9)])
+    together = ss.answers.compare_decays([findings(1), findings(2, amplitude=0.9)])
     assert [plate.name for plate in ss.figures(together)] == ["damping-ratio", "dry-displacement"]
     folder = ss.publish(together, folder=tmp_path / "out")
     page = (folder / "report.html").read_text("utf-8")

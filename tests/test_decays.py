@@ -164,7 +164,7 @@ def test_the_identified_motion_is_the_measured_one(release):
 def test_too_few_extremes_for_any_method_are_refused():
     values, fs, turns = free_decay(damping_ratio=0.4, dry=0.04)
     assert len(turns) == 3
-    with pytest.raises(ss.EstimateError, match="4 are needed"):
+    with pytest.raises(ss.errors.EstimateError, match="4 are needed"):
         ss.analyze_decay(ss.Record.of({"x": values}, fs=fs), method="thesis")
 
 
@@ -180,14 +180,14 @@ def test_a_pendulum_is_read_with_its_sine_and_by_its_own_waveform(dataset):
     other = found.as_force(found.older["extremes alone"].dry_displacement, "")
     assert low < other.value < high
     assert [plate.name for plate in ss.figures(found)] == ["decay", "identified"]
-    with pytest.raises(ss.EstimateError, match="hold for a linear spring"):
+    with pytest.raises(ss.errors.EstimateError, match="hold for a linear spring"):
         ss.analyze_decay(record, restoring="pendulum", method="thesis")
 
 
 @pytest.mark.parametrize("name", ["60.txt", "100.txt"])
 def test_a_clock_that_can_not_be_trusted_leaves_the_extremes(dataset, name):
     path = dataset("pendulum_bad_clock") / name
-    record = ss.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
+    record = ss.signals.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
     found = ss.analyze_decay(record, restoring="pendulum")
     assert found.waveform is None
     assert found.best is found.older["extremes alone"]
@@ -206,7 +206,7 @@ def test_a_clock_that_runs_unevenly_is_told_by_what_the_waveform_leaves():
     along = np.arange(len(values))
     warped = np.interp(along + 0.35 * fs * np.sin(2 * np.pi * along / (2.5 * fs)), along, values)
     noisy = warped + 1e-4 * np.random.default_rng(1).standard_normal(len(warped))
-    with pytest.raises(ss.EstimateError, match="of the motion; a waveform is read where the clock is even"):
+    with pytest.raises(ss.errors.EstimateError, match="of the motion; a waveform is read where the clock is even"):
         ss.analyze_decay(ss.Record.of({"x": noisy}, fs=fs), method="waveform")
 
 
@@ -231,7 +231,7 @@ def test_viscous_damping_alone_leaves_ten_times_the_residual_of_a_real_pendulum(
 
 
 def test_a_record_without_noise_is_no_digitiser_however_long_it_rests():
-    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
+    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
     record = ss.simulate(slider, duration=80.0, start={"x": 1.0}).record(fs=200)
     found = ss.analyze_decay(record, method="waveform", stiffness=10.0)
     assert found.releases.ring_downs[0].step == 0
@@ -346,15 +346,17 @@ def test_a_motion_rejected_by_chance_is_not_denied_as_a_fact():
 def test_what_no_repair_bridges_is_not_sent_to_a_repair():
     values = np.asarray(free_decay()[0]).copy()
     values[300:380] = np.nan
-    with pytest.raises(ss.RecordError, match=r"too many in a row .* keep a part without them with record.rows\(\)"):
+    with pytest.raises(
+        ss.errors.RecordError, match=r"too many in a row .* keep a part without them with record.rows\(\)"
+    ):
         ss.analyze_decay(ss.Record.of({"x": values}, fs=100))
-    with pytest.raises(ss.RecordError, match="look at its cable"):
+    with pytest.raises(ss.errors.RecordError, match="look at its cable"):
         ss.analyze_decay(ss.Record.of({"x": np.full(400, np.nan)}, fs=100))
 
 
 def test_the_release_is_told_by_one_number_everywhere():
-    from stickslip.reports.decay import headline
-    from stickslip.reports.words import value_of
+    from stickslip.story.decay import headline
+    from stickslip.story.words import value_of
 
     values, fs, _ = free_decay(hold=1.0)
     noisy = values + 1e-3 * np.random.default_rng(1).standard_normal(len(values))

@@ -110,7 +110,7 @@ def test_few_extremes_are_flagged_and_fewer_refused():
     assert "only 4 extremes" in ss.decrement(of(values, fs)).status
     three, fs, turns = free_decay(damping_ratio=0.4, dry=0.04)
     assert len(turns) == 3
-    with pytest.raises(ss.EstimateError, match=r"4 are needed.*form=\"plain\""):
+    with pytest.raises(ss.errors.EstimateError, match=r"4 are needed.*form=\"plain\""):
         ss.decrement(of(three, fs))
     decay = ss.decrement(of(three, fs), form="plain")
     assert decay.damping_ratio.value == pytest.approx(0.4, rel=0.01)
@@ -136,7 +136,7 @@ def test_a_lost_extreme_is_not_read_over():
 def test_what_can_not_be_chosen_is_refused():
     values, fs, _ = free_decay()
     for choice in ({"form": "quadratic"}, {"location": "eye"}):
-        with pytest.raises(ss.EstimateError, match="choose one"):
+        with pytest.raises(ss.errors.EstimateError, match="choose one"):
             ss.decrement(of(values, fs), **choice)
 
 
@@ -154,7 +154,7 @@ def test_the_bounds_of_a_record_hold_its_errors():
 def test_the_pendulum_with_the_bad_clock(dataset):
     for name in ("60.txt", "100.txt"):
         path = dataset("pendulum_bad_clock") / name
-        record = ss.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
+        record = ss.signals.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
         decay = ss.decrement(record)
         assert 0.0051 < decay.damping_ratio.value < 0.0070
         assert 0.010 < np.degrees(decay.dry_displacement.value) < 0.018
@@ -166,10 +166,10 @@ def test_the_pendulum_with_the_bad_clock(dataset):
 def test_extremes_that_are_read_in_counts_may_be_equal(dataset, name):
     """The largest samples of a slow decay differ by whole counts, or by none: no warning, and an answer."""
     path = dataset("pendulum_bad_clock") / name
-    record = ss.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
+    record = ss.signals.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
     decay = ss.decrement(record, location="sample")
     assert 0.004 < decay.damping_ratio.value < 0.0075
-    with pytest.raises(ss.EstimateError, match=r'about zero; .* form="plain" takes zero for the rest position'):
+    with pytest.raises(ss.errors.EstimateError, match=r'about zero; .* form="plain" takes zero for the rest position'):
         ss.decrement(record, form="plain")  # it hangs half a degree beside zero
 
 
@@ -188,7 +188,7 @@ def test_the_large_pendulum_is_flagged(dataset):
 @pytest.mark.parametrize(("hold", "side"), [(400, 1), (400, -1), (0, 1)])
 def test_a_noisy_acceleration_tells_what_the_displacement_does(hold, side):
     """It jumps from nothing at the release: what is held before has no sign and is no extreme."""
-    slider = ss.Oscillator(mass=2.0, stiffness=800.0, damping=1.6, law=ss.Coulomb(0.8))
+    slider = ss.Oscillator(mass=2.0, stiffness=800.0, damping=1.6, law=ss.laws.Coulomb(0.8))
     motion = ss.simulate(slider, duration=4.0, start={"x": side * 0.03}).record(fs=500)["a"]
     motion = np.concatenate([np.zeros(hold), motion])
     held, waves = [], []

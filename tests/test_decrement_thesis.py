@@ -7,7 +7,7 @@ import pytest
 from thesis import chapter6
 from thesis.printed import given
 
-from stickslip.identify import extremes as ex
+from stickslip.decay import extremes as ex
 
 GIVEN = given()
 TRUE = np.round(chapter6.extremes(GIVEN), 5)

@@ -10,7 +10,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from motions import stick_slip
 from stickslip.errors import EstimateError, RecordError
-from stickslip.signals.differentiate import (
+from stickslip.signals.derivatives import (
     Filter,
     best_bandwidth,
     differentiate,

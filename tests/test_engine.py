@@ -13,21 +13,23 @@ import stickslip as ss
 from stickslip import scenarios
 from stickslip.solve import phasors
 from stickslip.solve import simulate as simulate_module
-from stickslip.solve.energy import energy
+from stickslip.solve.energies import energy
 
-RIGID = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5))
-RECORDED = ss.RecordedBase([0.0, 1e-3, 0.0, -1e-3], fs=10.0)  # 0.3 s
-CONTACT = ss.CompliantContact(1.1, 192000, 23.8635)
+RIGID = ss.Oscillator(
+    mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
+)
+RECORDED = ss.drives.RecordedBase([0.0, 1e-3, 0.0, -1e-3], fs=10.0)  # 0.3 s
+CONTACT = ss.laws.CompliantContact(1.1, 192000, 23.8635)
 COMPLIANT = RIGID.having(law=CONTACT)
 DRIVES = (
-    lambda g, x, v, f, p: ss.HarmonicForce(p, f, g.uniform(0, 6)),
-    lambda g, x, v, f, p: ss.HarmonicBase(x, f, g.uniform(0, 6)),
-    lambda g, x, v, f, p: ss.HarmonicBase(x, f, contact="base"),
-    lambda g, x, v, f, p: ss.MultiTone([(p, f, 0.0), (0.3 * p, f * g.uniform(1, 9), 1.0)], on="force"),
-    lambda g, x, v, f, p: ss.MultiTone([(x, f, 0.0)], on="face"),
-    lambda g, x, v, f, p: ss.Belt(v * g.choice([-1.0, 1.0]) * 10 ** g.uniform(-2, 0.3)),
-    lambda g, x, v, f, p: ss.Ramp(v * 10 ** g.uniform(-2, 0.3)),
-    lambda g, x, v, f, p: ss.Release(),
+    lambda g, x, v, f, p: ss.drives.HarmonicForce(p, f, g.uniform(0, 6)),
+    lambda g, x, v, f, p: ss.drives.HarmonicBase(x, f, g.uniform(0, 6)),
+    lambda g, x, v, f, p: ss.drives.HarmonicBase(x, f, contact="base"),
+    lambda g, x, v, f, p: ss.drives.MultiTone([(p, f, 0.0), (0.3 * p, f * g.uniform(1, 9), 1.0)], on="force"),
+    lambda g, x, v, f, p: ss.drives.MultiTone([(x, f, 0.0)], on="face"),
+    lambda g, x, v, f, p: ss.drives.Belt(v * g.choice([-1.0, 1.0]) * 10 ** g.uniform(-2, 0.3)),
+    lambda g, x, v, f, p: ss.drives.Ramp(v * 10 ** g.uniform(-2, 0.3)),
+    lambda g, x, v, f, p: ss.drives.Release(),
 )
 
 
@@ -43,17 +45,20 @@ def random_case(seed: int) -> tuple[ss.Oscillator, dict[str, float], float]:
     x, v = push / stiffness, push / stiffness * rate
     count = int(g.integers(2, 6))
     laws = (
-        lambda: ss.Coulomb(level, static),
-        lambda: ss.CompliantContact(level, contact, loss, static),
-        lambda: ss.CompliantContact(level, contact, loss, static, "consistent"),
-        lambda: ss.LinearSlope(level, g.uniform(-0.2, 0.5) * math.sqrt(mass * stiffness), static),
-        lambda: ss.Tabulated([0, *np.cumsum(g.uniform(0.05, 1, count)) * v], level * g.uniform(0.3, 1, count + 1),
-                             static=1.1 * level),
-        lambda: ss.StateVariable(level, 10 ** g.uniform(-1, 1) * rate / level, steepness=10 ** g.uniform(1, 3) / v),
-        lambda: ss.InertialContact(level, contact, mass * 10 ** g.uniform(-1, 0), loss, static),
-        lambda: ss.ElastoSlip(contact * g.uniform(0.2, 1, count), level * g.uniform(0.05, 1, count)),
-        lambda: ss.PositionLoad(level, g.uniform(-1.5, 1.5) * level / x),
-    )  # fmt: skip
+        lambda: ss.laws.Coulomb(level, static),
+        lambda: ss.laws.CompliantContact(level, contact, loss, static),
+        lambda: ss.laws.CompliantContact(level, contact, loss, static, "consistent"),
+        lambda: ss.laws.LinearSlope(level, g.uniform(-0.2, 0.5) * math.sqrt(mass * stiffness), static),
+        lambda: ss.laws.Tabulated(
+            [0, *np.cumsum(g.uniform(0.05, 1, count)) * v], level * g.uniform(0.3, 1, count + 1), static=1.1 * level
+        ),
+        lambda: ss.laws.StateVariable(
+            level, 10 ** g.uniform(-1, 1) * rate / level, steepness=10 ** g.uniform(1, 3) / v
+        ),
+        lambda: ss.laws.InertialContact(level, contact, mass * 10 ** g.uniform(-1, 0), loss, static),
+        lambda: ss.laws.ElastoSlip(contact * g.uniform(0.2, 1, count), level * g.uniform(0.05, 1, count)),
+        lambda: ss.laws.PositionLoad(level, g.uniform(-1.5, 1.5) * level / x),
+    )
     law = laws[int(g.integers(len(laws)))]()
     frequency = rate / (2 * math.pi) * 10 ** g.uniform(-1, 0.5)
     drive = DRIVES[int(g.integers(len(DRIVES)))](g, x, v, frequency, push)
@@ -86,7 +91,7 @@ def test_energy_balances_over_thousands_of_cells(seed: int) -> None:
 def test_a_piece_of_a_hundred_thousand_cells_keeps_its_digits() -> None:
     """A free vibration on a belt that never lets it stick, against the closed form in 40 digits."""
     rate, damping, speed, level, mass = 1e4, 0.003, 10.0, 1.0, 1.5
-    law, drive = ss.Coulomb(level), ss.Belt(speed)
+    law, drive = ss.laws.Coulomb(level), ss.drives.Belt(speed)
     system = ss.Oscillator(mass=mass, stiffness=mass * rate**2, damping=damping, law=law, drive=drive)
     run = ss.simulate(system, duration=10.0, start={"x": 1e-5, "v": 0.0})
     assert len(run.modes) == 2  # cut once, for the ear of the caller
@@ -102,7 +107,7 @@ def test_a_piece_of_a_hundred_thousand_cells_keeps_its_digits() -> None:
 
 def test_friction_at_rest_follows_a_force_that_starts_at_zero() -> None:
     """A cosine that starts at zero carries the rounding of a cosine: it must not set off the state variable."""
-    law, drive = ss.StateVariable(0.5, rate=20), ss.HarmonicForce(1.2, frequency=0.13, phase=-math.pi / 2)
+    law, drive = ss.laws.StateVariable(0.5, rate=20), ss.drives.HarmonicForce(1.2, frequency=0.13, phase=-math.pi / 2)
     run = ss.simulate(ss.Oscillator(mass=1, stiffness=1, law=law, drive=drive), cycles=20)
     # held while the rate that friction needs, f' + f_k gamma f, stays below f_k^2 gamma
     omega = 2 * math.pi * 0.13
@@ -114,7 +119,7 @@ def test_friction_at_rest_follows_a_force_that_starts_at_zero() -> None:
 
 def test_a_run_that_ends_on_an_event_ends_there() -> None:
     """The energy at the end is that of the last instant, not of the last piece's start."""
-    system = ss.Oscillator(mass=1, stiffness=4, law=ss.Coulomb(1.0))
+    system = ss.Oscillator(mass=1, stiffness=4, law=ss.laws.Coulomb(1.0))
     whole = ss.simulate(system, duration=10, start={"x": 3.0})
     for event in whole.events[:3]:
         run = ss.simulate(system, duration=event.time, start={"x": 3.0})
@@ -140,8 +145,8 @@ def test_events_keep_when_units_change() -> None:
     reference = ss.simulate(COMPLIANT, cycles=12)
     for metre, second, newton in itertools.product((1e-9, 1e9), repeat=3):
         stiff, viscous = newton / metre, newton * second / metre
-        law = ss.CompliantContact(1.1 * newton, 192000 * stiff, 23.8635 * viscous)
-        drive = ss.HarmonicBase(0.65e-3 * metre, 2.5 / second)
+        law = ss.laws.CompliantContact(1.1 * newton, 192000 * stiff, 23.8635 * viscous)
+        drive = ss.drives.HarmonicBase(0.65e-3 * metre, 2.5 / second)
         mass = 2.42 * newton * second**2 / metre
         run = ss.simulate(ss.Oscillator(mass=mass, stiffness=2310 * stiff, law=law, drive=drive), cycles=12)
         assert [e.mode for e in run.events] == [e.mode for e in reference.events]
@@ -157,7 +162,7 @@ def test_a_stiffening_contact_becomes_rigid(system: ss.Oscillator, order: float)
     rigid = ss.steady_state(system).amplitude
     gaps = []
     for decade in range(2, 13):
-        law = ss.CompliantContact(1.1, 10.0**decade, math.sqrt(2.42 * 10.0**decade))
+        law = ss.laws.CompliantContact(1.1, 10.0**decade, math.sqrt(2.42 * 10.0**decade))
         transient = 64 if decade < 10 else 16
         gaps.append(abs(ss.steady_state(system.having(law=law), transient=transient).amplitude - rigid) / rigid)
     assert np.all(np.diff(gaps[2:]) < 0)
@@ -205,7 +210,7 @@ def test_the_closed_integral_of_friction_vanishes(name: str) -> None:
 
 
 def test_friction_stays_below_static_while_stuck() -> None:
-    run = ss.simulate(RIGID.having(law=ss.Coulomb(0.9, static=1.2)), cycles=20)
+    run = ss.simulate(RIGID.having(law=ss.laws.Coulomb(0.9, static=1.2)), cycles=20)
     record = run.record(fs=4000)
     _, piece = run.sample(record.time, ("x",))
     stuck = np.array([run.table.modes[m].kind == "stick" for m in run.modes])[piece]
@@ -217,7 +222,7 @@ def random_contact(seed: int) -> ss.Oscillator:
     """A compliant contact near the thesis's own."""
     g = np.random.default_rng(seed)
     level, stiffness = float(g.uniform(0.8, 1.3)), float(g.uniform(5e4, 3e5))
-    law = ss.CompliantContact(level, stiffness, float(g.uniform(0, 60)))
+    law = ss.laws.CompliantContact(level, stiffness, float(g.uniform(0, 60)))
     return RIGID.having(law=law, frequency=float(g.uniform(2, 7)), amplitude=float(g.uniform(0.5e-3, 1e-3)))
 
 
@@ -296,7 +301,9 @@ def test_a_recorded_base_follows_the_tone_it_was_taken_from() -> None:
     fs = 2000.0
     times = np.arange(8001) / fs
     tone = ss.simulate(RIGID, duration=4.0)
-    taken = ss.simulate(RIGID.having(drive=ss.RecordedBase(0.65e-3 * np.cos(5 * math.pi * times), fs=fs)), duration=4.0)
+    taken = ss.simulate(
+        RIGID.having(drive=ss.drives.RecordedBase(0.65e-3 * np.cos(5 * math.pi * times), fs=fs)), duration=4.0
+    )
     assert [e.mode for e in taken.events] == [e.mode for e in tone.events]
     assert np.allclose([e.time for e in taken.events], [e.time for e in tone.events], rtol=0, atol=1e-7)
 
@@ -304,8 +311,8 @@ def test_a_recorded_base_follows_the_tone_it_was_taken_from() -> None:
 def test_a_moving_base_equals_the_relative_coordinate() -> None:
     """Friction on the base: x - z obeys the force m w^2 z on the ground."""
     w = 5 * math.pi
-    base = RIGID.having(drive=ss.HarmonicBase(2e-2, 2.5, contact="base"))
-    relative = RIGID.having(drive=ss.HarmonicForce(2.42 * w**2 * 2e-2, 2.5))
+    base = RIGID.having(drive=ss.drives.HarmonicBase(2e-2, 2.5, contact="base"))
+    relative = RIGID.having(drive=ss.drives.HarmonicForce(2.42 * w**2 * 2e-2, 2.5))
     moving = ss.simulate(base, cycles=6, start={"x": 2e-2, "v": 0.0})
     fixed = ss.simulate(relative, cycles=6)
     assert [e.mode for e in moving.events] == [e.mode for e in fixed.events]
@@ -313,10 +320,10 @@ def test_a_moving_base_equals_the_relative_coordinate() -> None:
 
 
 def test_critical_damping_and_no_spring_are_exact() -> None:
-    critical = ss.Oscillator(mass=1, stiffness=1, damping=2.0, law=ss.Coulomb(0.0))
+    critical = ss.Oscillator(mass=1, stiffness=1, damping=2.0, law=ss.laws.Coulomb(0.0))
     run = ss.simulate(critical, duration=5, start={"x": 1.0})
     assert run.state(5)["x"] == pytest.approx(6 * math.exp(-5), rel=1e-14)
-    coasting = ss.Oscillator(mass=2, stiffness=0, law=ss.Coulomb(3.0))
+    coasting = ss.Oscillator(mass=2, stiffness=0, law=ss.laws.Coulomb(3.0))
     run = ss.simulate(coasting, duration=4, start={"v": 3.0})
     assert run.events[0].time == 2.0
     assert run.state(4)["x"] == 3.0
@@ -326,16 +333,16 @@ def test_critical_damping_and_no_spring_are_exact() -> None:
 @pytest.mark.parametrize(
     "call",
     [
-        lambda: ss.Oscillator(mass=-1, stiffness=1, law=ss.Coulomb(1)),
-        lambda: ss.Oscillator(mass=math.nan, stiffness=1, law=ss.Coulomb(1)),
-        lambda: ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb(1), damper="wall"),
-        lambda: ss.Coulomb(1.0, static=0.5),
-        lambda: ss.CompliantContact(1.0, 0.0),
-        lambda: ss.CompliantContact(1.0, 1.0, rule="loose"),
-        lambda: ss.Tabulated([0, 2, 1], [1, 1, 1]),
-        lambda: ss.Belt(0.0),
-        lambda: ss.HarmonicForce(1.0, 1e12),
-        lambda: ss.RecordedBase([0.0, math.nan, 1.0, 2.0], fs=10),
+        lambda: ss.Oscillator(mass=-1, stiffness=1, law=ss.laws.Coulomb(1)),
+        lambda: ss.Oscillator(mass=math.nan, stiffness=1, law=ss.laws.Coulomb(1)),
+        lambda: ss.Oscillator(mass=1, stiffness=1, law=ss.laws.Coulomb(1), damper="wall"),
+        lambda: ss.laws.Coulomb(1.0, static=0.5),
+        lambda: ss.laws.CompliantContact(1.0, 0.0),
+        lambda: ss.laws.CompliantContact(1.0, 1.0, rule="loose"),
+        lambda: ss.laws.Tabulated([0, 2, 1], [1, 1, 1]),
+        lambda: ss.drives.Belt(0.0),
+        lambda: ss.drives.HarmonicForce(1.0, 1e12),
+        lambda: ss.drives.RecordedBase([0.0, math.nan, 1.0, 2.0], fs=10),
         lambda: ss.simulate(RIGID, duration=0.0),
         lambda: ss.simulate(RIGID, duration=1.0, cycles=1.0),
         lambda: ss.simulate(RIGID, duration=1.0, start={"y": 1.0}),
@@ -346,23 +353,23 @@ def test_critical_damping_and_no_spring_are_exact() -> None:
         lambda: ss.simulate(RIGID.having(drive=RECORDED), duration=1.0),
         lambda: ss.steady_state(RIGID.having(drive=RECORDED)),
         lambda: ss.steady_state(RIGID, orders=0),
-        lambda: ss.Oscillator(mass="heavy", stiffness=1, law=ss.Coulomb(1)),
-        lambda: ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb),
-        lambda: ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb(1), drive=2.5),
-        lambda: ss.HarmonicForce("1 N", 2.5),
-        lambda: ss.MultiTone([(1.0, 2.5)]),
+        lambda: ss.Oscillator(mass="heavy", stiffness=1, law=ss.laws.Coulomb(1)),
+        lambda: ss.Oscillator(mass=1, stiffness=1, law=ss.laws.Coulomb),
+        lambda: ss.Oscillator(mass=1, stiffness=1, law=ss.laws.Coulomb(1), drive=2.5),
+        lambda: ss.drives.HarmonicForce("1 N", 2.5),
+        lambda: ss.drives.MultiTone([(1.0, 2.5)]),
         lambda: RIGID.having(colour=1),
         lambda: scenarios.get("none"),
     ],
 )
 def test_what_has_no_meaning_is_refused(call) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(ss.ModelError) as refusal:
+    with pytest.raises(ss.errors.ModelError) as refusal:
         call()
     assert len(refusal.value.args) == 3
 
 
 def test_chatter_ends_in_an_error_that_names_the_state() -> None:
-    with pytest.raises(ss.SolveError, match="x = "):
+    with pytest.raises(ss.errors.SolveError, match="x = "):
         ss.simulate(RIGID, cycles=2000, budget=1)
 
 
@@ -370,7 +377,7 @@ def test_chatter_ends_in_an_error_that_names_the_state() -> None:
 def test_a_budget_counts_in_short_runs_too(budget: int) -> None:
     """Four events in each of ten periods."""
     if budget < 4:
-        with pytest.raises(ss.SolveError, match="at most 3 events"):
+        with pytest.raises(ss.errors.SolveError, match="at most 3 events"):
             ss.simulate(RIGID, cycles=10, budget=budget)
     else:
         assert len(ss.simulate(RIGID, cycles=10, budget=budget).events) <= 4 * 10
@@ -379,7 +386,7 @@ def test_a_budget_counts_in_short_runs_too(budget: int) -> None:
 def test_growth_without_end_is_no_number() -> None:
     growing = RIGID.having(damping=-100.0)
     assert ss.steady_state(growing).status == "unbounded"
-    with pytest.raises(ss.SolveError, match="beyond the largest number"):
+    with pytest.raises(ss.errors.SolveError, match="beyond the largest number"):
         ss.simulate(growing.having(damping=-1e4), cycles=40)
 
 
@@ -394,14 +401,14 @@ def test_growth_without_end_is_no_number() -> None:
     ],
 )
 def test_a_run_is_asked_for_what_it_knows(call, names: str) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(ss.SolveError, match=names):
+    with pytest.raises(ss.errors.SolveError, match=names):
         call(ss.simulate(RIGID, duration=1.0))
 
 
 def test_chaos_has_a_positive_exponent() -> None:
     """FM-1: 0.596 +- 0.004 a forcing period."""
     scenario = scenarios.get("FM-1")
-    exponent = ss.lyapunov(scenario.system, cycles=4000, start=scenario.start)
+    exponent = ss.solve.lyapunov(scenario.system, cycles=4000, start=scenario.start)
     period = 1 / scenario.system.drive.frequency
     assert exponent.interval[0] * period < 0.596 + 0.012
     assert exponent.interval[1] * period > 0.596 - 0.012
@@ -418,7 +425,7 @@ def test_the_section_of_a_periodic_orbit_is_one_point() -> None:
 def test_rest_and_sliding_attract_beside_each_other() -> None:
     """Static friction above the force's amplitude: rest where the start is at rest, sliding where it slides."""
     system = scenarios.forced(0.8, 0.7, static_ratio=1.5)
-    rest, sliding, *more = ss.attractors(system, starts=[{}, {"x": 3.0}, {"x": 3.1}])
+    rest, sliding, *more = ss.solve.attractors(system, starts=[{}, {"x": 3.0}, {"x": 3.1}])
     assert not more
     assert (rest.status, sliding.status) == ("rest", "unique")
     assert sliding.stops == (0, 0)

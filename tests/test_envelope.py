@@ -25,9 +25,9 @@ def released(
 
 
 def test_each_reads_the_friction_it_knows() -> None:
-    assert ss.log_decrement(released(0.02, 0.0)).damping_ratio.value == pytest.approx(0.02, rel=0.01)
-    assert ss.linear_decrement(released(0.0, 0.02)).dry_displacement.value == pytest.approx(0.02, rel=0.01)
-    for method in (ss.extreme_decay, ss.hilbert_decay):
+    assert ss.decay.log_decrement(released(0.02, 0.0)).damping_ratio.value == pytest.approx(0.02, rel=0.01)
+    assert ss.decay.linear_decrement(released(0.0, 0.02)).dry_displacement.value == pytest.approx(0.02, rel=0.01)
+    for method in (ss.decay.extreme_decay, ss.decay.hilbert_decay):
         found = method(released(0.0177, 0.005))
         assert found.damping_ratio.value == pytest.approx(0.0177, rel=0.03)
         assert found.dry_displacement.value == pytest.approx(0.005, rel=0.06)
@@ -35,7 +35,7 @@ def test_each_reads_the_friction_it_knows() -> None:
 
 def test_each_takes_the_other_friction_for_its_own_and_says_so() -> None:
     record = released(0.0177, 0.005)
-    viscous, dry = ss.log_decrement(record), ss.linear_decrement(record)
+    viscous, dry = ss.decay.log_decrement(record), ss.decay.linear_decrement(record)
     assert viscous.damping_ratio.value > 1.3 * 0.0177
     assert "read as viscous" in viscous.status
     assert dry.dry_displacement.value > 2 * 0.005
@@ -47,7 +47,7 @@ def test_each_takes_the_other_friction_for_its_own_and_says_so() -> None:
 @pytest.mark.parametrize("pendulum", [False, True])
 def test_extremes_alone_tell_both(pendulum: bool) -> None:
     record = released(0.01, 0.01, noise=1e-4, pendulum=pendulum, first=2.0 if pendulum else 1.0)
-    found = ss.extreme_decay(record, restoring="pendulum" if pendulum else "linear")
+    found = ss.decay.extreme_decay(record, restoring="pendulum" if pendulum else "linear")
     assert found.damping_ratio.value == pytest.approx(0.01, rel=0.02)
     assert found.dry_displacement.value == pytest.approx(0.01, rel=0.02)
 
@@ -56,7 +56,7 @@ def test_extremes_do_not_ask_the_clock() -> None:
     record = released(0.0177, 0.005)
     rate = 200 * (1 + 0.05 * np.sin(TIMES))  # a clock that runs fast and slow
     warped = np.interp(np.cumsum(1 / rate), TIMES, record["x"])
-    found = ss.extreme_decay(ss.Record.of({"x": warped}, fs=200))
+    found = ss.decay.extreme_decay(ss.Record.of({"x": warped}, fs=200))
     assert found.damping_ratio.value == pytest.approx(0.0177, rel=0.01)
     assert found.dry_displacement.value == pytest.approx(0.005, rel=0.01)
 
@@ -67,8 +67,8 @@ READ = [("60.txt", 0.0063, 0.0169), ("100.txt", 0.0054, 0.0122)]
 @pytest.mark.parametrize(("name", "ratio", "band"), READ)
 def test_pendulums_whose_clock_is_broken(dataset: Callable[[str], Path], name: str, ratio: float, band: float) -> None:
     """Crude methods gave 0.0051 to 0.0065 and 0.011 to 0.016 deg, a sixth of the encoder's step."""
-    record = ss.repair_clock(read_pendulum(dataset("pendulum_bad_clock") / name))
-    found = ss.extreme_decay(record, restoring="pendulum")
+    record = ss.signals.repair_clock(read_pendulum(dataset("pendulum_bad_clock") / name))
+    found = ss.decay.extreme_decay(record, restoring="pendulum")
     assert found.damping_ratio.value == pytest.approx(ratio, abs=1e-4)
     assert 0.0051 < found.damping_ratio.value < 0.0065
     assert np.degrees(found.dry_displacement.value) == pytest.approx(band, abs=3e-4)
@@ -78,18 +78,18 @@ def test_pendulums_whose_clock_is_broken(dataset: Callable[[str], Path], name: s
 
 
 def test_too_few_extremes_and_speeds_are_refused() -> None:
-    with pytest.raises(ss.EstimateError, match="are needed"):
-        ss.log_decrement(released(0.0, 0.15))
+    with pytest.raises(ss.errors.EstimateError, match="are needed"):
+        ss.decay.log_decrement(released(0.0, 0.15))
     speed = np.gradient(released(0.02, 0.0)["x"], 0.005)
-    with pytest.raises(ss.EstimateError, match="displacements are read"):
-        ss.hilbert_decay(ss.Record.of({"v": speed}, fs=200))
+    with pytest.raises(ss.errors.EstimateError, match="displacements are read"):
+        ss.decay.hilbert_decay(ss.Record.of({"v": speed}, fs=200))
 
 
 @pytest.mark.parametrize("count", [100, 101])
 def test_the_analytic_signal_is_scipys(count):
     from scipy.signal import hilbert
 
-    from stickslip.identify.envelope import _analytic
+    from stickslip.decay.envelope import _analytic
 
     values = np.random.default_rng(1).standard_normal(count)
     assert np.abs(_analytic(values) - hilbert(values)).max() < 1e-12

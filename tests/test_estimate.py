@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from stickslip import Estimate, EstimateError
-from stickslip.reports.words import interval_of, value_of
+from stickslip import Estimate
+from stickslip.errors import EstimateError
+from stickslip.story.words import interval_of, value_of
 
 
 def estimate(value, low, high, *, sd=1.0, unit="N", status="ok"):

@@ -28,15 +28,15 @@ cycles = 8
 
 
 @cache
-def run() -> ss.Trajectory:
-    contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+def run() -> ss.solve.Trajectory:
+    contact = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     return ss.simulate(ss.Oscillator(mass=2.42, stiffness=2310, damping=0.12, law=contact, drive=drive), cycles=8)
 
 
 @cache
-def plan() -> ss.ExperimentPlan:
-    return ss.plan_experiment(run(), rates=(2000, 500), draws=2, start=0.8, seed=3)
+def plan() -> ss.answers.ExperimentPlan:
+    return ss.answers.plan_experiment(run(), rates=(2000, 500), draws=2, start=0.8, seed=3)
 
 
 def invoke(*arguments: str) -> Result:
@@ -89,14 +89,14 @@ def test_the_least_that_is_enough_is_named() -> None:
 
 def test_a_seed_gives_the_same_plan_again() -> None:
     asked = {"rates": [500], "draws": 1, "start": 0.8}
-    one, same, other = (ss.plan_experiment(run(), seed=seed, **asked) for seed in (3, 3, 4))  # type: ignore[arg-type]
+    one, same, other = (ss.answers.plan_experiment(run(), seed=seed, **asked) for seed in (3, 3, 4))  # type: ignore[arg-type]
     assert one == same
     assert one != other
 
 
 def test_it_says_how_far_it_is() -> None:
     told: list[tuple[str, float]] = []
-    ss.plan_experiment(
+    ss.answers.plan_experiment(
         run(), rates=[500], draws=2, start=0.8, progress=lambda words, share: told.append((words, share))
     )
     assert [share for _, share in told] == [0] * 4 + [0.5] * 4
@@ -104,21 +104,23 @@ def test_it_says_how_far_it_is() -> None:
 
 
 def test_the_figure_has_a_panel_for_every_question() -> None:
-    figure = ss.plot_plan(plan())
+    figure = ss.plot.plot_plan(plan())
     assert [panel.get_title(loc="left") for panel in figure.axes] == list(plan().questions)
     assert [len(panel.lines) for panel in figure.axes] == [4, 4, 4, 4]
 
 
 def test_what_can_not_be_planned_is_refused() -> None:
     with pytest.raises(ModelError, match="does not sense x"):
-        ss.plan_experiment(run(), rig=ss.Rig.perfect("a"))
+        ss.answers.plan_experiment(run(), rig=ss.Rig.perfect("a"))
     with pytest.raises(ModelError, match="draws"):
-        ss.plan_experiment(run(), draws=0)
+        ss.answers.plan_experiment(run(), draws=0)
     with pytest.raises(ModelError, match="fs"):
-        ss.plan_experiment(run(), rates=[-1.0])
-    two = ss.Structure(mass=np.eye(2), damping=np.zeros((2, 2)), stiffness=np.eye(2), contacts=(), drive=ss.Release())
+        ss.answers.plan_experiment(run(), rates=[-1.0])
+    two = ss.Structure(
+        mass=np.eye(2), damping=np.zeros((2, 2)), stiffness=np.eye(2), contacts=(), drive=ss.drives.Release()
+    )
     with pytest.raises(ModelError, match="several masses"):
-        ss.plan_experiment(ss.simulate(two, start={"x1": 1.0}, duration=1.0))
+        ss.answers.plan_experiment(ss.simulate(two, start={"x1": 1.0}, duration=1.0))
 
 
 @pytest.fixture

@@ -23,26 +23,28 @@ from stickslip.laws.export import FORMATS, FORMULAS, formula_of
 from stickslip.laws.formula import Formula
 
 LAWS = {
-    "Coulomb": ss.Coulomb(1.1, static=1.3),
-    "CompliantContact": ss.CompliantContact(1.1, stiffness=192000, damping=23.9, static=1.2),
-    "consistent contact": ss.CompliantContact(1.1, stiffness=192000, damping=23.9, rule="consistent"),
-    "LinearSlope": ss.LinearSlope(1.0, slope=-0.2, static=1.5),
-    "Tabulated": ss.Tabulated([0, 0.1, 0.3], [1.5, 1.0, 1.2]),
-    "StateVariable": ss.StateVariable(1.1, rate=100.0),
-    "steep StateVariable": ss.StateVariable(1.1, rate=100.0, steepness=500.0, printed=True),
-    "InertialContact": ss.InertialContact(1.1, stiffness=192000, mass=0.01, damping=3.0),
-    "ElastoSlip": ss.ElastoSlip.iwan(1e6, width=30e-6, elements=4),
-    "PositionLoad": ss.PositionLoad(1.0, gradient=1.5),
-    "Stribeck": ss.Stribeck(1.0, 1.5, speed=0.1, exponent=1.3, viscous=0.2),
-    "Dahl": ss.Dahl(1.1, stiffness=192000, exponent=1.5),
-    "LuGre": ss.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=316.23, viscous=0.4),
-    "RateState": ss.RateState(10.0, friction=0.6, direct=0.01, evolution=0.015, distance=1e-5, reference=1e-6),
-    "slip law": ss.RateState(9.0, friction=0.6, direct=0.01, evolution=0.01, distance=1e-5, reference=1e-6, law="slip"),
-    "SmoothStateVariable": ss.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
-    "FrictionCurve": ss.FrictionCurve(Formula("3 / (1 + 1.42 * v) + 1 + 0.1 * v**2")),
-    "InSeries": ss.InSeries(ss.LinearSlope(1.0, slope=-5.0), stiffness=192000, damping=24),
-    "TimeDelay": ss.TimeDelay(ss.LinearSlope(1.0, slope=2.0), lag=1e-3),
-}  # fmt: skip
+    "Coulomb": ss.laws.Coulomb(1.1, static=1.3),
+    "CompliantContact": ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9, static=1.2),
+    "consistent contact": ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9, rule="consistent"),
+    "LinearSlope": ss.laws.LinearSlope(1.0, slope=-0.2, static=1.5),
+    "Tabulated": ss.laws.Tabulated([0, 0.1, 0.3], [1.5, 1.0, 1.2]),
+    "StateVariable": ss.laws.StateVariable(1.1, rate=100.0),
+    "steep StateVariable": ss.laws.StateVariable(1.1, rate=100.0, steepness=500.0, printed=True),
+    "InertialContact": ss.laws.InertialContact(1.1, stiffness=192000, mass=0.01, damping=3.0),
+    "ElastoSlip": ss.laws.ElastoSlip.iwan(1e6, width=30e-6, elements=4),
+    "PositionLoad": ss.laws.PositionLoad(1.0, gradient=1.5),
+    "Stribeck": ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=1.3, viscous=0.2),
+    "Dahl": ss.laws.Dahl(1.1, stiffness=192000, exponent=1.5),
+    "LuGre": ss.laws.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=316.23, viscous=0.4),
+    "RateState": ss.laws.RateState(10.0, friction=0.6, direct=0.01, evolution=0.015, distance=1e-5, reference=1e-6),
+    "slip law": ss.laws.RateState(
+        9.0, friction=0.6, direct=0.01, evolution=0.01, distance=1e-5, reference=1e-6, law="slip"
+    ),
+    "SmoothStateVariable": ss.laws.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
+    "FrictionCurve": ss.laws.FrictionCurve(Formula("3 / (1 + 1.42 * v) + 1 + 0.1 * v**2")),
+    "InSeries": ss.laws.InSeries(ss.laws.LinearSlope(1.0, slope=-5.0), stiffness=192000, damping=24),
+    "TimeDelay": ss.laws.TimeDelay(ss.laws.LinearSlope(1.0, slope=2.0), lag=1e-3),
+}
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 
@@ -52,14 +54,14 @@ def test_every_law_is_here() -> None:
 
 
 ALL = {
-    **LAWS, "plain Coulomb": ss.Coulomb(1.1), "plain contact": ss.CompliantContact(1.1, stiffness=192000),
-    "plain slope": ss.LinearSlope(1.0, slope=0.1),
+    **LAWS, "plain Coulomb": ss.laws.Coulomb(1.1), "plain contact": ss.laws.CompliantContact(1.1, stiffness=192000),
+    "plain slope": ss.laws.LinearSlope(1.0, slope=0.1),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_formula_names_no_parameter_that_is_not_there(name: str) -> None:
-    law, told = ALL[name], ss.export_law(ALL[name], format="simulink").splitlines()[0]
+    law, told = ALL[name], ss.laws.export_law(ALL[name], format="simulink").splitlines()[0]
     absent = [field.name for field in fields(law) if getattr(law, field.name) is None]  # type: ignore[arg-type]
     assert not [each for each in absent if re.search(rf"\b{each}\b", told)]
     assert ("relaxes" in told) == (name == "consistent contact")
@@ -68,15 +70,15 @@ def test_a_formula_names_no_parameter_that_is_not_there(name: str) -> None:
 @pytest.mark.parametrize("name", LAWS)
 def test_toml_is_read_back(name: str, tmp_path: Path) -> None:
     path = tmp_path / "slider.toml"
-    path.write_text(f"system = {{ mass = 1.0, stiffness = 4.0 }}\n{ss.export_law(LAWS[name])}\n")
-    assert ss.read_system(path).system.law == LAWS[name]
+    path.write_text(f"system = {{ mass = 1.0, stiffness = 4.0 }}\n{ss.laws.export_law(LAWS[name])}\n")
+    assert ss.systems.read_system(path).system.law == LAWS[name]
 
 
 def test_a_curve_of_python_is_written_as_its_formula(tmp_path: Path) -> None:
-    law = ss.FrictionCurve(lambda v: 2.0 + 0.5 * exp(-(v / 0.1)) - v / (1 + v**2), static=3.0)
+    law = ss.laws.FrictionCurve(lambda v: 2.0 + 0.5 * exp(-(v / 0.1)) - v / (1 + v**2), static=3.0)
     path = tmp_path / "slider.toml"
-    path.write_text(f"system = {{ mass = 1.0, stiffness = 4.0 }}\n{ss.export_law(law)}\n")
-    again = ss.read_system(path).system.law
+    path.write_text(f"system = {{ mass = 1.0, stiffness = 4.0 }}\n{ss.laws.export_law(law)}\n")
+    again = ss.systems.read_system(path).system.law
     assert again.static == 3.0
     for speed in (0.0, 0.03, 0.7):
         assert again.friction(speed) == pytest.approx(law.friction(speed), rel=1e-14)
@@ -84,7 +86,7 @@ def test_a_curve_of_python_is_written_as_its_formula(tmp_path: Path) -> None:
 
 def run_as_it_stands(name: str) -> dict[str, object]:
     names: dict[str, object] = {}
-    exec(compile(ss.export_law(LAWS[name], format="python"), name, "exec"), names)
+    exec(compile(ss.laws.export_law(LAWS[name], format="python"), name, "exec"), names)
     return names
 
 
@@ -134,7 +136,7 @@ def test_python_names_what_a_contact_must_be_told() -> None:
 @pytest.mark.parametrize("name", ["CompliantContact", "consistent contact", "ElastoSlip", "Dahl", "LuGre"])
 def test_python_along_a_motion_is_the_friction_of_the_exact_solver(name: str) -> None:
     """The class is fed the motion of a simulated slider, 200 000 steps a second, and left to itself."""
-    system = ss.Oscillator(mass=2.42, stiffness=2310, law=LAWS[name], drive=ss.HarmonicBase(2e-3, frequency=5.0))
+    system = ss.Oscillator(mass=2.42, stiffness=2310, law=LAWS[name], drive=ss.drives.HarmonicBase(2e-3, frequency=5.0))
     record = ss.simulate(system, duration=0.3).record(fs=200_000)
     contact = run_as_it_stands(name)["Friction"](record["x"][0], record["v"][0])
     found = np.array([contact.step(x, v, 5e-6) for x, v in zip(record["x"], record["v"], strict=True)])
@@ -146,7 +148,7 @@ def built(law: object, folder: Path, *more: str, main: str = "") -> Path:
     if CC is None:
         pytest.skip("no C compiler on this machine (cc, gcc or clang)")
     source, program = folder / "friction.c", folder / "friction_test"
-    source.write_text(ss.export_law(law, format="c") + main)
+    source.write_text(ss.laws.export_law(law, format="c") + main)
     flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic"]
     run = subprocess.run([CC, *flags, *more, "-o", program, source, "-lm"], capture_output=True, text=True, timeout=60)
     assert run.returncode == 0, run.stderr
@@ -164,7 +166,7 @@ def test_the_test_vector_sees_a_wrong_number(tmp_path: Path) -> None:
     if CC is None:
         pytest.skip("no C compiler on this machine (cc, gcc or clang)")
     source, program = tmp_path / "friction.c", tmp_path / "friction_test"
-    source.write_text(ss.export_law(ss.Coulomb(1.1), format="c").replace("return 1.1;", "return 1.2;"))
+    source.write_text(ss.laws.export_law(ss.laws.Coulomb(1.1), format="c").replace("return 1.1;", "return 1.2;"))
     subprocess.run([CC, "-DFRICTION_TEST", "-o", program, source, "-lm"], check=True, timeout=60)
     run = subprocess.run([program], capture_output=True, text=True, timeout=60)
     assert run.returncode == 1
@@ -200,7 +202,7 @@ int main(void)
 @pytest.mark.parametrize("name", ["CompliantContact", "ElastoSlip", "Dahl", "LuGre"])
 def test_c_code_along_a_motion_is_the_friction_of_the_exact_solver(name: str, tmp_path: Path) -> None:
     """The C code is fed the displacement of a simulated slider, 500 000 steps a second, and left to itself."""
-    system = ss.Oscillator(mass=2.42, stiffness=2310, law=LAWS[name], drive=ss.HarmonicBase(2e-3, frequency=5.0))
+    system = ss.Oscillator(mass=2.42, stiffness=2310, law=LAWS[name], drive=ss.drives.HarmonicBase(2e-3, frequency=5.0))
     record = ss.simulate(system, duration=0.4).record(fs=10000)
     x, v, wanted = record["x"], record["v"], record["friction"]
     rows = "\n".join(f"{t:.17g} {a:.17g} {b:.17g}" for t, a, b in zip(record.time, x, v, strict=True))
@@ -212,18 +214,18 @@ def test_c_code_along_a_motion_is_the_friction_of_the_exact_solver(name: str, tm
 
 
 def test_mujoco_has_coulomb_and_viscous_joints() -> None:
-    text = ss.export_law(ss.LinearSlope(1.0, slope=0.2), format="mujoco")
+    text = ss.laws.export_law(ss.laws.LinearSlope(1.0, slope=0.2), format="mujoco")
     assert '<joint type="slide" frictionloss="1.0" damping="0.2"/>' in text
     for law in LAWS.values():
-        file = ElementTree.fromstring(ss.export_law(law, format="mujoco"))
+        file = ElementTree.fromstring(ss.laws.export_law(law, format="mujoco"))
         assert file.tag == "mujocoinclude"
         assert [part.tag for part in file] in (["joint"], ["custom"], ["actuator"])
         assert all(part.get("name") and part.get("data") for part in file.iterfind("custom/*"))
     lugre = LAWS["LuGre"]
-    found = ElementTree.fromstring(ss.export_law(replace(lugre, exponent=1.5), format="mujoco"))
+    found = ElementTree.fromstring(ss.laws.export_law(replace(lugre, exponent=1.5), format="mujoco"))
     given = {each.get("name"): float(each.get("data")) for each in found.iter("numeric")}
     assert given["LuGre_damping"] == 316.23
-    (motor,) = ElementTree.fromstring(ss.export_law(lugre, format="mujoco")).iter("dcmotor")  # its exponent is 2
+    (motor,) = ElementTree.fromstring(ss.laws.export_law(lugre, format="mujoco")).iter("dcmotor")  # its exponent is 2
     levels = [lugre.stiffness, lugre.damping, lugre.kinetic, lugre.static, lugre.speed]
     assert [float(each) for each in motor.get("lugre", "").split()] == levels
     assert float(motor.get("damping", "")) == lugre.viscous
@@ -232,7 +234,7 @@ def test_mujoco_has_coulomb_and_viscous_joints() -> None:
 @pytest.mark.parametrize("name", LAWS)
 def test_modelica_is_one_class_whose_statements_end(name: str) -> None:
     """What Modelica's grammar asks of a file: a class, statements with a semicolon inside of it, and its end."""
-    comment, *lines = ss.export_law(LAWS[name], format="modelica").splitlines()
+    comment, *lines = ss.laws.export_law(LAWS[name], format="modelica").splitlines()
     assert comment.startswith("// ")
     kind, called = lines[0].split()
     assert kind in ("model", "record")
@@ -255,33 +257,33 @@ def test_modelica_is_one_class_whose_statements_end(name: str) -> None:
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("format", ["modelica", "simulink"])
 def test_blocks_hold_every_number_and_the_formula(name: str, format: str) -> None:
-    law, text = LAWS[name], ss.export_law(LAWS[name], format=format)
+    law, text = LAWS[name], ss.laws.export_law(LAWS[name], format=format)
     assert formula_of(law) in text.splitlines()[0]
-    for key, value in tomllib.loads(ss.export_law(law))["law"].items():
+    for key, value in tomllib.loads(ss.laws.export_law(law))["law"].items():
         if isinstance(value, float):
             assert re.search(rf"\b{key} = {re.escape(repr(value))};", text)
 
 
 def test_tables_for_lookup_blocks_follow_the_law() -> None:
-    text = ss.export_law(LAWS["Stribeck"], format="simulink")
+    text = ss.laws.export_law(LAWS["Stribeck"], format="simulink")
     numbers = {key: np.array(row.split(), dtype=float) for key, row in re.findall(r"\.(\w+) = \[(.*?)\];", text)}
     strays = float(re.search(r"strays from the formula by (\S+) N", text)[1])
     for speed in np.linspace(0, 1, 77):
         wanted = LAWS["Stribeck"].friction(speed)
         assert np.interp(speed, numbers["breakpoints"], numbers["table"]) == pytest.approx(wanted, abs=1.05 * strays)
     assert strays < 0.01
-    assert "f_pos = [0.0, 1.1; 1.0, 1.1],\n    peak = 1.18" in ss.export_law(LAWS["Coulomb"], format="modelica")
+    assert "f_pos = [0.0, 1.1; 1.0, 1.1],\n    peak = 1.18" in ss.laws.export_law(LAWS["Coulomb"], format="modelica")
 
 
 def test_what_has_no_form_is_refused() -> None:
     with pytest.raises(ModelError, match=r"format = 'tmol'.*perhaps 'toml'|toml"):
-        ss.export_law(LAWS["Coulomb"], format="tmol")
+        ss.laws.export_law(LAWS["Coulomb"], format="tmol")
     with pytest.raises(ModelError, match="exported with its values"):
-        ss.export_law(ss.Coulomb)
-    rough = ss.RoughSurface(ss.Coulomb(1.1), share=0.03, length=1e-4, span=1e-3)
+        ss.laws.export_law(ss.laws.Coulomb)
+    rough = ss.laws.RoughSurface(ss.laws.Coulomb(1.1), share=0.03, length=1e-4, span=1e-3)
     for format in FORMATS:
         with pytest.raises(ModelError, match=r"has no formula; export the contact on it"):
-            ss.export_law(rough, format=format)
-    behind = ss.InSeries(ss.StateVariable(1.1, rate=100.0), stiffness=192000)
+            ss.laws.export_law(rough, format=format)
+    behind = ss.laws.InSeries(ss.laws.StateVariable(1.1, rate=100.0), stiffness=192000)
     with pytest.raises(ModelError, match="rate of its own friction"):
-        ss.export_law(behind, format="c")
+        ss.laws.export_law(behind, format="c")

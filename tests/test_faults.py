@@ -27,8 +27,8 @@ import stickslip as ss
 from stickslip import Record, StickslipError, read_record, whole, write_record
 from stickslip.lab.jobs import Jobs
 from stickslip.lab.uploads import Uploads
-from stickslip.reports import folder as folder_module
-from stickslip.reports.folder import publish
+from stickslip.story import folder as folder_module
+from stickslip.story.folder import publish
 
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.link", "os.symlink")

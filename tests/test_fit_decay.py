@@ -48,7 +48,7 @@ def test_the_motion_is_the_engines(side: int) -> None:
     """The same decay by the exact solver, which knows no half cycles."""
     parameters = [OMEGA, DAMPING, DRY, 0.0, side * AMPLITUDE, 0.0]
     system = ss.Oscillator(
-        mass=2.0, stiffness=2 * OMEGA**2, damping=4 * DAMPING * OMEGA, law=ss.Coulomb(2 * OMEGA**2 * DRY)
+        mass=2.0, stiffness=2 * OMEGA**2, damping=4 * DAMPING * OMEGA, law=ss.laws.Coulomb(2 * OMEGA**2 * DRY)
     )
     record = ss.simulate(system, duration=8.0, start={"x": side * AMPLITUDE}).record(fs=100)
     for order, name in enumerate(["x", "v"]):
@@ -156,24 +156,24 @@ def test_a_force_needs_the_stiffness_or_the_mass() -> None:
     ids=["flat", "overdamped", "noise"],
 )
 def test_what_does_not_ring_is_refused(samples) -> None:
-    with pytest.raises(ss.EstimateError, match="free decay"):
+    with pytest.raises(ss.errors.EstimateError, match="free decay"):
         ss.fit_decay(ss.Record.of({"x": samples}, fs=100.0))
 
 
 def test_mistakes_are_told() -> None:
     samples, dt, _ = ring_down()
     record = ss.Record.of({"x": samples}, fs=1 / dt)
-    with pytest.raises(ss.RecordError, match="channel y is not a motion"):
+    with pytest.raises(ss.errors.RecordError, match="channel y is not a motion"):
         ss.fit_decay(record, channel="y")
-    with pytest.raises(ss.EstimateError, match="mass = -1"):
+    with pytest.raises(ss.errors.EstimateError, match="mass = -1"):
         ss.fit_decay(record, mass=-1)
-    with pytest.raises(ss.RecordError, match="channel v is missing"):
+    with pytest.raises(ss.errors.RecordError, match="channel v is missing"):
         ss.fit_decay(record, channel="v")
-    with pytest.raises(ss.EstimateError, match="no step"):
+    with pytest.raises(ss.errors.EstimateError, match="no step"):
         ss.fit_decay(record, noise="quantised")
-    with pytest.raises(ss.EstimateError, match="restoring = 'round'"):
+    with pytest.raises(ss.errors.EstimateError, match="restoring = 'round'"):
         ss.fit_decay(record, restoring="round")
-    with pytest.raises(ss.EstimateError, match="an angle in rad"):
+    with pytest.raises(ss.errors.EstimateError, match="an angle in rad"):
         ss.fit_decay(record, restoring="pendulum")
 
 
@@ -219,7 +219,7 @@ def test_a_pendulum_s_static_friction_is_bracketed() -> None:
 def test_a_pendulum_s_fit_is_that_of_the_choice_among_motions() -> None:
     record = pendulum()
     found = ss.fit_decay(record, restoring="pendulum", candidates=("both", "viscous"))
-    chosen = ss.choose_motion(record, restoring="pendulum", candidates=("both", "static"))
+    chosen = ss.decay.choose_motion(record, restoring="pendulum", candidates=("both", "static"))
     for name in ("damping_ratio", "dry_displacement", "frequency"):
         one, other = getattr(found, name), getattr(chosen, name)
         assert (one.value, one.interval, one.sd) == (other.value, other.interval, other.sd)
@@ -264,7 +264,7 @@ def test_the_interval_that_counts_the_model_s_form_stands_beside_the_statistical
     assert dry.includes(0.02)
     assert dry.interval[0] <= plain.dry_displacement.interval[0]
     assert "stribeck" in dry.checks[0]
-    with pytest.raises(ss.EstimateError, match="candidates = coulomb; each is one of"):
+    with pytest.raises(ss.errors.EstimateError, match="candidates = coulomb; each is one of"):
         ss.fit_decay(record, candidates="coulomb")
 
 
@@ -290,9 +290,9 @@ def test_several_releases_reject_a_motion_together() -> None:
 
 
 def test_what_a_pendulum_s_fit_does_not_do_is_refused() -> None:
-    with pytest.raises(ss.EstimateError, match="2 releases"):
+    with pytest.raises(ss.errors.EstimateError, match="2 releases"):
         ss.fit_decay([pendulum(), pendulum(seed=1)], restoring="pendulum")
-    with pytest.raises(ss.EstimateError, match="noise = 'coloured'"):
+    with pytest.raises(ss.errors.EstimateError, match="noise = 'coloured'"):
         ss.fit_decay(pendulum(), restoring="pendulum", noise="coloured")
 
 
@@ -344,7 +344,7 @@ def test_a_slider_seen_in_hundredths_of_a_millimetre(
     mass: float, damping: float, stiffness: float, kinetic: float, amplitude: float
 ) -> None:
     """Like the thesis's rig, section 6.5, in steps of 0.01 mm: both frictions to a few tenths of a percent."""
-    slider = ss.Oscillator(mass=mass, stiffness=stiffness, damping=damping, law=ss.Coulomb(kinetic))
+    slider = ss.Oscillator(mass=mass, stiffness=stiffness, damping=damping, law=ss.laws.Coulomb(kinetic))
     motion = ss.simulate(slider, duration=2.0, start={"x": amplitude}).record(fs=1000)["x"]
     for seed in range(3):
         noise = 5e-7 * np.random.default_rng(seed).standard_normal(len(motion) + 200)
@@ -488,7 +488,7 @@ def test_one_friction_alone_is_told_from_both(damping: float, dry: float) -> Non
 
 
 def test_static_friction_above_the_kinetic_is_bracketed() -> None:
-    slider = ss.Oscillator(mass=1.0, stiffness=1000.0, damping=2.0, law=ss.Coulomb(0.3, 1.5))
+    slider = ss.Oscillator(mass=1.0, stiffness=1000.0, damping=2.0, law=ss.laws.Coulomb(0.3, 1.5))
     seen = ss.simulate(slider, duration=4.0, start={"x": 0.01}).record(fs=500)["x"]
     found = ss.fit_decay(ss.Record.of({"x": seen + 1e-5 * np.random.default_rng(0).standard_normal(len(seen))}, fs=500))
     assert abs(found.dry_displacement.value - 3e-4) < 4 * found.dry_displacement.sd
@@ -504,7 +504,7 @@ def test_another_motion_is_flagged() -> None:
 def test_a_growing_swing_is_refused() -> None:
     t = np.arange(3000) / 500
     seen = 1e-3 * np.exp(0.4 * t) * np.cos(30 * t) + 1e-6 * np.random.default_rng(0).standard_normal(3000)
-    with pytest.raises(ss.EstimateError, match="grow"):
+    with pytest.raises(ss.errors.EstimateError, match="grow"):
         ss.fit_decay(ss.Record.of({"x": seen}, fs=500))
 
 
@@ -530,7 +530,7 @@ def test_counts_at_a_high_rate_are_counts_still() -> None:
 
 
 def test_a_motion_without_noise_that_came_to_rest_is_not_taken_for_counts() -> None:
-    slider = ss.Oscillator(mass=1, stiffness=10, damping=0.2, law=ss.Coulomb(0.2))
+    slider = ss.Oscillator(mass=1, stiffness=10, damping=0.2, law=ss.laws.Coulomb(0.2))
     run = ss.simulate(slider, duration=60, start={"x": 1.0})
     found = ss.fit_decay(run.record(fs=200), stiffness=10)
     assert found.noise == "white"
@@ -546,7 +546,7 @@ HALF, NOISY = 78.5, 3e-5  # samples in half a cycle, standard deviation [m]
 @pytest.fixture(scope="module")
 def swinging() -> np.ndarray:
     """zeta 0.02, x_k 1 mm, released from 30 mm at the first sample."""
-    slider = ss.Oscillator(mass=2.0, stiffness=800.0, damping=1.6, law=ss.Coulomb(0.8))
+    slider = ss.Oscillator(mass=2.0, stiffness=800.0, damping=1.6, law=ss.laws.Coulomb(0.8))
     return np.asarray(ss.simulate(slider, duration=5.0, start={"x": 0.03}).record(fs=500)["x"])
 
 
@@ -564,7 +564,7 @@ def covered(motion: np.ndarray, trials: int = 20) -> tuple[int, int]:
 def test_a_record_may_begin_at_any_moment_of_a_swing(swinging: np.ndarray, phase: float) -> None:
     """A swing that turns soon after the record begins is no hold, however near its turn is."""
     motion = swinging[round(phase * HALF) :]
-    (ring,) = ss.find_releases(ss.Record.of({"x": motion}, fs=500)).ring_downs
+    (ring,) = ss.decay.find_releases(ss.Record.of({"x": motion}, fs=500)).ring_downs
     assert ring.held == (phase == 0.0)
     assert min(covered(motion)) >= 16
 
@@ -579,7 +579,7 @@ def test_what_follows_a_dropout_is_read_as_motion(swinging: np.ndarray, value: s
 @pytest.mark.parametrize("damping", [0.0, 1.6])
 @pytest.mark.parametrize("start", [0.0055, 0.0251, 0.03])
 def test_no_half_cycle_is_added_before_a_record_that_begins_with_the_release(damping: float, start: float) -> None:
-    slider = ss.Oscillator(mass=2.0, stiffness=800.0, damping=damping, law=ss.Coulomb(0.8))
+    slider = ss.Oscillator(mass=2.0, stiffness=800.0, damping=damping, law=ss.laws.Coulomb(0.8))
     motion = ss.simulate(slider, duration=4.0, start={"x": start}).record(fs=500)["x"]
     for seed in (0, 1, 49):
         noise = np.random.default_rng(seed).standard_normal(len(motion))

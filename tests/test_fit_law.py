@@ -13,20 +13,20 @@ from stickslip.record.record import Step
 
 RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
 SWINGS = {2.5: 0.65e-3, 8.7: 1.1e-3, 11.1: 2e-3}
-CONTACT = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+CONTACT = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
 
 
 @cache
 def measured(law: Any, frequency: float, seconds: float = 0.8, seed: int = 3) -> ss.Record:
     """What the thesis's rig reads, its sensors stated."""
-    slider = ss.Oscillator(law=law, drive=ss.HarmonicBase(SWINGS[frequency], frequency=frequency), **RIG)
+    slider = ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(SWINGS[frequency], frequency=frequency), **RIG)
     run = ss.simulate(slider, duration=10 / frequency + seconds, rtol=1e-9)
     rig = ss.Rig.air_track()
     return rig.stated(rig.measure(run, fs=4000, rng=seed, start=10 / frequency))
 
 
 def test_a_compliant_contact_is_found_from_far_away() -> None:
-    start = ss.Oscillator(law=ss.CompliantContact(2.0, stiffness=60000, damping=5.0), **RIG)
+    start = ss.Oscillator(law=ss.laws.CompliantContact(2.0, stiffness=60000, damping=5.0), **RIG)
     found = ss.fit_law(measured(CONTACT, 2.5), start)
     assert found.status == "ok"
     assert set(found.parameters) == {"kinetic", "law.stiffness", "law.damping"}
@@ -42,9 +42,12 @@ def test_a_compliant_contact_is_found_from_far_away() -> None:
 @pytest.mark.parametrize(
     ("law", "start"),
     [
-        (ss.Coulomb(1.0), ss.Coulomb(1.5)),
-        (ss.Coulomb(0.95, 1.2), ss.Coulomb(1.0, 1.05)),
-        (ss.StateVariable(0.95, rate=120.0, steepness=3000.0), ss.StateVariable(1.0, rate=80.0, steepness=2000.0)),
+        (ss.laws.Coulomb(1.0), ss.laws.Coulomb(1.5)),
+        (ss.laws.Coulomb(0.95, 1.2), ss.laws.Coulomb(1.0, 1.05)),
+        (
+            ss.laws.StateVariable(0.95, rate=120.0, steepness=3000.0),
+            ss.laws.StateVariable(1.0, rate=80.0, steepness=2000.0),
+        ),
     ],
     ids=["rigid", "static", "state variable"],
 )
@@ -58,8 +61,8 @@ def test_a_law_is_found_in_three_records(law: Any, start: Any) -> None:
 
 @pytest.mark.parametrize(("kinetic", "static"), [(1.1, 1.2), (1.5, 1.6), (0.5, 0.8)])
 def test_a_parameter_that_is_held_stays_as_it_was_given(kinetic: float, static: float) -> None:
-    record = measured(ss.Coulomb(0.9, static=1.2), 2.5)
-    start = ss.Oscillator(law=ss.Coulomb(kinetic, static=static), **RIG)
+    record = measured(ss.laws.Coulomb(0.9, static=1.2), 2.5)
+    start = ss.Oscillator(law=ss.laws.Coulomb(kinetic, static=static), **RIG)
     found = ss.fit_law(record, start, free=["kinetic"], intervals=False)
     assert found.law.static == static
     if static == 1.2:
@@ -75,24 +78,24 @@ def test_another_record_is_predicted() -> None:
 
 
 def test_a_gain_is_fitted_beside_the_law() -> None:
-    record = measured(ss.Coulomb(1.0), 8.7)
+    record = measured(ss.laws.Coulomb(1.0), 8.7)
     wrong = record.with_samples(
         {name: record[name] * (1.02 if name == "load" else 1.0) for name in record}, Step("wrong")
     )
-    found = ss.fit_law(wrong, ss.Oscillator(law=ss.Coulomb(1.0), **RIG), nuisance=["load.gain"])
+    found = ss.fit_law(wrong, ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG), nuisance=["load.gain"])
     assert found.parameters["load.gain"].value == pytest.approx(1.02, abs=4 * found.parameters["load.gain"].sd)
     assert found.parameters["kinetic"].value == pytest.approx(1.0, abs=4 * found.parameters["kinetic"].sd)
 
 
 def test_a_wrong_law_is_told_by_what_it_leaves() -> None:
-    found = ss.fit_law(measured(CONTACT, 2.5), ss.Oscillator(law=ss.Coulomb(1.0), **RIG))
+    found = ss.fit_law(measured(CONTACT, 2.5), ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG))
     assert "times its noise" in found.status
 
 
 def test_a_rough_surface_is_fitted_with_its_profile() -> None:
-    rough = ss.RoughSurface(CONTACT, share=0.03, length=2e-4, span=2e-3, seed=4)
+    rough = ss.laws.RoughSurface(CONTACT, share=0.03, length=2e-4, span=2e-3, seed=4)
     record = measured(rough, 8.7, 0.5)
-    start = ss.Oscillator(law=ss.CompliantContact(1.2, stiffness=150000, damping=15.0), **RIG)
+    start = ss.Oscillator(law=ss.laws.CompliantContact(1.2, stiffness=150000, damping=15.0), **RIG)
     found = ss.fit_law(record, start, surface="rough")
     assert found.surface == "rough"
     assert found.law.stiffness == pytest.approx(192000, rel=1e-2)
@@ -102,9 +105,9 @@ def test_a_rough_surface_is_fitted_with_its_profile() -> None:
 
 
 def test_a_stiffness_that_can_not_be_told_has_an_open_interval() -> None:
-    record = measured(ss.Coulomb(1.0), 11.1)
+    record = measured(ss.laws.Coulomb(1.0), 11.1)
     record = ss.Record.of({name: record[name] for name in "xz"}, fs=record.fs)
-    start = ss.Oscillator(law=ss.CompliantContact(1.0, stiffness=1e6, damping=30.0), **RIG)
+    start = ss.Oscillator(law=ss.laws.CompliantContact(1.0, stiffness=1e6, damping=30.0), **RIG)
     found = ss.fit_law(record, start, free=["kinetic", "law.stiffness"])
     each = found.parameters["law.stiffness"]
     assert np.isinf(each.interval[1])
@@ -113,7 +116,7 @@ def test_a_stiffness_that_can_not_be_told_has_an_open_interval() -> None:
 
 
 def test_a_free_decay_needs_no_drive() -> None:
-    slider = ss.Oscillator(law=ss.Coulomb(0.4), **RIG)
+    slider = ss.Oscillator(law=ss.laws.Coulomb(0.4), **RIG)
     run = ss.simulate(slider, duration=3.0, start={"x": 5e-3})
     record = ss.Rig.perfect("x").having("x", white=1e-6).measure(run, fs=2000, rng=2)
     found = ss.fit_law(record, slider.having(kinetic=0.5), nuisance=["stiffness"])
@@ -125,15 +128,17 @@ def test_a_base_of_any_motion_drives() -> None:
     fs, seconds = 2000, 4.0
     time = np.arange(int(fs * seconds)) / fs
     base = 1e-3 * np.sin(2 * np.pi * 5.3 * time) + 0.6e-3 * np.sin(2 * np.pi * 8.1 * time + 1)
-    slider = ss.Oscillator(law=ss.Coulomb(1.0), drive=ss.RecordedBase(base, fs=fs), **RIG)
+    slider = ss.Oscillator(law=ss.laws.Coulomb(1.0), drive=ss.drives.RecordedBase(base, fs=fs), **RIG)
     record = ss.Rig.perfect("x", "z").having("x", white=1e-6).measure(ss.simulate(slider, duration=3.9), fs=fs, rng=5)
-    found = ss.fit_law(record.rows(2000, 6000), ss.Oscillator(law=ss.Coulomb(0.8), **RIG))
+    found = ss.fit_law(record.rows(2000, 6000), ss.Oscillator(law=ss.laws.Coulomb(0.8), **RIG))
     assert found.law.kinetic == pytest.approx(1.0, rel=2e-3)
 
 
 def test_progress_is_told_and_ends() -> None:
     told: list[float] = []
-    ss.fit_law(measured(ss.Coulomb(1.0), 8.7), ss.Oscillator(law=ss.Coulomb(1.0), **RIG), progress=told.append)
+    ss.fit_law(
+        measured(ss.laws.Coulomb(1.0), 8.7), ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG), progress=told.append
+    )
     assert told == sorted(told)
     assert told[-1] == 1.0
 
@@ -150,12 +155,12 @@ def test_progress_is_told_and_ends() -> None:
 def test_what_can_not_tell_is_refused(samples: dict[str, Any], said: str) -> None:
     record = ss.Record.of(samples, fs=1000)
     with pytest.raises(ss.StickslipError, match=said):
-        ss.fit_law(record, ss.Oscillator(law=ss.Coulomb(1.0), **RIG))
+        ss.fit_law(record, ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG))
 
 
 def test_a_name_that_is_none_is_refused() -> None:
-    with pytest.raises(ss.ModelError, match="no parameter is called 'kinetc'"):
-        ss.fit_law(measured(ss.Coulomb(1.0), 8.7), ss.Oscillator(law=ss.Coulomb(1.0), **RIG), free=["kinetc"])
+    with pytest.raises(ss.errors.ModelError, match="no parameter is called 'kinetc'"):
+        ss.fit_law(measured(ss.laws.Coulomb(1.0), 8.7), ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG), free=["kinetc"])
 
 
 @pytest.mark.parametrize(
@@ -171,9 +176,9 @@ def test_a_name_that_is_none_is_refused() -> None:
     ],
 )
 def test_what_is_not_fitted_or_named_twice_is_refused(asked: dict[str, Any], said: str) -> None:
-    with pytest.raises(ss.ModelError, match=said):
+    with pytest.raises(ss.errors.ModelError, match=said):
         ss.fit_law(
-            measured(ss.Coulomb(1.0), 8.7),
-            ss.Oscillator(law=ss.Coulomb(1.0), drive=ss.HarmonicForce(3.0, frequency=4.0), **RIG),
+            measured(ss.laws.Coulomb(1.0), 8.7),
+            ss.Oscillator(law=ss.laws.Coulomb(1.0), drive=ss.drives.HarmonicForce(3.0, frequency=4.0), **RIG),
             **asked,
         )

@@ -18,12 +18,12 @@ def test_paper_slips_as_often_as_its_law_says(dataset: Callable[[str], Path]) ->
     """The force of the spring tells the way; friction differs from slip to slip, and the law is that of the mean."""
     path = dataset("paper_stick_slip") / "k168Nm_v1100.mat"
     record = ss.read_record(path, channels={"load": f"Fnorm * {MASS * 9.81} [N]"})
-    found = ss.pulled_slider(record)
+    found = ss.balance.pulled_slider(record)
     way = SPEED * np.arange(len(record)) / record.fs - record["load"] / STIFFNESS
     rows = np.round((found.slips - record.time[0]) * record.fs).astype(int)
     level = float(np.median(record["load"]))
     slider = ss.Oscillator(
-        MASS, STIFFNESS, law=ss.Coulomb(level, static=1.08 * level), drive=ss.Ramp(SPEED)
+        MASS, STIFFNESS, law=ss.laws.Coulomb(level, static=1.08 * level), drive=ss.drives.Ramp(SPEED)
     )  # fmt: skip
     excesses = []
     for first, last in zip(rows[:-1:EVERY], rows[1::EVERY], strict=False):

@@ -37,11 +37,11 @@ def test_the_law_is_written_for_other_programs(tmp_path: Path) -> None:
     record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
     found = ss.fit_curve(record, curve="coulomb")
     assert found.law is not None
-    folder = ss.publish_fit(found, folder=tmp_path / "fit", records=[record])
+    folder = ss.story.publish_fit(found, folder=tmp_path / "fit", records=[record])
     written = {file.name: file.read_text(encoding="utf-8") for file in (folder / "law").iterdir()}
     forms = ("toml", "python", "c", "mujoco", "modelica", "simulink")
     for form in forms:
-        assert any(ss.export_law(found.law, format=form).strip() in text for text in written.values()), form
+        assert any(ss.laws.export_law(found.law, format=form).strip() in text for text in written.values()), form
     assert all(text.endswith("\n") for text in written.values())
     assert "FRICTION_TEST" in written["friction.c"]
 
@@ -49,8 +49,8 @@ def test_the_law_is_written_for_other_programs(tmp_path: Path) -> None:
 def test_the_fitted_law_can_be_simulated_as_it_was_written(tmp_path: Path) -> None:
     record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
     found = ss.fit_curve(record, curve="coulomb")
-    folder = ss.publish_fit(found, folder=tmp_path / "fit", records=[record])
-    case = ss.read_system(folder / "law" / "law.toml")
+    folder = ss.story.publish_fit(found, folder=tmp_path / "fit", records=[record])
+    case = ss.systems.read_system(folder / "law" / "law.toml")
     assert case.system.law == found.law
     assert (case.system.mass, case.system.stiffness, case.duration) == (2.42, 2310.0, record.duration)
     assert case.system.drive.frequency == pytest.approx(2.5, rel=0.01)
@@ -65,11 +65,11 @@ def test_a_law_fitted_to_a_pull_is_written_with_the_pull(tmp_path: Path) -> None
     z = 0.003 + 2e-3 * t + 1e-6 * np.sin(60 * t) + rng.normal(0, 1e-6, t.size)
     v = 2e-3 * (1 + np.sin(40 * t))
     made = {"x": np.cumsum(v) / 1000, "v": v, "z": z, "friction": 1.1 + rng.normal(0, 0.01, t.size)}
-    step = ss.Step("friction_force", {"mass": 2.42, "stiffness": 2310.0, "contact": "ground"}, "")
+    step = ss.record.Step("friction_force", {"mass": 2.42, "stiffness": 2310.0, "contact": "ground"}, "")
     record = dataclasses.replace(ss.Record.of(made, fs=1000), history=(step,))
-    folder = ss.publish_fit(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", records=[record])
-    drive = ss.read_system(folder / "law" / "law.toml").system.drive
-    assert isinstance(drive, ss.Ramp)
+    folder = ss.story.publish_fit(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", records=[record])
+    drive = ss.systems.read_system(folder / "law" / "law.toml").system.drive
+    assert isinstance(drive, ss.drives.Ramp)
     assert drive.speed == pytest.approx(2e-3, rel=1e-3)
 
 
@@ -78,48 +78,50 @@ def test_the_load_of_the_settings_makes_a_force_of_a_coefficient(tmp_path: Path)
     v = 0.1 * np.sin(2 * np.pi * t)
     told = {"v": v, "coefficient": 0.3 * np.sign(v) + rng.normal(0, 0.003, t.size)}
     record = ss.Record.of(told, fs=1000)
-    step = ss.Step("read_record", {"files": [{"name": "run_250g.csv"}]}, "")
+    step = ss.record.Step("read_record", {"files": [{"name": "run_250g.csv"}]}, "")
     record = dataclasses.replace(record, history=(*record.history, step))
-    rig = ss.rig_settings({"normal": {"*100g*": 9.0, "*250g*": "2.5 N"}})
-    kinetic = ss.fit_records([record], rig=rig, curve="coulomb")[0].parameters["kinetic"]  # type: ignore[union-attr]
+    rig = ss.rig.rig_settings({"normal": {"*100g*": 9.0, "*250g*": "2.5 N"}})
+    kinetic = ss.answers.fit_records([record], rig=rig, curve="coulomb")[0].parameters["kinetic"]  # type: ignore[union-attr]
     assert kinetic.unit == "N"
     assert kinetic.value == pytest.approx(0.75, rel=0.01)
-    alone = ss.fit_records([record], rig=ss.rig_settings({}), curve="coulomb")[0].parameters["kinetic"]  # type: ignore[union-attr]
+    alone = ss.answers.fit_records([record], rig=ss.rig.rig_settings({}), curve="coulomb")[0].parameters["kinetic"]  # type: ignore[union-attr]
     assert alone.unit == "1"
 
 
 def test_a_single_fitted_law_is_shown_and_written_too(tmp_path: Path) -> None:
-    slider = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(1.1e-3, frequency=8.7))
+    slider = ss.Oscillator(
+        mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
+    )
     rig = ss.Rig.perfect("x", "z").having("x", white=1e-6)
     record = rig.measure(ss.simulate(slider, duration=1.6), fs=2000, rng=1, start=0.8)
     found = ss.fit_law(record, slider.having(kinetic=1.0))
     assert [plate.name for plate in ss.figures(found)] == ["fit-1"]
-    folder = ss.publish_fit(found, folder=tmp_path / "fit", records=[record])
+    folder = ss.story.publish_fit(found, folder=tmp_path / "fit", records=[record])
     told = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     assert (told["law"], told["estimates"][0]["value"]) == ("Coulomb", found.law.kinetic)
-    assert ss.read_system(folder / "law" / "law.toml").system.law == found.law
-    assert ss.fit_summary(found, records=[record], name="run").headline[0] == (
+    assert ss.systems.read_system(folder / "law" / "law.toml").system.law == found.law
+    assert ss.story.fit_summary(found, records=[record], name="run").headline[0] == (
         f"The law Coulomb, fitted to x: kinetic {found.law.kinetic:.3f} N."
     )
     ahead = ss.fit_law(record, found.oscillator, free=(), intervals=False)
-    assert "as it was given, predicts x" in ss.fit_summary(ahead, records=[record], name="run").headline[0]
+    assert "as it was given, predicts x" in ss.story.fit_summary(ahead, records=[record], name="run").headline[0]
 
 
 def test_a_law_without_a_mass_says_what_it_lacks(tmp_path: Path) -> None:
     t = np.arange(8000) / 1000
     v = 0.1 * np.sin(2 * np.pi * t)
     record = ss.Record.of({"v": v, "friction": np.sign(v)}, fs=1000)
-    folder = ss.publish_fit(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", records=[record])
+    folder = ss.story.publish_fit(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", records=[record])
     file = folder / "law" / "law.toml"
     assert file.read_text(encoding="utf-8").startswith("# a law alone: to simulate it, add [system]")
-    with pytest.raises(ss.ModelError, match=r"law.toml holds a law alone; .* add \[system\]"):
-        ss.read_system(file)
+    with pytest.raises(ss.errors.ModelError, match=r"law.toml holds a law alone; .* add \[system\]"):
+        ss.systems.read_system(file)
 
 
 def test_a_curve_without_a_law_has_none(tmp_path: Path) -> None:
     record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
     found = ss.fit_curve(record, curve="asymmetric")
-    folder = ss.publish_fit(found, folder=tmp_path / "fit", records=[record])
+    folder = ss.story.publish_fit(found, folder=tmp_path / "fit", records=[record])
     assert found.law is None
     assert not (folder / "law").exists()
 
@@ -167,32 +169,39 @@ def test_a_range_of_frequencies_is_read_with_its_units_or_refused() -> None:
 
 
 def test_a_curve_is_not_fitted_to_several_records_nor_a_law_to_several_masses() -> None:
-    demo, rig = ss.datasets.demo(), ss.rig_settings({"mass": 2.42, "stiffness": 2310})
-    with pytest.raises(ss.ModelError, match="a curve and 2 records"):
-        ss.fit_records([demo, demo], rig=rig, curve="coulomb")
-    with pytest.raises(ss.ModelError, match="no mass and no stiffness"):
-        ss.fit_records([demo], rig=ss.rig_settings({}), laws=["Coulomb"])
-    with pytest.raises(ss.ModelError, match="several masses"):
-        ss.fit_records([demo], rig=rig, system=ss.squeak_rig())
+    demo, rig = ss.datasets.demo(), ss.rig.rig_settings({"mass": 2.42, "stiffness": 2310})
+    with pytest.raises(ss.errors.ModelError, match="a curve and 2 records"):
+        ss.answers.fit_records([demo, demo], rig=rig, curve="coulomb")
+    with pytest.raises(ss.errors.ModelError, match="no mass and no stiffness"):
+        ss.answers.fit_records([demo], rig=ss.rig.rig_settings({}), laws=["Coulomb"])
+    with pytest.raises(ss.errors.ModelError, match="several masses"):
+        ss.answers.fit_records([demo], rig=rig, system=ss.squeak.squeak_rig())
 
 
 def test_what_the_settings_state_goes_before_the_system(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[ss.Oscillator] = []
-    monkeypatch.setattr("stickslip.analysis.fits.compare_laws", lambda records, system, **_: asked.append(system))
-    written = ss.Oscillator(mass=1.0, stiffness=9.0, law=ss.Coulomb(1.0), drive=ss.HarmonicBase(1e-3, frequency=2.5))
+    monkeypatch.setattr("stickslip.answers.fits.compare_laws", lambda records, system, **_: asked.append(system))
+    written = ss.Oscillator(
+        mass=1.0, stiffness=9.0, law=ss.laws.Coulomb(1.0), drive=ss.drives.HarmonicBase(1e-3, frequency=2.5)
+    )
     other = {"mass": 2.42, "damping": 0.0, "damper": "base", "contact": "base"}
     for settings, drive in (
-        ({}, written.drive), (other, written.drive), (other, ss.Release()), ({"mass": 2.42}, ss.Belt(0.01)),
-    ):  # fmt: skip
+        ({}, written.drive),
+        (other, written.drive),
+        (other, ss.drives.Release()),
+        ({"mass": 2.42}, ss.drives.Belt(0.01)),
+    ):
         system = written.having(damping=0.3, drive=drive)
-        ss.fit_records([ss.datasets.demo()], rig=ss.rig_settings(settings), system=system)
+        ss.answers.fit_records([ss.datasets.demo()], rig=ss.rig.rig_settings(settings), system=system)
         for name in ("mass", "damping", "damper"):
             assert getattr(asked[-1], name) == settings.get(name, getattr(system, name))
         assert asked[-1].stiffness == 9.0
         contact = getattr(drive, "contact", None)
         assert getattr(asked[-1].drive, "contact", None) == settings.get("contact", contact)
-    with pytest.raises(ss.ModelError, match="contact = 'base' under a Belt"):
-        ss.fit_records([ss.datasets.demo()], rig=ss.rig_settings(other), system=written.having(drive=ss.Belt(0.01)))
+    with pytest.raises(ss.errors.ModelError, match="contact = 'base' under a Belt"):
+        ss.answers.fit_records(
+            [ss.datasets.demo()], rig=ss.rig.rig_settings(other), system=written.having(drive=ss.drives.Belt(0.01))
+        )
 
 
 def test_laws_are_not_fitted_without_motion() -> None:

@@ -7,8 +7,8 @@ import pytest
 from scipy.io import loadmat
 
 from motions import stick_slip
+from stickslip.balance.force import friction_force
 from stickslip.errors import EstimateError, ModelError, RecordError, StickslipError
-from stickslip.identify.force import friction_force
 from stickslip.record.record import Record
 
 RIG = {"mass": 3.0, "stiffness": 1200.0, "damping": 0.7, "damper": "base"}

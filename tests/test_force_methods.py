@@ -8,7 +8,7 @@ import pytest
 import stickslip as ss
 from rigs import CASES, RIG, measured, told
 from stickslip.errors import EstimateError, ModelError, RecordError
-from stickslip.signals.differentiate import five_point_average
+from stickslip.signals.derivatives import five_point_average
 from test_fusion import error
 
 # Root mean square errors [N] of the thesis's methods on its own rig, from an independent simulation of six records.
@@ -103,8 +103,8 @@ def test_without_mass_or_stiffness_the_record_says_what_it_can(frequency: float,
 
 
 def test_a_damper_is_part_of_the_unknown_balance() -> None:
-    drive = ss.HarmonicBase(2e-3, frequency=7.0)
-    slider = ss.Oscillator(mass=2.0, stiffness=2000, damping=8.0, law=ss.Coulomb(1.0), drive=drive)
+    drive = ss.drives.HarmonicBase(2e-3, frequency=7.0)
+    slider = ss.Oscillator(mass=2.0, stiffness=2000, damping=8.0, law=ss.laws.Coulomb(1.0), drive=drive)
     run = ss.simulate(slider, duration=8.0)
     record = ss.Rig.perfect("x", "z", "a").having("x", white=1e-7).measure(run, fs=2000, rng=1, start=5.0)
     made = ss.friction_force(record, stiffness=2000, damping=8.0, method="F")
@@ -115,8 +115,8 @@ def test_a_damper_is_part_of_the_unknown_balance() -> None:
 
 @pytest.mark.parametrize("known", [{"stiffness": 2310.0}, {"mass": 2.42}])
 def test_an_applied_force_is_part_of_the_unknown_balance(known: dict[str, float]) -> None:
-    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    drive = ss.HarmonicForce(4.0, frequency=6.0)
+    law = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    drive = ss.drives.HarmonicForce(4.0, frequency=6.0)
     run = ss.simulate(ss.Oscillator(mass=2.42, stiffness=2310, law=law, drive=drive), duration=6.0)
     record = ss.Rig.perfect("x", "a").having("x", white=1e-7).measure(run, fs=4000, rng=1, start=4.0)
     applied = 4.0 * np.cos(2 * np.pi * 6.0 * (4.0 + record.time))

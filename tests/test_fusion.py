@@ -75,8 +75,8 @@ def test_the_cell_alone_is_deconvolved(frequency: float) -> None:
 
 
 def test_sensors_without_noise_are_taken_at_their_word() -> None:
-    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
-    law = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
+    law = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
     run = ss.simulate(ss.Oscillator(law=law, drive=drive, **RIG), cycles=5)
     record = ss.Rig.perfect().measure(run, fs=4000)
     found = ss.friction_force(record, method="fusion", **RIG)
@@ -91,7 +91,7 @@ def test_the_five_point_average_leaves_the_mount_ringing() -> None:
 def test_blocks_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
     record = told(measured(2.5)[0])
     whole = ss.friction_force(record, method="fusion", **RIG)
-    monkeypatch.setattr("stickslip.identify.fusion.BLOCK", 1500)
+    monkeypatch.setattr("stickslip.balance.fusion.BLOCK", 1500)
     parts = ss.friction_force(record, method="fusion", **RIG)
     assert np.sqrt(np.mean((whole["friction"] - parts["friction"]) ** 2)) < 2e-3
     assert np.abs(whole["friction"] - parts["friction"]).max() < 0.1
@@ -146,7 +146,7 @@ def test_the_smoother_is_the_least_squares_of_all_readings() -> None:
 
 def test_turns_held_within_a_sensors_step_are_no_end_of_its_range() -> None:
     run = ss.simulate(
-        ss.Oscillator(law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5), **RIG), cycles=8
+        ss.Oscillator(law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5), **RIG), cycles=8
     )
     record = ss.Rig().having("x", white=1e-8, lag=0.0).measure(run, fs=4000, rng=1, start=1.0)
     assert "end of its range" not in ss.friction_force(record, method="fusion", **RIG).history[-1].outcome

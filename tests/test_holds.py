@@ -9,8 +9,8 @@ import pytest
 
 import stickslip as ss
 from rigs import CASES, RIG, SETTLED, measured, motion, told
+from stickslip.cycle.sticks import StickEvent, Sticks
 from stickslip.errors import EstimateError
-from stickslip.identify.sticks import StickEvent, Sticks
 
 NEAR = 3e-3  # s: an onset that is further from every true one is false
 ENDS = 0.03  # s at the record's ends that do not count

@@ -20,9 +20,9 @@ def test_what_is_too_short_is_told_of_what_was_asked(samples, names):
     """And not of a side question: the delay between two sensors, or a comparison of forces."""
     demo = ss.datasets.demo()
     short = ss.Record.of({name: demo[name][::50][:samples] for name in names}, fs=demo.fs / 50)
-    with pytest.raises(ss.EstimateError, match="the friction force needs at least"):
+    with pytest.raises(ss.errors.EstimateError, match="the friction force needs at least"):
         ss.analyze(short, mass=2.42, stiffness=2310, damping=0.12)
-    with pytest.raises(ss.EstimateError, match=r"(friction loops|sticks and slips) needs at least"):
+    with pytest.raises(ss.errors.EstimateError, match=r"(friction loops|sticks and slips) needs at least"):
         ss.analyze(short)
 
 
@@ -37,7 +37,7 @@ def test_a_side_question_without_an_answer_refuses_no_other(samples):
 
 def free_decay():
     """A mass on a spring, let go, with both frictions."""
-    slider = ss.Oscillator(mass=1.0, stiffness=40.0, damping=0.2, law=ss.Coulomb(0.1))
+    slider = ss.Oscillator(mass=1.0, stiffness=40.0, damping=0.2, law=ss.laws.Coulomb(0.1))
     run = ss.simulate(slider, duration=12.0, start={"x": 0.1})
     return ss.Rig.perfect().having("x", white=1e-4).measure(run, fs=100, rng=1)
 

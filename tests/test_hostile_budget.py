@@ -42,7 +42,7 @@ from test_read import LVM
 def test_settings_that_no_one_wrote_by_hand_are_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
     path = tmp_path / "rig.toml"
     path.write_text(text)
-    with pytest.raises(ss.ModelError, match=sentence) as refused:
+    with pytest.raises(ss.errors.ModelError, match=sentence) as refused:
         read_toml(path, what="a rig's settings are")
     assert len(str(refused.value)) < 400
 
@@ -52,8 +52,8 @@ def test_settings_are_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "rig.toml")
     outcome = civil(program("check", "x.csv", "--config", "rig.toml", folder=tmp_path))
     assert outcome.code != 0
-    for read in (ss.read_rig, ss.read_system, ss.read_sweep):
-        with pytest.raises(ss.ModelError, match="no file of its own"):
+    for read in (ss.rig.read_rig, ss.systems.read_system, ss.maps.read_sweep):
+        with pytest.raises(ss.errors.ModelError, match="no file of its own"):
             read(tmp_path / "rig.toml")
 
 
@@ -181,9 +181,11 @@ def test_a_small_file_does_not_become_a_large_one(made: Callable[[str], Path], n
 
 
 def test_the_budget_is_said_and_blocks_are_the_way_out(made: Callable[[str], Path]) -> None:
-    with pytest.raises(ss.FormatError, match=r"30000000 cells or more; 16777216 are held .*, and 8 .*read_blocks"):
+    with pytest.raises(
+        ss.errors.FormatError, match=r"30000000 cells or more; 16777216 are held .*, and 8 .*read_blocks"
+    ):
         ss.read_record(made("zeros.flac"))
-    with pytest.raises(ss.FormatError, match="smaller size="):
+    with pytest.raises(ss.errors.FormatError, match="smaller size="):
         next(ss.read_blocks(made("zeros.flac"), size=30_000_000))
     assert sum(map(len, ss.read_blocks(made("zeros.flac")))) == 30_000_000
 
@@ -208,7 +210,7 @@ def test_what_is_of_no_format_is_not_hashed(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr("hashlib.file_digest", never)
     with (tmp_path / "rig.bin").open("wb") as file:
         file.truncate(5 << 30)
-    with pytest.raises(ss.FormatError, match="of no known format"):
+    with pytest.raises(ss.errors.FormatError, match="of no known format"):
         ss.read_record(tmp_path / "rig.bin")
 
 

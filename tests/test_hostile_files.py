@@ -207,16 +207,16 @@ def test_what_is_no_measurement_is_one_sentence(tmp_path: Path, contents: bytes,
 
 def test_a_folder_and_nothing_at_all(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "nowhere.csv", "a\0b"):
-        with pytest.raises(ss.FormatError, match=r"there is no file|can not be opened"):
+        with pytest.raises(ss.errors.FormatError, match=r"there is no file|can not be opened"):
             ss.read_record(path)
-    with pytest.raises(ss.FormatError, match="no file is named"):
+    with pytest.raises(ss.errors.FormatError, match="no file is named"):
         ss.read_record([])
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.csv")
-    with pytest.raises(ss.FormatError, match="there is no file"):
+    with pytest.raises(ss.errors.FormatError, match="there is no file"):
         ss.read_record(tmp_path / "pipe.csv")
 
 
@@ -247,6 +247,6 @@ def test_nothing_is_unpickled(tmp_path: Path, name: str) -> None:
         os.utime(path, (0, 0))  # the pickle beside it is the newer one
         assert len(ss.read_record(path)) == 3
     else:
-        with pytest.raises(ss.FormatError):
+        with pytest.raises(ss.errors.FormatError):
             ss.read_record(path)
     assert not mark.exists()

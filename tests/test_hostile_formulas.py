@@ -118,8 +118,8 @@ class Unchecked(Formula):
         return 1.1 + 0.0 * speed
 
 
-def law_of(text: str) -> ss.FrictionCurve:
-    return ss.FrictionCurve(Formula(text))
+def law_of(text: str) -> ss.laws.FrictionCurve:
+    return ss.laws.FrictionCurve(Formula(text))
 
 
 @pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
@@ -134,10 +134,10 @@ def test_a_formula_keeps_the_text_that_its_tree_gives(text: str) -> None:
     kept = Formula(text)
     assert Formula(kept.text) == kept
     for speed in (0.0, 0.01, 0.7):
-        assert ss.FrictionCurve(kept).friction(speed) == law_of(kept.text).friction(speed)
+        assert ss.laws.FrictionCurve(kept).friction(speed) == law_of(kept.text).friction(speed)
     assert Formula(" ( (1.5) + v*2. ) ").text == "1.5 + v * 2.0"
     deep = "+".join(["v"] * DEEPEST)
-    assert ss.FrictionCurve(Formula(deep)).friction(1.0) == DEEPEST
+    assert ss.laws.FrictionCurve(Formula(deep)).friction(1.0) == DEEPEST
     with pytest.raises(ModelError, match="deep"):
         Formula(deep + "+v")
 
@@ -148,7 +148,7 @@ def test_a_formula_without_a_value_at_some_speed_is_one_sentence(text: str) -> N
     with pytest.raises(ModelError, match=r"has no value at .*v = "):
         law.friction(0.1 if "/" in text else 1.0)
     with pytest.raises(ModelError, match=r"has no value at .*v = "):
-        ss.export_law(law, format="c")  # its test vector asks there
+        ss.laws.export_law(law, format="c")  # its test vector asks there
 
 
 def built(text: str, folder: Path) -> Path:
@@ -165,7 +165,7 @@ def built(text: str, folder: Path) -> Path:
 
 @pytest.mark.parametrize("law", [*map(law_of, HONEST), Rubber(), Fluid()], ids=[*HONEST, "linear", "curved"])
 def test_c_of_a_law_passes_its_vector_under_the_sanitizers(law: object, tmp_path: Path) -> None:
-    test = built(ss.export_law(law, format="c"), tmp_path)  # type: ignore[arg-type]
+    test = built(ss.laws.export_law(law, format="c"), tmp_path)  # type: ignore[arg-type]
     run = subprocess.run([test], capture_output=True, text=True, timeout=60, cwd=tmp_path)
     assert run.returncode == 0, run.stdout + run.stderr
     assert re.fullmatch(r"0 of \d+ wrong\n", run.stdout)
@@ -176,7 +176,7 @@ def test_c_of_a_law_passes_its_vector_under_the_sanitizers(law: object, tmp_path
 def test_what_slips_past_a_formula_stays_text_in_every_format(format: str, tmp_path: Path) -> None:
     """The second wall: a text that no formula lets in, put where one stands, is no code of the file either."""
     formula = Unchecked(FOREIGN + " --> <evil/> \u2028 \x07")
-    text = ss.export_law(ss.FrictionCurve(formula), format=format)
+    text = ss.laws.export_law(ss.laws.FrictionCurve(formula), format=format)
     assert "\x07" not in text
     assert format == "toml" or "\u2028" not in text  # a string of TOML may hold it
     if format == "c":
@@ -201,9 +201,9 @@ def test_what_slips_past_a_formula_stays_text_in_every_format(format: str, tmp_p
 def test_a_law_of_ones_own_is_exported_or_refused_in_a_sentence(law: object, format: str) -> None:
     if format == "toml":
         with pytest.raises(ModelError, match="a system's file names one of"):
-            ss.export_law(law, format=format)  # type: ignore[arg-type]
+            ss.laws.export_law(law, format=format)  # type: ignore[arg-type]
         return
-    text = ss.export_law(law, format=format)  # type: ignore[arg-type]
+    text = ss.laws.export_law(law, format=format)  # type: ignore[arg-type]
     assert ("1.25" if isinstance(law, Rubber) else "30.0") in text
     if format == "mujoco":
         named = {part.get("name"): part.get("data") for part in ElementTree.fromstring(text).iter("text")}
@@ -213,7 +213,7 @@ def test_a_law_of_ones_own_is_exported_or_refused_in_a_sentence(law: object, for
 @pytest.mark.parametrize("law", [Rubber(), Fluid()], ids=["linear", "curved"])
 def test_python_of_a_law_of_ones_own_has_its_friction(law: Rubber | Fluid) -> None:
     names: dict[str, Any] = {}
-    exec(compile(ss.export_law(law, format="python"), "friction", "exec"), names)
+    exec(compile(ss.laws.export_law(law, format="python"), "friction", "exec"), names)
     contact = names["Friction"](0.0, 0.02)
     wanted = 1.25 if isinstance(law, Rubber) else 1.5 * math.tanh(0.6)
     assert contact.step(0.0, 0.02, 1e-3, **({"hold": 0.0} if isinstance(law, Rubber) else {})) == pytest.approx(wanted)
@@ -221,7 +221,7 @@ def test_python_of_a_law_of_ones_own_has_its_friction(law: Rubber | Fluid) -> No
 
 def test_a_law_that_only_bears_the_name_of_another_has_its_own_formula() -> None:
     stranger = dataclasses.make_dataclass("Coulomb", [], bases=(Rubber,), frozen=True)()
-    first = ss.export_law(stranger, format="simulink").splitlines()[0]
+    first = ss.laws.export_law(stranger, format="simulink").splitlines()[0]
     assert "kinetic" not in first
     assert "1.25" in first
 
@@ -230,11 +230,11 @@ def ran(text: str) -> None:
     """One run of half a second, as a worker of the lab makes it."""
     law = {"name": "FrictionCurve", "curve": text}
     drive = {"name": "HarmonicBase", "amplitude": 1e-3, "frequency": 1.0}
-    case = ss.read_system({
+    case = ss.systems.read_system({
         "system": {"mass": 1.0, "stiffness": 4.0}, "law": law, "drive": drive, "run": {"duration": 0.5},
     })  # fmt: skip
     try:
-        ss.outcome(case)
+        ss.story.outcome(case)
     except StickslipError as error:
         print(error)
         raise SystemExit(error.exit_code) from None
@@ -256,9 +256,9 @@ def test_a_formula_that_would_compile_for_minutes_is_refused(text: str, tmp_path
 
 
 def test_every_law_of_the_package_is_far_from_that_limit() -> None:
-    slip = ss.RateState(9.0, friction=0.6, direct=0.01, evolution=0.01, distance=1e-5, reference=1e-6, law="slip")
+    slip = ss.laws.RateState(9.0, friction=0.6, direct=0.01, evolution=0.01, distance=1e-5, reference=1e-6, law="slip")
     for law in (law_of(HONEST[1]), slip):
-        table = tape(ss.Oscillator(mass=1.0, stiffness=4.0, law=law, drive=ss.HarmonicBase(1e-3, frequency=1.0)))
+        table = tape(ss.Oscillator(mass=1.0, stiffness=4.0, law=law, drive=ss.drives.HarmonicBase(1e-3, frequency=1.0)))
         assert series.curved_nodes(table.nodes) <= series.MOST // 1.5
 
 

@@ -90,8 +90,8 @@ def test_what_is_no_finite_quantity_is_refused_at_once(tmp_path: Path) -> None:
 
 def _no_mass(texts: list[str]) -> None:
     for text in texts:
-        with pytest.raises(ss.ModelError) as caught:
-            ss.rig_settings({"mass": text}, source="the form")
+        with pytest.raises(ss.errors.ModelError) as caught:
+            ss.rig.rig_settings({"mass": text}, source="the form")
         assert len(str(caught.value)) < 1000
 
 

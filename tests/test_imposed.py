@@ -20,7 +20,7 @@ def means(law: Any, amplitude: float, *, speed: float = 0.0) -> tuple[float, flo
 
     The counter-face moves as A cos t, the mass steadily at `speed`; the second cycle counts.
     """
-    drive = ss.MultiTone([(amplitude, 1 / (2 * math.pi), 0.0)], on="face")
+    drive = ss.drives.MultiTone([(amplitude, 1 / (2 * math.pi), 0.0)], on="face")
     run = ss.simulate(ss.Oscillator(mass=HEAVY, stiffness=0, law=law, drive=drive), cycles=3, start={"v": speed})
     nodes, weights = np.polynomial.legendre.leggauss(ORDER)
     turn = 2 * math.pi
@@ -43,7 +43,7 @@ def means(law: Any, amplitude: float, *, speed: float = 0.0) -> tuple[float, flo
         (485e-6, 0.0021087916666666667, 416.99379733432271, 2853.6475094143603),
     ],
 )
-@pytest.mark.parametrize("law", [ss.ElastoSlip([192000], [1.1]), ss.CompliantContact(1.1, 192000)], ids=repr)
+@pytest.mark.parametrize("law", [ss.laws.ElastoSlip([192000], [1.1]), ss.laws.CompliantContact(1.1, 192000)], ids=repr)
 def test_a_jenkins_loop(law: Any, amplitude: float, energy: float, stiffness: float, loss: float) -> None:
     """HY-2: energy W, first-harmonic stiffness k_eq = (k/pi)(th - sin(2 th)/2) and loss W / (pi X^2)."""
     _, along, taken = means(law, amplitude)
@@ -55,16 +55,16 @@ def test_a_jenkins_loop(law: Any, amplitude: float, energy: float, stiffness: fl
 @pytest.mark.parametrize(("amplitude", "energy"), [(20e-6, 1.7777777777777778e-4), (50e-6, 0.0018)])
 def test_iwans_loop_is_the_limit_of_many_elements(amplitude: float, energy: float) -> None:
     """HY-3: classes of an even density miss W by a term in 1 / n^2, which two counts remove."""
-    coarse, fine = (means(ss.ElastoSlip.iwan(1e6, width=30e-6, elements=n), amplitude)[2] for n in (15, 45))
+    coarse, fine = (means(ss.laws.ElastoSlip.iwan(1e6, width=30e-6, elements=n), amplitude)[2] for n in (15, 45))
     assert fine + (fine - coarse) / 8 == pytest.approx(energy, rel=1e-9)
 
 
-def segalman(strength: float, power: float, width: float, count: int) -> ss.ElastoSlip:
+def segalman(strength: float, power: float, width: float, count: int) -> ss.laws.ElastoSlip:
     """Elements of the density R phi^chi of yield displacements, one at the mean of each class of squared width."""
     edges = width * (np.arange(count + 1) / count) ** 2
     stiffness = strength * np.diff(edges ** (power + 1)) / (power + 1)
     force = strength * np.diff(edges ** (power + 2)) / (power + 2)
-    return ss.ElastoSlip(list(stiffness), list(force))
+    return ss.laws.ElastoSlip(list(stiffness), list(force))
 
 
 def test_segalmans_loop_is_the_limit_of_many_elements() -> None:
@@ -78,7 +78,7 @@ def test_segalmans_loop_is_the_limit_of_many_elements() -> None:
 @pytest.mark.parametrize("ratio", [0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99, 2.0])
 def test_dither_smooths_coulomb_friction(ratio: float) -> None:
     """DI-1: <f> / f_k = (2 / pi) asin(v / a w), whole above a w."""
-    mean, *_ = means(ss.Coulomb(1.1), 0.3, speed=0.3 * ratio)
+    mean, *_ = means(ss.laws.Coulomb(1.1), 0.3, speed=0.3 * ratio)
     assert mean == pytest.approx(1.1 * (2 / math.pi * math.asin(min(ratio, 1.0))), rel=1e-11, abs=1e-12)
 
 
@@ -89,7 +89,7 @@ def test_dither_smooths_coulomb_friction(ratio: float) -> None:
 def test_dither_smooths_a_stribeck_curve(speed: float, known: float) -> None:
     """DI-3: mu_s (2/pi) asin(v/U) - k1 v + k3 (v^3 + 1.5 v U^2) for a cubic curve with its minimum 0.25 at 0.5."""
     fall = 1.5 * (0.4 - 0.25) / 0.5
-    law = ss.FrictionCurve(lambda v: 0.4 - fall * v + fall / (3 * 0.5**2) * v * v * v)
+    law = ss.laws.FrictionCurve(lambda v: 0.4 - fall * v + fall / (3 * 0.5**2) * v * v * v)
     mean, *_ = means(law, 0.3, speed=speed)
     assert mean == pytest.approx(known, rel=1e-10)
 
@@ -106,8 +106,8 @@ def test_dither_of_other_shapes(ratio: float, slanted: float) -> None:
     if slanted == 1.0:  # the level parts have no length
         times, first = np.unique(times, return_index=True)
         speeds = speeds[first]
-    drive = ss.SpeedProfile([*times, cycles], [*speeds, 0.0], on="face")
-    system = ss.Oscillator(mass=HEAVY, stiffness=0, law=ss.Coulomb(1.0), drive=drive)
+    drive = ss.drives.SpeedProfile([*times, cycles], [*speeds, 0.0], on="face")
+    system = ss.Oscillator(mass=HEAVY, stiffness=0, law=ss.laws.Coulomb(1.0), drive=drive)
     run = ss.simulate(system, duration=float(cycles), start={"v": ratio * top})
     sides = np.array([run.table.modes[m].side for m in run.modes])
     inside = np.clip(run.starts + run.durations, 1.0, None) - np.clip(run.starts, 1.0, None)
@@ -117,8 +117,8 @@ def test_dither_of_other_shapes(ratio: float, slanted: float) -> None:
 def test_a_trapezoid_of_the_base_moves_as_its_closed_form() -> None:
     """A frictionless mass on a spring whose end starts, runs and stops: three ramps of speed superposed."""
     times, speeds, omega = [0.0, 0.7, 2.0, 2.3], [0.0, 0.5, 0.5, 0.0], 3.0
-    drive = ss.SpeedProfile(times, speeds)
-    run = ss.simulate(ss.Oscillator(mass=1, stiffness=omega**2, law=ss.Coulomb(0.0), drive=drive), duration=5.0)
+    drive = ss.drives.SpeedProfile(times, speeds)
+    run = ss.simulate(ss.Oscillator(mass=1, stiffness=omega**2, law=ss.laws.Coulomb(0.0), drive=drive), duration=5.0)
     kinks = np.diff([0.0, *(np.diff(speeds) / np.diff(times)), 0.0])
     after = np.clip(5.0 - np.array(times), 0, None)
     known = kinks @ (after**2 / 2 - (1 - np.cos(omega * after)) / omega**2)
@@ -130,5 +130,5 @@ def test_a_trapezoid_of_the_base_moves_as_its_closed_form() -> None:
     [([0.0, 1.0], [0.0]), ([0.1, 1.0], [0.0, 1.0]), ([0.0, 1.0, 1.0], [0, 1, 2]), ([0, 1], [0, math.nan])],
 )
 def test_a_profile_without_meaning_is_refused(times: list[float], speeds: list[float]) -> None:
-    with pytest.raises(ss.ModelError):
-        ss.SpeedProfile(times, speeds)
+    with pytest.raises(ss.errors.ModelError):
+        ss.drives.SpeedProfile(times, speeds)

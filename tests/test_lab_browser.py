@@ -221,7 +221,7 @@ def told(page: Page) -> list[list[str]]:
 
 def printed(state: dict[str, Any]) -> list[list[str]]:
     """What the library prints of that state."""
-    return [list(row) for row in ss.outcome(ss.read_system(state)).rows]
+    return [list(row) for row in ss.story.outcome(ss.systems.read_system(state)).rows]
 
 
 def test_the_numbers_of_a_motion_are_the_librarys_to_the_last_digit(page: Page, lab: Lab) -> None:

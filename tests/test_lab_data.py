@@ -208,7 +208,7 @@ def test_only_what_the_library_can_not_infer_is_asked_for(client: Client, tmp_pa
 
 
 def test_a_free_decay_comes_with_its_fitted_motion(client: Client, tmp_path: Path) -> None:
-    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
+    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
     x = ss.simulate(slider, duration=20.0, start={"x": 1.0}).record(fs=20)["x"]
     record = ss.Record.of({"x": x + np.random.default_rng(1).normal(0, 3e-3, len(x))}, fs=20)
     path = ss.write_record(record, tmp_path / "release.csv")
@@ -222,7 +222,9 @@ def test_a_free_decay_comes_with_its_fitted_motion(client: Client, tmp_path: Pat
 
 
 def test_a_fitted_law_lies_over_the_record(client: Client, tmp_path: Path) -> None:
-    slider = ss.Oscillator(mass=1.0, stiffness=100.0, law=ss.Coulomb(0.5), drive=ss.HarmonicBase(0.02, frequency=1.0))
+    slider = ss.Oscillator(
+        mass=1.0, stiffness=100.0, law=ss.laws.Coulomb(0.5), drive=ss.drives.HarmonicBase(0.02, frequency=1.0)
+    )
     record = ss.simulate(slider, cycles=4).record(fs=100)
     noise = np.random.default_rng(2).normal(0, 1e-5, len(record))
     record = ss.Record.of({"x": record["x"] + noise, "z": record["z"]}, fs=100)
@@ -233,7 +235,7 @@ def test_a_fitted_law_lies_over_the_record(client: Client, tmp_path: Path) -> No
     measured, fitted = (np.array(answer["overlay"][0][name]) for name in ("measured", "fitted"))
     assert np.std(measured - fitted) < 2e-5
     assert answer["state"]["law"]["kinetic"] == pytest.approx(0.5, rel=0.01)
-    assert ss.read_system(answer["state"]).system.mass == 1.0
+    assert ss.systems.read_system(answer["state"]).system.mass == 1.0
 
 
 def test_several_records_are_compared_and_one_that_does_not_answer_is_named(client: Client, tmp_path: Path) -> None:
@@ -450,7 +452,7 @@ def test_a_record_of_velocity_and_friction_is_fitted_without_mass_and_spring(cli
     answer = answered(client, "fit", key)
     assert 'the curve "stribeck"' in answer["headline"][0]
     record = ss.read_record(path)
-    told = ss.fit_summary(ss.fit_curve(record, curve="stribeck"), records=[record], name="").lines[0]
+    told = ss.story.fit_summary(ss.fit_curve(record, curve="stribeck"), records=[record], name="").lines[0]
     assert answer["lines"][0][:2] == [told.name, told.value]
 
 

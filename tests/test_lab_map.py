@@ -55,7 +55,7 @@ def test_the_coarse_map_is_that_of_a_sweep(parts: list[tuple[dict[str, Any], dic
     coarse = [arrays for header, arrays in parts if header["level"] == "coarse"]
     xs = np.concatenate([arrays["x"] for arrays in coarse])
     values = np.concatenate([arrays["values"] for arrays in coarse]).reshape(len(xs), -1)
-    system = ss.read_system(UNIT).system
+    system = ss.systems.read_system(UNIT).system
     grid = {"frequency": xs.tolist(), "kinetic": coarse[0]["y"].tolist()}
     swept = ss.sweep(system, grid, measures=["stops"], cycles=explored.CYCLES, settle=explored.SETTLE, engine="serial")
     moving = swept.status.values == 0

@@ -23,8 +23,8 @@ from stickslip.lab import drawn
 from stickslip.lab.frames import frame, unframed
 from stickslip.lab.server import lab_app
 
-COMPLIANT = ss.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
-STATE = json.loads(ss.export_system(COMPLIANT, format="json"))
+COMPLIANT = ss.systems.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
+STATE = json.loads(ss.systems.export_system(COMPLIANT, format="json"))
 HOME, BEARER = "http://127.0.0.1:8723", {"authorization": "Bearer t"}
 RIGID = {**STATE, "law": {"name": "Coulomb", "kinetic": 1.1}}
 PLAYED = ["FD-4", "BS-1", "THESIS rigid 2.5Hz fk=1.1", "FM-1", "MC-1", "SQUEAK wet 6.13 N", "DI-1 v=0.1",
@@ -58,7 +58,7 @@ def test_a_frame_is_read_as_it_was_written() -> None:
 @pytest.mark.parametrize("name", PLAYED)
 def test_the_numbers_are_those_that_the_library_prints(client: TestClient, name: str) -> None:
     header, _ = asked(client, "tell", state_of(client, name))
-    result = ss.outcome(ss.scenario_case(name))
+    result = ss.story.outcome(ss.systems.scenario_case(name))
     assert header["sentences"] == list(result.sentences)
     assert [tuple(row) for row in header["rows"]] == result.rows
 
@@ -66,7 +66,7 @@ def test_the_numbers_are_those_that_the_library_prints(client: TestClient, name:
 @pytest.mark.parametrize("name", PLAYED)
 def test_the_traces_are_the_exact_motion(client: TestClient, name: str) -> None:
     header, arrays = asked(client, "run", state_of(client, name))
-    case = ss.scenario_case(name)
+    case = ss.systems.scenario_case(name)
     run = ss.simulate(case.system, start=case.start, **case.run)
     names = [each["name"] for each in header["series"]]
     outputs = dict.fromkeys(("x", "v", "a", "friction"))
@@ -125,7 +125,7 @@ def test_the_python_and_the_toml_reproduce_what_is_on_screen(client: TestClient,
     header, _ = asked(client, "tell", state)
     file = tmp_path / "system.toml"
     file.write_text(texts["toml"], encoding="utf-8")
-    assert [list(row) for row in ss.outcome(ss.read_system(file)).rows] == header["rows"]
+    assert [list(row) for row in ss.story.outcome(ss.systems.read_system(file)).rows] == header["rows"]
     program = tmp_path / "lab.py"
     program.write_text(texts["python"], encoding="utf-8")
     printed = io.StringIO()
@@ -195,7 +195,7 @@ def test_the_wavelet_map_is_the_librarys(client: TestClient) -> None:
     header, arrays = asked(client, "wavelet", RIGID)
     case = drawn.read_case(RIGID)
     record = ss.simulate(case.system, cycles=40).record(fs=drawn.MAP / 16.0)
-    level = np.abs(ss.wavelet_overview(record, "a", columns=drawn.COLUMNS, voices=6).values)
+    level = np.abs(ss.signals.wavelet_overview(record, "a", columns=drawn.COLUMNS, voices=6).values)
     shown = arrays["levels"].reshape(header["rows"], -1) / 255 * drawn.SPAN - drawn.SPAN
     seen = shown > -drawn.SPAN
     np.testing.assert_allclose(shown[seen], (20 * np.log10(level / level.max()))[seen], atol=drawn.SPAN / 255)

@@ -23,8 +23,8 @@ import stickslip as ss  # noqa: E402
 from labs import received  # noqa: E402
 from stickslip.lab.server import lab_app  # noqa: E402
 
-COMPLIANT = ss.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
-STATE = json.loads(ss.export_system(COMPLIANT, format="json"))
+COMPLIANT = ss.systems.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
+STATE = json.loads(ss.systems.export_system(COMPLIANT, format="json"))
 TOKEN, PORT = "a-token", 8723
 HOME = f"http://127.0.0.1:{PORT}"
 BEARER = {"authorization": f"Bearer {TOKEN}"}

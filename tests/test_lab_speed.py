@@ -19,8 +19,8 @@ import stickslip as ss
 from stickslip.lab import drawn, forms
 from stickslip.lab.frames import frame
 
-COMPLIANT = ss.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
-STATE = json.loads(ss.export_system(COMPLIANT, format="json"))
+COMPLIANT = ss.systems.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
+STATE = json.loads(ss.systems.export_system(COMPLIANT, format="json"))
 PAGE = Path(ss.__file__).parent / "lab" / "page"
 FIRST = ("index.html", "lab.css", "data.css", "lab.js", "play.js", "controls.js", "stage.js", "canvas.js",
          "socket.js", "vendor/uPlot.min.js", "vendor/uPlot.min.css")  # fmt: skip

@@ -14,7 +14,7 @@ import stickslip as ss
 
 def sticking(speed: float, damping: float = 0.0) -> ss.Oscillator:
     """BS-1 and BS-4: static friction of 1.5 N over 1 N."""
-    return ss.Oscillator(1.0, 1.0, ss.Coulomb(1.0, static=1.5), ss.Belt(speed), damping=damping)
+    return ss.Oscillator(1.0, 1.0, ss.laws.Coulomb(1.0, static=1.5), ss.drives.Belt(speed), damping=damping)
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ def sticking(speed: float, damping: float = 0.0) -> ss.Oscillator:
     [(0.5, 0.0, 6.7123889803846899), (0.1, 0.1, 12.635457258784897), (0.5, 0.1, 6.4941269476513108)],
 )
 def test_stick_slip_has_the_period_of_the_closed_form(speed: float, damping: float, period: float) -> None:
-    found = ss.limit_cycle(sticking(speed, damping), push=1.5)
+    found = ss.squeak.limit_cycle(sticking(speed, damping), push=1.5)
     assert found.status == "periodic"
     assert 1 / found.frequency == pytest.approx(period, rel=1e-12)
     assert abs(found.multipliers[0]) < 1e-6, "a stick ends in one state alone"
@@ -34,7 +34,7 @@ def test_stick_slip_has_the_period_of_the_closed_form(speed: float, damping: flo
 def test_beside_stable_sliding_stick_slip_lasts_up_to_a_known_speed() -> None:
     """BS-4: above 0.549 the mass does not stick again."""
     speeds = [0.2, 0.54, 0.558]
-    found = ss.limit_cycles(sticking(0.5, 0.1), "drive.speed", values=speeds)
+    found = ss.squeak.limit_cycles(sticking(0.5, 0.1), "drive.speed", values=speeds)
     assert [one.status for one in found.up] == ["steady sliding"] * 3
     assert [one.status for one in found.down] == ["periodic", "periodic", "steady sliding"]
     assert (found.both, found.threshold, found.kind) == ((0.2, 0.54), None, "cannot be told")
@@ -42,11 +42,11 @@ def test_beside_stable_sliding_stick_slip_lasts_up_to_a_known_speed() -> None:
 
 
 @cache
-def smooth() -> ss.CycleBranches:
+def smooth() -> ss.squeak.CycleBranches:
     """ST-2: friction that falls with the speed and rises again by a cubic law, as Thomsen and Fidlin have it."""
-    law = ss.FrictionCurve(lambda v: 0.4 - 0.225 * (v / 0.5 - (v / 0.5) ** 3 / 3))
-    block = ss.Oscillator(1.0, 1.0, law, ss.Belt(0.5), damping=0.1)
-    return ss.limit_cycles(block, "drive.speed", values=[0.42, 0.43, 0.44, 0.45])
+    law = ss.laws.FrictionCurve(lambda v: 0.4 - 0.225 * (v / 0.5 - (v / 0.5) ** 3 / 3))
+    block = ss.Oscillator(1.0, 1.0, law, ss.drives.Belt(0.5), damping=0.1)
+    return ss.squeak.limit_cycles(block, "drive.speed", values=[0.42, 0.43, 0.44, 0.45])
 
 
 def test_a_smooth_law_begins_supercritically_with_the_root_of_the_distance() -> None:
@@ -65,9 +65,9 @@ def test_a_smooth_law_begins_supercritically_with_the_root_of_the_distance() -> 
 
 def test_a_falling_law_with_a_stick_begins_subcritically() -> None:
     """ST-1: sliding becomes stable above 0.2303; the stick that bounds the motion does not know of it."""
-    law = ss.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
-    block = ss.Oscillator(1.0, 1.0, law, ss.Belt(0.2), damping=0.3)
-    found = ss.limit_cycles(block, "drive.speed", values=[0.2, 0.22, 0.25])
+    law = ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
+    block = ss.Oscillator(1.0, 1.0, law, ss.drives.Belt(0.2), damping=0.3)
+    found = ss.squeak.limit_cycles(block, "drive.speed", values=[0.2, 0.22, 0.25])
     assert found.kind == "subcritical"
     assert found.both is not None
     assert found.both[0] < 0.2304 < found.both[1] == 0.25
@@ -77,15 +77,15 @@ def test_a_falling_law_with_a_stick_begins_subcritically() -> None:
 
 
 @cache
-def rig(load: float) -> ss.LimitCycle:
-    return ss.limit_cycle(ss.squeak_rig("wet", load), speed=-0.1)
+def rig(load: float) -> ss.squeak.LimitCycle:
+    return ss.squeak.limit_cycle(ss.squeak.squeak_rig("wet", load), speed=-0.1)
 
 
 def test_an_unstable_cycle_separates_the_vibration_from_stable_sliding() -> None:
     """It begins at the threshold with the root of the distance; within it a vibration dies away, beyond it grows."""
-    law = ss.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
-    block = ss.Oscillator(1.0, 1.0, law, ss.Belt(0.2), damping=0.3)
-    found = ss.limit_cycles(block, "drive.speed", values=[0.22, 0.2313, 0.2343])
+    law = ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
+    block = ss.Oscillator(1.0, 1.0, law, ss.drives.Belt(0.2), damping=0.3)
+    found = ss.squeak.limit_cycles(block, "drive.speed", values=[0.22, 0.2313, 0.2343])
     assert found.between[0] is None, "sliding is unstable"
     near, far = found.amplitudes("between")[1:]
     assert found.threshold is not None
@@ -95,9 +95,14 @@ def test_an_unstable_cycle_separates_the_vibration_from_stable_sliding() -> None
     assert cycle is not None
     assert cycle.multipliers[0].real > 1
     place, (x, v) = cycle.sliding.place[0], cycle.motion.states[0, :2]
-    ends = [ss.limit_cycle(block, speed=0.2343, start={"x": place + s * (x - place), "v": s * v}) for s in (0.97, 1.03)]
+    ends = [
+        ss.squeak.limit_cycle(block, speed=0.2343, start={"x": place + s * (x - place), "v": s * v})
+        for s in (0.97, 1.03)
+    ]
     assert [end.status for end in ends] == ["steady sliding", "periodic"]
-    assert "unstable, between" in [str(line.get_label()) for line in ss.plot_limit_cycles(found).axes[0].get_lines()]
+    assert "unstable, between" in [
+        str(line.get_label()) for line in ss.plot.plot_limit_cycles(found).axes[0].get_lines()
+    ]
 
 
 @pytest.mark.parametrize("load", [1.9, 3.0, 6.13])
@@ -112,7 +117,7 @@ def test_the_rig_squeaks_by_lifting_a_contact(load: float) -> None:
 
 
 def test_the_steady_state_on_a_belt_is_the_cycle() -> None:
-    found = ss.steady_state(ss.squeak_rig("wet", 3.0).having(drive=ss.Belt(-0.1)))
+    found = ss.steady_state(ss.squeak.squeak_rig("wet", 3.0).having(drive=ss.drives.Belt(-0.1)))
     assert found.status == "unique"
     assert 1 / found.period == pytest.approx(rig(3.0).frequency, rel=1e-9)
     assert np.allclose(np.abs(found.multipliers[:-1]), np.abs(rig(3.0).multipliers), rtol=1e-6)
@@ -120,7 +125,7 @@ def test_the_steady_state_on_a_belt_is_the_cycle() -> None:
 
 def test_the_cycle_is_what_a_long_simulation_ends_in() -> None:
     found = rig(3.0)
-    belt = ss.squeak_rig("wet", 3.0).having(drive=ss.Belt(-0.1))
+    belt = ss.squeak.squeak_rig("wet", 3.0).having(drive=ss.drives.Belt(-0.1))
     rest = dict(zip(("x1", "x2", "x3"), found.sliding.place, strict=True))
     run = ss.simulate(belt, duration=40.0, start={**rest, "v1": 0.0, "v2": 1e-4, "v3": 0.0})
     times = np.linspace(39.9, 40.0, 20_001)
@@ -135,19 +140,23 @@ HOFFMANN = [[23.25, 3.8971143170299739], [3.8971143170299739, 7.75]]
 
 def inclined(law: Any = None, *, speed: float = 1.0) -> ss.Structure:
     """MC-1 with some damping."""
-    pad = ss.Contact(law or ss.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=10.0)
-    return ss.Structure(np.eye(2), 0.05 * np.eye(2), HOFFMANN, contacts=[pad], drive=ss.Belt(speed))
+    pad = ss.Contact(law or ss.laws.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=10.0)
+    return ss.Structure(np.eye(2), 0.05 * np.eye(2), HOFFMANN, contacts=[pad], drive=ss.drives.Belt(speed))
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.3])
 @pytest.mark.parametrize(
     "law",
-    [ss.Coulomb(0.6), ss.LinearSlope(0.4, slope=-0.05, static=0.6), ss.CompliantContact(0.6, stiffness=300.0)],
+    [
+        ss.laws.Coulomb(0.6),
+        ss.laws.LinearSlope(0.4, slope=-0.05, static=0.6),
+        ss.laws.CompliantContact(0.6, stiffness=300.0),
+    ],
     ids=["rigid", "falling", "compliant"],
 )
 def test_a_cycle_is_repeated_when_it_is_simulated_again(law: Any, speed: float) -> None:
     system = inclined(law, speed=speed)
-    found = ss.limit_cycle(system)
+    found = ss.squeak.limit_cycle(system)
     assert found.status == "periodic"
     assert found.growth == pytest.approx(found.sliding.growth, rel=1e-8)
     own = dict(zip(("x1", "x2", "v1", "v2"), map(float, found.motion.states[0]), strict=False))
@@ -159,7 +168,7 @@ def test_a_cycle_is_repeated_when_it_is_simulated_again(law: Any, speed: float) 
 
 
 def test_hoffmanns_model_squeaks_on_below_its_critical_friction() -> None:
-    found = ss.limit_cycles(inclined(), "kinetic", values=[0.4, 0.46, 0.5, 0.6])
+    found = ss.squeak.limit_cycles(inclined(), "kinetic", values=[0.4, 0.46, 0.5, 0.6])
     assert found.kind == "subcritical"
     assert [one.vibrates for one in found.up] == [False, False, True, True]
     assert [one.vibrates for one in found.down] == [False, True, True, True]
@@ -180,7 +189,9 @@ def test_friction_feeds_torsion_and_the_contacts_carry_it_to_bending() -> None:
 
 
 def test_the_rig_begins_and_ends_to_squeak_at_one_load() -> None:
-    found = ss.limit_cycles(ss.squeak_rig(), lambda n: ss.squeak_rig("wet", n), values=[1.5, 1.9, 6.0], speed=-0.1)
+    found = ss.squeak.limit_cycles(
+        ss.squeak.squeak_rig(), lambda n: ss.squeak.squeak_rig("wet", n), values=[1.5, 1.9, 6.0], speed=-0.1
+    )
     assert found.threshold is not None
     assert found.threshold.value == pytest.approx(1.79657, rel=1e-5)
     assert found.kind == "supercritical"
@@ -190,8 +201,8 @@ def test_the_rig_begins_and_ends_to_squeak_at_one_load() -> None:
 
 
 def test_energy_of_each_displacement_adds_up_to_that_of_all() -> None:
-    run = ss.simulate(ss.squeak_rig(), duration=0.3)
-    flow, whole = ss.energy_flow(run), ss.energy(run)
+    run = ss.simulate(ss.squeak.squeak_rig(), duration=0.3)
+    flow, whole = ss.solve.energy_flow(run), ss.solve.energy(run)
     assert -flow.friction.sum() == pytest.approx(whole.friction, rel=1e-9)
     assert flow.kinetic.sum() == pytest.approx(whole.kinetic, rel=1e-9)
     assert np.allclose(flow.drive[1:], 0, atol=1e-12 * whole.turnover), "the base moves the mass alone"
@@ -202,7 +213,7 @@ def test_energy_of_each_displacement_adds_up_to_that_of_all() -> None:
 
 
 def test_the_figures_show_both_ways_and_the_threshold() -> None:
-    figure = ss.plot_limit_cycles(smooth(), label="belt speed [m/s]")
+    figure = ss.plot.plot_limit_cycles(smooth(), label="belt speed [m/s]")
     lines = figure.axes[0].get_lines()
     drawn = {line.get_label(): line for line in lines}
     assert np.array_equal(drawn["going up"].get_ydata(), 1e3 * smooth().amplitudes())
@@ -212,33 +223,35 @@ def test_the_figures_show_both_ways_and_the_threshold() -> None:
 
 def test_the_map_of_the_rig_over_load_and_slope() -> None:
     grid = {"slope": [-3.0, 0.0, 3.0], "load": [1.0, 4.0, 7.0]}
-    found = ss.stability_map(lambda load, slope: ss.squeak_rig("wet", load).having(slope=slope), grid=grid, speed=-0.1)
+    found = ss.squeak.stability_map(
+        lambda load, slope: ss.squeak.squeak_rig("wet", load).having(slope=slope), grid=grid, speed=-0.1
+    )
     assert found.mechanism.sel(load=7.0, slope=0.0) == "mode coupling"
     assert found.mechanism.sel(load=1.0, slope=3.0) == "stable"
-    figure = ss.plot_stability(found, labels=("slope [s/m]", "load [N]"))
+    figure = ss.plot.plot_stability(found, labels=("slope [s/m]", "load [N]"))
     named = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
     assert named == set(np.unique(found.mechanism.values))
-    with pytest.raises(ss.ModelError, match="two parameters"):
-        ss.plot_stability(found.isel(load=0))
+    with pytest.raises(ss.errors.ModelError, match="two parameters"):
+        ss.plot.plot_stability(found.isel(load=0))
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: ss.limit_cycle(sticking(0.5), speed=0.0), "speed = 0"),
-        (lambda: ss.limit_cycle(sticking(0.5), push=0.0), "push = 0"),
-        (lambda: ss.limit_cycle(sticking(0.5), speed="fast"), "speed = 'fast'"),  # type: ignore[arg-type]
-        (lambda: ss.limit_cycle(3), "Oscillator or a Structure"),  # type: ignore[arg-type]
-        (lambda: ss.limit_cycles(sticking(0.5), "drive.speed", values="all"), "finite numbers"),
-        (lambda: ss.limit_cycle(sticking(0.5), patience=3), "patience = 3"),
-        (lambda: ss.limit_cycle(sticking(0.5).having(drive=ss.Release())), "driven by Release"),
-        (lambda: ss.limit_cycle(sticking(0.5).having(stiffness=0.0)), "no spring holds"),
-        (lambda: ss.limit_cycles(sticking(0.5), "drive.speed", values=[0.3, 0.2, 0.4]), "numbers that rise"),
-        (lambda: ss.limit_cycles(sticking(0.5), "drive.speed", values=[0.3, 0.4]), "at least 3"),
-        (lambda: ss.limit_cycles(sticking(0.5), "drive.sped", values=[0.3, 0.4, 0.5]), "sped"),
+        (lambda: ss.squeak.limit_cycle(sticking(0.5), speed=0.0), "speed = 0"),
+        (lambda: ss.squeak.limit_cycle(sticking(0.5), push=0.0), "push = 0"),
+        (lambda: ss.squeak.limit_cycle(sticking(0.5), speed="fast"), "speed = 'fast'"),  # type: ignore[arg-type]
+        (lambda: ss.squeak.limit_cycle(3), "Oscillator or a Structure"),  # type: ignore[arg-type]
+        (lambda: ss.squeak.limit_cycles(sticking(0.5), "drive.speed", values="all"), "finite numbers"),
+        (lambda: ss.squeak.limit_cycle(sticking(0.5), patience=3), "patience = 3"),
+        (lambda: ss.squeak.limit_cycle(sticking(0.5).having(drive=ss.drives.Release())), "driven by Release"),
+        (lambda: ss.squeak.limit_cycle(sticking(0.5).having(stiffness=0.0)), "no spring holds"),
+        (lambda: ss.squeak.limit_cycles(sticking(0.5), "drive.speed", values=[0.3, 0.2, 0.4]), "numbers that rise"),
+        (lambda: ss.squeak.limit_cycles(sticking(0.5), "drive.speed", values=[0.3, 0.4]), "at least 3"),
+        (lambda: ss.squeak.limit_cycles(sticking(0.5), "drive.sped", values=[0.3, 0.4, 0.5]), "sped"),
     ],
 )
 def test_what_has_no_answer_is_refused(call: Any, words: str) -> None:
-    with pytest.raises(ss.ModelError) as refused:
+    with pytest.raises(ss.errors.ModelError) as refused:
         call()
     assert words in str(refused.value)

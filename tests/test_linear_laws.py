@@ -15,7 +15,9 @@ HEAVY = 1e15  # kg: a mass that the contact can not move, so that the counter-fa
 
 def loop_energy(law: Law, amplitude: float) -> float:
     """Energy [J] that a law takes in one closed cycle of imposed harmonic motion."""
-    system = ss.Oscillator(mass=HEAVY, stiffness=0, law=law, drive=ss.MultiTone([(amplitude, 1.0, 0.0)], on="face"))
+    system = ss.Oscillator(
+        mass=HEAVY, stiffness=0, law=law, drive=ss.drives.MultiTone([(amplitude, 1.0, 0.0)], on="face")
+    )
     run = ss.simulate(system, cycles=3)
     nodes, weights = np.polynomial.legendre.leggauss(20)
     total = 0.0
@@ -29,23 +31,23 @@ def loop_energy(law: Law, amplitude: float) -> float:
 
 
 def test_elements_yield_whatever_their_order() -> None:
-    one, other = ss.ElastoSlip([1e5, 2e5], [1.0, 0.2]), ss.ElastoSlip([2e5, 1e5], [0.2, 1.0])
+    one, other = ss.laws.ElastoSlip([1e5, 2e5], [1.0, 0.2]), ss.laws.ElastoSlip([2e5, 1e5], [0.2, 1.0])
     assert loop_energy(one, 3e-5) == loop_energy(other, 3e-5)
 
 
 def test_a_slope_damps_as_a_damper_does() -> None:
-    slope = ss.Oscillator(mass=1, stiffness=100, law=ss.LinearSlope(0.5, slope=0.3))
-    damper = ss.Oscillator(mass=1, stiffness=100, law=ss.Coulomb(0.5), damping=0.3)
+    slope = ss.Oscillator(mass=1, stiffness=100, law=ss.laws.LinearSlope(0.5, slope=0.3))
+    damper = ss.Oscillator(mass=1, stiffness=100, law=ss.laws.Coulomb(0.5), damping=0.3)
     runs = [ss.simulate(system, duration=5, start={"x": 0.1}) for system in (slope, damper)]
     assert [e[1:3] for e in runs[0].events] == [e[1:3] for e in runs[1].events]
     assert np.allclose(runs[0].starts, runs[1].starts, rtol=1e-14, atol=0)
 
 
 def test_a_table_of_a_straight_line_is_the_line() -> None:
-    table = ss.Tabulated(np.linspace(0, 10, 21), 0.5 + 0.3 * np.linspace(0, 10, 21))
+    table = ss.laws.Tabulated(np.linspace(0, 10, 21), 0.5 + 0.3 * np.linspace(0, 10, 21))
     runs = [
         ss.simulate(ss.Oscillator(mass=1, stiffness=100, law=law), duration=5, start={"x": 0.1})
-        for law in (table, ss.LinearSlope(0.5, slope=0.3))
+        for law in (table, ss.laws.LinearSlope(0.5, slope=0.3))
     ]
     times = np.linspace(0, 5, 501)
     left, right = (run.sample(times, ("x",))[0] for run in runs)
@@ -60,8 +62,8 @@ def test_a_polygon_converges_to_the_smooth_curve() -> None:
 
     errors = []
     for points in (101, 401):
-        law = ss.Tabulated.of(curve, np.linspace(0, 6, points))
-        orbit = ss.steady_state(ss.Oscillator(mass=1, stiffness=1, law=law, drive=ss.Belt(1.0)))
+        law = ss.laws.Tabulated.of(curve, np.linspace(0, 6, points))
+        orbit = ss.steady_state(ss.Oscillator(mass=1, stiffness=1, law=law, drive=ss.drives.Belt(1.0)))
         assert orbit.status == "unique"
         errors.append(abs(orbit.period - 8.0955494972436))
     assert errors[1] < 1e-3
@@ -71,7 +73,7 @@ def test_a_polygon_converges_to_the_smooth_curve() -> None:
 def test_the_state_variable_relaxes_to_its_backbone() -> None:
     """At constant speed theta = f_k (1 - exp(-f_k gamma t)); printed, the backbone is 1 N."""
     for printed, level in ((False, 1.1), (True, 1.0)):
-        law = ss.StateVariable(1.1, rate=2.0, printed=printed)
+        law = ss.laws.StateVariable(1.1, rate=2.0, printed=printed)
         run = ss.simulate(ss.Oscillator(mass=HEAVY, stiffness=0, law=law), duration=1.0, start={"v": 5.0})
         expected = level * (1 - math.exp(-1.1 * 2.0 * 0.7))
         assert run.state(0.7)["friction"] == pytest.approx(expected, rel=1e-12)
@@ -79,12 +81,12 @@ def test_the_state_variable_relaxes_to_its_backbone() -> None:
 
 def test_a_light_contact_becomes_massless() -> None:
     """The contact with inertia tends to the compliant one, at first order in its mass."""
-    drive = ss.HarmonicBase(1.1e-3, frequency=8.7)
-    base = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.CompliantContact(1.1, 181000), drive=drive)
+    drive = ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
+    base = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.laws.CompliantContact(1.1, 181000), drive=drive)
     reference = ss.simulate(base, cycles=3).sample([0.3], ("x",))[0][0, 0]
     gaps = []
     for mass in (1e-3, 1e-4):
-        law = ss.InertialContact(1.1, stiffness=181000, mass=mass, damping=2 * math.sqrt(181000 * mass))
+        law = ss.laws.InertialContact(1.1, stiffness=181000, mass=mass, damping=2 * math.sqrt(181000 * mass))
         run = ss.simulate(base.having(law=law), cycles=3)
         gaps.append(abs(run.sample([0.3], ("x",))[0][0, 0] - reference))
     assert gaps[1] < gaps[0] / 2
@@ -92,7 +94,7 @@ def test_a_light_contact_becomes_massless() -> None:
 
 
 def test_a_lifted_contact_rubs_no_more() -> None:
-    law = ss.PositionLoad(0.3, gradient=0.4)
+    law = ss.laws.PositionLoad(0.3, gradient=0.4)
     run = ss.simulate(ss.Oscillator(mass=1, stiffness=1, law=law), duration=12, start={"x": 3.0})
     values, piece = run.sample(np.linspace(0, 12, 601), ("x", "friction"))
     lifted = values[0] < -0.75 - 1e-9

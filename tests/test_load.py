@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip import Estimate, EstimateError, ModelError, friction_over_load
+from stickslip import Estimate
+from stickslip.errors import EstimateError, ModelError
+from stickslip.law import friction_over_load
 
 
 def levels(*values: float, sd: float = 0.01) -> list[Estimate]:

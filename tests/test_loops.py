@@ -7,10 +7,10 @@ import pytest
 from scipy.signal import lfilter
 
 from stickslip import datasets
+from stickslip.balance.force import friction_force
+from stickslip.cycle.loops import friction_loops
 from stickslip.errors import EstimateError, RecordError
 from stickslip.files.read import read_record
-from stickslip.identify.force import friction_force
-from stickslip.identify.loops import friction_loops
 from stickslip.record.record import Record
 
 FS, REACH, FREQUENCY = 500.0, 0.01, 2.0

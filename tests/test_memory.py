@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip import EstimateError, Record, friction_memory
+from stickslip import Record
+from stickslip.errors import EstimateError
+from stickslip.law import friction_memory
 
 AMPLITUDE, FS = 1e-3, 8000
 
@@ -72,13 +74,16 @@ def test_friction_that_goes_ahead_is_gone_round_clockwise() -> None:
 
 @pytest.mark.parametrize(
     ("law", "memory"),
-    [(ss.StateVariable(1.1, rate=30.0), "state variable"), (ss.CompliantContact(1.1, stiffness=20000), "way")],
+    [
+        (ss.laws.StateVariable(1.1, rate=30.0), "state variable"),
+        (ss.laws.CompliantContact(1.1, stiffness=20000), "way"),
+    ],
 )
 def test_laws_of_the_thesis_are_told(law: object, memory: str) -> None:
     """A slider shaken near and above its resonance, sliding all the time, as the thesis has it (4.4)."""
     records = []
     for hz, base in ((5.6, 0.6e-3), (8.7, 1.2e-3), (11.1, 2.0e-3)):
-        slider = ss.Oscillator(mass=2.42, stiffness=2310, law=law, drive=ss.HarmonicBase(base, frequency=hz))
+        slider = ss.Oscillator(mass=2.42, stiffness=2310, law=law, drive=ss.drives.HarmonicBase(base, frequency=hz))
         run = ss.simulate(slider, cycles=60).record(fs=4000)
         records.append(run.rows(len(run) // 2, len(run)))
     found = friction_memory(records)
@@ -92,7 +97,7 @@ def test_laws_of_the_thesis_are_told(law: object, memory: str) -> None:
 def shaken(law: object, hz: float, base: float, *, noise: float = 0.0) -> Record:
     """A slider shaken slowly, where a rigid contact sticks, or fast; 8 cycles, run in."""
     slider = ss.Oscillator(
-        mass=2.42, stiffness=2310, damping=0.12, law=law, drive=ss.HarmonicBase(base, frequency=hz)
+        mass=2.42, stiffness=2310, damping=0.12, law=law, drive=ss.drives.HarmonicBase(base, frequency=hz)
     )  # fmt: skip
     run = ss.simulate(slider, cycles=12).record(fs=4000)
     run, rng = run.rows(round(4000 * 4 / hz), len(run)), np.random.default_rng(1)
@@ -101,7 +106,7 @@ def shaken(law: object, hz: float, base: float, *, noise: float = 0.0) -> Record
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.002])
-@pytest.mark.parametrize("law", [ss.Coulomb(1.1), ss.Coulomb(1.1, static=1.4)])
+@pytest.mark.parametrize("law", [ss.laws.Coulomb(1.1), ss.laws.Coulomb(1.1, static=1.4)])
 def test_friction_that_sticks_has_no_memory(law: object, noise: float) -> None:
     found = friction_memory([shaken(law, 2.5, 0.65e-3, noise=noise), shaken(law, 8.7, 1.1e-3, noise=noise)])
     assert (found.memory, found.rotation) == ("none", "none"), found.reason
@@ -111,7 +116,7 @@ def test_friction_that_sticks_has_no_memory(law: object, noise: float) -> None:
 
 
 def test_a_state_is_told_though_the_contact_almost_sticks() -> None:
-    law = ss.StateVariable(1.1, rate=60.0)
+    law = ss.laws.StateVariable(1.1, rate=60.0)
     found = friction_memory([shaken(law, 2.5, 0.65e-3), shaken(law, 8.7, 1.1e-3)])
     assert found.memory == "state variable", found.reason
     assert found.time.includes(1 / (1.1 * 60.0))

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from stickslip.balance.motion import away_from, contact_motion, find_cycles, forcing_frequency, stretches
 from stickslip.errors import EstimateError, RecordError
-from stickslip.identify.motion import away_from, contact_motion, find_cycles, forcing_frequency, stretches
 from stickslip.record.record import Record
 
 FS = 500.0

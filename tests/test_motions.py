@@ -104,7 +104,9 @@ def test_means_over_blocks_are_those_of_the_samples() -> None:
 
 def test_friction_of_the_exact_engine() -> None:
     times = np.arange(240) / 20
-    slider = ss.Oscillator(mass=1.0, stiffness=4.0, damping=0.08, law=ss.Stribeck(0.08, 0.1, speed=0.4, exponent=1.0))
+    slider = ss.Oscillator(
+        mass=1.0, stiffness=4.0, damping=0.08, law=ss.laws.Stribeck(0.08, 0.1, speed=0.4, exponent=1.0)
+    )
     x = ss.simulate(slider, duration=12.0, start={"x": 1.0, "v": 0.0}).record(fs=20.0)["x"][:240]
     found, _, _ = free_decay(times, [2, 0.02, 0.02, 0, 1, 0, 0, 0.25, 0.4, 0, 0.5, 0])
     assert np.abs(found - x).max() < 1e-8
@@ -113,7 +115,7 @@ def test_friction_of_the_exact_engine() -> None:
 def test_micro_slip_is_that_of_many_sliders() -> None:
     """Iwan's even spread of yield displacements: backbone K x - K_j x^2 / (2 D), so kappa = K_j / (2 D K) and p = 1."""
     joint, width, first = 0.2, 3.0, 1.0
-    law = ss.ElastoSlip.iwan(joint, width=width, elements=12)
+    law = ss.laws.ElastoSlip.iwan(joint, width=width, elements=12)
     yields = np.array(law.forces) / np.array(law.stiffnesses)
     loaded = {f"anchor{j}": max(0.0, first - each) for j, each in enumerate(yields)}
     slider = ss.Oscillator(mass=1.0, stiffness=1.0, damping=0.01, law=law)

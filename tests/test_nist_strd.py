@@ -13,8 +13,8 @@ import pytest
 from numpy import arctan, cos, exp, log, pi, sin
 from numpy.typing import NDArray
 
-from stickslip.curves.nonlinear import minimise
 from stickslip.errors import EstimateError
+from stickslip.law.nonlinear import minimise
 
 Array = NDArray[np.float64]
 FOLDER = Path(__file__).parent / "data" / "nist_strd"

@@ -10,8 +10,8 @@ import pytest
 
 import stickslip as ss
 from rigs import RIG, measured, told
+from stickslip.cycle.parts import join_sticks, overlapping
 from stickslip.errors import EstimateError, RecordError
-from stickslip.identify.parts import join_sticks, overlapping
 
 
 def pieces(record: ss.Record, *rows: int) -> list[ss.Record]:

@@ -22,12 +22,12 @@ from stickslip.plot.trajectory import (
     plot_phase,
     stretches,
 )
-from stickslip.solve.energy import energy
+from stickslip.solve.energies import energy
 from stickslip.solve.trajectory import Trajectory
 
 
 def motion(name: str, **run: float) -> Trajectory:
-    case = ss.scenario_case(name)
+    case = ss.systems.scenario_case(name)
     return ss.simulate(case.system, start=case.start, **(run or case.run))  # type: ignore[arg-type]
 
 
@@ -143,9 +143,9 @@ def test_frames_move_and_count_themselves(sticking: Trajectory) -> None:
 @pytest.fixture(scope="module")
 def lifting() -> Trajectory:
     """A mass on a belt that its load lifts off."""
-    pad = ss.Contact(ss.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    pad = ss.Contact(ss.laws.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
     springs = [[23.25, 3.9], [3.9, 7.75]]
-    system = ss.Structure(np.eye(2), np.zeros((2, 2)), springs, contacts=[pad], drive=ss.Belt(0.8))
+    system = ss.Structure(np.eye(2), np.zeros((2, 2)), springs, contacts=[pad], drive=ss.drives.Belt(0.8))
     return ss.simulate(system, duration=25, start={"x1": 0.3, "v1": 0.0})
 
 
@@ -169,8 +169,11 @@ def test_sliding_lies_on_the_wedge_of_friction_over_load(lifting: Trajectory) ->
 
 
 def test_each_contact_has_its_own_loop_and_shades() -> None:
-    pads = [ss.Contact(ss.Coulomb(0.3), [1, 0]), ss.Contact(ss.CompliantContact(0.2, stiffness=50.0), [-1, 1])]
-    drive = ss.HarmonicForce(1.2, frequency=0.13)
+    pads = [
+        ss.Contact(ss.laws.Coulomb(0.3), [1, 0]),
+        ss.Contact(ss.laws.CompliantContact(0.2, stiffness=50.0), [-1, 1]),
+    ]
+    drive = ss.drives.HarmonicForce(1.2, frequency=0.13)
     system = ss.Structure(np.eye(2), 0.05 * np.eye(2), [[3.0, -1.3], [-1.3, 2.9]], contacts=pads, drive=drive)
     run = ss.simulate(system, cycles=10)
     names = [plate.name for plate in figures(run)]

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from stickslip import Dahl, ElastoSlip, EstimateError, Record, fit_curve, friction_loops
+from stickslip import Record, fit_curve, friction_loops
+from stickslip.errors import EstimateError
+from stickslip.laws import Dahl, ElastoSlip
 
 FS, STROKE = 1000, 1e-4
 

@@ -68,7 +68,7 @@ def test_arithmetic_is_linear_in_the_columns(text: str, scales: dict[str, float]
     ],
 )  # fmt: skip
 def test_anything_else_is_refused_in_one_sentence(text: str) -> None:
-    with pytest.raises(ss.RecordError, match=r"a channel is|did you mean|choose one|names no column"):
+    with pytest.raises(ss.errors.RecordError, match=r"a channel is|did you mean|choose one|names no column"):
         linear(split_spec(text).arithmetic, {"x": "x", "F": "F"}, {})
 
 
@@ -76,7 +76,7 @@ def test_anything_else_is_refused_in_one_sentence(text: str) -> None:
 def test_no_text_gets_past_the_grammar(text: str) -> None:
     try:
         found = linear(split_spec(text).arithmetic, {"x": "x", "F": "F"}, {})
-    except ss.RecordError:
+    except ss.errors.RecordError:
         return
     assert set(found.scales) <= {"x", "F"}
     assert all(np.isfinite([*found.scales.values(), found.offset]))
@@ -85,7 +85,7 @@ def test_no_text_gets_past_the_grammar(text: str) -> None:
 def test_a_missing_column_lists_what_there_is(csv: Callable[..., Path]) -> None:
     path = csv("t,servo speed,force\n0,1,2\n1,2,3\n")
     with pytest.raises(
-        ss.RecordError, match=r"no column 'forse'; the file has t, servo speed, force; did you mean 'force'"
+        ss.errors.RecordError, match=r"no column 'forse'; the file has t, servo speed, force; did you mean 'force'"
     ):
         ss.read_record(path, channels={"force": "forse * 2 [N]"})
 
@@ -147,7 +147,7 @@ def test_a_sensitivity_turns_volts_into_the_quantity(
 def test_a_wrong_unit_or_name_is_one_sentence(
     csv: Callable[..., Path], channels: dict[str, str], units: dict[str, str] | None, words: str
 ) -> None:
-    with pytest.raises(ss.RecordError, match=words):
+    with pytest.raises(ss.errors.RecordError, match=words):
         ss.read_record(csv("t,F\n0,1\n1,2\n"), channels=channels, units=units)
 
 
@@ -222,16 +222,16 @@ def test_stamps_in_whole_milliseconds(fs: float) -> None:
 
 @pytest.mark.parametrize("stamps", [[1.0, 1.0, 1.0], [np.nan, np.nan], [3.0, 2.0, 1.0], [5.0]])
 def test_a_clock_that_stands_still_is_refused(stamps: list[float]) -> None:
-    with pytest.raises(ss.RecordError, match=r"does not advance; .* pass fs="):
+    with pytest.raises(ss.errors.RecordError, match=r"does not advance; .* pass fs="):
         fit_clock(np.array(stamps))
 
 
 def test_neither_time_nor_rate(csv: Callable[..., Path]) -> None:
     path = csv("x [m],v [m/s]\n1,2\n3,4\n")
-    with pytest.raises(ss.RecordError, match=r"neither time nor sampling rate; .* fs= in Hz.*columns: x, v"):
+    with pytest.raises(ss.errors.RecordError, match=r"neither time nor sampling rate; .* fs= in Hz.*columns: x, v"):
         ss.read_record(path)
     assert ss.read_record(path, fs=100).fs == 100
-    with pytest.raises(ss.RecordError, match="positive and finite"):
+    with pytest.raises(ss.errors.RecordError, match="positive and finite"):
         ss.read_record(path, fs=-1)
 
 
@@ -244,7 +244,7 @@ def test_rows_are_cut_before_the_clock_is_read(csv: Callable[..., Path]) -> None
     record = ss.read_record(path, rows=(1, -1))
     assert (record.stamps, record.fs, record.start) == (None, 1.0, 5.0)
     assert ss.read_record(path, rows=(2, None), fs=2).start == 1.0
-    with pytest.raises(ss.RecordError, match="hold nothing"):
+    with pytest.raises(ss.errors.RecordError, match="hold nothing"):
         ss.read_record(path, rows=(10, None))
 
 
@@ -266,21 +266,21 @@ def test_columns_of_one_name_are_told_apart_by_file(csv: Callable[..., Path]) ->
     record = ss.read_record(paths, channels={"x": "top.csv:x [m]", "z": "`base.csv:#2` - `top.csv:x` [m]"})
     assert record["x"].tolist() == [1, 2]
     assert record["z"].tolist() == [4, 4]
-    with pytest.raises(ss.RecordError, match=r"no column 'x'.*top.csv:x"):
+    with pytest.raises(ss.errors.RecordError, match=r"no column 'x'.*top.csv:x"):
         ss.read_record(paths, channels={"x": "x [m]"})
 
 
 @pytest.mark.parametrize("other", ["t,z [m]\n0,1\n1,2\n", "t,z [m]\n0,1\n1.1,2\n2.2,3\n", "t,z [m]\n5,1\n6,2\n7,3\n"])
 def test_files_with_clocks_of_their_own_are_refused(csv: Callable[..., Path], other: str) -> None:
     paths = [csv("t,x [m]\n0,1\n1,2\n2,3\n"), csv(other, "other.csv")]
-    with pytest.raises(ss.RecordError, match=r"share one clock.*synchronise"):
+    with pytest.raises(ss.errors.RecordError, match=r"share one clock.*synchronise"):
         ss.read_record(paths)
 
 
 def test_two_time_columns_of_one_title_must_agree(csv: Callable[..., Path]) -> None:
     head = 'Unit,"V",Unit,"V"\nChannel name,"F",Channel name,"x"\n'
     assert len(ss.read_record(csv(head + "0,1,0,2\n1,2,1,3\n"))) == 2
-    with pytest.raises(ss.RecordError, match="one record has one clock"):
+    with pytest.raises(ss.errors.RecordError, match="one record has one clock"):
         ss.read_record(csv(head + "0,1,0.5,2\n1,2,1.5,3\n"))
 
 
@@ -434,7 +434,7 @@ def test_instrument_files(dataset: Callable[[str], Path], name: str, fs: float, 
 
 @pytest.mark.parametrize("name", ["non_ascii_header.uff", "sample_dataset58_psd.uff"])
 def test_spectra_are_no_records(dataset: Callable[[str], Path], name: str) -> None:
-    with pytest.raises(ss.FormatError, match="no function over time"):
+    with pytest.raises(ss.errors.FormatError, match="no function over time"):
         ss.read_record(dataset("formats") / name)
 
 
@@ -484,5 +484,5 @@ def test_a_number_too_large_for_a_float_is_no_column(tmp_path: Path) -> None:
 @pytest.mark.parametrize("unit", ["(m", "m(", 'm"""'])
 def test_a_unit_that_is_no_unit_is_a_sentence(tmp_path: Path, unit: str) -> None:
     (tmp_path / "run.csv").write_text("t [s],x\n0,1\n1,2\n2,-1\n")
-    with pytest.raises(ss.RecordError, match="is not known"):
+    with pytest.raises(ss.errors.RecordError, match="is not known"):
         ss.read_record(tmp_path / "run.csv", units={"x": unit})

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.identify.presliding import HIGH, LOW, _branch
-from stickslip.identify.strokes import find_strokes
+from stickslip.cycle.before_slip import HIGH, LOW, _branch
+from stickslip.cycle.strokes import find_strokes
 
 Sets = Callable[[str], Path]
 WEIGHT = 0.0307 * 9.81  # of the paper slider [N]
@@ -18,7 +18,7 @@ SOUND = ("0.5Hz35lbtension", "0.5Hz36lbtension1amplitude", "0.5Hz80lbtension", "
 FAULTY = "0.5Hz0lbtension0.5amplitude"
 
 
-def frame(dataset: Sets, weight: str) -> ss.Findings:
+def frame(dataset: Sets, weight: str) -> ss.answers.Findings:
     """The shaken frame: M 3.0799 kg, C 0.669 N s/m, K 1191 N/m (Marino and Cicirello 2023)."""
     files = [dataset("frame_base_excited") / f"s_b_{weight}_{side}.mat" for side in "xy"]
     record = ss.read_record(files, channels={"x": "x [mm]", "z": "y [mm]"})
@@ -76,7 +76,7 @@ def test_the_band_brake_gives_way_with_play_before_it_slips(dataset: Sets, name:
 
 
 def test_the_band_brake_rings_after_slip_begins(dataset: Sets) -> None:
-    found = ss.breakaway(brake(dataset, "0.5Hz35lbtension"))
+    found = ss.cycle.breakaway(brake(dataset, "0.5Hz35lbtension"))
     assert found.ringing_forward is not None
     assert 41 < found.ringing_forward.value < 56
     assert found.ringing_back is not None
@@ -90,7 +90,7 @@ def test_the_band_brake_rings_after_slip_begins(dataset: Sets) -> None:
 
 def test_the_faulty_file_is_flagged_and_the_others_are_not(dataset: Sets) -> None:
     for name in (*SOUND, "0.5Hz20lbtension", "1Hz20lbtension", FAULTY):
-        found = ss.breakaway(brake(dataset, name))
+        found = ss.cycle.breakaway(brake(dataset, name))
         flagged = [each for each in found.estimates if "no steady friction" in each.status]
         assert bool(flagged) == (name == FAULTY), name
 
@@ -110,5 +110,5 @@ def test_paper_on_paper_is_loaded_at_the_rate_of_the_spring(
 
 def test_paper_on_paper_swings_when_it_is_pulled_fast(dataset: Sets) -> None:
     path = dataset("paper_stick_slip") / "k168Nm_v4300.mat"
-    found = ss.pulled_slider(ss.read_record(path, channels={"load": f"Fnorm * {WEIGHT} [N]"}))
+    found = ss.balance.pulled_slider(ss.read_record(path, channels={"load": f"Fnorm * {WEIGHT} [N]"}))
     assert found.regime == "inertial"

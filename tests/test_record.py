@@ -46,7 +46,7 @@ def test_rows_share_the_samples_of_their_record() -> None:
     ],
 )  # fmt: skip
 def test_details_that_make_no_sense_are_refused(details: dict[str, Any]) -> None:
-    with pytest.raises(ss.RecordError):
+    with pytest.raises(ss.errors.RecordError):
         Record.of({"x": [1.0, 2.0]}, fs=1.0).with_details("x", **details)
 
 
@@ -54,13 +54,13 @@ def test_details_that_make_no_sense_are_refused(details: dict[str, Any]) -> None
     ("name", "unit"), [("x", "furlong"), ("x", "N"), ("ch", ""), ("ch", 5), ("a b", "m"), (5, "m")]
 )
 def test_a_channel_has_a_name_and_a_unit_that_fit(name: Any, unit: Any) -> None:
-    with pytest.raises(ss.RecordError):
+    with pytest.raises(ss.errors.RecordError):
         Channel(name, unit)
 
 
 @pytest.mark.parametrize("step", [("do", "abc", ""), ("do", {1: 2}, ""), (5, {}, ""), ("do", {}, None)])
 def test_a_step_is_words_and_a_mapping(step: tuple[Any, Any, Any]) -> None:
-    with pytest.raises(ss.RecordError):
+    with pytest.raises(ss.errors.RecordError):
         Step(*step)
 
 

@@ -111,10 +111,10 @@ def test_a_start_that_can_not_be_followed_costs_no_map() -> None:
 
 def test_micro_slips_go_one_by_one_as_the_contact_is_damped() -> None:
     """Contact damping at which two micro-slips a stick become one, and none (thesis's case of 2.5 Hz, by bisection)."""
-    contact = ss.CompliantContact(1.1, stiffness=192000.0, damping=23.9)
-    rig = ss.Oscillator(2.42, 2310, contact, ss.HarmonicBase(0.65e-3, frequency=2.5))
-    two = ss.boundary(rig, "law.damping", between=(50.0, 138.5), kind="regime", precision=1e-5)
-    none = ss.boundary(rig, "law.damping", between=(200.0, 350.0), kind="regime", precision=1e-5)
+    contact = ss.laws.CompliantContact(1.1, stiffness=192000.0, damping=23.9)
+    rig = ss.Oscillator(2.42, 2310, contact, ss.drives.HarmonicBase(0.65e-3, frequency=2.5))
+    two = ss.maps.boundary(rig, "law.damping", between=(50.0, 138.5), kind="regime", precision=1e-5)
+    none = ss.maps.boundary(rig, "law.damping", between=(200.0, 350.0), kind="regime", precision=1e-5)
     assert two.value == pytest.approx(138.07, abs=0.15)
     assert none.value == pytest.approx(298.35, abs=0.15)
 
@@ -132,14 +132,14 @@ def test_the_boundary_is_den_hartogs(row: tuple[float, float, float]) -> None:
     if (ratio, damping) == (0.5, 0.0):
         pytest.skip("at half the natural frequency the sliding motion is not unique")
     system = forced(ratio, 0.5, damping_ratio=damping)
-    found = ss.boundary(system, "kinetic", between=(0.9 * load, min(1.1 * load, 0.99)))
+    found = ss.maps.boundary(system, "kinetic", between=(0.9 * load, min(1.1 * load, 0.99)))
     assert found.value == pytest.approx(load, rel=1e-8)
     assert found.kinds == (("no stops", "stops"),)
     assert np.all(found.multipliers < 1)
 
 
 def test_the_boundary_with_static_friction_is_shaws() -> None:
-    found = ss.boundary(BISTABLE, "amplitude", between=(1.2, 1.6), start={"x": 3.0})
+    found = ss.maps.boundary(BISTABLE, "amplitude", between=(1.2, 1.6), start={"x": 3.0})
     assert found.value == pytest.approx(1 / SHAW, rel=1e-8)
     assert found.kinds == (("stops", "no stops"),)
 
@@ -147,16 +147,18 @@ def test_the_boundary_with_static_friction_is_shaws() -> None:
 def test_a_boundary_is_followed_along_a_parameter() -> None:
     chosen = {b: r for b, z, r in ss.scenarios.grid("DH-2")["boundary"] if not z and b in (0.4, 0.8, 1.4)}
     places = np.array(sorted(chosen)) / TURN
-    found = ss.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along={"frequency": places})
+    found = ss.maps.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along={"frequency": places})
     assert found.values == pytest.approx([chosen[b] for b in sorted(chosen)], rel=1e-8)
     assert found.data["kinetic"].dims == ("frequency",)
 
 
 def test_other_questions_have_boundaries_too() -> None:
     """Held from where the friction is the force; and a user's own question."""
-    held = ss.boundary(forced(0.3, 0.5), "kinetic", between=(0.9, 1.2), kind="held", precision=1e-6)
+    held = ss.maps.boundary(forced(0.3, 0.5), "kinetic", between=(0.9, 1.2), kind="held", precision=1e-6)
     assert held.value == pytest.approx(1.0, rel=2e-4)
-    orbit = ss.boundary(forced(0.8, 0.5), "kinetic", between=(0.1, 0.7), kind=lambda found: found.orbit.amplitude > 2.5)
+    orbit = ss.maps.boundary(
+        forced(0.8, 0.5), "kinetic", between=(0.1, 0.7), kind=lambda found: found.orbit.amplitude > 2.5
+    )
     assert orbit.low[0].orbit.amplitude == pytest.approx(2.5, rel=1e-6)
 
 
@@ -167,18 +169,18 @@ def test_other_questions_have_boundaries_too() -> None:
         (lambda: ss.bifurcation(BISTABLE, "law", values=[1, 2]), "one number is varied"),
         (lambda: ss.bifurcation(BISTABLE, "amplitude", values=[1.0]), "two different finite values"),
         (lambda: ss.bifurcation(BISTABLE, "amplitude", values=[1.0, math.nan]), "finite"),
-        (lambda: ss.bifurcation(BISTABLE.having(drive=ss.Belt(0.1)), "kinetic", values=[1, 1.2]), "Belt"),
-        (lambda: ss.basins(BISTABLE.having(drive=ss.Release()), grid={"x": [0, 1], "v": [0, 1]}), "Release"),
+        (lambda: ss.bifurcation(BISTABLE.having(drive=ss.drives.Belt(0.1)), "kinetic", values=[1, 1.2]), "Belt"),
+        (lambda: ss.basins(BISTABLE.having(drive=ss.drives.Release()), grid={"x": [0, 1], "v": [0, 1]}), "Release"),
         (lambda: ss.basins(BISTABLE, grid={"x": [0, 1]}), "two start coordinates"),
         (lambda: ss.basins(BISTABLE, grid={"x": [0, 1], "v": [0]}), "two different finite values"),
         (lambda: ss.bifurcation(BISTABLE, "amplitude", values=["much"]), "made of numbers"),
         (lambda: ss.basins(BISTABLE, grid={"x": [0, 1], "q": [0, 1]}), "'q'"),
-        (lambda: ss.boundary(BISTABLE, "kinetc", between=(0.1, 0.2)), "kinetic"),
-        (lambda: ss.boundary(BISTABLE, "kinetic", between=(0.2, 0.2)), "two different values"),
-        (lambda: ss.boundary(forced(0.8, 0.5), "kinetic", between=(0.1, 0.2)), "widen between="),
-        (lambda: ss.boundary(BISTABLE, "kinetic", between=(0.1, 0.2), kind="colour"), "sticking"),
+        (lambda: ss.maps.boundary(BISTABLE, "kinetc", between=(0.1, 0.2)), "kinetic"),
+        (lambda: ss.maps.boundary(BISTABLE, "kinetic", between=(0.2, 0.2)), "two different values"),
+        (lambda: ss.maps.boundary(forced(0.8, 0.5), "kinetic", between=(0.1, 0.2)), "widen between="),
+        (lambda: ss.maps.boundary(BISTABLE, "kinetic", between=(0.1, 0.2), kind="colour"), "sticking"),
         (
-            lambda: ss.boundary(BISTABLE, "kinetic", between=(0.1, 0.2), along={"frequency": [1.0]}),
+            lambda: ss.maps.boundary(BISTABLE, "kinetic", between=(0.1, 0.2), along={"frequency": [1.0]}),
             "two different finite values",
         ),
     ],
@@ -192,42 +194,44 @@ def test_bad_questions_are_refused_in_a_sentence(ask, told) -> None:  # type: ig
 
 def test_a_tone_on_top_of_any_drive() -> None:
     """As two tones on the mass; and on the face of a belt, seen from the face."""
-    tone, drive = (0.3, 24 / TURN), ss.HarmonicForce(1.0, 0.8 / TURN)
-    both = ss.MultiTone([(1.0, 0.8 / TURN, 0.0), (*tone, 0.0)], on="force")
-    mine = forced(0.8, 0.5).having(drive=ss.Dithered(drive, *tone, on="force"))
+    tone, drive = (0.3, 24 / TURN), ss.drives.HarmonicForce(1.0, 0.8 / TURN)
+    both = ss.drives.MultiTone([(1.0, 0.8 / TURN, 0.0), (*tone, 0.0)], on="force")
+    mine = forced(0.8, 0.5).having(drive=ss.drives.Dithered(drive, *tone, on="force"))
     other = forced(0.8, 0.5).having(drive=both)
     one, two = (ss.simulate(system, duration=30.0) for system in (mine, other))
     assert [event[1:] for event in one.events] == [event[1:] for event in two.events]
     assert one.state(30.0)["x"] == pytest.approx(two.state(30.0)["x"], rel=1e-9)
     assert mine.drive.motion().period == pytest.approx(TURN / 0.8)
     # a belt whose face shakes: in the face's frame the mass feels its acceleration
-    belt = ss.Oscillator(mass=1, stiffness=0, law=ss.Coulomb(1.0), drive=ss.Dithered(ss.Belt(0.5), 0.01, 10.0))
+    belt = ss.Oscillator(
+        mass=1, stiffness=0, law=ss.laws.Coulomb(1.0), drive=ss.drives.Dithered(ss.drives.Belt(0.5), 0.01, 10.0)
+    )
     run = ss.simulate(belt, duration=2.0)
     assert run.sample([1.0], ("slip",))[0][0, 0] == pytest.approx(
         run.state(1.0)["v"] - 0.5 + 0.01 * TURN * 10 * math.sin(TURN * 10), abs=1e-12
     )
-    with pytest.raises(ss.ModelError, match="three"):
-        ss.Dithered(drive, *tone, on="roof")
+    with pytest.raises(ss.errors.ModelError, match="three"):
+        ss.drives.Dithered(drive, *tone, on="roof")
 
 
 def test_the_figures_show_what_was_found() -> None:
     diagram = ss.bifurcation(BISTABLE, "amplitude", values=[1.3, 1.6], starts=[{}, {"x": 3.0}], precision=1e-2)
     places = {"frequency": np.array([0.6, 0.8, 1.1]) / TURN}
-    curve = ss.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along=places, precision=1e-6)
+    curve = ss.maps.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along=places, precision=1e-6)
     found = ss.basins(BISTABLE.having(amplitude=1.25), grid={"x": np.linspace(-2, 2, 5), "v": np.linspace(-2, 2, 5)})
     for result, words in ((diagram, "held"), (curve, "Den Hartog"), (found, "2 + 0 stops")):
         [plate] = ss.figures(result)
         assert words in plate.svg()
-    line = next(line for line in ss.plot_boundary(curve).get_lines() if "Hartog" in str(line.get_label()))
+    line = next(line for line in ss.plot.plot_boundary(curve).get_lines() if "Hartog" in str(line.get_label()))
     assert np.interp(curve.places, *line.get_data()) == pytest.approx(curve.values, rel=2e-4)
 
 
 def test_the_figures_tell_an_angle_in_radians() -> None:
     lever = ss.Structure(
-        [[1.0]], [[0.1]], [[1.0]], contacts=[ss.Contact(ss.Coulomb(0.8), [1.0])], acts_on=[1.0], rotations=[1],
-        drive=ss.HarmonicForce(1.0, frequency=0.08),
+        [[1.0]], [[0.1]], [[1.0]], contacts=[ss.Contact(ss.laws.Coulomb(0.8), [1.0])], acts_on=[1.0], rotations=[1],
+        drive=ss.drives.HarmonicForce(1.0, frequency=0.08),
     )  # fmt: skip
-    map_ = ss.plot_basins(ss.basins(lever, grid={"x": [-1.0, 1.0], "v": [-1.0, 1.0]}))
+    map_ = ss.plot.plot_basins(ss.basins(lever, grid={"x": [-1.0, 1.0], "v": [-1.0, 1.0]}))
     assert (map_.get_xlabel(), map_.get_ylabel()) == ("x [rad]", "v [rad/s]")
-    diagram = ss.plot_bifurcation(ss.bifurcation(lever, "drive.amplitude", values=[1.0, 1.2]))
+    diagram = ss.plot.plot_bifurcation(ss.bifurcation(lever, "drive.amplitude", values=[1.0, 1.2]))
     assert diagram.axes[0].get_ylabel() == "displacement at phase zero [rad]"

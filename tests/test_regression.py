@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from stickslip.cycle.regression import regress_friction
 from stickslip.errors import EstimateError, RecordError
 from stickslip.files.read import read_record
-from stickslip.identify.regression import regress_friction
 from stickslip.record.record import Record
 
 FS = 1000.0
@@ -197,7 +197,7 @@ def test_emps_asymmetric(dataset):
 
 
 def test_rack_of_two_instruments(dataset):
-    from stickslip.signals.synchronise import synchronise
+    from stickslip.signals.clocks import synchronise
 
     folder = dataset("rack_two_daq")
     force = read_record(

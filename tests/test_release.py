@@ -7,7 +7,7 @@ import pytest
 
 import stickslip as ss
 from motions import free_decay
-from stickslip.identify.release import find_releases
+from stickslip.decay.release import find_releases
 from stickslip.signals.turns import turning_points
 
 
@@ -130,7 +130,7 @@ def no_decay(kind: str):
     ],
 )
 def test_what_is_no_free_decay_is_refused_in_one_sentence(kind, words):
-    with pytest.raises(ss.EstimateError, match=words) as error:
+    with pytest.raises(ss.errors.EstimateError, match=words) as error:
         find_releases(of(no_decay(kind), 100.0))
     assert str(error.value).count(". ") == 0
 
@@ -138,7 +138,7 @@ def test_what_is_no_free_decay_is_refused_in_one_sentence(kind, words):
 def test_a_driven_record_is_refused():
     values, fs, _ = free_decay()
     base = 0.1 * np.sin(np.arange(len(values)) / 10)
-    with pytest.raises(ss.EstimateError, match="channel z moves"):
+    with pytest.raises(ss.errors.EstimateError, match="channel z moves"):
         find_releases(ss.Record.of({"x": values, "z": base}, fs=fs))
     still = ss.Record.of({"x": values, "z": 1e-4 * np.random.default_rng(0).standard_normal(len(values))}, fs=fs)
     assert find_releases(still).ring_downs
@@ -146,13 +146,13 @@ def test_a_driven_record_is_refused():
 
 def test_a_record_without_motion_channels_is_refused():
     values, fs, _ = free_decay()
-    with pytest.raises(ss.RecordError, match="read from x, theta, v or a"):
+    with pytest.raises(ss.errors.RecordError, match="read from x, theta, v or a"):
         find_releases(of(values, fs, "pressure"))
-    with pytest.raises(ss.RecordError, match="not a motion"):
+    with pytest.raises(ss.errors.RecordError, match="not a motion"):
         find_releases(of(values, fs), channel="pressure")
     broken = values.copy()
     broken[50] = np.nan
-    with pytest.raises(ss.RecordError, match="no number"):
+    with pytest.raises(ss.errors.RecordError, match="no number"):
         find_releases(of(broken, fs))
 
 
@@ -174,7 +174,7 @@ def test_the_pendulums(dataset):
     assert found.held
     for name, frequency in (("60.txt", 4.73), ("100.txt", 2.76)):
         path = dataset("pendulum_bad_clock") / name
-        mended = ss.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
+        mended = ss.signals.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
         (found,) = find_releases(mended).ring_downs
         assert found.frequency == pytest.approx(frequency, rel=0.01)
         assert found.stopped
@@ -186,9 +186,11 @@ def test_a_spike_is_refused_with_what_takes_it_out(height):
     values = values + 1e-3 * np.random.default_rng(1).standard_normal(len(values))
     spiked = values.copy()
     spiked[355] += height
-    with pytest.raises(ss.RecordError, match=r"spikes \(row 355\).*remove_spikes"):
+    with pytest.raises(ss.errors.RecordError, match=r"spikes \(row 355\).*remove_spikes"):
         find_releases(of(spiked, fs))
-    assert ss.fit_decay(ss.remove_spikes(of(spiked, fs), "x")).damping_ratio.value == pytest.approx(0.0316, abs=1e-3)
+    assert ss.fit_decay(ss.signals.remove_spikes(of(spiked, fs), "x")).damping_ratio.value == pytest.approx(
+        0.0316, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("moment", [55, 90, 160, 215])

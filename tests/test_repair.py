@@ -9,19 +9,18 @@ import numpy as np
 import pytest
 
 from corpus import FS, Damaged, clean_records, damaged_records
-from stickslip import (
-    Record,
-    RecordError,
+from stickslip import Record, friction_force
+from stickslip.errors import RecordError
+from stickslip.record.flaws import runs_of
+from stickslip.signals import (
     fill_gaps,
     fill_missing,
-    friction_force,
     remove_drift,
     remove_spikes,
     repair_clock,
     resample,
     restore_clipped,
 )
-from stickslip.record.flaws import runs_of
 from stickslip.signals.interpolate import band_limited, bridge
 from test_check import read_pendulum, read_seal
 

@@ -15,16 +15,16 @@ import pytest
 
 import stickslip as ss
 from stickslip import whole
-from stickslip.analysis.comparison import compare
-from stickslip.analysis.findings import Findings
-from stickslip.analysis.questions import analyze
+from stickslip.answers.comparison import compare
+from stickslip.answers.findings import Findings
+from stickslip.answers.questions import analyze
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Estimate
-from stickslip.reports import folder as folder_module
-from stickslip.reports.folder import publish
-from stickslip.reports.page import report
-from stickslip.reports.summary import summary
-from stickslip.reports.words import doubts, headline, interval_of, value_of
+from stickslip.story import folder as folder_module
+from stickslip.story.folder import publish
+from stickslip.story.page import report
+from stickslip.story.summary import summary
+from stickslip.story.words import doubts, headline, interval_of, value_of
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
 
@@ -118,7 +118,7 @@ def test_the_page_holds_the_checksum_of_what_was_read(tmp_path: Path) -> None:
 def test_what_a_file_says_is_text_and_never_markup(demo: Findings, tmp_path: Path) -> None:
     evil = "<script>alert(1)</script>&\"'"
     estimate = Estimate.normal(evil, 1.0, sd=0.1, unit="N", method=evil, status=evil, checks=(evil,))
-    step = ss.Step(evil, {evil: [{"name": evil}]}, evil)
+    step = ss.record.Step(evil, {evil: [{"name": evil}]}, evil)
     record = replace(demo.record, history=(step,))
     findings = replace(demo, name=evil, notes=(evil,), settings={**demo.settings, "damper": evil}, record=record)
     for results, of in ((findings, None), ([estimate], record)):
@@ -278,7 +278,7 @@ def test_earlier_results_come_back_when_the_new_ones_can_not_take_their_place(
 
 
 def test_the_digits_of_an_interval_do_not_exclude_the_value():
-    from stickslip.reports.words import interval_of
+    from stickslip.story.words import interval_of
 
     wide = ss.Estimate("dry, whichever motion", 1.0003e-3, (0.0005e-3, 1.0012e-3), 2.5e-4, "m", "any")
     low, _, high, unit = interval_of(wide).split()

@@ -25,7 +25,7 @@ def test_two_crossing_chirps_do_not_make_a_ridge_jump() -> None:
     signal = np.sin(2 * np.pi * (30 * t + 6 * t**2)) + 0.7 * np.sin(2 * np.pi * (140 * t - 7 * t**2))
     wavelets = ss.wavelet_map(of(signal + RNG.normal(0, 0.2, t.size)), "a", frequencies=(10, 240), wavelet_frequency=10)
     step = float(wavelets.frequency[1] / wavelets.frequency[0])
-    ridges = ss.find_ridges(wavelets, span=30)
+    ridges = ss.signals.find_ridges(wavelets, span=30)
     assert len(ridges) >= 2
     for ridge in ridges:
         ratio = ridge.frequency[1:] / ridge.frequency[:-1]
@@ -39,7 +39,7 @@ def test_two_crossing_chirps_do_not_make_a_ridge_jump() -> None:
 def test_a_ridge_reads_a_tone_between_the_frequencies_of_the_map() -> None:
     t = np.arange(8000) / FS
     wavelets = ss.wavelet_map(of(np.sin(2 * np.pi * 47.3 * t)), "a", frequencies=(20, 100), voices=12)
-    ridge = ss.find_ridges(wavelets)[0]
+    ridge = ss.signals.find_ridges(wavelets)[0]
     inside = (ridge.time > 1) & (ridge.time < 7)
     np.testing.assert_allclose(ridge.frequency[inside], 47.3, rtol=2e-3)
 
@@ -48,7 +48,7 @@ def test_the_chalk_screech_is_a_ridge(dataset: Callable[[str], Path]) -> None:
     record = ss.read_record(dataset("audio") / "chalk_screech_01.ogg", channels={"sound": "#1"})
     part = record.between(record.start + 0.25, record.start + 0.7)
     wavelets = ss.wavelet_map(part, "sound", frequencies=(1500, 6000), wavelet_frequency=20)
-    ridge = ss.find_ridges(wavelets, span=25)[0]
+    ridge = ss.signals.find_ridges(wavelets, span=25)[0]
     assert ridge.duration > 0.05
     assert float(np.average(ridge.frequency, weights=ridge.modulus**2)) == pytest.approx(2950, rel=0.03)
 
@@ -60,7 +60,7 @@ def test_peaks_have_the_prominence_that_their_saddle_leaves() -> None:
         return height * np.exp(-(((t - at) / 0.15) ** 2)) * np.sin(2 * np.pi * frequency * t)
 
     signal = burst(1, 40, 1.0) + burst(3, 40, 0.5) + burst(5, 90, 0.25)
-    found = ss.local_maxima(ss.wavelet_map(of(signal), "a", frequencies=(10, 240), normalisation="amplitude"))
+    found = ss.signals.local_maxima(ss.wavelet_map(of(signal), "a", frequencies=(10, 240), normalisation="amplitude"))
     assert [(round(peak.time, 1), round(peak.frequency, -1)) for peak in found] == [
         (1.0, 40.0),
         (3.0, 40.0),
@@ -68,10 +68,10 @@ def test_peaks_have_the_prominence_that_their_saddle_leaves() -> None:
     ]
     assert found[0].prominence > found[1].prominence > found[2].prominence > 20
     assert found[0].modulus / found[1].modulus == pytest.approx(2, rel=0.01)
-    low = ss.local_maxima(ss.wavelet_map(of(signal), "a", frequencies=(10, 240)), prominence=200)
+    low = ss.signals.local_maxima(ss.wavelet_map(of(signal), "a", frequencies=(10, 240)), prominence=200)
     assert low == ()
     with pytest.raises(RecordError, match="more than 0 dB"):
-        ss.local_maxima(ss.wavelet_map(of(signal), "a"), prominence=0)
+        ss.signals.local_maxima(ss.wavelet_map(of(signal), "a"), prominence=0)
 
 
 @pytest.mark.parametrize("shape", ["impulse", "jump", "kink"])
@@ -88,7 +88,7 @@ def test_spikes_are_found_to_the_sample(shape: str) -> None:
             signal[row:] += sign
         else:
             signal[row:] += 0.2 * sign * (np.arange(count - row))
-    found = ss.find_spikes(of(signal + RNG.normal(0, 3e-3, count)), "a", frequencies=(100, 250), threshold=15)
+    found = ss.signals.find_spikes(of(signal + RNG.normal(0, 3e-3, count)), "a", frequencies=(100, 250), threshold=15)
     rows = np.array([spike.time for spike in found]) * FS
     assert len(rows) == len(at)
     assert np.abs(rows - at).max() <= 1.0001
@@ -97,10 +97,16 @@ def test_spikes_are_found_to_the_sample(shape: str) -> None:
 
 def test_noise_and_tones_have_no_spikes() -> None:
     t = np.arange(20000) / FS
-    assert ss.find_spikes(of(RNG.normal(size=t.size)), "a") == ()
-    assert ss.find_spikes(of(np.sin(2 * np.pi * 150 * t) * (np.sin(2 * np.pi * t) > 0.99) + RNG.normal(0, 0.2, t.size)),
-                          "a", frequencies=(15, 60)) == ()  # fmt: skip
-    assert ss.find_spikes(of(np.zeros(1000)), "a") == ()
+    assert ss.signals.find_spikes(of(RNG.normal(size=t.size)), "a") == ()
+    assert (
+        ss.signals.find_spikes(
+            of(np.sin(2 * np.pi * 150 * t) * (np.sin(2 * np.pi * t) > 0.99) + RNG.normal(0, 0.2, t.size)),
+            "a",
+            frequencies=(15, 60),
+        )
+        == ()
+    )
+    assert ss.signals.find_spikes(of(np.zeros(1000)), "a") == ()
 
 
 def test_a_signal_is_cut_where_it_was_put_together() -> None:
@@ -152,7 +158,7 @@ def test_a_band_brake_rings_after_slip_begins(dataset: Callable[[str], Path]) ->
     path = dataset("band_brake_damper") / "0.5Hz35lbtension.json"
     record = ss.read_record(path, channels={"friction": "c3 [kip]", "v": "#4 [in/s]"}, time="#1")
     wavelets = ss.wavelet_map(record, "friction", frequencies=(20, 120), wavelet_frequency=6)
-    peaks = [peak for peak in ss.local_maxima(wavelets, prominence=20, span=30) if peak.frequency > 30]
+    peaks = [peak for peak in ss.signals.local_maxima(wavelets, prominence=20, span=30) if peak.frequency > 30]
     velocity = np.convolve(record["v"], np.full(64, 1 / 64), "same")
     ways = np.sign(np.interp([peak.time for peak in peaks], record.time, velocity))
     forward, back = (
@@ -167,6 +173,6 @@ def test_a_steady_tone_is_a_line_and_no_island() -> None:
     t = np.arange(16000) / 4000
     tone = ss.Record.of({"a": 3 * np.sin(2 * np.pi * 45 * t)}, fs=4000)
     wavelets = ss.wavelet_map(tone, "a", frequencies=(5, 1000))
-    (ridge,) = ss.find_ridges(wavelets)
+    (ridge,) = ss.signals.find_ridges(wavelets)
     np.testing.assert_allclose(ridge.frequency, 45, rtol=3e-3)
-    assert ss.local_maxima(wavelets) == ()
+    assert ss.signals.local_maxima(wavelets) == ()

@@ -15,9 +15,9 @@ from stickslip.rig.sensor import SENSED, Digitiser, Mount, Noise, Sensor
 
 
 @cache
-def run() -> ss.Trajectory:
-    contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+def run() -> ss.solve.Trajectory:
+    contact = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     return ss.simulate(ss.Oscillator(mass=2.42, stiffness=2310, law=contact, drive=drive), cycles=10)
 
 
@@ -100,7 +100,7 @@ def test_a_unit_with_its_own_clock_is_found_by_synchronise() -> None:
     amplitude = {"noise": Noise(1e-7)}
     one = ss.Rig((Sensor("x", **amplitude),)).measure(run(), fs=1000, rng=1)  # type: ignore[arg-type]
     two = ss.Rig((Sensor("x", **amplitude),), offset=0.1234).measure(run(), fs=500, rng=2)  # type: ignore[arg-type]
-    offset = ss.clock_offset(one, two)
+    offset = ss.signals.clock_offset(one, two)
     assert abs(abs(offset.value) - 0.1234) < 1e-4
 
 
@@ -108,14 +108,14 @@ def test_a_unit_whose_clock_runs_fast_is_found() -> None:
     sensor = Sensor("x", noise=Noise(1e-8))
     true, fast = (ss.Rig((sensor,), rate=rate).measure(run(), fs=1000, rng=1) for rate in (0.0, 2e-3))
     assert len(fast) == pytest.approx(len(true) * 1.002, abs=2)
-    assert 1 / ss.clock_rate(true, fast).value - 1 == pytest.approx(2e-3, rel=0.01)
+    assert 1 / ss.signals.clock_rate(true, fast).value - 1 == pytest.approx(2e-3, rel=0.01)
 
 
 @pytest.mark.parametrize(("rig", "seen"), [(ss.Rig(), 0.0326), (ss.Rig().having("x", lag=1.461e-3), 0.0389)])
 def test_the_lead_of_the_accelerometer_is_made_of_three_parts(rig: ss.Rig, seen: float) -> None:
     """Section 2.3, in a free vibration: the lag of x, less that of the mount, and 2 zeta of the decay."""
     natural, ratio = 30.91, 0.0008
-    slider = ss.Oscillator(mass=1.0, stiffness=natural**2, damping=2 * ratio * natural, law=ss.Coulomb(0.0))
+    slider = ss.Oscillator(mass=1.0, stiffness=natural**2, damping=2 * ratio * natural, law=ss.laws.Coulomb(0.0))
     record = rig.measure(ss.simulate(slider, start={"x": 0.005}, duration=10), fs=4000, rng=2)
     turning = np.hanning(len(record)) * np.exp(-1j * natural * record.time)
     lead = np.angle(np.sum(turning * record["a"]) / np.sum(turning * -record["x"]))
@@ -151,7 +151,7 @@ def test_the_presets_are_the_rigs_of_the_thesis() -> None:
 def test_the_normal_direction_of_a_structure_is_heard() -> None:
     block = ss.Structure(
         mass=np.diag([1.0, 1.0]), damping=np.diag([0.1, 0.1]), stiffness=np.diag([100.0, 400.0]), contacts=(),
-        drive=ss.Release(),
+        drive=ss.drives.Release(),
     )  # fmt: skip
     motion = ss.simulate(block, start={"x1": 1e-2, "x2": 1e-2}, duration=2.0)
     rig = ss.Rig.linear_bearing().having("ay", of="a2", white=0.0).having("a", of="a1")
@@ -188,8 +188,8 @@ def test_any_run_can_be_measured() -> None:
     curved = ss.Oscillator(
         mass=1,
         stiffness=100,
-        law=ss.Stribeck(0.5, static=0.8, speed=0.01),
-        drive=ss.HarmonicBase(0.02, frequency=1.0),
+        law=ss.laws.Stribeck(0.5, static=0.8, speed=0.01),
+        drive=ss.drives.HarmonicBase(0.02, frequency=1.0),
     )
     record = ss.Rig().measure(ss.simulate(curved, cycles=3), fs=1000, rng=1)
     assert list(record) == ["x", "z", "a", "load"]

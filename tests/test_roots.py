@@ -93,15 +93,15 @@ def test_a_stop_of_a_millionth_of_a_period_is_seen() -> None:
         # after a slip to rest at the force's crest, friction falls short by `loaded` until the force has turned
         level = 1.0 - loaded
         system = ss.Oscillator(
-            mass=1, stiffness=0, law=ss.Coulomb(0.5, static=level), drive=ss.HarmonicForce(1.0, 1 / period)
+            mass=1, stiffness=0, law=ss.laws.Coulomb(0.5, static=level), drive=ss.drives.HarmonicForce(1.0, 1 / period)
         )
         wait = math.acos(level)
         run = ss.simulate(system, duration=period, start={"x": 0.0})
         first = run.pieces[0]
         assert first.mode == "forward"
         late = ss.simulate(
-            ss.Oscillator(mass=1, stiffness=0, law=ss.Coulomb(0.5, static=level),
-                          drive=ss.HarmonicForce(1.0, 1 / period, -wait - 1e-6 * period)),
+            ss.Oscillator(mass=1, stiffness=0, law=ss.laws.Coulomb(0.5, static=level),
+                          drive=ss.drives.HarmonicForce(1.0, 1 / period, -wait - 1e-6 * period)),
             duration=period,
         )  # fmt: skip
         assert late.pieces[0].mode == "stuck"
@@ -111,11 +111,11 @@ def test_a_stop_of_a_millionth_of_a_period_is_seen() -> None:
 
 def test_exits_at_one_instant_follow_the_law_s_order() -> None:
     """Two equal contacts of a symmetric structure break away and stop together, and stay equal."""
-    drive = ss.HarmonicForce(1.0, frequency=0.13)
-    contacts = [ss.Contact(ss.Coulomb(0.4, static=0.5), row) for row in ([1.0, 0.0], [0.0, 1.0])]
+    drive = ss.drives.HarmonicForce(1.0, frequency=0.13)
+    contacts = [ss.Contact(ss.laws.Coulomb(0.4, static=0.5), row) for row in ([1.0, 0.0], [0.0, 1.0])]
     pair = ss.Structure(np.eye(2), 0.02 * np.eye(2), [[2.0, -0.5], [-0.5, 2.0]], contacts=contacts, drive=drive,
                         acts_on=[1.0, 1.0])  # fmt: skip
-    alone = ss.Oscillator(mass=1, stiffness=1.5, damping=0.02, law=ss.Coulomb(0.4, static=0.5), drive=drive)
+    alone = ss.Oscillator(mass=1, stiffness=1.5, damping=0.02, law=ss.laws.Coulomb(0.4, static=0.5), drive=drive)
     run, one = ss.simulate(pair, cycles=5), ss.simulate(alone, cycles=5)
     times = np.linspace(0, run.duration, 2001)
     moved, known = run.sample(times, ("x",))[0], one.sample(times, ("x",))[0]
@@ -128,7 +128,7 @@ def test_exits_at_one_instant_follow_the_law_s_order() -> None:
 
 def test_stop_and_full_load_at_one_instant() -> None:
     """The mass comes to rest exactly where the spring pulls with the static force: the tie holds it."""
-    system = ss.Oscillator(mass=1, stiffness=4, law=ss.Coulomb(1.0))
+    system = ss.Oscillator(mass=1, stiffness=4, law=ss.laws.Coulomb(1.0))
     run = ss.simulate(system, duration=20, start={"x": 1.25})  # turns at -0.75 and 0.25, where 4 x = 1
     assert [event.kind for event in run.events] == ["reversal", "stick"]
     assert run.status == "at rest"
@@ -138,7 +138,7 @@ def test_stop_and_full_load_at_one_instant() -> None:
 
 
 def test_the_end_of_the_time_on_an_event_keeps_the_event() -> None:
-    system = ss.Oscillator(mass=1, stiffness=4, law=ss.Coulomb(1.0))
+    system = ss.Oscillator(mass=1, stiffness=4, law=ss.laws.Coulomb(1.0))
     run = ss.simulate(system, duration=math.pi / 2, start={"x": 3.0})  # the first reversal
     assert len(run.modes) == 1
     assert run.durations[0] == pytest.approx(math.pi / 2, rel=1e-15)
@@ -150,7 +150,9 @@ def test_the_end_of_the_time_on_an_event_keeps_the_event() -> None:
 def test_repeated_and_zero_eigenvalues_are_exact(stiffness: float, damping: float) -> None:
     """Free, overdamped without a spring, critical, and a hair beside critical, under a pull that grows linearly."""
     speed = 0.3
-    system = ss.Oscillator(mass=1, stiffness=stiffness, damping=damping, law=ss.Coulomb(0.0), drive=ss.Ramp(speed))
+    system = ss.Oscillator(
+        mass=1, stiffness=stiffness, damping=damping, law=ss.laws.Coulomb(0.0), drive=ss.drives.Ramp(speed)
+    )
     run = ss.simulate(system, duration=4.0, start={"x": 0.0, "v": 0.5})
     x = run.state(4.0)["x"]
     with np.errstate(all="ignore"):

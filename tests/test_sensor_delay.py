@@ -59,14 +59,14 @@ def test_the_spectrum_of_a_derivative_is_that_of_the_measured_one(order: int, ch
 @pytest.mark.parametrize("whole", [1, -7])
 def test_no_lag_between_samples_is_favoured(part: float, whole: int) -> None:
     delay = (whole + part) / FS
-    found = [ss.sensor_delay(ring_down(delay, seed)).delay for seed in range(5)]
+    found = [ss.balance.sensor_delay(ring_down(delay, seed)).delay for seed in range(5)]
     errors = np.array([estimate.value + delay for estimate in found])
     assert abs(errors.mean()) < 3.5 * bound() / math.sqrt(len(errors))
     assert found[0].sd < 1.1 * bound()
 
 
 def test_it_reaches_its_bound_and_the_interval_holds() -> None:
-    found = [ss.sensor_delay(ring_down(1.2585e-3, seed)).delay for seed in range(100, 125)]
+    found = [ss.balance.sensor_delay(ring_down(1.2585e-3, seed)).delay for seed in range(100, 125)]
     errors = np.array([estimate.value + 1.2585e-3 for estimate in found])
     assert np.sqrt(np.mean(errors**2)) < 1.1 * bound() * (1 + 2 / math.sqrt(2 * len(errors)))
     assert np.mean([estimate.sd for estimate in found]) < 1.1 * bound()
@@ -85,7 +85,7 @@ def test_any_two_channels_of_one_motion_are_aligned(channels: tuple[str, str], d
         return np.asarray(clean + 1e-3 * np.std(clean) * rng.standard_normal(times.size))
 
     first, second = channels
-    found = ss.sensor_delay(
+    found = ss.balance.sensor_delay(
         ss.Record.of({first: reading(first, T), second: reading(second, T - delay)}, fs=FS), channels=channels
     )
     assert "more than noise" not in found.status
@@ -94,33 +94,36 @@ def test_any_two_channels_of_one_motion_are_aligned(channels: tuple[str, str], d
 
 
 def test_the_least_residual_is_drawn_half_way_between_samples() -> None:
-    errors = [ss.sensor_delay(ring_down(5.1 / FS, seed), method="residual").delay.value + 5.1 / FS for seed in range(4)]
+    errors = [
+        ss.balance.sensor_delay(ring_down(5.1 / FS, seed), method="residual").delay.value + 5.1 / FS
+        for seed in range(4)
+    ]
     assert max(errors) < -0.05 / FS  # the phase is 1e-6 s off
-    assert "interpolation" in ss.sensor_delay(ring_down(5.1 / FS, 1), method="residual").status
+    assert "interpolation" in ss.balance.sensor_delay(ring_down(5.1 / FS, 1), method="residual").status
     with pytest.raises(EstimateError, match="2 records"):
-        ss.sensor_delay([ring_down(0.0, 1), ring_down(0.0, 2)], method="residual")
+        ss.balance.sensor_delay([ring_down(0.0, 1), ring_down(0.0, 2)], method="residual")
 
 
 def test_the_least_residual_at_a_few_samples_a_second() -> None:
     t, rng = np.arange(400) / 8, np.random.default_rng(0)
     x, a = (sign * np.sin(t) + 1e-6 * rng.standard_normal(t.size) for sign in (1, -1))
-    found = ss.sensor_delay(ss.Record.of({"x": x, "a": a}, fs=8.0), method="residual")
+    found = ss.balance.sensor_delay(ss.Record.of({"x": x, "a": a}, fs=8.0), method="residual")
     assert found.delay.includes(0.0)
 
 
 def test_a_stated_mount_is_held_and_a_hidden_one_is_said() -> None:
     record = ring_down(1.2585e-3, 3, mount=(125.0, 0.1))
-    blind = ss.sensor_delay(record)
+    blind = ss.balance.sensor_delay(record)
     assert blind.delay.value + 1.2585e-3 == pytest.approx(2 * 0.1 / (2 * math.pi * 125), rel=0.02)
     assert "mount of a delays" in blind.status
-    told = ss.sensor_delay(record.with_details("a", mount=(125.0, 0.1)))
+    told = ss.balance.sensor_delay(record.with_details("a", mount=(125.0, 0.1)))
     assert abs(told.delay.value + 1.2585e-3) < 4 * bound()
     assert told.mount_frequency is None
     assert "held at 125 Hz" in told.delay.checks[0]
 
 
 def test_a_whole_cycle_more_is_named() -> None:
-    found = ss.sensor_delay(ring_down(1.2585e-3, 3))
+    found = ss.balance.sensor_delay(ring_down(1.2585e-3, 3))
     assert "repeats itself" in found.status
     assert any(abs(other + 1.2585e-3 - 2 * math.pi / RATE) < 2e-3 for other in found.others)
 
@@ -128,7 +131,7 @@ def test_a_whole_cycle_more_is_named() -> None:
 def test_a_sensor_of_the_wrong_sign_is_found() -> None:
     record = ring_down(1.2585e-3, 3)
     turned = record.with_channel("a", -record["a"], unit="m/s^2")
-    found = ss.sensor_delay(turned)
+    found = ss.balance.sensor_delay(turned)
     assert found.gain.value == pytest.approx(-1, abs=1e-3)
     assert "wrong sign" in found.status
 
@@ -138,9 +141,9 @@ LAG = 0.0389 / 30.91
 
 
 @cache
-def moved(frequency: float, amplitude: float, kinetic: float) -> ss.Trajectory:
-    contact = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9) if kinetic else ss.Coulomb(0.0)
-    drive = ss.HarmonicBase(amplitude, frequency=frequency) if frequency else ss.Release()
+def moved(frequency: float, amplitude: float, kinetic: float) -> ss.solve.Trajectory:
+    contact = ss.laws.CompliantContact(kinetic, stiffness=192000, damping=23.9) if kinetic else ss.laws.Coulomb(0.0)
+    drive = ss.drives.HarmonicBase(amplitude, frequency=frequency) if frequency else ss.drives.Release()
     slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.1196, law=contact, drive=drive)
     return ss.simulate(slider, duration=10.0, start={} if frequency else {"x": amplitude})
 
@@ -152,7 +155,7 @@ def measured(frequency: float, amplitude: float, kinetic: float, seed: int = 1) 
 
 
 def test_runs_with_friction_tell_the_mount_and_the_delay() -> None:
-    found = ss.sensor_delay(measured(*FRICTION[0]))
+    found = ss.balance.sensor_delay(measured(*FRICTION[0]))
     assert found.mount_frequency is not None
     assert found.mount_damping is not None
     assert found.mount_frequency.includes(125)
@@ -163,7 +166,7 @@ def test_runs_with_friction_tell_the_mount_and_the_delay() -> None:
 
 def test_several_runs_are_answered_together() -> None:
     runs = [measured(*each) for each in FRICTION]
-    alone, joint = ss.sensor_delay(runs[0]), ss.sensor_delay(runs)
+    alone, joint = ss.balance.sensor_delay(runs[0]), ss.balance.sensor_delay(runs)
     assert joint.status == "ok"  # no delay of whole cycles fits all of them
     assert joint.delay.sd < alone.delay.sd
     assert abs(joint.delay.value + LAG) < 3 * joint.delay.sd
@@ -173,7 +176,7 @@ def test_several_runs_are_answered_together() -> None:
 def test_what_is_found_is_used() -> None:
     """The whole way: the delay and the mount found in one run, stated for another, and the friction of that."""
     runs = [measured(*each) for each in FRICTION]
-    found = ss.sensor_delay([runs[0], runs[2]])
+    found = ss.balance.sensor_delay([runs[0], runs[2]])
     assert found.mount_frequency is not None
     assert found.mount_damping is not None
     record = runs[1].with_details("a", mount=(found.mount_frequency.value, found.mount_damping.value))
@@ -192,16 +195,16 @@ def test_swapped_channels_are_found() -> None:
     record = ring_down(1.2585e-3, 3)
     swapped = ss.Record.of({"x": record["a"], "a": record["x"]}, fs=FS)
     with pytest.raises(EstimateError, match="swapped"):
-        ss.sensor_delay(swapped)
+        ss.balance.sensor_delay(swapped)
     friction = measured(*FRICTION[0])
     swapped = ss.Record.of({"x": friction["a"], "a": friction["x"]}, fs=4000)
     with pytest.raises(EstimateError, match="swapped"):
-        ss.sensor_delay(swapped)
+        ss.balance.sensor_delay(swapped)
 
 
 def test_a_wrong_unit_is_named() -> None:
     record = ring_down(1.2585e-3, 3)
-    found = ss.sensor_delay(record.with_channel("a", record["a"] / 9.80665, unit="m/s^2"))
+    found = ss.balance.sensor_delay(record.with_channel("a", record["a"] / 9.80665, unit="m/s^2"))
     assert "0.102 times" in found.status
     assert found.delay.includes(-1.2585e-3)
 
@@ -212,16 +215,16 @@ def test_noise_that_is_not_white_widens_the_interval() -> None:
     slow = np.fft.rfft(rng.standard_normal(T.size))
     slow *= 10 / np.maximum(np.fft.rfftfreq(T.size, 1 / FS), 0.5)
     louder = record.with_channel("a", record["a"] + 0.04 * np.fft.irfft(slow, T.size), unit="m/s^2", noise=0.04)
-    found = ss.sensor_delay(louder).delay
+    found = ss.balance.sensor_delay(louder).delay
     assert 1.5 < found.sd / bound() < 4  # (1 + (10/5)^2)^(1/2) = 2.2 at the line
     assert found.includes(-1.2585e-3)
 
 
 def test_a_long_record_in_blocks_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     record = ring_down(1.2585e-3, 3)
-    whole = ss.sensor_delay(record).delay
+    whole = ss.balance.sensor_delay(record).delay
     monkeypatch.setattr("stickslip.signals.alignment.BLOCK", 2000)
-    parts = ss.sensor_delay(record).delay
+    parts = ss.balance.sensor_delay(record).delay
     assert abs(parts.value - whole.value) < 2 * bound()
     assert parts.sd == pytest.approx(whole.sd, rel=0.15)
 
@@ -230,10 +233,10 @@ def test_channels_that_do_not_follow_one_motion_are_told() -> None:
     rng = np.random.default_rng(2)
     record = ss.Record.of({"x": np.sin(30 * T), "a": np.sin(47 * T) + 0.01 * rng.standard_normal(T.size)}, fs=FS)
     with pytest.raises(EstimateError, match="does not follow"):
-        ss.sensor_delay(record)
+        ss.balance.sensor_delay(record)
     other = ring_down(0.0, 1)
     other = other.with_channel("a", other["a"] + 0.5 * np.sin(40 * T), unit="m/s^2")
-    assert "more than noise" in ss.sensor_delay(other).status
+    assert "more than noise" in ss.balance.sensor_delay(other).status
 
 
 @pytest.mark.parametrize(
@@ -243,19 +246,19 @@ def test_what_can_not_be_compared_is_refused(channels: tuple[str, str], match: s
     record = ring_down(0.0, 1)
     record = record.with_channel("load", record["a"], unit="N")
     with pytest.raises(EstimateError, match=match):
-        ss.sensor_delay(record, channels=channels)
+        ss.balance.sensor_delay(record, channels=channels)
 
 
 def test_what_can_not_be_answered_is_refused() -> None:
     rng = np.random.default_rng(1)
     silent = ss.Record.of({"x": rng.standard_normal(6000), "a": rng.standard_normal(6000)}, fs=FS)
     with pytest.raises(EstimateError, match="no line"):
-        ss.sensor_delay(silent)
+        ss.balance.sensor_delay(silent)
     with pytest.raises(EstimateError, match="does not change"):
-        ss.sensor_delay(ss.Record.of({"x": np.zeros(6000), "a": rng.standard_normal(6000)}, fs=FS))
+        ss.balance.sensor_delay(ss.Record.of({"x": np.zeros(6000), "a": rng.standard_normal(6000)}, fs=FS))
     with pytest.raises(EstimateError, match="magic"):
-        ss.sensor_delay(silent, method="magic")
+        ss.balance.sensor_delay(silent, method="magic")
     with pytest.raises(EstimateError, match="no record"):
-        ss.sensor_delay([])
+        ss.balance.sensor_delay([])
     with pytest.raises(RecordError, match="missing"):
-        ss.sensor_delay(ss.Record.of({"x": T}, fs=FS))
+        ss.balance.sensor_delay(ss.Record.of({"x": T}, fs=FS))

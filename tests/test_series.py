@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from stickslip.drives import Belt, Drive, HarmonicBase, HarmonicForce, RecordedBase
+from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, RecordedBase
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact
@@ -23,7 +23,7 @@ from stickslip.laws.series import InSeries
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.tabulated import Tabulated
 from stickslip.oscillator import Oscillator
-from stickslip.solve.energy import energy
+from stickslip.solve.energies import energy
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
 

@@ -18,7 +18,7 @@ from PIL import Image
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.files.write import WRITERS
-from stickslip.reports import simulation
+from stickslip.story import simulation
 
 SLIDER = """
 system = { mass = "2.42 kg", stiffness = 2310 }
@@ -92,7 +92,7 @@ def test_a_file_gives_a_folder_that_holds_the_motion() -> None:
     assert {path.name for path in folder.iterdir()} == {"results.json", "events.csv", "record.csv", "figures"}
     assert {path.stem for path in (folder / "figures").iterdir()} == FIGURES
     record = ss.read_record(folder / "record.csv")
-    motion = ss.simulate(ss.read_system("slider.toml").system, cycles=30)
+    motion = ss.simulate(ss.systems.read_system("slider.toml").system, cycles=30)
     assert record.equals(motion.record(fs=1000))
     events = np.genfromtxt(folder / "events.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
     known = [(*event[:4], event.contact + 1) for event in motion.events]
@@ -111,7 +111,7 @@ def test_every_format_holds_the_same_record(form: str) -> None:
     assert f".{form}" in WRITERS
     assert run("slider.toml", "--format", form, "--output", "out", "--cycles", "2").exit_code == 0
     record = ss.read_record(f"out/record.{form}")
-    assert record.equals(ss.simulate(ss.read_system("slider.toml").system, cycles=2).record(fs=1000))
+    assert record.equals(ss.simulate(ss.systems.read_system("slider.toml").system, cycles=2).record(fs=1000))
 
 
 def test_the_json_is_the_folder_s_and_alone_writes_nothing() -> None:
@@ -126,7 +126,7 @@ def test_the_json_is_the_folder_s_and_alone_writes_nothing() -> None:
 
 def test_work_and_shares_are_those_of_the_exact_motion() -> None:
     found = quantities(told("DH-3 b=0.25 r=0.9", "--cycles", "100"))
-    orbit = ss.steady_state(ss.scenario_case("DH-3 b=0.25 r=0.9").system)
+    orbit = ss.steady_state(ss.systems.scenario_case("DH-3 b=0.25 r=0.9").system)
     assert found["displacement, to"] == pytest.approx(orbit.amplitude, rel=1e-9)
     stuck = sum(piece.duration for piece in orbit.orbit.pieces if piece.mode == "stuck") / orbit.period
     assert found["share of time in stick"] == pytest.approx(stuck, abs=0.01)
@@ -148,7 +148,7 @@ def test_several_masses_are_told_shown_and_written() -> None:
     assert (found["system"]["mass"], found["drive"]["speed"]) == ([[1.0, 0.0], [0.0, 1.0]], 0.8)
     numbers = quantities(found)
     assert numbers["normal load, from"] == 0
-    motion = ss.simulate(ss.read_system("squeal.toml").system, duration=25, start={"x1": 0.3, "v1": 0.0})
+    motion = ss.simulate(ss.systems.read_system("squeal.toml").system, duration=25, start={"x1": 0.3, "v1": 0.0})
     flown = sum(piece.duration for piece in motion.pieces if piece.mode == "lifted") / 25
     assert numbers["share of time in flight"] == pytest.approx(flown, rel=1e-12)
     assert numbers["energy unaccounted for, relative"] < 1e-12
@@ -250,7 +250,7 @@ def test_wrong_use_is_one_sentence_and_leaves_nothing(arguments: list[str], word
 
 def test_a_run_that_can_not_be_trusted_ends_with_1(monkeypatch: pytest.MonkeyPatch) -> None:
     def trembling(*_: object, **__: object) -> None:
-        raise ss.SolveError("too many events", "a period has at most 10000", "check the law")
+        raise ss.errors.SolveError("too many events", "a period has at most 10000", "check the law")
 
     monkeypatch.setattr(simulation, "simulate", trembling)
     result = run("FD-4")
@@ -284,7 +284,7 @@ def test_an_interrupted_run_keeps_what_was_done_marked_so(monkeypatch: pytest.Mo
 
     whole = simulation.simulate
 
-    def interrupted(*arguments: Any, **options: Any) -> ss.Trajectory:
+    def interrupted(*arguments: Any, **options: Any) -> ss.solve.Trajectory:
         return replace(whole(*arguments, **options), status="interrupted")
 
     monkeypatch.setattr(simulation, "simulate", interrupted)

@@ -36,7 +36,7 @@ def rung(
 
 
 def test_frequency_damping_and_difference_of_closed_forms() -> None:
-    found = ss.slip_ringing(rung())
+    found = ss.cycle.slip_ringing(rung())
     truth = {
         "forward": FORWARD, "back": BACK, "difference": FORWARD - BACK,
         "damping_forward": 10 / np.hypot(10, 2 * np.pi * FORWARD), "damping_back": 10 / np.hypot(10, 2 * np.pi * BACK),
@@ -53,7 +53,7 @@ def test_frequency_damping_and_difference_of_closed_forms() -> None:
 def test_intervals_hold_the_truth() -> None:
     held = []
     for seed in range(40):
-        found = ss.slip_ringing(rung(noise=0.05, seed=seed))
+        found = ss.cycle.slip_ringing(rung(noise=0.05, seed=seed))
         for estimate, true in ((found.forward, FORWARD), (found.back, BACK), (found.difference, FORWARD - BACK)):
             assert estimate is not None
             held.append(estimate.interval[0] <= true <= estimate.interval[1])
@@ -62,7 +62,7 @@ def test_intervals_hold_the_truth() -> None:
 
 def test_neither_unit_nor_rate_matters() -> None:
     one, large, fast = (
-        ss.slip_ringing(each) for each in (rung(noise=0), rung(noise=0, scale=1e4), rung(4000, noise=0))
+        ss.cycle.slip_ringing(each) for each in (rung(noise=0), rung(noise=0, scale=1e4), rung(4000, noise=0))
     )
     for name in ("forward", "back", "damping_forward", "amplitude_back"):
         assert getattr(large, name).value == pytest.approx(getattr(one, name).value, rel=1e-6)
@@ -71,25 +71,25 @@ def test_neither_unit_nor_rate_matters() -> None:
 
 def test_two_alike_directions_have_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(globals(), "BACK", FORWARD)
-    differences = [ss.slip_ringing(rung(noise=0.05, seed=seed)).verdict for seed in range(10)]
+    differences = [ss.cycle.slip_ringing(rung(noise=0.05, seed=seed)).verdict for seed in range(10)]
     assert differences.count("no difference can be told") >= 8
 
 
 def test_no_ringing_is_refused() -> None:
     for seed in range(10):
         with pytest.raises(EstimateError, match="no ringing"):
-            ss.slip_ringing(rung(size=0.0, noise=0.1, seed=seed))
+            ss.cycle.slip_ringing(rung(size=0.0, noise=0.1, seed=seed))
     with pytest.raises(EstimateError, match="no ringing"):
-        ss.slip_ringing(rung(size=0.01, noise=0.0))
+        ss.cycle.slip_ringing(rung(size=0.01, noise=0.0))
     with pytest.raises(RecordError, match="friction"):
-        ss.slip_ringing(ss.Record.of({"x": np.sin(np.arange(4000) / 100)}, fs=1000))
+        ss.cycle.slip_ringing(ss.Record.of({"x": np.sin(np.arange(4000) / 100)}, fs=1000))
 
 
 def test_friction_from_a_balance_is_refused() -> None:
-    slider = ss.Oscillator(3.0, 1200, law=ss.Coulomb(1.0), drive=ss.HarmonicBase(3e-3, frequency=1.0))
+    slider = ss.Oscillator(3.0, 1200, law=ss.laws.Coulomb(1.0), drive=ss.drives.HarmonicBase(3e-3, frequency=1.0))
     record = ss.friction_force(ss.simulate(slider, cycles=6).record(fs=500), mass=3.0, stiffness=1200)
     with pytest.raises(RecordError, match="balance"):
-        ss.slip_ringing(record)
+        ss.cycle.slip_ringing(record)
 
 
 def test_what_is_taken_for_the_course_of_the_friction_widens_the_interval() -> None:
@@ -102,7 +102,7 @@ def test_what_is_taken_for_the_course_of_the_friction_widens_the_interval() -> N
     record = ss.Record.of(
         {"x": np.sin(np.pi * time) / np.pi, "friction": way * (1 + 0.3 * ring + bent) + noises}, fs=1000
     )
-    found = ss.slip_ringing(record)
+    found = ss.cycle.slip_ringing(record)
     assert found.forward is not None
     assert "takes part of the ring" in found.forward.status
     low, high = found.forward.interval

@@ -23,16 +23,16 @@ def tone(level: float, *, frequency: float = 1000.0, modulation: float = 0.0, du
 @pytest.mark.parametrize(("level", "sone"), [(40.0, 1.0), (60.0, 4.0), (80.0, 16.0)])
 def test_a_tone_of_1_khz_doubles_its_loudness_every_ten_decibel(level: float, sone: float) -> None:
     pytest.importorskip("mosqito", reason="the extra sound is not installed")
-    assert ss.sound_quality(tone(level, duration=0.3)).loudness == pytest.approx(sone, rel=0.05)
+    assert ss.squeak.sound_quality(tone(level, duration=0.3)).loudness == pytest.approx(sone, rel=0.05)
 
 
 def test_roughness_and_sharpness_have_their_units() -> None:
     pytest.importorskip("mosqito", reason="the extra sound is not installed")
-    rough = ss.sound_quality(tone(60.0, modulation=70.0))  # 1 asper: 60 dB at 1 kHz, 100 % at 70 Hz
+    rough = ss.squeak.sound_quality(tone(60.0, modulation=70.0))  # 1 asper: 60 dB at 1 kHz, 100 % at 70 Hz
     assert rough.roughness == pytest.approx(1.0, rel=0.17)  # a listener tells 17 % apart
-    smooth = ss.sound_quality(tone(60.0))
+    smooth = ss.squeak.sound_quality(tone(60.0))
     assert smooth.roughness < 0.1
-    low, high = (ss.sound_quality(tone(60.0, frequency=f, duration=0.3)).sharpness for f in (500.0, 6000.0))
+    low, high = (ss.squeak.sound_quality(tone(60.0, frequency=f, duration=0.3)).sharpness for f in (500.0, 6000.0))
     assert low < smooth.sharpness < high
     assert smooth.sharpness == pytest.approx(1.0, rel=0.1)
 
@@ -41,10 +41,10 @@ def test_a_recording_at_another_rate_is_as_loud() -> None:
     pytest.importorskip("mosqito", reason="the extra sound is not installed")
     t = np.arange(5000) / 10_000
     slow = ss.Record.of({"sound": np.sqrt(2) * 0.02 * np.sin(2 * np.pi * 1000 * t)}, fs=10_000)
-    found = ss.sound_quality(slow)
-    assert found.loudness == pytest.approx(ss.sound_quality(tone(60.0, duration=0.5)).loudness, rel=0.01)
+    found = ss.squeak.sound_quality(slow)
+    assert found.loudness == pytest.approx(ss.squeak.sound_quality(tone(60.0, duration=0.5)).loudness, rel=0.01)
     assert found.to_dict()["method"] == "MoSQITo, of what lies below 5000 Hz"
-    short = ss.sound_quality(slow.rows(0, 1000))
+    short = ss.squeak.sound_quality(slow.rows(0, 1000))
     assert np.isnan(short.roughness)
     assert short.to_dict()["roughness"] is None
 
@@ -59,14 +59,14 @@ def test_a_recording_at_another_rate_is_as_loud() -> None:
     ],
 )
 def test_what_has_no_loudness_is_refused(record: ss.Record, words: str) -> None:
-    with pytest.raises(ss.RecordError, match=words):
-        ss.sound_quality(record)
+    with pytest.raises(ss.errors.RecordError, match=words):
+        ss.squeak.sound_quality(record)
 
 
 def test_without_the_program_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mosqito", None)
-    with pytest.raises(ss.FormatError, match=r"\.\[sound\]"):
-        ss.sound_quality(tone(60.0, duration=0.2))
+    with pytest.raises(ss.errors.FormatError, match=r"\.\[sound\]"):
+        ss.squeak.sound_quality(tone(60.0, duration=0.2))
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_without_the_program_the_error_names_the_extra(monkeypatch: pytest.Monke
     ids=["sine", "noise"],
 )
 def test_crest_factor_and_kurtosis(values: np.ndarray, crest: float, kurtosis: float) -> None:
-    found = ss.impulsiveness(ss.Record.of({"a": values}, fs=10_000))
+    found = ss.squeak.impulsiveness(ss.Record.of({"a": values}, fs=10_000))
     assert found.crest_factor == pytest.approx(crest, rel=0.07)  # of n normal samples about sqrt(2 ln n)
     assert found.kurtosis == pytest.approx(kurtosis, rel=0.03)
 
@@ -89,22 +89,22 @@ def test_pulses_are_counted(rate: int) -> None:
     rng = np.random.default_rng(rate)
     since = np.mod(t - 0.003, 1 / rate)
     pulses = np.exp(-since / 0.001) * np.sin(2 * np.pi * 3000 * since) + 0.01 * rng.standard_normal(len(t))
-    found = ss.impulsiveness(ss.Record.of({"sound": 3 * pulses}, fs=20_000))
+    found = ss.squeak.impulsiveness(ss.Record.of({"sound": 3 * pulses}, fs=20_000))
     assert found.rate == pytest.approx(rate, abs=0.51)
     assert np.diff(found.pulses) == pytest.approx(1 / rate, abs=2e-3)
     assert found.kurtosis > 10
 
 
 def test_what_has_no_pulses_is_refused() -> None:
-    with pytest.raises(ss.RecordError, match="never changes"):
-        ss.impulsiveness(ss.Record.of({"a": np.ones(1000)}, fs=FS))
-    with pytest.raises(ss.RecordError, match="clipped"):
-        ss.impulsiveness(ss.Record.of({"a": np.clip(np.sin(0.01 * np.arange(9000)), -0.5, 0.5)}, fs=FS))
+    with pytest.raises(ss.errors.RecordError, match="never changes"):
+        ss.squeak.impulsiveness(ss.Record.of({"a": np.ones(1000)}, fs=FS))
+    with pytest.raises(ss.errors.RecordError, match="clipped"):
+        ss.squeak.impulsiveness(ss.Record.of({"a": np.clip(np.sin(0.01 * np.arange(9000)), -0.5, 0.5)}, fs=FS))
 
 
 def test_noise_has_no_pulses_and_a_slow_record_tells_none() -> None:
     noise = np.random.default_rng(0).standard_normal(50_000)
-    assert ss.impulsiveness(ss.Record.of({"a": noise}, fs=20_000)).rate == 0
-    slow = ss.impulsiveness(ss.Record.of({"a": noise}, fs=2_000))
+    assert ss.squeak.impulsiveness(ss.Record.of({"a": noise}, fs=20_000)).rate == 0
+    slow = ss.squeak.impulsiveness(ss.Record.of({"a": noise}, fs=2_000))
     assert np.isnan(slow.rate)
     assert slow.to_dict()["rate"] is None

@@ -27,17 +27,17 @@ FS = 10_000.0
 
 @cache
 def measured(surface: str, load: float) -> ss.Record:
-    run = ss.simulate(ss.squeak_rig(surface, load), duration=2.4)
-    return ss.squeak_record(run, snr=30, rng=1).between(0.4, 2.4)
+    run = ss.simulate(ss.squeak.squeak_rig(surface, load), duration=2.4)
+    return ss.squeak.squeak_record(run, snr=30, rng=1).between(0.4, 2.4)
 
 
 @cache
-def findings(surface: str, load: float) -> ss.SqueakFindings:
+def findings(surface: str, load: float) -> ss.answers.SqueakFindings:
     return ss.analyze_squeaks(measured(surface, load), name=f"{surface}, {load:g} N", normal=load)
 
 
-def compared() -> ss.SqueakComparison:
-    return ss.compare_squeaks([findings(*each) for each in CONDITIONS])
+def compared() -> ss.answers.SqueakComparison:
+    return ss.answers.compare_squeaks([findings(*each) for each in CONDITIONS])
 
 
 def run(*arguments: object) -> Result:
@@ -84,7 +84,7 @@ def test_a_condition_says_what_drove_it() -> None:
     assert each.to_dict()["trend"] == each.trend
 
 
-def of_sound(values: np.ndarray, name: str) -> ss.SqueakFindings:
+def of_sound(values: np.ndarray, name: str) -> ss.answers.SqueakFindings:
     return ss.analyze_squeaks(ss.Record.of({"sound": values}, fs=FS), name=name)
 
 
@@ -95,7 +95,7 @@ def test_what_creaks_or_whistles_is_not_called_silent() -> None:
     found = [
         of_sound(*each) for each in ((tone(), "Chalk"), (creak * (t > 0.1) * (t < 0.9), "Door"), (whistle, "Pipe"))
     ]
-    together = ss.compare_squeaks(found)
+    together = ss.answers.compare_squeaks(found)
     assert [each.answer for each in together.conditions] == ["squeals", "creaks", "can not be told"]
     assert together.verdicts == ("Chalk squeals; Door creaks.", "Whether Pipe squeaks can not be told.")
     (table,) = ss.summary(together).tables
@@ -105,8 +105,8 @@ def test_what_creaks_or_whistles_is_not_called_silent() -> None:
     assert heard[1].startswith("creak, 2")
     assert heard[1].endswith(" pulses in a second")
     assert heard[2] == "can not be told"
-    assert ss.compare_squeaks(found[1:2] * 2).verdicts == ("No condition squeaks.", "Door and Door creak.")
-    assert ss.compare_squeaks(found[2:] * 2).verdicts == ("Whether Pipe and Pipe squeak can not be told.",)
+    assert ss.answers.compare_squeaks(found[1:2] * 2).verdicts == ("No condition squeaks.", "Door and Door creak.")
+    assert ss.answers.compare_squeaks(found[2:] * 2).verdicts == ("Whether Pipe and Pipe squeak can not be told.",)
 
 
 def test_no_squeak_is_said_with_what_sounds_instead() -> None:
@@ -121,7 +121,7 @@ def test_friction_falls_too_only_where_it_is_known_to_fall_in_what_squeaks() -> 
     for low, too in ((-3.0, True), (-4.0, False)):
         ends = replace(slope, value=-2.0, interval=(low, -4.0 - low))
         squeaking = replace(pair[0], loops=replace(pair[0].loops, slope=ends))
-        (told,) = (each for each in ss.compare_squeaks([squeaking, pair[1]]).verdicts if "falls" in each)
+        (told,) = (each for each in ss.answers.compare_squeaks([squeaking, pair[1]]).verdicts if "falls" in each)
         assert (" too," in told) == too
         assert "a falling friction alone is not enough" in told
 
@@ -137,15 +137,15 @@ def test_bursts_that_are_not_told_are_counted_among_all() -> None:
 
 
 def test_one_record_is_no_comparison() -> None:
-    with pytest.raises(ss.EstimateError, match="two or more"):
-        ss.compare_squeaks([findings("wet", 1.23)])
+    with pytest.raises(ss.errors.EstimateError, match="two or more"):
+        ss.answers.compare_squeaks([findings("wet", 1.23)])
 
 
 def test_the_load_is_read_where_it_is_measured() -> None:
     record = measured("wet", 1.23)
     with_load = record.with_channel("normal", np.full(len(record), -1.23), unit="N", source="cell")
     assert ss.analyze_squeaks(with_load).normal == pytest.approx(1.23)
-    with pytest.raises(ss.EstimateError, match="normal = -1"):
+    with pytest.raises(ss.errors.EstimateError, match="normal = -1"):
         ss.analyze_squeaks(record, normal=-1)
 
 
@@ -154,7 +154,7 @@ def test_the_load_is_read_where_it_is_measured() -> None:
 
 def test_the_tone_stands_in_the_bursts_alone() -> None:
     record = ss.Record.of({"sound": tone()}, fs=FS)
-    found = ss.burst_spectra(record)
+    found = ss.squeak.burst_spectra(record)
     place = int(np.argmax(found.inside["sound"]))
     assert found.frequency[place] == pytest.approx(500, abs=found.resolution)
     assert found.inside["sound"][place] > 1e4 * found.outside["sound"][place]
@@ -166,7 +166,7 @@ def test_the_spectrum_has_the_power_of_the_noise() -> None:
     noise = 0.3 * rng.standard_normal(60_000)
     loud = np.zeros(60_000)
     loud[20_000:40_000] = 10 * np.sin(2 * np.pi * 1000 * np.arange(20_000) / FS)
-    found = ss.burst_spectra(ss.Record.of({"sound": noise + loud}, fs=FS))
+    found = ss.squeak.burst_spectra(ss.Record.of({"sound": noise + loud}, fs=FS))
     assert np.mean(found.outside["sound"][5:-5]) == pytest.approx(0.3**2 / (FS / 2), rel=0.1)
     assert found.inside["sound"].sum() * found.resolution == pytest.approx(50 + 0.09, rel=0.02)
 
@@ -177,7 +177,7 @@ def test_channels_without_a_tie_are_below_chance_as_often_as_said() -> None:
     gate = (t > 1) & (t < 3)
     record = ss.Record.of({"sound": gate * np.sin(2 * np.pi * 500 * t) + 0.1 * rng.standard_normal(t.size),
                            "a": rng.standard_normal(t.size)}, fs=FS)  # fmt: skip
-    found = ss.burst_spectra(record)
+    found = ss.squeak.burst_spectra(record)
     beyond = np.mean(found.coherence["a", "sound"][2:-2] > found.significant)
     assert 0.02 < beyond < 0.09
 
@@ -206,7 +206,7 @@ def test_names_of_a_usual_length_are_not_broken_in_the_terminal() -> None:
 # ---- coupling in words
 
 
-def told_of(pairs: tuple[ss.Pair, ...], found: ss.SqueakFindings) -> list[str]:
+def told_of(pairs: tuple[ss.squeak.Pair, ...], found: ss.answers.SqueakFindings) -> list[str]:
     joined = replace(found.coupling, pairs=pairs)
     return list(ss.summary(replace(found, coupling=joined)).headline)
 
@@ -239,7 +239,7 @@ def test_where_the_energy_is_not_told_the_lever_is_asked_for() -> None:
         "can not be told; what it gives the torsion is told where" in each and "--lever" in each for each in told
     )
     found = findings("wet", 6.13)
-    stated = ss.coupling(found.record, squeaks=found.squeaks, lever="1.7 mm")
+    stated = ss.squeak.coupling(found.record, squeaks=found.squeaks, lever="1.7 mm")
     told = list(ss.summary(replace(found, coupling=stated)).headline)
     assert any(each.startswith("Friction feeds the torsion: ") for each in told)
     assert not any("lever" in each for each in told)
@@ -250,21 +250,21 @@ def test_where_the_energy_is_not_told_the_lever_is_asked_for() -> None:
 
 def test_a_sound_comes_back_as_it_was(tmp_path: Path) -> None:
     record = ss.Record.of({"sound": 3 * tone()}, fs=FS)
-    scale = ss.write_sound(record, tmp_path / "tone.wav")
+    scale = ss.squeak.write_sound(record, tmp_path / "tone.wav")
     again = ss.read_record(tmp_path / "tone.wav", channels={"sound": f"sound * {scale} [Pa]"})
     assert again.fs == FS
     assert again["sound"] == pytest.approx(record["sound"], abs=0.51 * scale / 32768)
-    with pytest.raises(ss.FormatError, match="there already"):
-        ss.write_sound(record, tmp_path / "tone.wav")
-    with pytest.raises(ss.FormatError, match=r"written as \.wav"):
-        ss.write_sound(record, tmp_path / "tone.mp3")
-    with pytest.raises(ss.RecordError, match="full scale of 1"):
-        ss.write_sound(record, tmp_path / "loud.wav", full_scale=1.0)
+    with pytest.raises(ss.errors.FormatError, match="there already"):
+        ss.squeak.write_sound(record, tmp_path / "tone.wav")
+    with pytest.raises(ss.errors.FormatError, match=r"written as \.wav"):
+        ss.squeak.write_sound(record, tmp_path / "tone.mp3")
+    with pytest.raises(ss.errors.RecordError, match="full scale of 1"):
+        ss.squeak.write_sound(record, tmp_path / "loud.wav", full_scale=1.0)
 
 
 def test_a_slow_record_is_written_faster_and_sounds_alike(tmp_path: Path) -> None:
     record = ss.Record.of({"a": np.sin(2 * np.pi * 200 * np.arange(3000) / 1000.0)}, fs=1000)
-    ss.write_sound(record, tmp_path / "slow.wav", full_scale=2.0)
+    ss.squeak.write_sound(record, tmp_path / "slow.wav", full_scale=2.0)
     again = ss.read_record(tmp_path / "slow.wav")
     assert again.fs == 8000
     power = np.abs(np.fft.rfft(again["sound"]))
@@ -274,10 +274,10 @@ def test_a_slow_record_is_written_faster_and_sounds_alike(tmp_path: Path) -> Non
 def test_bursts_are_cut_out_in_proportion() -> None:
     quiet = np.concatenate([tone(), 0.1 * tone()])
     found = ss.find_squeaks(ss.Record.of({"sound": quiet}, fs=FS))
-    loud, soft = ss.burst_clips(found)
+    loud, soft = ss.squeak.burst_clips(found)
     assert loud.full_scale == soft.full_scale == pytest.approx(np.max(np.abs(tone())), rel=0.05)
     assert loud.level > 50 * soft.level
-    assert ss.burst_clips(found, most=1) == (loud,)
+    assert ss.squeak.burst_clips(found, most=1) == (loud,)
 
 
 # ---- the command
@@ -348,8 +348,8 @@ def seal(dataset: Callable[[str], Path]) -> dict[int, ss.Record]:
     channels = {"x": "#5 [mm]", "pressure": "#6 [bar]", "friction": f"(#7 - #6 * 1e5 * {area}) [N]"}
     folder = dataset("rubber_seal")
     return {
-        bar: ss.fill_missing(
-            ss.fill_gaps(
+        bar: ss.signals.fill_missing(
+            ss.signals.fill_gaps(
                 ss.read_record(folder / f"O-ring_{bar}bar.csv", channels=channels, time="#1 [ms]", rows=(15, None))
             )
         )
@@ -363,7 +363,7 @@ def test_a_rubber_seals_friction_and_its_rise_with_the_pressure(seal: dict[int, 
         assert 2 * levels[bar].value == pytest.approx(known, rel=0.03)
         assert levels[bar].includes(known / 2)
     pressures = [float(record["pressure"].mean()) / 1e5 for record in seal.values()]  # bar, in the place of a load
-    line = ss.friction_over_load(list(levels.values()), loads=pressures)
+    line = ss.law.friction_over_load(list(levels.values()), loads=pressures)
     rise = line.coefficient.scaled(2, "N/bar")
     assert rise.includes((RANGES[5] - RANGES[1]) / 4)
     assert rise.value == pytest.approx(1.5, rel=0.05)
@@ -404,7 +404,7 @@ def test_a_record_that_can_not_be_heard_ends_in_a_sentence(tmp_path: Path, value
 @pytest.mark.parametrize("scale", [1.2, 1.5, 4.0])
 def test_clipped_sound_from_a_file_has_no_level(tmp_path: Path, scale: float) -> None:
     clipped = np.clip(scale * tone(), -1, 1)
-    ss.write_sound(ss.Record.of({"sound": clipped}, fs=FS), tmp_path / "clipped.wav", full_scale=1.0)
+    ss.squeak.write_sound(ss.Record.of({"sound": clipped}, fs=FS), tmp_path / "clipped.wav", full_scale=1.0)
     bursts = ss.find_squeaks(ss.read_record(tmp_path / "clipped.wav")).bursts
     assert bursts
     for burst in bursts:
@@ -416,7 +416,7 @@ def test_clipped_sound_from_a_file_has_no_level(tmp_path: Path, scale: float) ->
 @pytest.mark.parametrize("frequency", [55.0, 440.0, 2000.0])
 def test_a_tone_on_the_steps_of_16_bit_is_not_called_clipped(tmp_path: Path, frequency: float) -> None:
     wave = np.sin(2 * np.pi * frequency * np.arange(40_000) / 44_100)
-    ss.write_sound(ss.Record.of({"sound": wave}, fs=44_100), tmp_path / "tone.wav", full_scale=1.2)
+    ss.squeak.write_sound(ss.Record.of({"sound": wave}, fs=44_100), tmp_path / "tone.wav", full_scale=1.2)
     assert np.isfinite(ss.find_squeaks(ss.read_record(tmp_path / "tone.wav")).bursts[0].level)
 
 
@@ -451,7 +451,7 @@ def test_of_stereo_the_other_channel_is_named(tmp_path: Path) -> None:
 
 def test_a_spike_may_be_a_contact() -> None:
     found = ss.analyze_squeaks(ss.Record.of({"sound": tone()}, fs=FS))
-    spike = ss.Fault("spike", "a", ((3, 9),), "7 samples that stand off as spikes", "replace them")
+    spike = ss.record.Fault("spike", "a", ((3, 9),), "7 samples that stand off as spikes", "replace them")
     cautions = ss.summary(replace(found, faults=(spike,))).cautions
     assert any("lifts or lands" in each for each in cautions)
     assert not any("lifts or lands" in each for each in ss.summary(found).cautions)
@@ -460,13 +460,13 @@ def test_a_spike_may_be_a_contact() -> None:
 def test_what_is_asked_in_vain_is_said() -> None:
     record = ss.Record.of({"sound": tone()}, fs=FS)
     assert any("no torsion is recorded" in note for note in ss.analyze_squeaks(record, lever=0.003).notes)
-    with pytest.raises(ss.RecordError, match="no kind of burst is called 'hiss'; there are squeak, squeal"):
+    with pytest.raises(ss.errors.RecordError, match="no kind of burst is called 'hiss'; there are squeak, squeal"):
         ss.find_squeaks(record).of("hiss")
 
 
 def test_json_alone_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    ss.write_sound(ss.Record.of({"sound": tone()}, fs=FS), tmp_path / "squeal.wav")
+    ss.squeak.write_sound(ss.Record.of({"sound": tone()}, fs=FS), tmp_path / "squeal.wav")
     told = json.loads(run("squeal.wav", "--json").output)
     assert (told["program"], told["version"], told["squeaks"]["reference"]) == ("stickslip", ss.__version__, "1")
     assert [path.name for path in tmp_path.iterdir()] == ["squeal.wav"]

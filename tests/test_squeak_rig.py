@@ -18,25 +18,25 @@ SQUEAKS = ("wet", 6.13)
 
 
 @cache
-def driven(surface: str, load: float) -> ss.Trajectory:
-    return ss.simulate(ss.squeak_rig(surface, load), duration=2.0)
+def driven(surface: str, load: float) -> ss.solve.Trajectory:
+    return ss.simulate(ss.squeak.squeak_rig(surface, load), duration=2.0)
 
 
-def normal_acceleration(run: ss.Trajectory) -> np.ndarray:
+def normal_acceleration(run: ss.solve.Trajectory) -> np.ndarray:
     """Of the beam's tip over the last second, at 10 kHz."""
     return run.sample(1.0 + np.arange(10_000) / 1e4, ("a",))[0][1]
 
 
 @pytest.mark.parametrize(("surface", "load"), CASES)
 def test_it_slides_steadily_unless_wet_and_heavily_loaded(surface: str, load: float) -> None:
-    found = [ss.stability(ss.squeak_rig(surface, load), speed=speed) for speed in (-0.1, 0.1)]
+    found = [ss.stability(ss.squeak.squeak_rig(surface, load), speed=speed) for speed in (-0.1, 0.1)]
     assert [one.mechanism == "mode coupling" for one in found] == [(surface, load) == SQUEAKS, False]
     assert all(one.stable == (one.mechanism == "stable") and one.status == "ok" for one in found)
 
 
 def test_falling_friction_alone_does_not_squeak() -> None:
-    rig = ss.squeak_rig(*SQUEAKS)
-    assert rig.contacts[0].law.slope < 0 < ss.squeak_rig("dry", 6.13).contacts[0].law.slope
+    rig = ss.squeak.squeak_rig(*SQUEAKS)
+    assert rig.contacts[0].law.slope < 0 < ss.squeak.squeak_rig("dry", 6.13).contacts[0].law.slope
     found = ss.stability(rig, speed=-0.1)
     assert found.without_coupling < 0 < found.without_slope < found.growth
     assert 475 < found.frequency < 500
@@ -59,7 +59,7 @@ def uncoupled(rig: ss.Structure) -> ss.Structure:
 
 
 def test_driven_it_squeaks_without_the_slope_but_not_without_the_coupling() -> None:
-    rig = ss.squeak_rig(*SQUEAKS)
+    rig = ss.squeak.squeak_rig(*SQUEAKS)
     found = ss.stability(rig, speed=-0.1)
     for other, growth, squeaks in (
         (rig.having(slope=0.0), found.without_slope, True),
@@ -75,12 +75,12 @@ def test_it_squeaks_at_the_frequency_that_bending_and_torsion_share() -> None:
 
 
 def test_where_it_begins_to_squeak_is_where_sliding_ceases_to_be_stable() -> None:
-    critical = ss.critical_value(
-        ss.squeak_rig(), lambda load: ss.squeak_rig("wet", load), between=(1.23, 6.13), speed=-0.1
+    critical = ss.squeak.critical_value(
+        ss.squeak.squeak_rig(), lambda load: ss.squeak.squeak_rig("wet", load), between=(1.23, 6.13), speed=-0.1
     )
     assert (critical.mechanism, critical.stable_below) == ("mode coupling", True)
     for load, begins in ((0.99 * critical.value, False), (1.01 * critical.value, True)):
-        rig = ss.squeak_rig("wet", load).having(drive=ss.Belt(-0.1), acts_on=None)
+        rig = ss.squeak.squeak_rig("wet", load).having(drive=ss.drives.Belt(-0.1), acts_on=None)
         rest = dict(zip(("x1", "x2", "x3"), ss.stability(rig).place, strict=True))
         late = ss.simulate(rig, duration=6.0, start={**rest, "v1": 0.0, "v2": 1e-6, "v3": 0.0})
         moments = np.array([0.5, 5.5])[:, None] + np.arange(200) / 2e4
@@ -91,7 +91,7 @@ def test_where_it_begins_to_squeak_is_where_sliding_ceases_to_be_stable() -> Non
 
 @pytest.mark.parametrize("peer", ["extended precision", "scipy"])
 def test_sticks_and_flights_of_two_contacts_are_those_of_the_rules_written_out(peer: str) -> None:
-    rig, duration = ss.squeak_rig(*SQUEAKS), 0.28
+    rig, duration = ss.squeak.squeak_rig(*SQUEAKS), 0.28
     if peer == "scipy":
         order, end = dop853(Rig(rig), duration, rtol=1e-10, longest=2e-5)
     else:
@@ -105,7 +105,7 @@ def test_sticks_and_flights_of_two_contacts_are_those_of_the_rules_written_out(p
 
 @pytest.mark.parametrize(("surface", "load"), CASES)
 def test_the_scenario_is_the_rig(surface: str, load: float) -> None:
-    known, rig = ss.scenarios.get(f"SQUEAK {surface} {load} N").system, ss.squeak_rig(surface, load)
+    known, rig = ss.scenarios.get(f"SQUEAK {surface} {load} N").system, ss.squeak.squeak_rig(surface, load)
     for name in ("mass", "damping", "stiffness", "acts_on"):
         assert np.array_equal(getattr(known, name), getattr(rig, name))
     assert known.drive == rig.drive
@@ -120,40 +120,40 @@ def test_the_scenario_is_the_rig(surface: str, load: float) -> None:
     [({"surface": "oily"}, "surface = 'oily'"), ({"load": -1.0}, "load = -1"), ({"amplitude": 0.0}, "amplitude = 0")],
 )
 def test_what_has_no_meaning_is_refused(change: dict[str, object], words: str) -> None:
-    with pytest.raises(ss.ModelError, match=words):
-        ss.squeak_rig(**change)  # type: ignore[arg-type]
+    with pytest.raises(ss.errors.ModelError, match=words):
+        ss.squeak.squeak_rig(**change)  # type: ignore[arg-type]
 
 
 def test_the_angle_is_told_in_radians() -> None:
-    run = ss.simulate(ss.squeak_rig("wet"), duration=0.05)
+    run = ss.simulate(ss.squeak.squeak_rig("wet"), duration=0.05)
     record = run.record(fs=1000.0)
     assert [record.channels[name].unit for name in ("x2", "x3", "v3", "a3")] == ["m", "rad", "rad/s", "rad/s^2"]
     assert record.channels["v3"].quantity == "angular velocity"
     drawn = [axes.get_ylabel().replace("\n", " ") for axes in plot_motion(run).axes]
     assert drawn[2:4] == ["angle [rad]", "angular velocity [rad/s]"]
     assert plot_phase(run, mass=2).get_xlabel() == "angle x3 [rad]"
-    told = ss.outcome(ss.scenario_case("SQUEAK wet 6.13 N"))
+    told = ss.story.outcome(ss.systems.scenario_case("SQUEAK wet 6.13 N"))
     assert "rad, at up to" in told.sentences[0]
     assert told.values["largest angular speed v3"][1] == "rad/s"
 
 
 def test_what_is_no_rig_is_refused_in_words() -> None:
-    assert ss.squeak_rig("wet", "6").contacts[0].preload == 3.0  # type: ignore[arg-type]
+    assert ss.squeak.squeak_rig("wet", "6").contacts[0].preload == 3.0  # type: ignore[arg-type]
     for surface, load in (("wet", "heavy"), ("wet", [1, 2]), (["wet"], 6.0)):
-        with pytest.raises(ss.ModelError, match=r"load|surface"):
-            ss.squeak_rig(surface, load)  # type: ignore[arg-type]
+        with pytest.raises(ss.errors.ModelError, match=r"load|surface"):
+            ss.squeak.squeak_rig(surface, load)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("rotations", [[0], [4], ["x3"], 2.5])
 def test_an_angle_that_is_no_degree_of_freedom_is_refused(rotations: Any) -> None:
-    with pytest.raises(ss.ModelError, match=r"rotations = .*from 1 to 3"):
-        ss.squeak_rig().having(rotations=rotations)
+    with pytest.raises(ss.errors.ModelError, match=r"rotations = .*from 1 to 3"):
+        ss.squeak.squeak_rig().having(rotations=rotations)
 
 
 @pytest.mark.parametrize(("load", "answer"), [(1.4, "does not squeak"), (1.7, "can not be told"), (2.0, "squeaks")])
 def test_just_below_the_threshold_it_can_not_be_told_whether_it_squeaks(load: float, answer: str) -> None:
     """Sliding is stable up to 1.797 N, and what is struck at a reversal hardly dies away just below."""
-    run = ss.simulate(ss.squeak_rig("wet", load), duration=1.7)
-    found = ss.find_squeaks(ss.squeak_record(run, snr=30, rng=1).between(0.4, 1.4))
+    run = ss.simulate(ss.squeak.squeak_rig("wet", load), duration=1.7)
+    found = ss.find_squeaks(ss.squeak.squeak_record(run, snr=30, rng=1).between(0.4, 1.4))
     assert found.answer == answer
     assert all("near the threshold" in burst.evidence for burst in found.untold)

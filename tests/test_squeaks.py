@@ -13,7 +13,7 @@ import pytest
 import stickslip as ss
 from scripts import loaded
 
-Heard = Callable[[str], ss.Squeaks]
+Heard = Callable[[str], ss.squeak.Squeaks]
 FS = 10_000.0
 REAL = {
     "chalk_screech_01.ogg": {"squeal", "tonal"},
@@ -174,12 +174,12 @@ def test_a_burst_cut_by_the_end_says_so() -> None:
 @pytest.mark.parametrize(
     ("record", "options", "error", "words"),
     [
-        (ss.Record.of({"sound": np.zeros(1000)}, fs=FS), {}, ss.EstimateError, "silent"),
-        (ss.Record.of({"sound": burst()}, fs=FS), {"channel": "a"}, ss.RecordError, "channel a is missing"),
-        (ss.Record.of({"sound": burst()[:200]}, fs=FS), {}, ss.RecordError, "200 samples"),
-        (ss.Record.of({"sound": burst()}, fs=100.0), {}, ss.RecordError, "two octaves"),
-        (ss.Record.of({"sound": burst()}, fs=FS), {"frequencies": (100, 9000)}, ss.RecordError, "half the rate"),
-        (ss.Record.of({"sound": burst()}, fs=FS), {"span": -1.0}, ss.RecordError, "span = -1"),
+        (ss.Record.of({"sound": np.zeros(1000)}, fs=FS), {}, ss.errors.EstimateError, "silent"),
+        (ss.Record.of({"sound": burst()}, fs=FS), {"channel": "a"}, ss.errors.RecordError, "channel a is missing"),
+        (ss.Record.of({"sound": burst()[:200]}, fs=FS), {}, ss.errors.RecordError, "200 samples"),
+        (ss.Record.of({"sound": burst()}, fs=100.0), {}, ss.errors.RecordError, "two octaves"),
+        (ss.Record.of({"sound": burst()}, fs=FS), {"frequencies": (100, 9000)}, ss.errors.RecordError, "half the rate"),
+        (ss.Record.of({"sound": burst()}, fs=FS), {"span": -1.0}, ss.errors.RecordError, "span = -1"),
     ],
 )
 def test_what_can_not_be_heard_is_refused(record: ss.Record, options: dict, error: type, words: str) -> None:
@@ -214,7 +214,7 @@ def test_squeaks_of_the_virtual_rig_are_found_and_told_from_ringing(benchmark: M
 
 
 def test_a_squeak_says_where_in_the_cycle_it_is() -> None:
-    record = ss.squeak_record(ss.simulate(ss.squeak_rig(), duration=2.4), snr=40, rng=1)
+    record = ss.squeak.squeak_record(ss.simulate(ss.squeak.squeak_rig(), duration=2.4), snr=40, rng=1)
     found = ss.find_squeaks(record)
     assert not found.of("creak")  # many squeaks at even intervals are no pulses
     squeaks = [burst for burst in found.of("squeak") if burst.status == "ok"]
@@ -232,35 +232,35 @@ def test_a_squeak_says_where_in_the_cycle_it_is() -> None:
 def test_the_sound_of_a_point_source() -> None:
     t = np.arange(8000) / 8000
     shaken = ss.Record.of({"a": 100 * np.sin(2 * np.pi * 400 * t)}, fs=8000)
-    near, far = (ss.sound_pressure(shaken, area=1e-3, distance=r)["sound"] for r in (1.0, 2.0))
+    near, far = (ss.squeak.sound_pressure(shaken, area=1e-3, distance=r)["sound"] for r in (1.0, 2.0))
     expected = 1.204 * 1e-3 * 100 / (4 * np.pi) * np.sin(2 * np.pi * 400 * (t - 1 / 343.2))
     assert near[800:7000] == pytest.approx(expected[800:7000], abs=1e-6)
     assert np.std(near[800:7000]) == pytest.approx(2 * np.std(far[800:7000]), rel=1e-3)
 
 
 def test_a_run_sounds_as_its_record_does() -> None:
-    run = ss.simulate(ss.squeak_rig(), duration=0.3)
-    exact = ss.sound_pressure(run, fs=40_000)["sound"]
+    run = ss.simulate(ss.squeak.squeak_rig(), duration=0.3)
+    exact = ss.squeak.sound_pressure(run, fs=40_000)["sound"]
     record = run.record(fs=40_000)
-    sampled = ss.sound_pressure(record, normal="a2")["sound"]
+    sampled = ss.squeak.sound_pressure(record, normal="a2")["sound"]
     assert sampled[200:-200] == pytest.approx(exact[200:-200], abs=0.02 * np.max(np.abs(exact)))
 
 
 @pytest.mark.parametrize(
     ("options", "error", "words"),
     [
-        ({"area": -1.0}, ss.ModelError, "area = -1"),
-        ({"distance": 1e-3}, ss.ModelError, "point source"),
-        ({"normal": "y"}, ss.RecordError, "channel y is missing"),
+        ({"area": -1.0}, ss.errors.ModelError, "area = -1"),
+        ({"distance": 1e-3}, ss.errors.ModelError, "point source"),
+        ({"normal": "y"}, ss.errors.RecordError, "channel y is missing"),
     ],
 )
 def test_a_source_without_meaning_is_refused(options: dict, error: type, words: str) -> None:
     with pytest.raises(error, match=words):
-        ss.sound_pressure(ss.Record.of({"a": [0.0, 1.0]}, fs=10), **options)
+        ss.squeak.sound_pressure(ss.Record.of({"a": [0.0, 1.0]}, fs=10), **options)
 
 
 def test_noise_is_as_loud_as_asked() -> None:
-    run = ss.simulate(ss.squeak_rig(), duration=0.5)
-    clean, noisy = (ss.squeak_record(run, snr=snr, rng=1) for snr in (math.inf, 20.0))
+    run = ss.simulate(ss.squeak.squeak_rig(), duration=0.5)
+    clean, noisy = (ss.squeak.squeak_record(run, snr=snr, rng=1) for snr in (math.inf, 20.0))
     for name in clean:
         assert np.std(noisy[name] - clean[name]) == pytest.approx(0.1 * np.std(clean[name]), rel=0.05)

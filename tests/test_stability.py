@@ -15,28 +15,28 @@ W1, W2 = 200 * math.pi, 150 * math.pi
 
 def inclined(friction: float = 0.3, preload: float = 10.0, **law: float) -> ss.Structure:
     """MC-1: two inclined springs and a contact spring on a belt."""
-    pad = ss.Contact(ss.LinearSlope(friction, **{"slope": 0.0, **law}), [1, 0], normal=[0, 1], stiffness=11.0,
+    pad = ss.Contact(ss.laws.LinearSlope(friction, **{"slope": 0.0, **law}), [1, 0], normal=[0, 1], stiffness=11.0,
                      preload=preload)  # fmt: skip
     stiffness = [[23.25, 3.8971143170299739], [3.8971143170299739, 7.75]]
-    return ss.Structure(np.eye(2), np.zeros((2, 2)), stiffness, contacts=[pad], drive=ss.Belt(1.0))
+    return ss.Structure(np.eye(2), np.zeros((2, 2)), stiffness, contacts=[pad], drive=ss.drives.Belt(1.0))
 
 
 def block(law: Any, speed: float = 1.0) -> ss.Oscillator:
-    return ss.Oscillator(1.0, 1.0, law, ss.Belt(speed), damping=0.3)
+    return ss.Oscillator(1.0, 1.0, law, ss.drives.Belt(speed), damping=0.3)
 
 
 def crossed(eta: tuple[float, float] = (0.0, 0.0)) -> ss.Structure:
     """MC-2: two modes that press each other's contacts."""
     pads = [
-        ss.Contact(ss.Coulomb(0.1), [1, 0], normal=[0, 1], stiffness=W2**2, preload=1e3),
-        ss.Contact(ss.Coulomb(0.1), [0, 1], normal=[1, 0], stiffness=W1**2, preload=1e3, carried=-1.0),
+        ss.Contact(ss.laws.Coulomb(0.1), [1, 0], normal=[0, 1], stiffness=W2**2, preload=1e3),
+        ss.Contact(ss.laws.Coulomb(0.1), [0, 1], normal=[1, 0], stiffness=W1**2, preload=1e3, carried=-1.0),
     ]
     damping = np.diag([eta[0] * W1, eta[1] * W2])
-    return ss.Structure(np.eye(2), damping, np.zeros((2, 2)), contacts=pads, drive=ss.Belt(1.0))
+    return ss.Structure(np.eye(2), damping, np.zeros((2, 2)), contacts=pads, drive=ss.drives.Belt(1.0))
 
 
 def test_the_inclined_springs_couple_at_the_closed_form() -> None:
-    found = ss.critical_value(inclined(), "kinetic", between=(0.05, 1.0))
+    found = ss.squeak.critical_value(inclined(), "kinetic", between=(0.05, 1.0))
     assert found.value == pytest.approx(0.47237749297333017, rel=1e-13)
     assert 2 * math.pi * found.frequency == pytest.approx(4.58257569495584, rel=1e-13)
     assert (found.mechanism, found.stable_below) == ("mode coupling", True)
@@ -54,7 +54,7 @@ def test_the_inclined_springs_couple_at_the_closed_form() -> None:
 def test_damping_may_lower_the_threshold_of_coupling(
     eta: tuple[float, float], critical: float, frequency: float
 ) -> None:
-    found = ss.critical_value(crossed(eta), "kinetic", between=(0.01, 1.0))
+    found = ss.squeak.critical_value(crossed(eta), "kinetic", between=(0.01, 1.0))
     assert found.value == pytest.approx(critical, rel=1e-12)
     assert found.frequency == pytest.approx(frequency, rel=1e-12)
 
@@ -63,15 +63,15 @@ def test_damping_may_lower_the_threshold_of_coupling(
                                                 (2.0, (0.0050125787690136614, 0.19084020979734697))])  # fmt: skip
 def test_a_falling_curve_feeds_motion_in_its_band(exponent: float, band: tuple[float, float]) -> None:
     """ST-1: c + F'(V) = 0 at its ends."""
-    law = ss.Stribeck(1.0, 1.5, speed=0.1, exponent=exponent, viscous=0.2)
+    law = ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=exponent, viscous=0.2)
     slider = block(law, speed=0.1)
-    upper = ss.critical_value(slider, "drive.speed", between=(0.05, 1.0))
+    upper = ss.squeak.critical_value(slider, "drive.speed", between=(0.05, 1.0))
     assert (upper.value, upper.stable_below) == (pytest.approx(band[1], rel=1e-12), False)
     assert upper.mechanism == "falling friction"
     if band[0]:
-        lower = ss.critical_value(slider, "drive.speed", between=(1e-3, 0.05))
+        lower = ss.squeak.critical_value(slider, "drive.speed", between=(1e-3, 0.05))
         assert (lower.value, lower.stable_below) == (pytest.approx(band[0], rel=1e-12), True)
-    same = ss.steady_sliding(slider)
+    same = ss.solve.steady_sliding(slider)
     assert ss.stability(slider).growth == pytest.approx(same.eigenvalues[0].real, rel=1e-12)
 
 
@@ -80,11 +80,11 @@ def test_a_sprag_jams_at_its_angle(friction: float) -> None:
     """SP-1: a strut inclined by atan(1/mu) is drawn in, whatever the load."""
 
     def inclined_by(angle: float) -> ss.Structure:
-        law, tangent, normal = ss.Coulomb(friction), [-math.sin(angle)], [-math.cos(angle)]
+        law, tangent, normal = ss.laws.Coulomb(friction), [-math.sin(angle)], [-math.cos(angle)]
         pad = ss.Contact(law, tangent, normal=normal, stiffness=1e4, preload=10.0)
-        return ss.Structure([[1.0]], [[0.0]], [[0.0]], contacts=[pad], drive=ss.Belt(1.0))
+        return ss.Structure([[1.0]], [[0.0]], [[0.0]], contacts=[pad], drive=ss.drives.Belt(1.0))
 
-    found = ss.critical_value(inclined_by(1.0), inclined_by, between=(0.1, 1.5))
+    found = ss.squeak.critical_value(inclined_by(1.0), inclined_by, between=(0.1, 1.5))
     assert found.value == pytest.approx(math.atan(1 / friction), rel=1e-12)
     assert (found.mechanism, found.frequency) == ("jamming", 0.0)
 
@@ -96,7 +96,7 @@ def test_each_mechanism_is_told_by_switching_it_off() -> None:
     assert ss.stability(damped.having(kinetic=0.6)).mechanism == "mode coupling"
     assert ss.stability(damped.having(**falls)).mechanism == "falling friction"
     assert ss.stability(damped.having(kinetic=0.6, **falls)).mechanism == "mode coupling, and falling friction too"
-    near = ss.critical_value(damped, "kinetic", between=(0.05, 1.0)).value
+    near = ss.squeak.critical_value(damped, "kinetic", between=(0.05, 1.0)).value
     both = ss.stability(damped.having(kinetic=0.999 * near, slope=-0.003))
     assert both.mechanism == "mode coupling and falling friction together"
     assert both.without_slope < 0 < both.growth
@@ -113,27 +113,27 @@ def test_each_mechanism_is_told_by_switching_it_off() -> None:
 )
 @pytest.mark.parametrize("friction", [0.0, 0.1])
 def test_what_grows_without_friction_is_the_structure(damping: Any, stiffness: Any, friction: float) -> None:
-    pad = ss.Contact(ss.Coulomb(friction), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
-    found = ss.stability(ss.Structure(np.eye(2), damping, stiffness, contacts=[pad], drive=ss.Belt(1.0)))
+    pad = ss.Contact(ss.laws.Coulomb(friction), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
+    found = ss.stability(ss.Structure(np.eye(2), damping, stiffness, contacts=[pad], drive=ss.drives.Belt(1.0)))
     assert not found.stable
     assert found.mechanism == "the structure itself"
 
 
 def test_one_mass_neither_couples_nor_jams() -> None:
-    fed = ss.stability(block(ss.Coulomb(1.0)).having(damping=-0.3))
+    fed = ss.stability(block(ss.laws.Coulomb(1.0)).having(damping=-0.3))
     assert fed.mechanism == "the structure itself"
-    steep = ss.stability(block(ss.LinearSlope(10.0, slope=-5.0)))
+    steep = ss.stability(block(ss.laws.LinearSlope(10.0, slope=-5.0)))
     assert (steep.frequency, steep.mechanism) == (0.0, "falling friction")
     buckles = lambda k: ss.Structure(np.eye(2), np.zeros((2, 2)), [[k, 0], [0, 8.0]], contacts=inclined().contacts)  # noqa: E731
-    found = ss.critical_value(buckles(1.0), buckles, between=(-1.0, 1.0), speed=1.0)
+    found = ss.squeak.critical_value(buckles(1.0), buckles, between=(-1.0, 1.0), speed=1.0)
     assert (found.value, found.frequency) == (pytest.approx(0.0, abs=1e-9), 0.0)
 
 
 def test_a_slope_counts_with_the_load() -> None:
     damped = inclined(0.0, slope=-0.01).having(damping=0.05 * np.eye(2))
-    found = ss.critical_value(damped, "preload", between=(0.1, 50.0))
+    found = ss.squeak.critical_value(damped, "preload", between=(0.1, 50.0))
     assert (found.mechanism, found.stable_below) == ("falling friction", True)
-    heavier = ss.critical_value(damped.having(slope=-0.005), "preload", between=(0.1, 50.0))
+    heavier = ss.squeak.critical_value(damped.having(slope=-0.005), "preload", between=(0.1, 50.0))
     assert heavier.value == pytest.approx(2 * found.value, rel=1e-12)
 
 
@@ -152,7 +152,7 @@ def test_the_exact_engine_grows_as_the_eigenvalue_says(change: dict[str, float])
     assert math.log(abs(grown)) == pytest.approx(found.growth * period, abs=1e-6)
 
 
-def _share(found: ss.Stability, state: np.ndarray) -> tuple[float, float]:
+def _share(found: ss.squeak.Stability, state: np.ndarray) -> tuple[float, float]:
     """Real and imaginary part of the fastest mode's share in a state."""
     columns = []
     for mode in found.modes:
@@ -165,7 +165,7 @@ def _share(found: ss.Stability, state: np.ndarray) -> tuple[float, float]:
 
 def test_a_map_says_what_ends_the_sliding() -> None:
     block = inclined().having(damping=0.05 * np.eye(2))
-    found = ss.stability_map(block, grid={"kinetic": [0.3, 0.6], "slope": [-0.02, 0.0, 0.02]})
+    found = ss.squeak.stability_map(block, grid={"kinetic": [0.3, 0.6], "slope": [-0.02, 0.0, 0.02]})
     assert found.mechanism.sel(kinetic=0.3, slope=0.0) == "stable"
     assert found.mechanism.sel(kinetic=0.6, slope=0.0) == "mode coupling"
     assert found.mechanism.sel(kinetic=0.3, slope=-0.02) == "falling friction"
@@ -176,7 +176,7 @@ def test_a_map_says_what_ends_the_sliding() -> None:
 
 def test_a_contact_that_would_lift_off_is_named() -> None:
     lifting = inclined()
-    pull = ss.Contact(ss.Coulomb(30.0), [0, -1])
+    pull = ss.Contact(ss.laws.Coulomb(30.0), [0, -1])
     found = ss.stability(lifting.having(contacts=[*lifting.contacts, pull]))
     assert found.loads[0] <= 0
     assert found.status == "contact 1 would lift off before it slides steadily"
@@ -186,22 +186,22 @@ def test_a_contact_that_would_lift_off_is_named() -> None:
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: ss.stability(inclined().having(drive=ss.Release())), "driven by Release"),
+        (lambda: ss.stability(inclined().having(drive=ss.drives.Release())), "driven by Release"),
         (lambda: ss.stability(inclined(), speed=0.0), "speed = 0"),
-        (lambda: ss.stability(ss.Structure([[1.0]], [[0.0]], [[1.0]], drive=ss.Belt(1.0))), "without contacts"),
-        (lambda: ss.stability(block(ss.LuGre(1.0, 1.5, speed=0.1, stiffness=1e4))), "LuGre"),
-        (lambda: ss.stability(block(ss.StateVariable(1.0, rate=10.0))), "remembers"),
-        (lambda: ss.critical_value(inclined(), "kinetic", between=(0.1, 0.2)), "stable at 257 values"),
-        (lambda: ss.critical_value(inclined(), "kinetic", between=(0.2, 0.1)), "the lower one first"),
-        (lambda: ss.critical_value(inclined(), "kinetic", between=(0.2,)), "two values"),  # type: ignore[arg-type]
-        (lambda: ss.stability_map(inclined(), grid={"kinetic": ["a"]}), "finite numbers"),  # type: ignore[list-item]
-        (lambda: ss.critical_value(inclined(), "kinetik", between=(0.1, 0.2)), "kinetik"),
-        (lambda: ss.stability_map(inclined(), grid={}), "a map has values"),
-        (lambda: ss.stability_map(inclined(), grid={"kinetic": []}), "a map has values"),
+        (lambda: ss.stability(ss.Structure([[1.0]], [[0.0]], [[1.0]], drive=ss.drives.Belt(1.0))), "without contacts"),
+        (lambda: ss.stability(block(ss.laws.LuGre(1.0, 1.5, speed=0.1, stiffness=1e4))), "LuGre"),
+        (lambda: ss.stability(block(ss.laws.StateVariable(1.0, rate=10.0))), "remembers"),
+        (lambda: ss.squeak.critical_value(inclined(), "kinetic", between=(0.1, 0.2)), "stable at 257 values"),
+        (lambda: ss.squeak.critical_value(inclined(), "kinetic", between=(0.2, 0.1)), "the lower one first"),
+        (lambda: ss.squeak.critical_value(inclined(), "kinetic", between=(0.2,)), "two values"),  # type: ignore[arg-type]
+        (lambda: ss.squeak.stability_map(inclined(), grid={"kinetic": ["a"]}), "finite numbers"),  # type: ignore[list-item]
+        (lambda: ss.squeak.critical_value(inclined(), "kinetik", between=(0.1, 0.2)), "kinetik"),
+        (lambda: ss.squeak.stability_map(inclined(), grid={}), "a map has values"),
+        (lambda: ss.squeak.stability_map(inclined(), grid={"kinetic": []}), "a map has values"),
     ],
 )  # fmt: skip
 def test_what_has_no_answer_is_refused(call: Any, words: str) -> None:
-    with pytest.raises(ss.ModelError) as refused:
+    with pytest.raises(ss.errors.ModelError) as refused:
         call()
     assert words in str(refused.value)
 
@@ -210,25 +210,25 @@ def test_what_is_refused_says_what_would_do() -> None:
     def rig(load: float) -> ss.Structure:
         return inclined(preload=load)
 
-    with pytest.raises(ss.ModelError, match=r"grid over lod; .* takes load"):
-        ss.stability_map(rig, grid={"lod": [1, 2]})
+    with pytest.raises(ss.errors.ModelError, match=r"grid over lod; .* takes load"):
+        ss.squeak.stability_map(rig, grid={"lod": [1, 2]})
     for between, step in (((2, 2), "lowest"), ((2,), "lowest"), ((2, 1), "turn them round")):
-        with pytest.raises(ss.ModelError, match=step):
-            ss.critical_value(inclined(), "kinetic", between=between)  # type: ignore[arg-type]
+        with pytest.raises(ss.errors.ModelError, match=step):
+            ss.squeak.critical_value(inclined(), "kinetic", between=between)  # type: ignore[arg-type]
     for values, step in (([6.0], "linspace"), ([], "linspace"), ([[1, 2, 3]], "linspace"), ([1, 3, 2], "sort")):
-        with pytest.raises(ss.ModelError, match=step):
-            ss.limit_cycles(inclined(), "kinetic", values=values)
+        with pytest.raises(ss.errors.ModelError, match=step):
+            ss.squeak.limit_cycles(inclined(), "kinetic", values=values)
 
 
 def test_a_threshold_and_what_dies_away_are_told_in_words() -> None:
-    rig = ss.squeak_rig("wet", load=6.13)
-    load = ss.critical_value(rig, lambda n: ss.squeak_rig("wet", n), between=(1.23, 6.13), speed=-0.1)
+    rig = ss.squeak.squeak_rig("wet", load=6.13)
+    load = ss.squeak.critical_value(rig, lambda n: ss.squeak.squeak_rig("wet", n), between=(1.23, 6.13), speed=-0.1)
     assert repr(load).startswith("Threshold: stable below 1.79")
     assert repr(load).endswith("; beyond, mode coupling at 421 Hz")
-    assert " dies away by 0.5" in repr(ss.stability(ss.squeak_rig("wet", 1.23), speed=-0.1))
+    assert " dies away by 0.5" in repr(ss.stability(ss.squeak.squeak_rig("wet", 1.23), speed=-0.1))
     assert " grows by 61.88 " in repr(ss.stability(rig, speed=-0.1))
 
 
 def test_a_map_that_turns_back_is_refused() -> None:
-    with pytest.raises(ss.ModelError, match="sort them, each of them once"):
-        ss.stability_map(lambda load: ss.squeak_rig("wet", load), grid={"load": [2, 1, 1]}, speed=-0.1)
+    with pytest.raises(ss.errors.ModelError, match="sort them, each of them once"):
+        ss.squeak.stability_map(lambda load: ss.squeak.squeak_rig("wet", load), grid={"load": [2, 1, 1]}, speed=-0.1)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from stickslip import datasets
+from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import EstimateError, RecordError, StickslipError
 from stickslip.files.read import read_record
-from stickslip.identify.sticks import find_sticks
 from stickslip.record.record import Record
 
 FS, PEAK = 1000.0, 0.05

@@ -18,8 +18,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip import Coulomb, HarmonicForce, ModelError, Oscillator, SolveError, Trajectory, simulate, sweep
-from stickslip.sweeps.sweep import planned
+from stickslip import Oscillator, simulate, sweep
+from stickslip.drives import HarmonicForce
+from stickslip.errors import ModelError, SolveError
+from stickslip.laws import Coulomb
+from stickslip.maps.sweep import planned
+from stickslip.solve import Trajectory
 
 pytest.importorskip("zarr")
 SLIDER = Oscillator(mass=1, stiffness=1, law=Coulomb(0.5), drive=HarmonicForce(1.0, frequency=0.127))
@@ -60,7 +64,7 @@ def test_killed_at_random_it_goes_on_and_ends_with_the_same_bytes(whole: Path, t
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         from test_store import GRID, SETTINGS, SLIDER
         from stickslip import sweep
-        from stickslip.sweeps.store import Store
+        from stickslip.maps.store import Store
         keep = Store.keep
         def slowly(store, *block):
             keep(store, *block)
@@ -84,7 +88,7 @@ def test_killed_at_random_it_goes_on_and_ends_with_the_same_bytes(whole: Path, t
 
 
 def test_what_is_done_is_not_run_again(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from stickslip.sweeps import serial
+    from stickslip.maps import serial
 
     def refuse(plan: Any, number: int) -> Any:
         raise AssertionError(f"block {number} is there already")
@@ -257,7 +261,7 @@ def test_the_cluster_gives_the_same_bytes(whole: Path, tmp_path: Path) -> None:
 
 def test_workers_that_die_are_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    from stickslip.sweeps import cluster
+    from stickslip.maps import cluster
 
     def deadly(run: Trajectory) -> float:
         os._exit(1)

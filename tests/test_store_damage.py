@@ -11,7 +11,10 @@ from typing import Any
 
 import pytest
 
-from stickslip import Coulomb, HarmonicForce, ModelError, Oscillator, StickslipError, sweep
+from stickslip import Oscillator, StickslipError, sweep
+from stickslip.drives import HarmonicForce
+from stickslip.errors import ModelError
+from stickslip.laws import Coulomb
 
 pytest.importorskip("zarr")
 pytest.importorskip("pyarrow")

@@ -143,10 +143,10 @@ def test_a_fault_in_a_later_block_is_named(tmp_path: Path) -> None:
     path.write_text("t,x [m]\n" + "".join(f"{i},{'oops' if i == 80 else i}\n" for i in range(100)))
     blocks = ss.read_blocks(path, size=25)
     assert [next(blocks).start for _ in range(3)] == [0, 25, 50]
-    with pytest.raises(ss.FormatError, match=r"row 82 of 'late\.csv' reads '80,oops'"):
+    with pytest.raises(ss.errors.FormatError, match=r"row 82 of 'late\.csv' reads '80,oops'"):
         next(blocks)
 
 
 def test_a_block_has_rows(tmp_path: Path) -> None:
-    with pytest.raises(ss.RecordError, match="at least one row"):
+    with pytest.raises(ss.errors.RecordError, match="at least one row"):
         ss.read_blocks(tmp_path / "any.csv", size=0)

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from stickslip.drives import Belt, Drive, HarmonicBase, HarmonicForce, MultiTone, Ramp, RecordedBase, Release
+from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, MultiTone, Ramp, RecordedBase, Release
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact
@@ -24,7 +24,7 @@ from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.tabulated import Tabulated
 from stickslip.oscillator import Oscillator
-from stickslip.solve.energy import energy
+from stickslip.solve.energies import energy
 from stickslip.solve.periodic import steady_state
 from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import table_of

@@ -17,14 +17,18 @@ import pytest
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Exit, Mode, Rigid
-from stickslip.sweeps import progress, serial
-from stickslip.sweeps.plan import Arrays, Plan
+from stickslip.maps import progress, serial
+from stickslip.maps.plan import Arrays, Plan
 
 pytest.importorskip("xarray")
 CIRCLE = 2 * math.pi
-UNIT = ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb(0.5), drive=ss.HarmonicForce(1.0, frequency=0.8 / CIRCLE))
-RIGID = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5))
-COMPLIANT = RIGID.having(law=ss.CompliantContact(1.1, 192000, 23.8635))
+UNIT = ss.Oscillator(
+    mass=1, stiffness=1, law=ss.laws.Coulomb(0.5), drive=ss.drives.HarmonicForce(1.0, frequency=0.8 / CIRCLE)
+)
+RIGID = ss.Oscillator(
+    mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
+)
+COMPLIANT = RIGID.having(law=ss.laws.CompliantContact(1.1, 192000, 23.8635))
 
 
 def test_amplitudes_are_den_hartogs() -> None:
@@ -59,14 +63,14 @@ def test_micro_slips_and_transition_speed_are_those_of_the_contact() -> None:
     orbit = ss.steady_state(COMPLIANT)
     assert float(found.micro_slips[0]) == 4
     assert float(found.transition_speed[0]) == pytest.approx(orbit.transition_speed, rel=1e-9)
-    assert float(found.energy[0]) == pytest.approx(ss.energy(orbit.orbit).friction, rel=1e-9)
+    assert float(found.energy[0]) == pytest.approx(ss.solve.energy(orbit.orbit).friction, rel=1e-9)
 
 
 def test_laws_arrays_starts_and_own_functions() -> None:
-    def events(run: ss.Trajectory) -> float:
+    def events(run: ss.solve.Trajectory) -> float:
         return float(len(run.events))
 
-    grid = {"law": [ss.Coulomb(1.0), COMPLIANT.law], ("start.x", "start.v"): [(0.0, 0.0), (1e-3, 0.02)]}
+    grid = {"law": [ss.laws.Coulomb(1.0), COMPLIANT.law], ("start.x", "start.v"): [(0.0, 0.0), (1e-3, 0.02)]}
     found = ss.sweep(RIGID, grid, measures=[events, "amplitude"], settle=2, cycles=2)
     assert dict(found.sizes) == {"law": 2, "start.x_start.v": 2}
     assert found["start.x"].values.tolist() == [0.0, 1e-3]
@@ -118,7 +122,7 @@ def test_a_parameter_called_as_an_answer_goes_by_its_place() -> None:
     assert found.amplitude.dims == ("drive.amplitude",)
     assert found["drive.amplitude"].values.tolist() == [5e-4, 6e-4]
 
-    def mass(run: ss.Trajectory) -> float:
+    def mass(run: ss.solve.Trajectory) -> float:
         return 1.0
 
     with pytest.raises(ModelError, match="'mass' is a parameter and a measure"):
@@ -144,18 +148,18 @@ def test_a_point_that_is_no_system_may_stand_first_and_where_all_are_wrong_the_g
 
 
 def test_a_border_of_what_is_a_system_is_refined() -> None:
-    found = ss.refine(UNIT, {"mass": [-1.0, 1.0]}, halvings=3, settle=2, cycles=2)
+    found = ss.maps.refine(UNIT, {"mass": [-1.0, 1.0]}, halvings=3, settle=2, cycles=2)
     assert found.status.values.tolist()[:5] == [3] * 5  # up to and with a mass of 0
     assert 3 not in found.status.values[5:]
     with pytest.raises(ModelError, match="correct the grid of mass"):
-        ss.refine(UNIT, {"mass": [-1.0, -0.5]}, halvings=3)
+        ss.maps.refine(UNIT, {"mass": [-1.0, -0.5]}, halvings=3)
 
 
 def test_what_a_measure_refuses_is_no_missing_system() -> None:
-    def refuses(run: ss.Trajectory) -> float:
+    def refuses(run: ss.solve.Trajectory) -> float:
         raise ModelError("the run", "it is asked for what it has not", "ask another")
 
-    delayed = UNIT.having(law=ss.TimeDelay(ss.LinearSlope(0.5, slope=0.0), lag=0.1))
+    delayed = UNIT.having(law=ss.laws.TimeDelay(ss.laws.LinearSlope(0.5, slope=0.0), lag=0.1))
     for system in (UNIT, delayed):
         with pytest.raises(ModelError, match="asked for what it has not"):
             ss.sweep(system, {"mass": [1.0]}, measures=[refuses], settle=0, cycles=1, engine="serial")
@@ -209,20 +213,20 @@ def test_the_answer_says_what_made_it() -> None:
 def test_a_border_is_refined_with_few_runs_and_none_wrong() -> None:
     slider = ss.scenarios.forced(0.8, 0.5)
     coarse = {"frequency": np.linspace(0.08, 0.3, 9), "kinetic": np.linspace(0.1, 1.2, 9)}
-    found = ss.refine(slider, coarse, halvings=3, settle=200, cycles=10)
+    found = ss.maps.refine(slider, coarse, halvings=3, settle=200, cycles=10)
     fine = {name: found[name].values for name in coarse}
     whole = ss.sweep(slider, fine, measures=["stops"], settle=200, cycles=10)
     for name in ("normal_stops", "abnormal_stops", "status"):
         assert np.array_equal(np.round(found[name]), np.round(whole[name])), name
     assert found.run.sum() < found.run.size / 5
     with pytest.raises(ModelError, match="halvings = 0"):
-        ss.refine(slider, coarse, halvings=0)
+        ss.maps.refine(slider, coarse, halvings=0)
     with pytest.raises(ModelError, match="has 1 values"):
-        ss.refine(slider, {"kinetic": [0.5]})
+        ss.maps.refine(slider, {"kinetic": [0.5]})
     with pytest.raises(ModelError, match=r"measure = 'amplitude'; borders are of what counts"):
-        ss.refine(slider, coarse, measure="amplitude")
+        ss.maps.refine(slider, coarse, measure="amplitude")
     with pytest.raises(ModelError, match=r"1099513724929 points.*memory"):
-        ss.refine(slider, {"frequency": [0.1, 0.2], "kinetic": [0.3, 0.5]}, halvings=20)
+        ss.maps.refine(slider, {"frequency": [0.1, 0.2], "kinetic": [0.3, 0.5]}, halvings=20)
 
 
 @pytest.mark.parametrize("last", [12, 17])
@@ -238,9 +242,9 @@ def test_an_interrupt_ends_a_refinement_with_what_is_known(last: int, monkeypatc
     slider = ss.scenarios.forced(0.8, 0.5)
     coarse = {"frequency": np.linspace(0.08, 0.3, 9), "kinetic": np.linspace(0.1, 1.2, 9)}
     options: dict[str, Any] = {"halvings": 1, "settle": 5, "cycles": 2, "engine": "serial"}
-    whole = ss.refine(slider, coarse, **options)
+    whole = ss.maps.refine(slider, coarse, **options)
     monkeypatch.setattr(serial, "run_block", interrupted)
-    found = ss.refine(slider, coarse, **options)
+    found = ss.maps.refine(slider, coarse, **options)
     assert next(begun) == last + 1
     assert found.attrs["status"] == f"interrupted: {int(found.run.sum())} points were run"
     assert 0 < found.run.sum() < whole.run.sum()
@@ -251,23 +255,23 @@ def test_an_interrupt_ends_a_refinement_with_what_is_known(last: int, monkeypatc
 
 
 def test_a_design_tells_what_an_answer_depends_on() -> None:
-    def of_two(run: ss.Trajectory) -> float:
+    def of_two(run: ss.solve.Trajectory) -> float:
         return run.system.mass + 2 * run.system.stiffness  # type: ignore[union-attr, operator, return-value]
 
-    points = ss.design({"mass": (1.0, 2.0), "stiffness": (1.0, 2.0), "kinetic": (0.1, 0.2)}, count=64)
+    points = ss.maps.design({"mass": (1.0, 2.0), "stiffness": (1.0, 2.0), "kinetic": (0.1, 0.2)}, count=64)
     assert len(points) == 64 * 5
-    found = ss.sensitivity(ss.sweep(UNIT, points, measures=[of_two], settle=0, cycles=1), variable="of_two")
+    found = ss.maps.sensitivity(ss.sweep(UNIT, points, measures=[of_two], settle=0, cycles=1), variable="of_two")
     for name, share in (("mass", 0.2), ("stiffness", 0.8), ("kinetic", 0.0)):  # variances 1 : 4 : 0
         assert found[name]["total"].value == pytest.approx(share, abs=0.03)
         assert found[name]["first"].value == pytest.approx(share, abs=0.05)
     with pytest.raises(ModelError, match="power of two"):
-        ss.design({"mass": (1.0, 2.0)}, count=3)
+        ss.maps.design({"mass": (1.0, 2.0)}, count=3)
     with pytest.raises(ModelError, match="lowest and a higher"):
-        ss.design({"mass": (2.0, 1.0)}, count=4)
-    points = ss.design({"mass": (1.0, 2.0), "stiffness": (1.0, 2.0)}, count=32, kind="random")  # 8 times 2 + 2
+        ss.maps.design({"mass": (2.0, 1.0)}, count=4)
+    points = ss.maps.design({"mass": (1.0, 2.0), "stiffness": (1.0, 2.0)}, count=32, kind="random")  # 8 times 2 + 2
     random = ss.sweep(UNIT, points, settle=0, cycles=1)
-    with pytest.raises(ss.EstimateError, match="Sobol design"):
-        ss.sensitivity(random, variable="amplitude")
+    with pytest.raises(ss.errors.EstimateError, match="Sobol design"):
+        ss.maps.sensitivity(random, variable="amplitude")
 
 
 def test_shares_of_ishigamis_function_hold_its_closed_form() -> None:
@@ -282,11 +286,11 @@ def test_shares_of_ishigamis_function_hold_its_closed_form() -> None:
              ("x1", "total"): alone[0] + together, ("x2", "total"): alone[1], ("x3", "total"): together}  # fmt: skip
     held = []
     for seed in range(10):
-        points = ss.design(dict.fromkeys(("x1", "x2", "x3"), (-np.pi, np.pi)), count=1024, seed=seed)
+        points = ss.maps.design(dict.fromkeys(("x1", "x2", "x3"), (-np.pi, np.pi)), count=1024, seed=seed)
         x1, x2, x3 = (np.array([point[name] for point in points]) for name in ("x1", "x2", "x3"))
         y = np.sin(x1) + a * np.sin(x2) ** 2 + b * x3**4 * np.sin(x1)
         coordinates = {name: ("point", values) for name, values in (("x1", x1), ("x2", x2), ("x3", x3))}
-        shares = ss.sensitivity(xarray.Dataset({"y": ("point", y)}, coords=coordinates), variable="y", seed=seed)
+        shares = ss.maps.sensitivity(xarray.Dataset({"y": ("point", y)}, coords=coordinates), variable="y", seed=seed)
         for (name, kind), part in truth.items():
             assert shares[name][kind].value == pytest.approx(part / variance, abs=0.04)  # 0.027 at most of 40 seeds
             held.append(shares[name][kind].includes(part / variance))

@@ -41,7 +41,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def test_a_file_is_the_sweep_it_says(file: Path) -> None:
-    asked = ss.read_sweep(file)
+    asked = ss.maps.read_sweep(file)
     assert asked.case.system.drive.amplitude == pytest.approx(0.65e-3)  # type: ignore[union-attr]
     assert np.allclose(asked.grid["frequency"], np.linspace(2, 9, 8))
     assert asked.grid["kinetic"] == [0.2, 0.7, 1.2]
@@ -54,12 +54,12 @@ def test_a_file_has_laws_and_what_changes_together(file: Path) -> None:
     )
     pairs = '"mass, stiffness" = [[1, 4], ["2 kg", "8 N/m"]]'
     file.write_text(GRID.replace('kinetic = ["200 mN", 0.7, 1.2]', f"{laws}\n{pairs}"))
-    grid = ss.read_sweep(file).grid
-    assert grid["law"] == [ss.Coulomb(1.1), ss.CompliantContact(1.0, 2e5)]
+    grid = ss.maps.read_sweep(file).grid
+    assert grid["law"] == [ss.laws.Coulomb(1.1), ss.laws.CompliantContact(1.0, 2e5)]
     assert grid["mass", "stiffness"] == [(1.0, 4.0), (2.0, 8.0)]
     file.write_text(GRID.replace('kinetic = ["200 mN", 0.7, 1.2]', '"mass, stiffness" = [[1, 4], [2]]'))
     with pytest.raises(ModelError, match=r"line 8.*mass, stiffness.*list of lists"):
-        ss.read_sweep(file)
+        ss.maps.read_sweep(file)
 
 
 @pytest.mark.parametrize(
@@ -80,13 +80,13 @@ def test_a_mistake_in_the_file_is_named(file: Path, old: str, new: str, words: s
     if old == "[0":
         file.write_text(GRID + '\nbroken = "')
     with pytest.raises(ModelError, match=words):
-        ss.read_sweep(file)
+        ss.maps.read_sweep(file)
 
 
 def test_a_file_with_an_empty_grid_is_refused(file: Path) -> None:
     file.write_text(GRID.partition("frequency")[0])
     with pytest.raises(ModelError, match=r"grid.toml, line 6, has an empty grid.*kinetic = "):
-        ss.read_sweep(file)
+        ss.maps.read_sweep(file)
 
 
 def test_the_command_maps_keeps_and_draws(file: Path, tmp_path: Path) -> None:
@@ -121,31 +121,31 @@ def test_the_map_is_drawn_over_its_parameters() -> None:
     slider = forced(0.8, 0.5)
     values = {"frequency": np.linspace(0.08, 0.3, 12), "kinetic": np.linspace(0.1, 1.2, 10)}
     atlas = ss.sweep(slider, values, measures=["stops", "amplitude", "multipliers"], settle=60, cycles=20)
-    ax = ss.plot_map(atlas, system=slider)
+    ax = ss.plot.plot_map(atlas, system=slider)
     drawn = ax.collections[0].get_array()
     assert np.array_equal(np.ravel(drawn), np.ravel((atlas.normal_stops + atlas.abnormal_stops).values.T))
     assert [line.get_label() for line in ax.lines] == ["Den Hartog (1931): no stops below"]
-    assert len(ss.plot_map(atlas, variable="multiplier").collections) == 1
-    curve = ss.plot_map(atlas.isel(kinetic=3), variable="amplitude")
+    assert len(ss.plot.plot_map(atlas, variable="multiplier").collections) == 1
+    curve = ss.plot.plot_map(atlas.isel(kinetic=3), variable="amplitude")
     assert np.allclose(curve.lines[0].get_xdata(), values["frequency"])
-    stops = ss.plot_map(atlas.isel(frequency=3))
+    stops = ss.plot.plot_map(atlas.isel(frequency=3))
     assert all(tick == int(tick) for tick in stops.get_yticks())
-    status = ss.plot_map(atlas, variable="status").figure.axes[1]
+    status = ss.plot.plot_map(atlas, variable="status").figure.axes[1]
     assert [tick.get_text() for tick in status.get_yticklabels()] == ["moving", "at rest"]
     with pytest.raises(ModelError, match="has no 'stick'"):
-        ss.plot_map(atlas, variable="stick")
+        ss.plot.plot_map(atlas, variable="stick")
 
 
 def test_a_map_that_can_not_be_drawn_says_why(tmp_path: Path) -> None:
     slider = forced(0.8, 0.5)
     cube = {"frequency": [0.1, 0.13], "kinetic": [2.0, 3.0], ("mass", "stiffness"): [(1, 1), (2, 2)]}
     atlas = ss.sweep(slider, cube, measures=["stops"], settle=2, cycles=2)
-    page = (ss.publish_map(atlas, folder=tmp_path / "cube", system=slider) / "report.html").read_text("utf-8")
+    page = (ss.story.publish_map(atlas, folder=tmp_path / "cube", system=slider) / "report.html").read_text("utf-8")
     assert "over frequency and kinetic and mass with stiffness: 8 at rest" in page
     assert "There is no figure: the map is over 3 parameters" in page
     assert "Nothing moves anywhere" in page
     thin = ss.sweep(slider, {**cube, "kinetic": [0.5]}, measures=["stops"], settle=2, cycles=2)
-    folder = ss.publish_map(thin.isel(mass_stiffness=[0]), folder=tmp_path / "thin", system=slider)
+    folder = ss.story.publish_map(thin.isel(mass_stiffness=[0]), folder=tmp_path / "thin", system=slider)
     assert "no figure" not in (folder / "report.html").read_text("utf-8")
     assert (folder / "figures" / "stops.png").is_file()
 
@@ -161,6 +161,6 @@ def test_what_is_white_on_a_map_is_explained() -> None:
     (figure,) = plates_of(atlas)
     assert figure.caption.endswith("White: no number at 4 of 4 points (no orbit repeats yet after the settling).")
     whole = ss.sweep(slider, {"kinetic": [-1.0, 0.5], "frequency": [0.1, 0.13]}, measures=["stops"], settle=2, cycles=2)
-    legend = ss.plot_map(whole).get_legend()
+    legend = ss.plot.plot_map(whole).get_legend()
     assert legend is not None
     assert legend.get_texts()[0].get_text() == "white: no number at 2 of 4 points (no such system)"

@@ -16,26 +16,30 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
+from stickslip.maps.block import _alone, run_block
+from stickslip.maps.measures import LOG, MEASURES
+from stickslip.maps.sweep import planned
+from stickslip.maps.threads import threads
 from stickslip.solve.tables import systems_of, table_of, tables_of
-from stickslip.sweeps.block import _alone, run_block
-from stickslip.sweeps.measures import LOG, MEASURES
-from stickslip.sweeps.sweep import planned
-from stickslip.sweeps.threads import threads
 
 xarray = pytest.importorskip("xarray")
 COUNTED = [measure for measure in MEASURES if measure != LOG]  # what a march counts without keeping the motion
 RIGID = ss.Oscillator(
-    mass=2.42, stiffness=2310, damping=0.12, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(0.65e-3, frequency=2.5)
+    mass=2.42,
+    stiffness=2310,
+    damping=0.12,
+    law=ss.laws.Coulomb(1.1),
+    drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5),
 )
-COMPLIANT = RIGID.having(law=ss.CompliantContact(1.1, 192000, 23.9))
-BELT = ss.Oscillator(mass=1, stiffness=1, damping=0.1, law=ss.Coulomb(1.0, static=1.5), drive=ss.Belt(0.5))
+COMPLIANT = RIGID.having(law=ss.laws.CompliantContact(1.1, 192000, 23.9))
+BELT = ss.Oscillator(mass=1, stiffness=1, damping=0.1, law=ss.laws.Coulomb(1.0, static=1.5), drive=ss.drives.Belt(0.5))
 CASES: dict[str, tuple[ss.Oscillator, dict[Any, Any], int, int]] = {
     "rigid": (RIGID, {"frequency": [1.3, 5.61, 20.0], "kinetic": [0.3, 1.1, 1.6]}, 30, 40),
     "compliant": (COMPLIANT, {"frequency": [2.5, 5.61], "kinetic": [0.7, 1.28]}, 30, 40),
     "starts": (RIGID, {("start.x", "start.v"): [(0, 0), (1e-3, 0.02)], "mass": [1.0, 2.42]}, 30, 40),
-    "laws": (RIGID, {"law": [ss.Coulomb(1.0), COMPLIANT.law, ss.LinearSlope(1.0, 0.5)]}, 30, 40),
+    "laws": (RIGID, {"law": [ss.laws.Coulomb(1.0), COMPLIANT.law, ss.laws.LinearSlope(1.0, 0.5)]}, 30, 40),
     "a belt": (BELT, {"speed": [0.1, 0.5]}, 30, 40),
-    "free": (ss.Oscillator(mass=1, stiffness=4, law=ss.Coulomb(1.0)), {"start.x": [1.25, 3.7]}, 2, 30),
+    "free": (ss.Oscillator(mass=1, stiffness=4, law=ss.laws.Coulomb(1.0)), {"start.x": [1.25, 3.7]}, 2, 30),
 }
 
 
@@ -45,7 +49,7 @@ CASES: dict[str, tuple[ss.Oscillator, dict[Any, Any], int, int]] = {
         [RIGID.having(frequency=f, kinetic=k) for f in (2.5, 9.0) for k in (0.5, 1.1)],
         [COMPLIANT.having(kinetic=k, mass=m) for k in (0.5, 1.1) for m in (1.0, 2.42)],
         [BELT.having(speed=v, damping=c) for v in (0.1, 0.5) for c in (0.0, 0.1)],
-        [RIGID.having(law=ss.PositionLoad(1.0, gradient=g)) for g in (0.5, 1.5)],
+        [RIGID.having(law=ss.laws.PositionLoad(1.0, gradient=g)) for g in (0.5, 1.5)],
     ],
     ids=["rigid", "compliant", "belt", "position"],
 )
@@ -100,7 +104,7 @@ def test_threads_give_the_same_bytes(engine: str) -> None:
 def test_an_interrupt_keeps_what_is_done() -> None:
     calls: list[int] = []
 
-    def stop(run: ss.Trajectory) -> float:
+    def stop(run: ss.solve.Trajectory) -> float:
         calls.append(1)
         if len(calls) == 5:
             raise KeyboardInterrupt
@@ -112,7 +116,7 @@ def test_an_interrupt_keeps_what_is_done() -> None:
 
 
 def test_a_failed_point_does_not_stop_the_threads() -> None:
-    def broken(run: ss.Trajectory) -> float:
+    def broken(run: ss.solve.Trajectory) -> float:
         raise ZeroDivisionError("a user's mistake is a user's")
 
     with pytest.raises(ZeroDivisionError):
@@ -177,7 +181,7 @@ def test_a_gpu_refuses_what_it_cannot_march(monkeypatch: pytest.MonkeyPatch) -> 
     numba_cuda = pytest.importorskip("numba.cuda")
     monkeypatch.setattr(numba_cuda, "is_available", lambda: True)
     monkeypatch.setattr(numba_cuda, "get_current_device", lambda: SimpleNamespace(compute_capability=(9, 0)))
-    slider = RIGID.having(law=ss.LuGre(1.1, 1.3, speed=1e-3, stiffness=2e5, damping=20.0))
+    slider = RIGID.having(law=ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=2e5, damping=20.0))
     with pytest.raises(ModelError, match=r'LuGre.*take engine="threads"'):
         ss.sweep(slider, {"kinetic": [1.0]}, engine="cuda", settle=1, cycles=1)
     with pytest.raises(ModelError, match=r"'events'.*keeps none.*threads"):

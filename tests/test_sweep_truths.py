@@ -25,8 +25,8 @@ pytest.importorskip("xarray")
 CIRCLE = 2 * math.pi
 SHAW = 0.72697564257968176  # friction over force at which sliding begins to stick, b = 0.8, static 1.5 of kinetic
 STRIBECK = ss.Oscillator(
-    mass=1, stiffness=1, damping=0.3, drive=ss.Belt(0.1),
-    law=ss.Stribeck(kinetic=1.0, static=1.5, speed=0.1, exponent=2.0, viscous=0.2),
+    mass=1, stiffness=1, damping=0.3, drive=ss.drives.Belt(0.1),
+    law=ss.laws.Stribeck(kinetic=1.0, static=1.5, speed=0.1, exponent=2.0, viscous=0.2),
 )  # fmt: skip
 BAND = (0.0050125787690136614, 0.19084020979734697)  # belt speeds [m/s] between which its steady sliding is lost
 CHAOS = ss.scenarios.get("FM-1").system
@@ -55,7 +55,7 @@ def belts() -> list[dict[str, float]]:
     """Starts beside the steady sliding, 3 % outside and inside of either end of the band."""
     points = []
     for speed in (0.97 * BAND[0], 1.03 * BAND[0], 0.97 * BAND[1], 1.03 * BAND[1]):
-        steady = ss.steady_sliding(STRIBECK.having(drive=ss.Belt(speed))).state["x"]
+        steady = ss.solve.steady_sliding(STRIBECK.having(drive=ss.drives.Belt(speed))).state["x"]
         points.append({"drive.speed": speed, "start.x": steady + 1e-5, "start.v": 0.0})
     return points
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip import EstimateError, Record, RecordError, clock_offset, clock_rate, read_record, synchronise
+from stickslip import Record, read_record
+from stickslip.errors import EstimateError, RecordError
+from stickslip.signals import clock_offset, clock_rate, synchronise
 
 FS_A, FS_B = 1000.0, 730.0
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import stickslip as ss
 from stickslip.errors import ModelError, StickslipError
 from stickslip.scenarios import DRIVES, LAWS
-from stickslip.system_file import UNITS, Case, read_system, scenario_case
+from stickslip.systems.file import UNITS, Case, read_system, scenario_case
 
 WHOLE = """about = "a slider on a driven base"
 [system]
@@ -51,17 +51,17 @@ def test_a_whole_file_is_read_into_si(tmp_path: Path) -> None:
     case = read_system(written(tmp_path, WHOLE))
     assert case.system == ss.Oscillator(
         mass=2.42, stiffness=2310, damping=0.12, drive=case.system.drive,
-        law=ss.CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9),
+        law=ss.laws.CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9),
     )  # fmt: skip
-    assert isinstance(case.system.drive, ss.HarmonicBase)
+    assert isinstance(case.system.drive, ss.drives.HarmonicBase)
     assert case.system.drive.amplitude == pytest.approx(0.65e-3, rel=1e-15)
     assert (case.name, case.run, case.fs, case.start) == ("slider", {"cycles": 40.0}, 4000.0, {"x": 1e-4})
 
 
 def test_the_motion_is_that_of_the_same_system_in_python(tmp_path: Path) -> None:
     case = read_system(written(tmp_path, WHOLE.replace('"0.65 mm"', "0.65e-3")))
-    law = ss.CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9)
-    drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+    law = ss.laws.CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9)
+    drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     system = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.12, law=law, drive=drive)
     assert ss.simulate(case.system, start=case.start, **case.run).events == ss.simulate(
         system, start={"x": 1e-4}, cycles=40
@@ -127,7 +127,7 @@ def test_a_tone_goes_on_top_of_a_drive(tmp_path: Path) -> None:
     inner = 'drive = { name = "Belt", speed = "100 mm/s" }\n'
     outer = 'name = "Dithered"\namplitude = 5e-6\nfrequency = 200\n'
     case = read_system(written(tmp_path, WHOLE.replace(DRIVE, outer + inner)))
-    assert case.system.drive == ss.Dithered(ss.Belt(0.1), amplitude=5e-6, frequency=200.0)
+    assert case.system.drive == ss.drives.Dithered(ss.drives.Belt(0.1), amplitude=5e-6, frequency=200.0)
     with pytest.raises(ModelError, match="a drive within a drive is a table"):
         read_system(written(tmp_path, WHOLE.replace(DRIVE, outer + 'drive = "Belt"\n')))
 
@@ -139,7 +139,7 @@ def test_a_recorded_base_comes_from_a_file_beside(tmp_path: Path) -> None:
     text = WHOLE.replace(DRIVE, 'name = "RecordedBase"\nrecord = "base.csv"\nchannel = "plate [m]"')
     case = read_system(written(tmp_path, text.replace("cycles = 40", "")))
     drive = case.system.drive
-    assert isinstance(drive, ss.RecordedBase)
+    assert isinstance(drive, ss.drives.RecordedBase)
     assert drive.fs == 200
     assert np.array_equal(np.asarray(drive.samples), z)
     assert case.run == {"duration": 399 / 200}, "as long as the record"
@@ -196,12 +196,12 @@ anchor1 = 0.0
 def test_a_structure_is_read_as_python_makes_it(tmp_path: Path) -> None:
     case = read_system(written(tmp_path, TWO))
     pads = [
-        ss.Contact(ss.CompliantContact(0.5, stiffness=50.0), [1, 0]),
-        ss.Contact(ss.Coulomb(0.2, static=0.3), [-1, 1], normal=[0, 1], stiffness=2.0, preload=5.0),
+        ss.Contact(ss.laws.CompliantContact(0.5, stiffness=50.0), [1, 0]),
+        ss.Contact(ss.laws.Coulomb(0.2, static=0.3), [-1, 1], normal=[0, 1], stiffness=2.0, preload=5.0),
     ]
     system = ss.Structure(
         np.diag([1.3, 700 * 1e-3]), np.diag([0.05, 0.05]), [[3.0, -1.3], [-1.3, 2.9]], contacts=pads, acts_on=[1, 0],
-        drive=ss.HarmonicForce(1.2, frequency=0.13),
+        drive=ss.drives.HarmonicForce(1.2, frequency=0.13),
     )  # fmt: skip
     assert isinstance(case.system, ss.Structure)
     assert (case.start, case.run) == ({"x2": 0.1, "anchor1": 0.0}, {"cycles": 20.0})
@@ -254,11 +254,11 @@ def test_a_law_behind_a_compliant_contact_is_a_table_within(tmp_path: Path) -> N
     inner = 'name = "LinearSlope"\nkinetic = 1.1\nslope = -5\n'
     outer = '[law]\nname = "InSeries"\nstiffness = 192000\ndamping = 24\n[law.law]\n'
     text = WHOLE.replace(LAW, outer + inner)
-    law = ss.InSeries(ss.LinearSlope(1.1, slope=-5.0), stiffness=192000.0, damping=24.0)
+    law = ss.laws.InSeries(ss.laws.LinearSlope(1.1, slope=-5.0), stiffness=192000.0, damping=24.0)
     case = read_system(written(tmp_path, text))
     assert case.system.law == law  # type: ignore[union-attr]
     changed = case.having(**{"law.stiffness": "1 N/um", "slope": -4}).system
-    assert changed.law == ss.InSeries(ss.LinearSlope(1.1, slope=-4.0), stiffness=1e6, damping=24.0)  # type: ignore[union-attr]
+    assert changed.law == ss.laws.InSeries(ss.laws.LinearSlope(1.1, slope=-4.0), stiffness=1e6, damping=24.0)  # type: ignore[union-attr]
     for old, new, told in (("slope = -5", "slop = -5", "law.law.slop"), ("slope = -5", "slope = -50", "raise damping"),
                            ('name = "LinearSlope"', 'name = "Linear"', "line 11,")):  # fmt: skip
         with pytest.raises(ModelError, match=told):
@@ -268,13 +268,13 @@ def test_a_law_behind_a_compliant_contact_is_a_table_within(tmp_path: Path) -> N
 def test_a_law_with_a_time_lag_holds_its_curve(tmp_path: Path) -> None:
     text = '[law]\nname = "TimeDelay"\nlag = "1 ms"\nlaw = { name = "LinearSlope", kinetic = 1.1, slope = 2 }\n'
     system = read_system(written(tmp_path, WHOLE.replace(LAW, text))).system
-    assert system.law == ss.TimeDelay(ss.LinearSlope(1.1, slope=2.0), lag=1e-3)  # type: ignore[union-attr]
+    assert system.law == ss.laws.TimeDelay(ss.laws.LinearSlope(1.1, slope=2.0), lag=1e-3)  # type: ignore[union-attr]
 
 
 def test_a_curve_is_a_formula_of_the_speed(tmp_path: Path) -> None:
     text = WHOLE.replace(LAW, '[law]\nname = "FrictionCurve"\ncurve = "3 / (1 + 1.42 * v) + 1 + 0.1 * v**2"\n')
     law = read_system(written(tmp_path, text)).system.law  # type: ignore[union-attr]
-    assert isinstance(law, ss.FrictionCurve)
+    assert isinstance(law, ss.laws.FrictionCurve)
     assert law.friction(0.7) == pytest.approx(3 / (1 + 1.42 * 0.7) + 1 + 0.1 * 0.49, rel=1e-15)
     for curve, told in (("1 / v", "no value at rest"), ("v^2", r"has '\^'"), ("w", "has 'w'"), ("1 +", "read"),
                         ("__import__('os')", "has"), ("v ** v", "has"), ("9**9**9**9", "rest"),

@@ -106,7 +106,7 @@ def test_no_reading_is_nan_and_check_may_speak(tmp_path: Path) -> None:
 def test_columns_of_unequal_length_are_refused_with_the_rows_that_all_have(tmp_path: Path) -> None:
     path = tmp_path / "short.csv"
     path.write_text("t,x [m],load [N]\n0,1,5\n1,2,6\n2,3\n3,4\n")
-    with pytest.raises(ss.RecordError, match=r"column load has values in 2 rows, others in 4; .* rows=\(0, 2\)"):
+    with pytest.raises(ss.errors.RecordError, match=r"column load has values in 2 rows, others in 4; .* rows=\(0, 2\)"):
         ss.read_record(path)
     np.testing.assert_array_equal(ss.read_record(path, rows=(0, 2))["load"], [5, 6])
 
@@ -125,14 +125,14 @@ def test_columns_of_unequal_length_are_refused_with_the_rows_that_all_have(tmp_p
 def test_a_fault_is_named_by_its_row(tmp_path: Path, text: str, row: int) -> None:
     path = tmp_path / "fault.csv"
     path.write_text(text)
-    with pytest.raises(ss.FormatError, match=rf"row {row} of 'fault.csv' reads"):
+    with pytest.raises(ss.errors.FormatError, match=rf"row {row} of 'fault.csv' reads"):
         ss.read_record(path)
 
 
 def test_a_decimal_comma_met_late_is_named(tmp_path: Path) -> None:
     path = tmp_path / "late.csv"
     path.write_text("t;x\n" + "".join(f"{i};1\n" for i in range(3000)) + "3000;0,5\n")
-    with pytest.raises(ss.FormatError, match=r"row 3002 .* pass delimiter= and decimal="):
+    with pytest.raises(ss.errors.FormatError, match=r"row 3002 .* pass delimiter= and decimal="):
         ss.read_record(path)
     assert ss.read_record(path, decimal=",")["x"][-1] == 0.5
 
@@ -140,9 +140,9 @@ def test_a_decimal_comma_met_late_is_named(tmp_path: Path) -> None:
 def test_options_are_checked(tmp_path: Path) -> None:
     path = tmp_path / "rig.csv"
     path.write_text(DIALECTS["comma"])
-    with pytest.raises(ss.FormatError, match="same sign"):
+    with pytest.raises(ss.errors.FormatError, match="same sign"):
         ss.read_record(path, delimiter=",", decimal=",")
-    with pytest.raises(ss.FormatError, match="one character"):
+    with pytest.raises(ss.errors.FormatError, match="one character"):
         ss.read_record(path, delimiter="<>")
     assert len(ss.read_record(path, delimiter="comma")) == len(T)
 

@@ -11,21 +11,21 @@ from thesis import beyond, chapter2, chapter3, chapter4, chapter6
 from thesis.printed import given
 
 import stickslip as ss
-from stickslip.identify import extremes as ex
-from stickslip.signals.differentiate import five_point_response
+from stickslip.decay import extremes as ex
+from stickslip.signals.derivatives import five_point_response
 
 GIVEN = given()
 
 
-def undamped(case: int) -> ss.SteadyState:
+def undamped(case: int) -> ss.solve.SteadyState:
     """A sliding case of chapter 3 without damping in the contact."""
     told = GIVEN["sliding"]
-    law = ss.CompliantContact(told["kinetic"][case], stiffness=told["stiffness"][case])
-    drive = ss.HarmonicBase(told["base"][case], frequency=told["frequency"][case])
+    law = ss.laws.CompliantContact(told["kinetic"][case], stiffness=told["stiffness"][case])
+    drive = ss.drives.HarmonicBase(told["base"][case], frequency=told["frequency"][case])
     return ss.steady_state(ss.Oscillator(mass=told["mass"], stiffness=told["spring"], law=law, drive=drive))
 
 
-def energies(orbit: ss.SteadyState) -> list[float]:
+def energies(orbit: ss.solve.SteadyState) -> list[float]:
     """v^2 + (w x)^2 gained in each microstick of an orbit, over the largest one."""
     w = 2 * math.pi / orbit.period
     pieces = orbit.orbit.pieces
@@ -77,8 +77,8 @@ def test_the_printed_backbone_holds_friction_below_one_newton() -> None:
     told, slider = GIVEN["state_variable"], GIVEN["stick_slip"]
     largest = {}
     for printed in (True, False):
-        law = ss.SmoothStateVariable(1.1, rate=told["rate"], steepness=told["steepness"], printed=printed)
-        drive = ss.HarmonicBase(told["base"][0], frequency=told["frequency"][0])
+        law = ss.laws.SmoothStateVariable(1.1, rate=told["rate"], steepness=told["steepness"], printed=printed)
+        drive = ss.drives.HarmonicBase(told["base"][0], frequency=told["frequency"][0])
         oscillator = ss.Oscillator(mass=slider["mass"], stiffness=slider["spring"], law=law, drive=drive)
         run = ss.simulate(oscillator, cycles=3)
         largest[printed] = np.max(np.abs(run.sample(np.linspace(0, run.duration, 2000), ("friction",))[0]))

@@ -13,12 +13,12 @@ from scipy.integrate import solve_ivp
 import stickslip as ss
 
 BELT = ss.Oscillator(
-    mass=1.3, stiffness=2.0, damping=0.1, drive=ss.Belt(1.0),
-    law=ss.TimeDelay(ss.LinearSlope(1.0, slope=-0.4, static=1.3), lag=0.3),
+    mass=1.3, stiffness=2.0, damping=0.1, drive=ss.drives.Belt(1.0),
+    law=ss.laws.TimeDelay(ss.laws.LinearSlope(1.0, slope=-0.4, static=1.3), lag=0.3),
 )  # fmt: skip
 SHAKEN = ss.Oscillator(
-    mass=2.42, stiffness=2310, drive=ss.HarmonicBase(0.65e-3, 2.5),
-    law=ss.TimeDelay(ss.Stribeck(1.1, 1.3, speed=4e-3, exponent=1.0, viscous=4.0), lag=7e-3),
+    mass=2.42, stiffness=2310, drive=ss.drives.HarmonicBase(0.65e-3, 2.5),
+    law=ss.laws.TimeDelay(ss.laws.Stribeck(1.1, 1.3, speed=4e-3, exponent=1.0, viscous=4.0), lag=7e-3),
 )  # fmt: skip
 
 
@@ -33,12 +33,12 @@ class Steps:
         self.breaks = [self.law.lag * k for k in range(1, 30)]
 
     def face(self, _: float) -> float:
-        return self.system.drive.speed if isinstance(self.system.drive, ss.Belt) else 0.0
+        return self.system.drive.speed if isinstance(self.system.drive, ss.drives.Belt) else 0.0
 
     def pull(self, t: float, x: float, v: float) -> float:
         """Every force but friction."""
         s, drive = self.system, self.system.drive
-        z = 0.0 if isinstance(drive, ss.Belt) else drive.amplitude * math.cos(2 * math.pi * drive.frequency * t)
+        z = 0.0 if isinstance(drive, ss.drives.Belt) else drive.amplitude * math.cos(2 * math.pi * drive.frequency * t)
         return s.stiffness * (z - x) - s.damping * v
 
     def friction(self, t: float) -> float:
@@ -50,9 +50,9 @@ class Steps:
                 speed = abs(path(then)[1] - self.face(then)) if side else 0.0
                 break
         curve = self.law.law
-        if isinstance(curve, ss.LinearSlope):
+        if isinstance(curve, ss.laws.LinearSlope):
             return curve.kinetic + curve.slope * speed
-        if isinstance(curve, ss.Tabulated):
+        if isinstance(curve, ss.laws.Tabulated):
             return float(np.interp(speed, curve.speeds, curve.forces))
         return curve.friction(speed)
 
@@ -88,13 +88,23 @@ class Steps:
         return self.events
 
 
-@pytest.mark.parametrize(("system", "start", "mode", "duration"), [
-    (BELT, {"x": -0.3}, 0, 12.0),
-    (BELT.having(law=ss.TimeDelay(ss.Stribeck(0.8, 1.3, speed=0.3), lag=0.7)), {"x": -0.3}, 0, 12.0),
-    (BELT.having(damping=0.0, law=ss.TimeDelay(ss.Tabulated([0, 0.2, 1.5], [1, 0.6, 0.5], static=1.2), lag=0.3)),
-     {"x": -0.3}, 0, 12.0),
-    (SHAKEN, {}, 1, 1.2),
-], ids=["slope", "stribeck", "tabulated", "shaken"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("system", "start", "mode", "duration"),
+    [
+        (BELT, {"x": -0.3}, 0, 12.0),
+        (BELT.having(law=ss.laws.TimeDelay(ss.laws.Stribeck(0.8, 1.3, speed=0.3), lag=0.7)), {"x": -0.3}, 0, 12.0),
+        (
+            BELT.having(
+                damping=0.0, law=ss.laws.TimeDelay(ss.laws.Tabulated([0, 0.2, 1.5], [1, 0.6, 0.5], static=1.2), lag=0.3)
+            ),
+            {"x": -0.3},
+            0,
+            12.0,
+        ),
+        (SHAKEN, {}, 1, 1.2),
+    ],
+    ids=["slope", "stribeck", "tabulated", "shaken"],
+)
 def test_the_motion_is_that_of_the_method_of_steps(
     system: ss.Oscillator, start: dict[str, float], mode: int, duration: float
 ) -> None:
@@ -106,7 +116,7 @@ def test_the_motion_is_that_of_the_method_of_steps(
     assert [event.time for event in run.events] == pytest.approx([time for time, _ in known], rel=1e-11)
     end = run.state(duration)
     assert [end["x"], end["v"]] == pytest.approx(peer.state, rel=1e-9, abs=1e-12)
-    assert ss.energy(run).residual < 1e-12
+    assert ss.solve.energy(run).residual < 1e-12
 
 
 def characteristic_root(system: ss.Oscillator, slope: float, guess: complex) -> complex:
@@ -119,8 +129,10 @@ def characteristic_root(system: ss.Oscillator, slope: float, guess: complex) -> 
 
 @pytest.mark.parametrize(("lag", "grows"), [(0.05, True), (1.3, False), (2.5, True)])
 def test_small_oscillations_about_steady_sliding_follow_the_characteristic_root(lag: float, grows: bool) -> None:
-    law = ss.Stribeck(1.0, 1.5, speed=0.5, exponent=1.0)
-    system = ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.TimeDelay(law, lag=lag), drive=ss.Belt(1.0), damping=0.05)
+    law = ss.laws.Stribeck(1.0, 1.5, speed=0.5, exponent=1.0)
+    system = ss.Oscillator(
+        mass=1.0, stiffness=4.0, law=ss.laws.TimeDelay(law, lag=lag), drive=ss.drives.Belt(1.0), damping=0.05
+    )
     slope = -0.5 / 0.5 * math.exp(-2.0)
     root = characteristic_root(system, slope, 2j)
     assert (root.real > 0) == grows
@@ -136,8 +148,8 @@ def test_small_oscillations_about_steady_sliding_follow_the_characteristic_root(
 
 
 def test_steady_sliding_goes_on() -> None:
-    law = ss.Stribeck(1.0, 1.5, speed=0.5, exponent=1.0, viscous=0.5)
-    system = ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.TimeDelay(law, lag=0.1), drive=ss.Belt(1.0))
+    law = ss.laws.Stribeck(1.0, 1.5, speed=0.5, exponent=1.0, viscous=0.5)
+    system = ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.laws.TimeDelay(law, lag=0.1), drive=ss.drives.Belt(1.0))
     rest = law.friction(1.0) / 4.0
     run = ss.simulate(system, duration=100.0, start={"x": rest, "v": 0.0})
     assert not run.events
@@ -163,8 +175,8 @@ def test_the_loop_over_the_speed_turns_as_its_area_tells_and_widens_with_the_fre
     lag, speed, swing, areas = 0.02, 1.0, 0.3, []
     for frequency in (1.0, 2.0, 4.0, 8.0):
         turn = 2 * math.pi * frequency
-        face = ss.MultiTone([(swing / turn, frequency, math.pi / 2)], on="face")  # -A cos wt under the mass
-        law = ss.TimeDelay(ss.LinearSlope(1.0, slope=slope), lag=lag)
+        face = ss.drives.MultiTone([(swing / turn, frequency, math.pi / 2)], on="face")  # -A cos wt under the mass
+        law = ss.laws.TimeDelay(ss.laws.LinearSlope(1.0, slope=slope), lag=lag)
         system = ss.Oscillator(mass=1e30, stiffness=0.0, law=law, drive=face)
         run = ss.simulate(system, duration=lag + 2 / frequency, start={"v": speed})
         times = lag + 1 / frequency + np.arange(256) / 256 / frequency
@@ -185,11 +197,11 @@ def test_the_answer_does_not_hang_on_tolerance_samples_or_units() -> None:
     coarse, fine = run.record(fs=100), run.record(fs=1000)
     assert coarse["friction"] == pytest.approx(fine["friction"][::10], rel=1e-12)
     length, time, force = 1e6, 1e-3, 1e-4
-    curve = ss.Stribeck(1.1 * force, 1.3 * force, speed=4e-3 * length / time, exponent=1.0,
+    curve = ss.laws.Stribeck(1.1 * force, 1.3 * force, speed=4e-3 * length / time, exponent=1.0,
                         viscous=4.0 * force * time / length)  # fmt: skip
     scaled = ss.Oscillator(
         mass=2.42 * force * time**2 / length, stiffness=2310 * force / length,
-        law=ss.TimeDelay(curve, lag=7e-3 * time), drive=ss.HarmonicBase(0.65e-3 * length, 2.5 / time),
+        law=ss.laws.TimeDelay(curve, lag=7e-3 * time), drive=ss.drives.HarmonicBase(0.65e-3 * length, 2.5 / time),
     )  # fmt: skip
     other = ss.simulate(scaled, cycles=20)
     assert [e.mode for e in other.events] == [e.mode for e in run.events]
@@ -209,16 +221,16 @@ def test_a_long_run_keeps_its_pace_and_its_past() -> None:
 
 def test_a_recorded_base_moves_a_law_with_a_lag() -> None:
     times = np.arange(81) / 100
-    base = ss.RecordedBase(0.65e-3 * np.cos(2 * math.pi * 2.5 * times), fs=100)
+    base = ss.drives.RecordedBase(0.65e-3 * np.cos(2 * math.pi * 2.5 * times), fs=100)
     run = ss.simulate(SHAKEN.having(drive=base), duration=0.8)
     near = ss.simulate(SHAKEN, duration=0.8)
     assert [e.mode for e in run.events] == [e.mode for e in near.events]
     assert [e.time for e in run.events] == pytest.approx([e.time for e in near.events], abs=2e-4)
-    assert ss.energy(run).residual < 1e-12
+    assert ss.solve.energy(run).residual < 1e-12
 
 
 def test_a_stop_shorter_than_the_lag_remembers_the_slip_before() -> None:
-    law = ss.TimeDelay(ss.LinearSlope(1.0, slope=2.0, static=1.0), lag=0.5)
+    law = ss.laws.TimeDelay(ss.laws.LinearSlope(1.0, slope=2.0, static=1.0), lag=0.5)
     run = ss.simulate(ss.Oscillator(mass=1.0, stiffness=0.0, law=law), duration=3.0, start={"v": 1.0})
     # 3 N while the delayed speed is 1 m/s: stopped after 1/3 s, and held whatever the past was
     assert [(round(e.time, 12), e.kind) for e in run.events] == [(round(1 / 3, 12), "stick")]
@@ -238,27 +250,33 @@ def test_a_lag_is_written_in_a_file_around_its_law(tmp_path: Path) -> None:
         law = {name = "Stribeck", kinetic = 1.1, static = 1.3, speed = "4 mm/s", exponent = 1.0, viscous = 4.0}
     """
     file.write_text(text)
-    case = ss.read_system(file)
+    case = ss.systems.read_system(file)
     assert case.system.law == SHAKEN.law
     assert case.having(lag="3 ms").system.law.lag == 3e-3
     file.write_text(text.replace('"7 ms"', '"-7 ms"'))
-    with pytest.raises(ss.ModelError, match=r"line 6.*lag = -0.007 s"):
-        ss.read_system(file)
+    with pytest.raises(ss.errors.ModelError, match=r"line 6.*lag = -0.007 s"):
+        ss.systems.read_system(file)
 
 
-@pytest.mark.parametrize(("build", "word"), [
-    (lambda: ss.TimeDelay(ss.Dahl(1.0, 1.0), lag=0.1), "Dahl"), (lambda: ss.TimeDelay(SHAKEN.law.law, lag=0.0), "lag"),
-    (lambda: ss.TimeDelay(SHAKEN.law.law, lag=-1.0), "lag"), (lambda: ss.TimeDelay(SHAKEN.law.law, math.nan), "lag"),
-    (lambda: ss.TimeDelay(1.0, lag=1.0), "float"), (lambda: ss.InSeries(SHAKEN.law, stiffness=1.0), "series"),
-    (lambda: ss.simulate(SHAKEN, cycles=1, rtol=0.0), "rtol"),
-    (lambda: ss.simulate(SHAKEN, cycles=1, start={"delayed_speed": 1.0}), "start"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("build", "word"),
+    [
+        (lambda: ss.laws.TimeDelay(ss.laws.Dahl(1.0, 1.0), lag=0.1), "Dahl"),
+        (lambda: ss.laws.TimeDelay(SHAKEN.law.law, lag=0.0), "lag"),
+        (lambda: ss.laws.TimeDelay(SHAKEN.law.law, lag=-1.0), "lag"),
+        (lambda: ss.laws.TimeDelay(SHAKEN.law.law, math.nan), "lag"),
+        (lambda: ss.laws.TimeDelay(1.0, lag=1.0), "float"),
+        (lambda: ss.laws.InSeries(SHAKEN.law, stiffness=1.0), "series"),
+        (lambda: ss.simulate(SHAKEN, cycles=1, rtol=0.0), "rtol"),
+        (lambda: ss.simulate(SHAKEN, cycles=1, start={"delayed_speed": 1.0}), "start"),
+    ],
+)
 def test_bad_input_is_named(build: object, word: str) -> None:
-    with pytest.raises(ss.ModelError, match=word) as error:
+    with pytest.raises(ss.errors.ModelError, match=word) as error:
         build()  # type: ignore[operator]
     assert all((error.value.value, error.value.rule, error.value.next_step))
 
 
 def test_a_lag_too_short_for_the_run_is_refused() -> None:
-    with pytest.raises(ss.SolveError, match="lag"):
+    with pytest.raises(ss.errors.SolveError, match="lag"):
         ss.simulate(SHAKEN.having(lag=1e-12), cycles=100)

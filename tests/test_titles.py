@@ -93,9 +93,9 @@ def test_a_unit_stated_beside_the_title_counts(tmp_path: Path) -> None:
 
 def test_a_near_name_is_suggested_as_it_must_be_written(tmp_path: Path) -> None:
     WRITERS["run.csv"](tmp_path / "run.csv")
-    with pytest.raises(ss.RecordError, match="did you mean '`rig acc`'"):
+    with pytest.raises(ss.errors.RecordError, match="did you mean '`rig acc`'"):
         ss.read_record(tmp_path / "run.csv", channels={"a": "rig_ac * 2"})
-    with pytest.raises(ss.RecordError, match="did you mean 'plate'"):
+    with pytest.raises(ss.errors.RecordError, match="did you mean 'plate'"):
         ss.read_record(tmp_path / "run.csv", channels={"a": "plat"})
 
 

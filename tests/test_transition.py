@@ -12,29 +12,29 @@ from click.testing import CliRunner
 
 import stickslip as ss
 from stickslip.cli.program import main
+from stickslip.contact.frequency_transition import _agreement
+from stickslip.contact.mechanisms import UNTOLD
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate
-from stickslip.identify.mechanism import UNTOLD
-from stickslip.identify.transition import _agreement
 
 MASS, SPRING, CONTACT, FS = 2.42, 2310.0, 192000.0, 4000.0
 
 
-def compliant(kinetic: float, damping: float) -> ss.CompliantContact:
-    return ss.CompliantContact(kinetic=kinetic, stiffness=CONTACT, damping=damping)
+def compliant(kinetic: float, damping: float) -> ss.laws.CompliantContact:
+    return ss.laws.CompliantContact(kinetic=kinetic, stiffness=CONTACT, damping=damping)
 
 
 @functools.cache
-def truth(name: str, cycles: int = 10) -> tuple[ss.Record, ss.Trajectory]:
+def truth(name: str, cycles: int = 10) -> tuple[ss.Record, ss.solve.Trajectory]:
     """The thesis's case of 2.5 Hz with the contact of that name, once it is steady."""
     laws = {
-        "rigid": ss.Coulomb(kinetic=1.1),
+        "rigid": ss.laws.Coulomb(kinetic=1.1),
         "two": compliant(1.1, 23.8635),
         "one": compliant(1.1, 200.0),
         "none": compliant(1.1, 320.0),
-        "state": ss.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
+        "state": ss.laws.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
     }
-    drive = ss.HarmonicBase(amplitude=0.6e-3 if name == "state" else 0.65e-3, frequency=2.5)
+    drive = ss.drives.HarmonicBase(amplitude=0.6e-3 if name == "state" else 0.65e-3, frequency=2.5)
     run = ss.simulate(ss.Oscillator(mass=MASS, stiffness=SPRING, law=laws[name], drive=drive), cycles=6 + cycles)
     return run.record(fs=FS).between(2.4, 2.4 + cycles / 2.5), run
 
@@ -48,7 +48,7 @@ def noisy(name: str, level: float, seed: int = 0, cycles: int = 10) -> ss.Record
 
 
 def test_the_mode_of_a_contact_without_noise() -> None:
-    found = ss.transition(truth("two")[0], mass=MASS, stiffness=SPRING)
+    found = ss.contact.transition(truth("two")[0], mass=MASS, stiffness=SPRING)
     damping = 23.8635 / (2 * np.sqrt(MASS * (SPRING + CONTACT)))
     natural = np.sqrt((SPRING + CONTACT) / MASS)
     assert found.frequency.value == pytest.approx(natural * np.sqrt(1 - damping**2) / (2 * np.pi), rel=1e-8)
@@ -63,7 +63,7 @@ def test_the_mode_of_a_contact_without_noise() -> None:
 def test_the_mode_at_40_db(name: str) -> None:
     damping = truth(name)[1].system.law.damping / (2 * np.sqrt(MASS * (SPRING + CONTACT)))
     true = np.sqrt((SPRING + CONTACT) / MASS * (1 - damping**2)) / (2 * np.pi)
-    found = ss.transition(noisy(name, 40), mass=MASS, stiffness=SPRING)
+    found = ss.contact.transition(noisy(name, 40), mass=MASS, stiffness=SPRING)
     assert found.frequency.value == pytest.approx(true, rel=3e-3)
     assert found.frequency.sd < 1e-3 * true * 2
     assert abs(found.frequency.value - true) < 4 * found.frequency.sd
@@ -75,7 +75,7 @@ def test_the_mode_at_40_db(name: str) -> None:
 
 def test_the_wavelet_reads_low_where_micro_slips_cut_in() -> None:
     """The local maximum of the simulated transition, by the thesis's wavelet: 39.0 Hz at 1.1 N."""
-    found = ss.transition(truth("two")[0])
+    found = ss.contact.transition(truth("two")[0])
     assert found.wavelet_frequency.value == pytest.approx(39.0, rel=0.02)
     assert found.agreement.startswith("the mode and the wavelet differ: the wavelet reads 39")
     assert "lower, less than its bandwidth resolves" in found.agreement
@@ -104,7 +104,7 @@ def test_the_words_say_what_the_numbers_say() -> None:
 @pytest.mark.parametrize(("name", "count"), [("two", 2), ("one", 1), ("none", 0)])
 def test_micro_slips_are_counted_and_timed(name: str, count: int) -> None:
     record, run = noisy(name, 40), truth(name)[1]
-    found = ss.find_microslips(record)
+    found = ss.contact.find_microslips(record)
     assert found.per_stick.value == pytest.approx(count, abs=0.1)
     assert found.kind == ("double stick-slip" if count else "no micro-slips")
     slips = [event.time for event in run.events if event.kind == "slip"]
@@ -119,7 +119,7 @@ def test_micro_slips_are_counted_and_timed(name: str, count: int) -> None:
 @pytest.mark.parametrize(("name", "count"), [("two", 2), ("one", 1)])
 def test_micro_slips_in_loud_noise(name: str, count: int) -> None:
     slips = np.array([event.time for event in truth(name)[1].events if event.kind == "slip"])
-    found = ss.find_microslips(noisy(name, 25, cycles=6))
+    found = ss.contact.find_microslips(noisy(name, 25, cycles=6))
     assert found.per_stick.value == pytest.approx(count, abs=0.2)
     off = [np.abs(slips - event.time).min() for event in found.events]
     assert max(off) < 0.5e-3
@@ -137,7 +137,7 @@ def test_micro_slips_in_loud_noise(name: str, count: int) -> None:
 )
 @pytest.mark.parametrize("level", [40, 25])
 def test_the_mechanism_is_named(name: str, mechanism: str, level: float) -> None:
-    found = ss.mechanism(noisy(name, level, cycles=6))
+    found = ss.contact.mechanism(noisy(name, level, cycles=6))
     assert max(found.probabilities, key=lambda each: found.probabilities[each]) == mechanism
     assert sum(found.probabilities.values()) == pytest.approx(1)
 
@@ -151,36 +151,36 @@ def test_less_noise_takes_no_verdict_away(case: str) -> None:
     clean = ss.simulate(ss.scenarios.get(case).system, cycles=16).record(fs=FS).between(1.6, 6.4)["a"]
     white = np.random.default_rng(0).normal(size=len(clean)) * clean.std()
     for share in (0.0, 1e-6, 1e-4, 1e-3, 1e-2):
-        found = ss.mechanism(ss.Record.of({"a": clean + share * white}, fs=FS))
+        found = ss.contact.mechanism(ss.Record.of({"a": clean + share * white}, fs=FS))
         assert found.name == "double stick-slip", (share, found)
 
 
 def test_friction_with_a_memory_is_no_contact_that_rings() -> None:
     record = noisy("state", 25, cycles=6)
-    found = ss.mechanism(record)
+    found = ss.contact.mechanism(record)
     assert found.name == "non-sinusoidal oscillation"
     assert found.probability < found.probabilities[found.name]  # the mount of an acceleration alone might ring
-    mode, slips = ss.transition(record), ss.find_microslips(record)
+    mode, slips = ss.contact.transition(record), ss.contact.find_microslips(record)
     for each in (mode.frequency, mode.damping, mode.amplitude, mode.wavelet_frequency, slips.per_stick, mode, slips):
         assert "not as one mode" in each.status
-    stated = ss.mechanism(record.with_details("a", mount=(30e3, 0.02)))
+    stated = ss.contact.mechanism(record.with_details("a", mount=(30e3, 0.02)))
     assert stated.probability == found.probabilities[found.name]
 
 
-@pytest.mark.parametrize("mount", [ss.Mount(125, 0.1), ss.Mount(285, 0.158)])
-def test_a_mount_that_rings_is_not_told_from_a_memory(mount: ss.Mount) -> None:
+@pytest.mark.parametrize("mount", [ss.rig.Mount(125, 0.1), ss.rig.Mount(285, 0.158)])
+def test_a_mount_that_rings_is_not_told_from_a_memory(mount: ss.rig.Mount) -> None:
     rig = ss.Rig.perfect().having("a", mount=mount)
     record = rig.measure(truth("none")[1], fs=FS, rng=1, start=2.4)
-    found = ss.mechanism(ss.Record.of({"a": record["a"]}, fs=FS))
+    found = ss.contact.mechanism(ss.Record.of({"a": record["a"]}, fs=FS))
     assert found.name == UNTOLD
     assert "whose mount rings: state the mount" in found.reason
 
 
 def test_a_rigid_contact_has_no_transition() -> None:
     with pytest.raises(EstimateError, match="no transition"):
-        ss.transition(noisy("rigid", 40))
+        ss.contact.transition(noisy("rigid", 40))
     with pytest.raises(EstimateError, match="no transition"):
-        ss.find_microslips(noisy("rigid", 40))
+        ss.contact.find_microslips(noisy("rigid", 40))
 
 
 def spurious(kind: str) -> ss.Record:
@@ -199,8 +199,8 @@ def spurious(kind: str) -> ss.Record:
 def test_what_never_sticks_has_no_transition(kind: str) -> None:
     record = spurious(kind)
     with pytest.raises(EstimateError, match=r"no transition|constant"):
-        ss.transition(record)
-    found = ss.mechanism(record)
+        ss.contact.transition(record)
+    found = ss.contact.mechanism(record)
     assert found.name == UNTOLD
     assert found.reason
 
@@ -214,22 +214,22 @@ def test_blows_that_ring_down_are_no_sticks(noise: float, seed: int) -> None:
     values = np.exp(-since / 0.08) * np.sin(2 * np.pi * 60 * since)
     values = values + noise * np.random.default_rng(seed).normal(size=t.size)
     record = ss.Record.of({"a": values}, fs=FS)
-    for question in (ss.find_microslips, ss.transition):
+    for question in (ss.contact.find_microslips, ss.contact.transition):
         with pytest.raises(EstimateError, match="swings to and fro"):
             question(record)
-    assert ss.mechanism(record).name == UNTOLD
+    assert ss.contact.mechanism(record).name == UNTOLD
 
 
 def test_bad_records_are_refused() -> None:
     with pytest.raises(RecordError, match="channel a is missing"):
-        ss.transition(ss.Record.of({"x": np.arange(300.0)}, fs=FS))
+        ss.contact.transition(ss.Record.of({"x": np.arange(300.0)}, fs=FS))
     broken = truth("two")[0]["a"].copy()
     broken[100] = np.nan
     with pytest.raises(RecordError, match="fill_missing"):
-        ss.mechanism(ss.Record.of({"a": broken}, fs=FS))
+        ss.contact.mechanism(ss.Record.of({"a": broken}, fs=FS))
     with pytest.raises(EstimateError, match="mass is positive"):
-        ss.transition(noisy("none", 40, cycles=6), mass=-1)
-    for question in (ss.time_frequency, ss.mechanism, ss.find_microslips):
+        ss.contact.transition(noisy("none", 40, cycles=6), mass=-1)
+    for question in (ss.answers.time_frequency, ss.contact.mechanism, ss.contact.find_microslips):
         with pytest.raises(EstimateError, match="mass is positive"):
             question(spurious("tone"), mass=-1, stiffness=3)
 
@@ -238,14 +238,14 @@ def test_the_answer_does_not_know_units_of_time_and_length() -> None:
     """Ten times as fast and a thousand times as large: the same pieces."""
     slow = noisy("one", 40, cycles=6)
     fast = ss.Record.of({"a": 1000 * slow["a"]}, fs=10 * FS)
-    one, two = ss.transition(slow), ss.transition(fast)
+    one, two = ss.contact.transition(slow), ss.contact.transition(fast)
     assert two.frequency.value == pytest.approx(10 * one.frequency.value, rel=1e-6)
     assert two.damping.value == pytest.approx(one.damping.value, rel=1e-6)
-    assert ss.find_microslips(fast).counts == ss.find_microslips(slow).counts
+    assert ss.contact.find_microslips(fast).counts == ss.contact.find_microslips(slow).counts
 
 
 def test_everything_at_once() -> None:
-    found = ss.time_frequency(noisy("two", 40, cycles=6), mass="2.42 kg", stiffness="2.31 N/mm")
+    found = ss.answers.time_frequency(noisy("two", 40, cycles=6), mass="2.42 kg", stiffness="2.31 N/mm")
     assert found.transition is not None
     assert found.microslips is not None
     assert found.transition.stiffness is not None
@@ -257,10 +257,10 @@ def test_everything_at_once() -> None:
 
 
 def test_a_record_in_parts_is_mapped_whole_and_its_begin_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip.analysis.time_frequency.LONG", 8000)
+    monkeypatch.setattr("stickslip.answers.frequencies.LONG", 8000)
     record = noisy("two", 40)
     parts = [record.rows(first, min(first + 6000, len(record))) for first in range(0, len(record), 6000)]
-    whole, found = (ss.time_frequency(each, frequencies=(5, 1000)) for each in (record, iter(parts)))
+    whole, found = (ss.answers.time_frequency(each, frequencies=(5, 1000)) for each in (record, iter(parts)))
     inner = slice(150, 850)  # the mean taken off is that of the first part: the ends feel it
     apart = np.abs(found.wavelets - whole.wavelets).values[:, inner]
     assert apart.max() < 1e-5 * float(whole.wavelets.max())
@@ -270,12 +270,12 @@ def test_a_record_in_parts_is_mapped_whole_and_its_begin_asked(monkeypatch: pyte
     assert len(ss.figures(found)[0].figure.axes) == 2  # the map and its bar; the signal is there no more
     assert len(ss.figures(whole)[0].figure.axes) == 3
     with pytest.raises(RecordError, match="no part"):
-        ss.time_frequency(iter(()))
+        ss.answers.time_frequency(iter(()))
 
 
 def test_a_channel_that_is_no_acceleration_is_mapped_alone() -> None:
     record = ss.Record.of({"x": np.sin(2 * np.pi * 40 * np.arange(8000) / 1000)}, fs=1000.0)
-    found = ss.time_frequency(record)
+    found = ss.answers.time_frequency(record)
     assert (found.channel, found.mechanism, found.transition) == ("x", None, None)
     assert float(np.median(found.ridges[0].frequency)) == pytest.approx(40, rel=0.01)
     assert "no acceleration" in found.notes[-1]
@@ -284,26 +284,29 @@ def test_a_channel_that_is_no_acceleration_is_mapped_alone() -> None:
 def test_a_column_of_times_is_not_taken_for_a_vibration() -> None:
     t = np.arange(2000) / 1000
     record = ss.Record.of({"c1": 3 * t, "c2": np.sin(2 * np.pi * 40 * t)}, fs=1000.0)
-    found = ss.time_frequency(record)
+    found = ss.answers.time_frequency(record)
     assert found.channel == "c2"
     assert found.notes[0] == "Channel c1 only rises or only falls, as times do: c2 is mapped."
     with pytest.raises(RecordError, match="c1 only rise"):
-        ss.time_frequency(ss.Record.of({"c1": 3 * t}, fs=1000.0))
+        ss.answers.time_frequency(ss.Record.of({"c1": 3 * t}, fs=1000.0))
 
 
 def test_a_ridge_that_wanders_is_told_as_one_that_may_be_chance() -> None:
-    words = {kind: " ".join(ss.summary(ss.time_frequency(spurious(kind))).headline) for kind in ("noise", "fast tone")}
+    words = {
+        kind: " ".join(ss.summary(ss.answers.time_frequency(spurious(kind))).headline)
+        for kind in ("noise", "fast tone")
+    }
     assert "chance in noise" in words["noise"]
     assert "chance" not in words["fast tone"]
 
 
 def test_the_page_tells_no_micro_slips_against_its_verdict() -> None:
-    found = ss.time_frequency(noisy("state", 25, cycles=6))
+    found = ss.answers.time_frequency(noisy("state", 25, cycles=6))
     assert found.mechanism is not None
     assert found.mechanism.name == "non-sinusoidal oscillation"
     assert "double stick-slip" not in " ".join(ss.summary(found).headline)
     assert found.microslips is None or found.microslips.per_stick.interval[0] >= 0
-    rigid = ss.time_frequency(noisy("rigid", 40, cycles=6))
+    rigid = ss.answers.time_frequency(noisy("rigid", 40, cycles=6))
     stick = next(plate for plate in ss.figures(rigid) if plate.name == "stick").figure
     assert "rings" not in stick.axes[0].get_legend_handles_labels()[1]
 
@@ -326,8 +329,8 @@ def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_record_too_short_for_sticks_is_mapped_where_its_wavelets_fit() -> None:
     short = ss.Record.of({"a": np.sin(np.arange(30) / 6)}, fs=2000)
     with pytest.raises(RecordError, match=r"the lowest frequency that it allows is \d+\.\d Hz"):
-        ss.time_frequency(short, frequencies=(50, 800))
-    found = ss.time_frequency(short, frequencies=(200, 800))
+        ss.answers.time_frequency(short, frequencies=(50, 800))
+    found = ss.answers.time_frequency(short, frequencies=(200, 800))
     assert found.ridges == ()
     assert found.mechanism is None
     assert found.notes == ("30 samples are mapped, and too few to ask about spikes and sticks: give 256.",)

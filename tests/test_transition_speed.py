@@ -17,8 +17,8 @@ ROUGH = 0.03
 
 
 @cache
-def found(frequency: float, rough: float = 0.0) -> ss.TransitionSpeed:
-    return ss.transition_speed(balanced(frequency, rough))
+def found(frequency: float, rough: float = 0.0) -> ss.contact.TransitionSpeed:
+    return ss.contact.transition_speed(balanced(frequency, rough))
 
 
 @cache
@@ -30,10 +30,10 @@ def balanced(frequency: float, rough: float = 0.0) -> ss.Record:
 def true_speed(frequency: float, rough: float) -> float:
     """Mean speed at the begins of sliding in the record."""
     amplitude, kinetic = CASES[frequency]
-    law: object = ss.CompliantContact(kinetic, stiffness=192000, damping=23.9)
+    law: object = ss.laws.CompliantContact(kinetic, stiffness=192000, damping=23.9)
     if rough:
-        law = ss.RoughSurface(law, share=rough, length=2e-4, span=2e-3, seed=4)  # type: ignore[arg-type]
-    drive = ss.HarmonicBase(amplitude, frequency=frequency)
+        law = ss.laws.RoughSurface(law, share=rough, length=2e-4, span=2e-3, seed=4)  # type: ignore[arg-type]
+    drive = ss.drives.HarmonicBase(amplitude, frequency=frequency)
     run = ss.simulate(ss.Oscillator(law=law, drive=drive, **RIG), duration=SETTLED + 2)  # type: ignore[arg-type]
     begins = [event.time for event in run.events if event.kind == "slip" and event.time > SETTLED]
     return float(np.mean([abs(run.state(time)["v"]) for time in begins]))
@@ -79,7 +79,7 @@ def test_equation_3_4_is_the_thesis_s() -> None:
     after = np.where(v > 0, amplitude + x, amplitude - x)  # way since the turn
     friction = np.sign(v) * np.clip(stiffness * after - level, -level, level)
     record = ss.Record.of({"x": x, "v": v, "friction": friction}, fs=4000)
-    answer = ss.transition_speed(record, method="equation")
+    answer = ss.contact.transition_speed(record, method="equation")
     deflection = level / stiffness
     assert answer.speed.value == pytest.approx(2 * turn * math.sqrt(amplitude * deflection - deflection**2), rel=5e-3)
     assert answer.curve is not None
@@ -89,12 +89,12 @@ def test_equation_3_4_is_the_thesis_s() -> None:
 
 
 def test_loops_tell_it_crudely() -> None:
-    answer = ss.transition_speed(ss.friction_loops(balanced(8.7)))
+    answer = ss.contact.transition_speed(ss.friction_loops(balanced(8.7)))
     assert answer.method == "equation"
     assert answer.speed.value == pytest.approx(true_speed(8.7, 0.0), rel=0.1)
     assert "crude" in answer.status
     with pytest.raises(EstimateError, match="curve, equation"):
-        ss.transition_speed(ss.friction_loops(balanced(8.7)), method="contact")
+        ss.contact.transition_speed(ss.friction_loops(balanced(8.7)), method="contact")
 
 
 def test_stick_slip_is_no_harmonic_sliding() -> None:
@@ -102,7 +102,7 @@ def test_stick_slip_is_no_harmonic_sliding() -> None:
 
 
 def test_the_held_mass_rings_as_its_contact_says() -> None:
-    frequency = ss.coupled_frequency(balanced(2.5))
+    frequency = ss.contact.coupled_frequency(balanced(2.5))
     assert frequency.value == pytest.approx(math.sqrt((2310 + 192000) / 2.42) / (2 * math.pi), rel=5e-4)
     assert frequency.includes(math.sqrt((2310 + 192000) / 2.42) / (2 * math.pi))
     assert frequency.status == "ok"
@@ -110,7 +110,7 @@ def test_the_held_mass_rings_as_its_contact_says() -> None:
 
 
 def test_where_nothing_rings_the_contact_alone_speaks() -> None:
-    frequency = ss.coupled_frequency(balanced(8.7))
+    frequency = ss.contact.coupled_frequency(balanced(8.7))
     assert frequency.value == pytest.approx(45.1, rel=5e-3)
     assert "no ringing" in frequency.checks[0]
 
@@ -118,7 +118,7 @@ def test_where_nothing_rings_the_contact_alone_speaks() -> None:
 def test_it_is_drawn_with_each_method() -> None:
     import matplotlib.pyplot as plt
 
-    ax = ss.plot_transition_speed(found(8.7))
+    ax = ss.plot.plot_transition_speed(found(8.7))
     carried = next(line for line in ax.lines if line.get_label() == "carried on")
     by_curve = next(line for line in ax.lines if line.get_label() == "by the curve")
     assert carried.get_xdata()[-1] == by_curve.get_xdata()[0]  # the curve is seen to lead there
@@ -128,19 +128,21 @@ def test_it_is_drawn_with_each_method() -> None:
 
 def test_what_it_lacks_is_said() -> None:
     with pytest.raises(RecordError, match="friction"):
-        ss.transition_speed(measured(8.7, 0.0, seconds=2.0)[0])
+        ss.contact.transition_speed(measured(8.7, 0.0, seconds=2.0)[0])
     with pytest.raises(EstimateError, match="contact, curve, equation"):
-        ss.transition_speed(balanced(8.7), method="eye")
+        ss.contact.transition_speed(balanced(8.7), method="eye")
     slow = balanced(8.7)
     few = ss.Record.of({name: slow[name][::16] for name in ("x", "v", "friction")}, fs=250)
     with pytest.raises(EstimateError, match="sample faster"):
-        ss.transition_speed(few)
+        ss.contact.transition_speed(few)
 
 
 def test_a_sensor_whose_zero_is_off_changes_no_speed() -> None:
     record = told(measured(8.7)[0])
     off = record.with_channel("x", record["x"] + 0.1e-3, unit="m").with_details("x", delay=record.channels["x"].delay)
-    right, wrong = (ss.transition_speed(ss.friction_force(each, method="fusion", **RIG)) for each in (record, off))
+    right, wrong = (
+        ss.contact.transition_speed(ss.friction_force(each, method="fusion", **RIG)) for each in (record, off)
+    )
     for one, other in ((right.contact, wrong.contact), (right.curve, wrong.curve), (right.equation, wrong.equation)):
         assert one is not None
         assert other is not None

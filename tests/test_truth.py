@@ -11,7 +11,7 @@ import pytest
 
 import stickslip as ss
 from stickslip import scenarios
-from stickslip.solve.energy import energy
+from stickslip.solve.energies import energy
 from stickslip.solve.periodic import steady_state
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
@@ -117,7 +117,7 @@ def test_negative_damping_loses_stability() -> None:
 def test_a_fast_belt_is_not_stuck_to_again(side: int) -> None:
     """BS-4: from break-away, with a damper, stick is met again below V_c = 0.549046312057... alone."""
     speed = 0.54904631205793635 * (1 + side * 1e-10)
-    system = ss.Oscillator(mass=1, stiffness=1, damping=0.1, law=ss.Coulomb(1.0, 1.5), drive=ss.Belt(speed))
+    system = ss.Oscillator(mass=1, stiffness=1, damping=0.1, law=ss.laws.Coulomb(1.0, 1.5), drive=ss.drives.Belt(speed))
     run = simulate(system, duration=100, start={"x": 1.5 - 0.1 * speed, "v": speed})
     assert any(event.kind == "stick" for event in run.events) == (side < 0)
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from stickslip import EstimateError, RateState, Record, fit_curve
+from stickslip import Record, fit_curve
+from stickslip.errors import EstimateError
+from stickslip.laws import RateState
 
 A, B, DC, MU, V1, V2, K, NORMAL = 0.010, 0.007, 8e-6, 0.6, 3e-6, 1e-5, 2e5, 50.0
 

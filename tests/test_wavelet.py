@@ -162,7 +162,7 @@ def test_the_stated_bandwidth_is_that_at_half_power() -> None:
 def test_the_cone_is_where_a_jump_at_the_end_has_fallen_to_1_over_e() -> None:
     t = np.arange(4000) / 1000.0
     found = ss.wavelet_map(of(np.sin(2 * np.pi * 30 * t)), "a", frequencies=(10, 100))
-    cone = ss.cone_of_influence(found)
+    cone = ss.signals.cone_of_influence(found)
     for frequency in (10.0, 50.0):
         row = cone.sel(frequency=frequency, method="nearest")
         assert (~row).sum() / 1000 == pytest.approx(4.0 - 2 * float(row.cone), abs=3e-3)
@@ -174,7 +174,9 @@ def test_the_inverse_gives_the_signal_back() -> None:
     t = np.arange(16384) / 1000.0
     burst = 3.0 + np.exp(-(((t - 8) / 1.5) ** 2)) * (np.cos(2 * np.pi * 40 * t) + 0.5 * np.sin(2 * np.pi * 90 * t))
     for normalisation in ("energy", "amplitude"):
-        found = ss.inverse_wavelet(ss.wavelet_map(of(burst), "a", frequencies=(5, 250), normalisation=normalisation))
+        found = ss.signals.inverse_wavelet(
+            ss.wavelet_map(of(burst), "a", frequencies=(5, 250), normalisation=normalisation)
+        )
         assert np.abs(found - burst).max() < 1e-10
 
 
@@ -186,7 +188,7 @@ def test_the_inverse_is_right_within_a_record_that_begins_and_ends_in_motion(
     t = np.arange(16000) / 4000
     tone = 3 * np.sin(2 * np.pi * 45 * t + 0.3)
     wavelets = ss.wavelet_map(of(tone, 4000.0), "a", frequencies=(lowest, highest), normalisation=normalisation)
-    off = np.abs(ss.inverse_wavelet(wavelets) - tone)
+    off = np.abs(ss.signals.inverse_wavelet(wavelets) - tone)
     assert off[4000:12000].max() < 3 * 5e-3  # what the steps at the ends have below 5 Hz is not in the map
     assert off[7000:9000].max() < 3 * 1e-4
 
@@ -206,7 +208,7 @@ def test_blocks_equal_the_whole() -> None:
     record = of(values - values.mean())
     whole = ss.wavelet_map(record, "a", frequencies=(5, 200), voices=4)
     for size in (700, 3000, 50000):
-        parts = list(ss.wavelet_blocks(record, "a", frequencies=(5, 200), voices=4, size=size))
+        parts = list(ss.signals.wavelet_blocks(record, "a", frequencies=(5, 200), voices=4, size=size))
         assert worst(np.hstack([part.values for part in parts]), whole.values) < 1e-9
         np.testing.assert_allclose(np.concatenate([part.time for part in parts]), whole.time)
 
@@ -220,10 +222,10 @@ def test_blocks_of_a_stream_equal_the_whole() -> None:
         for first in range(0, 10000, 500):
             yield record.rows(first, first + 500)
 
-    parts = list(ss.wavelet_blocks(stream(), "a", frequencies=(10, 200), voices=4, size=1234))
+    parts = list(ss.signals.wavelet_blocks(stream(), "a", frequencies=(10, 200), voices=4, size=1234))
     assert worst(np.hstack([part.values for part in parts]), whole.values) < 1e-9
     with pytest.raises(RecordError, match="in order"):
-        list(ss.wavelet_blocks(iter([record.rows(0, 500), record.rows(0, 500)]), "a", frequencies=(10, 200)))
+        list(ss.signals.wavelet_blocks(iter([record.rows(0, 500), record.rows(0, 500)]), "a", frequencies=(10, 200)))
 
 
 def test_an_overview_of_blocks_is_that_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -232,7 +234,7 @@ def test_an_overview_of_blocks_is_that_of_the_whole(monkeypatch: pytest.MonkeyPa
     spikes = np.zeros(9000)
     spikes[[700, 2900, 4300, 8888]] = 1.0
     record = of(spikes)
-    seen = ss.wavelet_overview(record, "a", frequencies=(50, 200), voices=6, columns=30)
+    seen = ss.signals.wavelet_overview(record, "a", frequencies=(50, 200), voices=6, columns=30)
     width = round(float(seen.time[1] - seen.time[0]) * record.fs)
     whole = np.abs(ss.wavelet_map(record, "a", frequencies=(50, 200), voices=6).values)
     starts = np.arange(0, len(record), width)
@@ -245,7 +247,7 @@ def test_an_overview_keeps_the_largest() -> None:
     values[31234] = 1.0
     record = of(values)
     whole = abs(ss.wavelet_map(record, "a", frequencies=(20, 200), voices=4))
-    seen = ss.wavelet_overview(record, "a", frequencies=(20, 200), voices=4, columns=300)
+    seen = ss.signals.wavelet_overview(record, "a", frequencies=(20, 200), voices=4, columns=300)
     assert 150 <= seen.sizes["time"] <= 300
     np.testing.assert_allclose(seen.values.max(axis=1), whole.values.max(axis=1), rtol=1e-9)
     assert float(seen.sel(frequency=200, method="nearest").idxmax()) == pytest.approx(31.234, abs=0.2)
@@ -263,7 +265,7 @@ def test_a_day_in_bounded_memory(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def peak(blocks: int) -> int:
         tracemalloc.start()
-        seen = ss.wavelet_overview(stream(blocks), "a", frequencies=(100, 400), voices=2, columns=100)
+        seen = ss.signals.wavelet_overview(stream(blocks), "a", frequencies=(100, 400), voices=2, columns=100)
         taken = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert float(seen.max()) > 0
@@ -277,7 +279,9 @@ def test_the_longest_wavelets_take_no_more_memory(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("stickslip.signals.wavelet.BLOCK_BYTES", 8 << 20)
     record = of(RNG.normal(size=60000), 4000.0)
     tracemalloc.start()
-    seen = ss.wavelet_overview((record.rows(first, first + 20000) for first in range(0, 60000, 20000)), "a", voices=8)
+    seen = ss.signals.wavelet_overview(
+        (record.rows(first, first + 20000) for first in range(0, 60000, 20000)), "a", voices=8
+    )
     taken = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert taken < 5 * (8 << 20)
@@ -288,7 +292,7 @@ def test_the_longest_wavelets_take_no_more_memory(monkeypatch: pytest.MonkeyPatc
 def test_the_thesis_grid() -> None:
     t = np.arange(4096) / 1000.0
     record = of(np.sin(2 * np.pi * 30 * t))
-    points = ss.dyadic_map(record, "a")
+    points = ss.signals.dyadic_map(record, "a")
     level = points.where(points.m == 4, drop=True)
     assert level.sizes["point"] == 4096 // 16
     np.testing.assert_allclose(np.diff(level.time), 0.016)
@@ -299,7 +303,7 @@ def test_the_thesis_grid() -> None:
 
 def test_the_short_time_transform_reads_a_tone() -> None:
     record = of(0.3 * np.sin(2 * np.pi * 50 * np.arange(4000) / 1000) + 5)
-    found = abs(ss.stft_map(record, "a", nperseg=200))
+    found = abs(ss.signals.stft_map(record, "a", nperseg=200))
     assert float(found.sel(frequency=50.0, time=2.0)) == pytest.approx(0.3, rel=1e-3)
     assert float(found.sel(frequency=200.0, time=2.0)) < 1e-3
 
@@ -349,14 +353,14 @@ def test_the_chalk_screech_rings_at_2950_hz(dataset: Callable[[str], Path]) -> N
 
 def test_it_can_be_drawn() -> None:
     record = of(np.sin(0.3 * np.arange(2000)))
-    maps = (ss.wavelet_map(record, "a"), ss.dyadic_map(record, "a"), ss.stft_map(record, "a"),
-            ss.wavelet_overview(record, "a", columns=100), ss.wavelet_map(of(np.zeros(2000)), "a"))  # fmt: skip
+    maps = (ss.wavelet_map(record, "a"), ss.signals.dyadic_map(record, "a"), ss.signals.stft_map(record, "a"),
+            ss.signals.wavelet_overview(record, "a", columns=100), ss.wavelet_map(of(np.zeros(2000)), "a"))  # fmt: skip
     for found in maps:
         for style in ("filled", "lines"):
-            figure = ss.plot_wavelet(found, record=record, style=style)
+            figure = ss.plot.plot_wavelet(found, record=record, style=style)
             assert [ax.get_ylabel() for ax in figure.axes][1] == "frequency [Hz]"
     with pytest.raises(RecordError, match="spans some decibel"):
-        ss.plot_wavelet(maps[0], span=-3)
+        ss.plot.plot_wavelet(maps[0], span=-3)
 
 
 def test_no_frequency_is_refused_and_a_single_one_is_drawn() -> None:
@@ -364,6 +368,6 @@ def test_no_frequency_is_refused_and_a_single_one_is_drawn() -> None:
     with pytest.raises(RecordError, match="positive and rise"):
         ss.wavelet_map(record, "a", frequencies=[])
     single = ss.wavelet_map(record, "a", frequencies=[45.0])
-    assert len(ss.plot_wavelet(single, record=record).axes) == 3
+    assert len(ss.plot.plot_wavelet(single, record=record).axes) == 3
     with pytest.raises(RecordError, match="two frequencies"):
-        ss.plot_wavelet(single, style="lines")
+        ss.plot.plot_wavelet(single, style="lines")

@@ -14,37 +14,37 @@ from click.testing import CliRunner
 
 import stickslip as ss
 from stickslip.cli.program import main
-from stickslip.fit.choice import CERTAIN, Evidence, Misfit, standings
-from stickslip.fit.guess import GUESSES, Seen
-from stickslip.fit.search import Knob, Problem
-from stickslip.fit.start import Shown
-from stickslip.fit.stretch import channels_of
-from stickslip.fit.surety import _end
+from stickslip.law.choice import CERTAIN, Evidence, Misfit, standings
+from stickslip.law.guess import GUESSES, Seen
+from stickslip.law.search import Knob, Problem
+from stickslip.law.start import Shown
+from stickslip.law.stretch import channels_of
+from stickslip.law.surety import _end
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Step
 
 RIG: dict[str, Any] = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12}
 FS = 2500  # Hz: more readings than a search looks at
 TRUE = {
-    "Coulomb": ss.Coulomb(0.95),
-    "static": ss.Coulomb(0.95, static=1.2),
-    "Stribeck": ss.Stribeck(0.95, 1.2, speed=5e-3),
-    "compliant": ss.CompliantContact(0.95, stiffness=192000, damping=24),
-    "state variable": ss.SmoothStateVariable(0.95, rate=120.0, steepness=3000.0),
-    "LuGre": ss.LuGre(0.95, 1.2, speed=5e-3, stiffness=192000, damping=24),
+    "Coulomb": ss.laws.Coulomb(0.95),
+    "static": ss.laws.Coulomb(0.95, static=1.2),
+    "Stribeck": ss.laws.Stribeck(0.95, 1.2, speed=5e-3),
+    "compliant": ss.laws.CompliantContact(0.95, stiffness=192000, damping=24),
+    "state variable": ss.laws.SmoothStateVariable(0.95, rate=120.0, steepness=3000.0),
+    "LuGre": ss.laws.LuGre(0.95, 1.2, speed=5e-3, stiffness=192000, damping=24),
 }
 
 
 @cache
 def record(name: str, frequency: float = 8.7, amplitude: float = 1.1e-3) -> ss.Record:
     """Half a second of a rig with noise alone, its load cell and its base's motion measured."""
-    slider = ss.Oscillator(law=TRUE[name], drive=ss.HarmonicBase(amplitude, frequency=frequency), **RIG)
+    slider = ss.Oscillator(law=TRUE[name], drive=ss.drives.HarmonicBase(amplitude, frequency=frequency), **RIG)
     rig = ss.Rig.perfect("x", "z", "load").having("x", white=1e-6).having("z", white=1e-6).having("load", white=2e-3)
     return rig.measure(ss.simulate(slider, duration=2.5, rtol=1e-9), fs=FS, rng=3, start=2.0)
 
 
 def slider() -> ss.Oscillator:
-    return ss.Oscillator(law=ss.Coulomb(1.0), **RIG)
+    return ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG)
 
 
 @pytest.mark.parametrize("name", TRUE)
@@ -100,10 +100,10 @@ def test_a_comparison_is_cancelled_by_its_progress() -> None:
 @pytest.mark.parametrize(
     ("given", "error", "words"),
     [
-        ({"laws": ["cheese"]}, ss.ModelError, "laws are Coulomb, static"),
-        ({"laws": []}, ss.ModelError, "no law"),
-        ({"laws": [ss.Dahl]}, ss.ModelError, "values to start from"),
-        ({"calibration": 2.0}, ss.ModelError, "part of 1"),
+        ({"laws": ["cheese"]}, ss.errors.ModelError, "laws are Coulomb, static"),
+        ({"laws": []}, ss.errors.ModelError, "no law"),
+        ({"laws": [ss.laws.Dahl]}, ss.errors.ModelError, "values to start from"),
+        ({"calibration": 2.0}, ss.errors.ModelError, "part of 1"),
     ],
 )
 def test_what_can_not_be_asked_is_said(given: dict[str, Any], error: type[Exception], words: str) -> None:
@@ -112,7 +112,7 @@ def test_what_can_not_be_asked_is_said(given: dict[str, Any], error: type[Except
 
 
 def test_no_records_are_refused() -> None:
-    with pytest.raises(ss.EstimateError, match="one record"):
+    with pytest.raises(ss.errors.EstimateError, match="one record"):
         ss.compare_laws([], slider())
 
 
@@ -208,7 +208,7 @@ def test_a_contacts_damping_is_searched_where_the_friction_of_two_records_shows_
     """It began at zero, where a number is not fitted; the stiffness came out 4 % too large, its interval narrow."""
     laws = {"kinetic": 1.1, "stiffness": 192000.0, "damping": 23.9}
     system = ss.Oscillator(
-        law=ss.CompliantContact(**laws), drive=ss.HarmonicBase(0.65e-3, frequency=2.5), **RIG
+        law=ss.laws.CompliantContact(**laws), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5), **RIG
     )  # fmt: skip
     runs = [ss.simulate(system.having(frequency=each), duration=2).record(fs=2000) for each in (2.5, 8.7)]
     found = ss.compare_laws(runs, system, laws=["compliant"])
@@ -237,7 +237,7 @@ def test_a_stiff_contact_that_leaves_far_less_stands_for_itself() -> None:
 def test_the_static_friction_of_a_stribeck_curve_lies_in_its_interval() -> None:
     """Through sensors that swing, as stated; a load cell that reads as it is does not seem to contradict the law."""
     rig = ss.Rig.air_track()
-    truth = ss.Oscillator(law=TRUE["Stribeck"], drive=ss.HarmonicBase(0.65e-3, frequency=2.5), **RIG)
+    truth = ss.Oscillator(law=TRUE["Stribeck"], drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5), **RIG)
     told = rig.stated(rig.measure(ss.simulate(truth, duration=2.8, rtol=1e-9), fs=FS, rng=5, start=2.0))
     found = ss.compare_laws(told, slider(), laws=["Coulomb", "Stribeck"])
     assert (found.law, found.status) == ("Stribeck", "ok")
@@ -250,7 +250,7 @@ def test_a_level_above_a_held_static_friction_ends_its_interval() -> None:
     """The releases tell the static friction, which is held; looking for the end of the level's interval passed it."""
     told = record("Coulomb")
     shown = Shown.of(told, channels_of(told, None), slider())
-    system = slider().having(law=ss.Coulomb(0.95, static=1.0))
+    system = slider().having(law=ss.laws.Coulomb(0.95, static=1.0))
     problem = Problem.of(system, [shown.stretch(0, (0, len(told) - 1))], [Knob("kinetic", "log", 0.95)])
     end = _end(problem, problem.begin(np.zeros(1)), 0, 1.0, 1e300, lambda: None)
     assert 0 < end < 0.1  # of a logarithm: 5 % lie between
@@ -271,9 +271,9 @@ def test_wrong_units_are_named_and_nothing_is_concluded() -> None:
 
 def test_a_sensor_that_nobody_stated_is_left_out() -> None:
     """Its mount swings at 60 Hz: read as an ideal accelerometer it would choose the law."""
-    clean = ss.Oscillator(law=TRUE["Coulomb"], drive=ss.HarmonicBase(1.1e-3, frequency=8.7), **RIG)
+    clean = ss.Oscillator(law=TRUE["Coulomb"], drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7), **RIG)
     rig = ss.Rig.perfect("x", "z", "a").having("x", white=1e-6).having("z", white=1e-6)
-    rig = rig.having("a", mount=ss.Mount(60.0, 0.05))
+    rig = rig.having("a", mount=ss.rig.Mount(60.0, 0.05))
     found = ss.compare_laws(
         rig.measure(ss.simulate(clean, duration=2.5, rtol=1e-9), fs=FS, rng=3, start=2.0), slider(),
         laws=["Coulomb", "compliant"],
@@ -287,9 +287,9 @@ def test_a_base_that_was_not_recorded_is_asked_for() -> None:
     told = record("Coulomb")
     alone = ss.Record.of({name: told[name] for name in ("x", "load")}, fs=FS)
     only = ss.Record.of({"x": told["x"]}, fs=FS)
-    with pytest.raises(ss.EstimateError, match="give the base's motion as channel z"):
+    with pytest.raises(ss.errors.EstimateError, match="give the base's motion as channel z"):
         ss.compare_laws(only, slider(), laws=["Coulomb"])
-    driven = slider().having(drive=ss.HarmonicBase(1.1e-3, frequency=8.7, phase=2 * np.pi * 8.7 * 2.0))
+    driven = slider().having(drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7, phase=2 * np.pi * 8.7 * 2.0))
     assert ss.compare_laws(alone, driven, laws=["Coulomb"]).status == "ok"
 
 
@@ -308,14 +308,14 @@ def test_forces_are_no_surer_than_the_bases_calibration() -> None:
 
 
 def test_a_nuisance_of_no_channel_is_refused() -> None:
-    with pytest.raises(ss.ModelError, match=r"the gain of 'laod'.*perhaps load is meant"):
+    with pytest.raises(ss.errors.ModelError, match=r"the gain of 'laod'.*perhaps load is meant"):
         ss.compare_laws(record("Coulomb"), slider(), nuisance=["laod.gain"])
 
 
 def test_one_way_without_a_stop_is_refused() -> None:
     time = np.arange(4 * FS) / FS
     steady = ss.Record.of({"v": 5e-3 + 3e-3 * np.sin(40 * time)}, fs=FS)
-    with pytest.raises(ss.EstimateError, match="one way"):
+    with pytest.raises(ss.errors.EstimateError, match="one way"):
         ss.compare_laws(steady, slider(), laws=["Coulomb"])
 
 

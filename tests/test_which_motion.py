@@ -26,7 +26,7 @@ def released(damping: float, dry: float, *, seed: int, restoring: str = "linear"
     ("damping", "dry", "model"), [(0.02, 0.02, "both"), (0.02, 0.0, "viscous"), (0.0, 0.02, "dry")]
 )
 def test_the_model_is_chosen_from_the_record_alone(damping: float, dry: float, model: str) -> None:
-    found = ss.choose_motion(released(damping, dry, seed=1))
+    found = ss.decay.choose_motion(released(damping, dry, seed=1))
     assert (found.model, found.status) == (model, "ok")
     for narrow, wide, truth in (
         (found.damping_ratio, found.damping_ratio_any, damping),
@@ -42,23 +42,25 @@ def test_the_model_is_chosen_from_the_record_alone(damping: float, dry: float, m
 
 def test_a_pendulum_is_told_from_a_straight_spring() -> None:
     record = released(0.01, 0.01, seed=2, restoring="pendulum")
-    assert ss.choose_motion(record).model == "curved spring"
-    assert ss.choose_motion(record, restoring="pendulum").model == "both"
+    assert ss.decay.choose_motion(record).model == "curved spring"
+    assert ss.decay.choose_motion(record, restoring="pendulum").model == "both"
 
 
 def test_what_can_not_be_asked_is_refused() -> None:
     speed = np.gradient(released(0.02, 0.02, seed=0)["theta"], 0.005)
-    with pytest.raises(ss.EstimateError, match="made on a displacement"):
-        ss.choose_motion(ss.Record.of({"v": speed}, fs=200))
+    with pytest.raises(ss.errors.EstimateError, match="made on a displacement"):
+        ss.decay.choose_motion(ss.Record.of({"v": speed}, fs=200))
     record = released(0.02, 0.02, seed=0)
-    with pytest.raises(ss.EstimateError, match="restoring = 'round'"):
-        ss.choose_motion(record, restoring="round")
-    with pytest.raises(ss.EstimateError, match="an angle in rad"):
-        ss.choose_motion(ss.Record.of({"x": record["theta"]}, fs=200), restoring="pendulum")
+    with pytest.raises(ss.errors.EstimateError, match="restoring = 'round'"):
+        ss.decay.choose_motion(record, restoring="round")
+    with pytest.raises(ss.errors.EstimateError, match="an angle in rad"):
+        ss.decay.choose_motion(ss.Record.of({"x": record["theta"]}, fs=200), restoring="pendulum")
 
 
 def test_clipped_swings_are_left_out() -> None:
-    found = ss.choose_motion(ss.Record.of({"theta": np.clip(released(0.02, 0.02, seed=1)["theta"], -0.7, 0.7)}, fs=200))
+    found = ss.decay.choose_motion(
+        ss.Record.of({"theta": np.clip(released(0.02, 0.02, seed=1)["theta"], -0.7, 0.7)}, fs=200)
+    )
     assert found.model == "both"
     assert found.status == "clipped swings are left out"
     assert abs(found.dry_displacement.value - 0.02) < 4.5 * found.dry_displacement.sd
@@ -68,7 +70,9 @@ def test_a_real_pendulum(dataset: Callable[[str], Path]) -> None:
     """Its authors: 4.1e-3 N m dry, 0.5e-3 N m s viscous; three other methods 3.7e-3 to 4.9e-3 and 2.6e-4 to 5.5e-4."""
     path = dataset("pendulum_decay") / "pend1.csv"
     record = ss.read_record(path, channels={"theta": "#2 - 3.141592653589793 [rad]"}, time="#1 [s]")
-    found = ss.choose_motion(record, restoring="pendulum", candidates=("viscous", "both", "quadratic", "stribeck"))
+    found = ss.decay.choose_motion(
+        record, restoring="pendulum", candidates=("viscous", "both", "quadratic", "stribeck")
+    )
     inertia = 0.2235 * 0.31692**2
     both = found.choice.candidate("both")
     w = both.fitted.value("angular_frequency")
@@ -91,15 +95,15 @@ def test_a_real_pendulum(dataset: Callable[[str], Path]) -> None:
 def test_a_motion_without_noise_is_the_simplest_that_makes_it(length: float) -> None:
     """What is left is rounding, whose colour says nothing."""
     x = length * free_decay(TIMES, [2 * np.pi, 0.02, 0.02, 0.013, 1.0, 0.27, 0, 0, 0, 0, 0.5, 0])[0]
-    found = ss.choose_motion(ss.Record.of({"x": x}, fs=200))
+    found = ss.decay.choose_motion(ss.Record.of({"x": x}, fs=200))
     assert (found.model, found.status) == ("both", "ok")
     assert ss.fit_decay(ss.Record.of({"x": x}, fs=200)).noise == "white"
 
 
 def test_a_simulated_release_is_what_it_was_made_of() -> None:
     """Without noise, from the exact engine, in blocks of nine samples that hold turning points too."""
-    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
-    found = ss.choose_motion(ss.simulate(slider, duration=20.0, start={"x": 1.0}).record(fs=200))
+    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
+    found = ss.decay.choose_motion(ss.simulate(slider, duration=20.0, start={"x": 1.0}).record(fs=200))
     assert (found.model, found.status) == ("both", "ok")
     assert found.dry_displacement_any.includes(0.02)
 
@@ -110,7 +114,7 @@ def test_a_coarse_encoder_feigns_no_friction(step: float, noise: float, counts: 
     """Readings of one level at rest are one reading: its error does not average out."""
     given = [2 * np.pi, 0.02, 0.02, 0.013, 1.0, 0.27, 0, 0, 0, 0, 0.5, 0]
     x = free_decay(TIMES, given)[0] + noise * np.random.default_rng(1).standard_normal(TIMES.size)
-    found = ss.choose_motion(ss.Record.of({"x": np.round(x / step) * (1 if counts else step)}, fs=200))
+    found = ss.decay.choose_motion(ss.Record.of({"x": np.round(x / step) * (1 if counts else step)}, fs=200))
     assert (found.model, found.status) == ("both", "ok")
     assert found.dry_displacement_any.includes(0.02 / (step if counts else 1))
 
@@ -119,7 +123,7 @@ def test_dry_friction_beyond_doubt_stays_so_whichever_motion_it_was() -> None:
     """Friction that may rise towards rest shares the dry friction with the rise, and never takes it all."""
     x = free_decay(TIMES, [20, 0, 0.001, 0, 0.03, 0, 0, 0, 0, 0, 0.5, 0])[0]
     x += 3e-5 * np.random.default_rng(1).standard_normal(TIMES.size)
-    found = ss.choose_motion(ss.Record.of({"x": x}, fs=200))
+    found = ss.decay.choose_motion(ss.Record.of({"x": x}, fs=200))
     assert "stribeck" in [each.name for each in found.choice.kept]
     low, high = found.dry_displacement_any.interval
     assert 0.4e-3 < low < 1e-3 < high < 1.1e-3

@@ -26,7 +26,7 @@ def example(rows: int = 500, **changes: object) -> ss.Record:
     }
     record = ss.Record.of(samples, fs=1000 / 3, units={"x": "mm", "load": "lbf"}, start=0.1, truth={"level": 1 / 3})
     record = record.with_details("x", delay=1e-3, noise=2e-7, sensitivity="2 mm/V")
-    step = ss.Step(
+    step = ss.record.Step(
         "invented", {"rows": (1, None), "nested": {"list": [1, (2.5, "two")]}, "text": 'a "b", ü\n#'}, "done"
     )
     return replace(record, history=(*record.history, step), **changes)
@@ -54,7 +54,9 @@ def test_stamps_and_what_is_not_a_number_come_back(tmp_path: Path, suffix: str) 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_a_long_history_comes_back(tmp_path: Path, suffix: str) -> None:
-    record = replace(example(20), history=tuple(ss.Step("step", {"number": n, "text": "x" * 90}) for n in range(3000)))
+    record = replace(
+        example(20), history=tuple(ss.record.Step("step", {"number": n, "text": "x" * 90}) for n in range(3000))
+    )
     assert ss.read_record(ss.write_record(record, tmp_path / f"kept{suffix}")).equals(record)
 
 
@@ -99,13 +101,13 @@ def test_any_record_comes_back(
 
 
 def test_an_unknown_ending_lists_those_that_there_are(tmp_path: Path) -> None:
-    with pytest.raises(ss.FormatError, match=r"\.csv, \.h5, \.hdf5, \.parquet"):
+    with pytest.raises(ss.errors.FormatError, match=r"\.csv, \.h5, \.hdf5, \.parquet"):
         ss.write_record(example(), tmp_path / "kept.xls")
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".h5", ".parquet"])
 def test_a_folder_that_is_not_there_is_one_sentence(tmp_path: Path, suffix: str) -> None:
-    with pytest.raises(ss.FormatError, match="can not be written"):
+    with pytest.raises(ss.errors.FormatError, match="can not be written"):
         ss.write_record(example(), tmp_path / "nowhere" / f"kept{suffix}")
 
 
@@ -113,7 +115,7 @@ def test_a_folder_that_is_not_there_is_one_sentence(tmp_path: Path, suffix: str)
 def test_a_file_that_is_there_is_replaced_only_when_asked(tmp_path: Path, suffix: str) -> None:
     path = ss.write_record(example(10), tmp_path / f"kept{suffix}")
     before = path.read_bytes()
-    with pytest.raises(ss.FormatError, match=r"is there already.*overwrite=True"):
+    with pytest.raises(ss.errors.FormatError, match=r"is there already.*overwrite=True"):
         ss.write_record(example(20), path)
     assert path.read_bytes() == before
     assert len(ss.read_record(ss.write_record(example(20), path, overwrite=True))) == 20
@@ -134,7 +136,7 @@ def test_a_failure_half_way_leaves_the_old_file(tmp_path: Path, suffix: str, mon
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(writer[suffix], full)
-    with pytest.raises(ss.FormatError, match="No space left"):
+    with pytest.raises(ss.errors.FormatError, match="No space left"):
         ss.write_record(broken, path, overwrite=True)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
@@ -207,7 +209,7 @@ def test_a_column_added_outside_is_read_too(tmp_path: Path) -> None:
 
 
 def test_blocks_of_an_edited_file_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ss.FormatError, match=r"x .*changed.*channels="):
+    with pytest.raises(ss.errors.FormatError, match=r"x .*changed.*channels="):
         list(ss.read_blocks(edited(kept(tmp_path), "2.5", "2.75"), size=2))
 
 

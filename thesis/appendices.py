@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from stickslip.plot.plate import Plate
 from stickslip.plot.style import BLUE, ORANGE, styled
-from stickslip.signals.differentiate import five_point_response
+from stickslip.signals.derivatives import five_point_response
 from thesis.drawing import figure, panels, tag
 from thesis.printed import Given, Ours
 

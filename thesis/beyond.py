@@ -79,26 +79,26 @@ def behind_the_spring(given: Given) -> dict[str, Any]:
     spring = {"stiffness": contact.stiffness}
     return {
         "Coulomb": contact,
-        "Stribeck": ss.InSeries(ss.Tabulated(speed, falling), damping=told["damping"], **spring),
-        "state variable": ss.InSeries(
-            ss.StateVariable(contact.kinetic, rate=1 / told["lag"]), damping=contact.damping, **spring
+        "Stribeck": ss.laws.InSeries(ss.laws.Tabulated(speed, falling), damping=told["damping"], **spring),
+        "state variable": ss.laws.InSeries(
+            ss.laws.StateVariable(contact.kinetic, rate=1 / told["lag"]), damping=contact.damping, **spring
         ),
     }
 
 
-def orbits(given: Given) -> dict[str, ss.SteadyState]:
+def orbits(given: Given) -> dict[str, ss.solve.SteadyState]:
     """The steady motion at 8.7 Hz with each of them."""
     told = given["sliding"]
-    drive = ss.HarmonicBase(chapter3.base_for(given, 1), frequency=told["frequency"][1])
+    drive = ss.drives.HarmonicBase(chapter3.base_for(given, 1), frequency=told["frequency"][1])
     return {name: _orbit(told["mass"], told["spring"], law, drive) for name, law in behind_the_spring(given).items()}
 
 
 @functools.lru_cache(8)
-def _orbit(mass: float, spring: float, law: Any, drive: Any) -> ss.SteadyState:
+def _orbit(mass: float, spring: float, law: Any, drive: Any) -> ss.solve.SteadyState:
     return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive))
 
 
-def identity(orbit: ss.SteadyState) -> tuple[Array, Array]:
+def identity(orbit: ss.solve.SteadyState) -> tuple[Array, Array]:
     """Time, and the integral of (x" + w^2 x) df up to it, over that of its magnitude: zero after a whole period."""
     time, motion = around(orbit)
     level = motion["a"] + (2 * math.pi / orbit.period) ** 2 * motion["x"]
@@ -139,7 +139,7 @@ def _laws(given: Given) -> Any:
 def ringing(system: ss.Oscillator) -> float:
     """Frequency of the transition oscillation [Hz], found in the last four of six cycles of simulated acceleration."""
     record = ss.simulate(system, cycles=6).record(fs=4000)
-    return ss.transition(record.between(2 / system.drive.frequency, record.duration)).frequency.value
+    return ss.contact.transition(record.between(2 / system.drive.frequency, record.duration)).frequency.value
 
 
 def stick_slip(given: Given, *, stiffness: float = 1.0, load: float = 1.0) -> ss.Oscillator:
@@ -147,8 +147,8 @@ def stick_slip(given: Given, *, stiffness: float = 1.0, load: float = 1.0) -> ss
     told = given["stick_slip"]
     stiff = told["stiffness"] * stiffness * load ** (1 / 3)
     damping = 2 * told["case2"] * math.sqrt(told["mass"] * (told["spring"] + stiff))
-    law = ss.CompliantContact(told["kinetic"] * load, stiffness=stiff, damping=damping)
-    drive = ss.HarmonicBase(told["base"] * load, frequency=told["frequency"])
+    law = ss.laws.CompliantContact(told["kinetic"] * load, stiffness=stiff, damping=damping)
+    drive = ss.drives.HarmonicBase(told["base"] * load, frequency=told["frequency"])
     return ss.Oscillator(mass=told["mass"], stiffness=told["spring"], law=law, drive=drive)
 
 
@@ -183,7 +183,7 @@ def dither(given: Given) -> tuple[Any, float]:
 @functools.lru_cache(4)
 def _dither(system: ss.Oscillator) -> tuple[Any, float]:
     record = ss.simulate(system, cycles=10).record(fs=4000)
-    found = ss.transition(record.between(2 / system.drive.frequency, record.duration))
+    found = ss.contact.transition(record.between(2 / system.drive.frequency, record.duration))
     return ss.dither(system, transition=found), found.frequency.value
 
 

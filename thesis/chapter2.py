@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import stickslip as ss
 from stickslip.plot.plate import Plate
 from stickslip.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
-from stickslip.signals.differentiate import five_point_average
+from stickslip.signals.derivatives import five_point_average
 from thesis.drawing import figure, panels, tag
 from thesis.printed import Given, Ours
 from thesis.sketches import apparatus
@@ -28,9 +28,11 @@ SETTLED = 40.0  # s: the air track hardly damps
 def numbers(given: Given) -> Ours:
     """The chapter's numbers."""
     told, free = given["rig"], free_vibration(given)
-    lines = {each.name: each.frequency.value for each in ss.impact_test(impact(given), mass=told["mass"]).resonances}
+    lines = {
+        each.name: each.frequency.value for each in ss.balance.impact_test(impact(given), mass=told["mass"]).resonances
+    }
     return {
-        "damping ratio": ss.log_decrement(free).damping_ratio.value,
+        "damping ratio": ss.decay.log_decrement(free).damping_ratio.value,
         "natural frequency": math.sqrt(told["spring"] / told["mass"]),
         "phase": lead(given, free),
         "contact": lines["coupled contact"],
@@ -60,7 +62,7 @@ def plates(given: Given) -> Iterator[Plate]:
         )
     for number, case in (("2.7", 0), ("2.8", 1), ("2.9", 2), ("2.10", 3)):
         record = rubbing(given, case)
-        found = ss.compare_force(record)
+        found = ss.balance.compare_force(record)
         yield figure(
             number,
             _both_forces(given, record),
@@ -107,14 +109,14 @@ def slider(given: Given, *, law: Any = None, drive: Any = None) -> ss.Oscillator
     damping = 2 * told["damping_ratio"] * math.sqrt(told["mass"] * told["spring"])
     drive = {} if drive is None else {"drive": drive}
     return ss.Oscillator(
-        mass=told["mass"], stiffness=told["spring"], damping=damping, law=law or ss.Coulomb(0.0), **drive
+        mass=told["mass"], stiffness=told["spring"], damping=damping, law=law or ss.laws.Coulomb(0.0), **drive
     )
 
 
-def contact(given: Given) -> ss.CompliantContact:
+def contact(given: Given) -> ss.laws.CompliantContact:
     """The friction contact, as in chapter 4."""
     told = given["rig"]
-    return ss.CompliantContact(told["kinetic"], stiffness=told["stiffness"], damping=told["contact_damping"])
+    return ss.laws.CompliantContact(told["kinetic"], stiffness=told["stiffness"], damping=told["contact_damping"])
 
 
 def free_vibration(given: Given) -> ss.Record:
@@ -125,14 +127,14 @@ def free_vibration(given: Given) -> ss.Record:
 def forced(given: Given, case: int) -> ss.Record:
     """Figures 2.4 to 2.6: the base moves, without friction; settled."""
     told = given["rig"]
-    drive = ss.HarmonicBase(told["forced_base"][case], frequency=told["forced"][case])
+    drive = ss.drives.HarmonicBase(told["forced_base"][case], frequency=told["forced"][case])
     return _measured(slider(given, drive=drive), 0.0, SETTLED, 1.0, **_sensors(given))
 
 
 def rubbing(given: Given, case: int) -> ss.Record:
     """Figures 2.7 to 2.10: with friction."""
     told = given["rig"]
-    drive = ss.HarmonicBase(told["base"][case], frequency=told["frequency"][case])
+    drive = ss.drives.HarmonicBase(told["base"][case], frequency=told["frequency"][case])
     record = _measured(slider(given, law=contact(given), drive=drive), 0.0, SETTLED, 2.0, **_sensors(given))
     return ss.friction_force(record, mass=told["mass"], stiffness=told["spring"])
 
@@ -148,7 +150,7 @@ def impact(given: Given) -> ss.Record:
 
 @functools.lru_cache(2)
 def _struck(mass: float, spring: float, law: Any, base: tuple[float, ...], fs: float) -> ss.Record:
-    drive = ss.RecordedBase(base, fs=fs)
+    drive = ss.drives.RecordedBase(base, fs=fs)
     run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive), duration=(len(base) - 1) / fs)
     return ss.Rig().measure(run, fs=4000, rng=4)
 

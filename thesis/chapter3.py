@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import stickslip as ss
-from stickslip.identify.contact import branch_slopes
+from stickslip.contact.contact import branch_slopes
 from stickslip.plot.plate import Plate
 from stickslip.plot.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
 from thesis.drawing import RESPONSES, around, characteristics, exact, figure, panels, responses, tag
@@ -34,7 +34,7 @@ def numbers(given: Given) -> Ours:
     told = given["sliding"]
     orbits = [sliding(given, case) for case in CASES]
     slopes = [slopes_of_sticks(measured(given, case)) for case in CASES]
-    speeds = [ss.transition_speed(measured(given, case)).curve for case in CASES]
+    speeds = [ss.contact.transition_speed(measured(given, case)).curve for case in CASES]
     return {
         "stiffness": [float(np.mean(each)) / 1e4 for each in slopes],
         "stiffness scatter": [float(np.std(each, ddof=1)) / 1e4 for each in slopes],
@@ -90,15 +90,17 @@ def plates(given: Given) -> Iterator[Plate]:
         )
 
 
-def contact(given: Given, case: int) -> ss.CompliantContact:
+def contact(given: Given, case: int) -> ss.laws.CompliantContact:
     """The contact of one of the three cases, with the damping ratio that the thesis states, of m and k + K_y."""
     told = given["sliding"]
     stiffness = told["stiffness"][case]
     whole = math.sqrt(told["mass"] * (told["spring"] + stiffness))
-    return ss.CompliantContact(told["kinetic"][case], stiffness=stiffness, damping=2 * told["damping_ratio"] * whole)
+    return ss.laws.CompliantContact(
+        told["kinetic"][case], stiffness=stiffness, damping=2 * told["damping_ratio"] * whole
+    )
 
 
-def sliding(given: Given, case: int, *, base: float | None = None) -> ss.SteadyState:
+def sliding(given: Given, case: int, *, base: float | None = None) -> ss.solve.SteadyState:
     """The steady motion at a base amplitude [m], that of Table 3.3 if none is told."""
     told = given["sliding"]
     base = told["base"][case] if base is None else base
@@ -106,8 +108,8 @@ def sliding(given: Given, case: int, *, base: float | None = None) -> ss.SteadyS
 
 
 @functools.lru_cache(256)
-def _steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.SteadyState:
-    drive = ss.HarmonicBase(base, frequency=frequency)
+def _steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.solve.SteadyState:
+    drive = ss.drives.HarmonicBase(base, frequency=frequency)
     return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive))
 
 
@@ -129,7 +131,7 @@ def equation_3_4(told: Mapping[str, Any], case: int) -> float:
 
 @functools.lru_cache(8)
 def _measured(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.Record:
-    drive = ss.HarmonicBase(base, frequency=frequency)
+    drive = ss.drives.HarmonicBase(base, frequency=frequency)
     run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive), duration=10)
     rig = ss.Rig()
     record = rig.stated(rig.measure(run, fs=4000, rng=7, start=8.0))
@@ -139,7 +141,7 @@ def _measured(mass: float, spring: float, law: Any, base: float, frequency: floa
 def measured(given: Given, case: int) -> ss.Record:
     """What the virtual rig makes of one of the three cases: two seconds, with friction."""
     told = given["sliding"]
-    law = ss.RoughSurface(contact(given, case), share=told["roughness"], length=2e-4, span=2e-3, seed=4)
+    law = ss.laws.RoughSurface(contact(given, case), share=told["roughness"], length=2e-4, span=2e-3, seed=4)
     return _measured(told["mass"], told["spring"], law, base_for(given, case), told["frequency"][case])
 
 
@@ -157,7 +159,7 @@ def third_harmonic(given: Given) -> float:
     return float(first / third)
 
 
-def _of_orbit(orbit: ss.SteadyState) -> str:
+def _of_orbit(orbit: ss.solve.SteadyState) -> str:
     return (f"Steady motion by the exact solver: the mass moves {1e3 * orbit.amplitude:.3f} mm, and sliding begins at "
             f"{1e3 * orbit.transition_speed:.2f} mm/s.")  # fmt: skip
 
@@ -165,7 +167,7 @@ def _of_orbit(orbit: ss.SteadyState) -> str:
 def _imposed(law: Any, memory: tuple[str, ...] = ()) -> tuple[Array, dict[str, Array]]:
     """A contact under an imposed motion x = -cos t, from turn to turn: a mass that no contact can move, on a moving
     counter-face."""
-    drive = ss.MultiTone([(1.0, 1 / (2 * math.pi), 0.0)], on="face")
+    drive = ss.drives.MultiTone([(1.0, 1 / (2 * math.pi), 0.0)], on="face")
     run = ss.simulate(ss.Oscillator(mass=1e21, stiffness=0, law=law, drive=drive), cycles=3)
     turn = 2 * math.pi
     times, motion = exact(run, first=turn, last=2 * turn, names=("slip", "friction", *memory))
@@ -185,11 +187,11 @@ def _schematics(given: Given) -> Iterator[Plate]:
     soft = given["schematic"]
     words = (f"Computed, not sketched: the model under an imposed motion, with a contact so soft that 2f_k/K_y is "
              f"{2 / soft['stiffness']:.2g} of the amplitude. ")  # fmt: skip
-    time, motion = _imposed(ss.CompliantContact(1.0, stiffness=soft["stiffness"]))
+    time, motion = _imposed(ss.laws.CompliantContact(1.0, stiffness=soft["stiffness"]))
     yield figure("3.2", _hypothetical(time, motion), words.strip())
     for number, axis, label in (("3.3", "x", "x / X_m"), ("3.4", "v", "ẋ / ωX_m")):
         yield figure(number, _phases(motion, axis, label), _corners(number, soft["stiffness"], words))
-    _, over = _imposed(ss.CompliantContact(1.0, stiffness=soft["stiffness"], static=soft["static"]))
+    _, over = _imposed(ss.laws.CompliantContact(1.0, stiffness=soft["stiffness"], static=soft["static"]))
     for number, axis, label in (("3.5", "x", "x / X_m"), ("3.6", "v", "ẋ / ωX_m")):
         yield figure(
             number,
@@ -239,7 +241,7 @@ def _stribeck(soft: Mapping[str, float]) -> Any:
     """Figure 3.7: friction that falls with the sliding speed, rigid and behind a compliant contact."""
     speed = np.linspace(0, 1.2, 241)
     friction = 1 + (soft["static"] - 1) * np.exp(-((speed / soft["stribeck_speed"]) ** 2))
-    law = ss.InSeries(ss.Tabulated(speed, friction), stiffness=soft["stiffness"], damping=soft["damping"])
+    law = ss.laws.InSeries(ss.laws.Tabulated(speed, friction), stiffness=soft["stiffness"], damping=soft["damping"])
     _, motion = _imposed(law)
     drawn, axes = panels(1, 3, height=2.6)
     axes[0].plot(np.concatenate([-speed[::-1], speed]), np.concatenate([-friction[::-1], friction]), color=ORANGE)
@@ -257,7 +259,7 @@ def _measured_responses(given: Given, case: int) -> Any:
     """Figures 3.8, 3.10, 3.11: half a second of the record, its velocity by the five-point average as in the thesis."""
     record = measured(given, case)
     part = slice(0, round(0.6 * record.fs))
-    v = ss.differentiate(record["x"], record.fs, method="five-point").values
+    v = ss.signals.differentiate(record["x"], record.fs, method="five-point").values
     motion = {"x": record["x"], "v": v, "a": record["a"], "friction": record["friction"]}
     cut = {name: values[part] for name, values in motion.items()}
     if case == 0:  # printed in another order

@@ -84,34 +84,34 @@ def plates(given: Given) -> Iterator[Plate]:
     yield from _inertial(given)
 
 
-def stick_slip(given: Given, ratio: float, *, kinetic: float | None = None) -> ss.SteadyState:
+def stick_slip(given: Given, ratio: float, *, kinetic: float | None = None) -> ss.solve.SteadyState:
     """The motion of section 4.3 with a damping ratio of m and k + K_y in the contact."""
     told = given["stick_slip"]
     damping = 2 * ratio * math.sqrt(told["mass"] * (told["spring"] + told["stiffness"]))
     return _steady(told["mass"], told["spring"], _contact(given, damping, kinetic), told["base"], told["frequency"])
 
 
-def _contact(given: Given, damping: float, kinetic: float | None = None) -> ss.CompliantContact:
+def _contact(given: Given, damping: float, kinetic: float | None = None) -> ss.laws.CompliantContact:
     told = given["stick_slip"]
     kinetic = told["kinetic"] if kinetic is None else kinetic
-    return ss.CompliantContact(kinetic, stiffness=told["stiffness"], damping=damping)
+    return ss.laws.CompliantContact(kinetic, stiffness=told["stiffness"], damping=damping)
 
 
 @functools.lru_cache(1024)
-def _steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.SteadyState:
-    drive = ss.HarmonicBase(base, frequency=frequency)
+def _steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.solve.SteadyState:
+    drive = ss.drives.HarmonicBase(base, frequency=frequency)
     return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive))
 
 
-def micro_slips(orbit: ss.SteadyState) -> int:
+def micro_slips(orbit: ss.solve.SteadyState) -> int:
     """Slips within a macroscopic sticking interval: one less than its microsticks, of which a cycle has two sets."""
     return orbit.orbit.event_counts()["microstick"] // 2 - 1
 
 
-def state_variable(given: Given, case: int, *, base: float | None = None) -> ss.SteadyState:
+def state_variable(given: Given, case: int, *, base: float | None = None) -> ss.solve.SteadyState:
     """The motion of section 4.4 at 2.5, 5.61 or 8.7 Hz."""
     told, slider = given["state_variable"], given["stick_slip"]
-    law = ss.SmoothStateVariable(told["kinetic"][case], rate=told["rate"], steepness=told["steepness"])
+    law = ss.laws.SmoothStateVariable(told["kinetic"][case], rate=told["rate"], steepness=told["steepness"])
     base = told["base"][case] if base is None else base
     return _steady(slider["mass"], slider["spring"], law, base, told["frequency"][case])
 
@@ -164,7 +164,7 @@ def _spectrum(time: Array, values: Array) -> tuple[Array, Array]:
 
 @functools.lru_cache(4)
 def _measured(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.Record:
-    drive = ss.HarmonicBase(base, frequency=frequency)
+    drive = ss.drives.HarmonicBase(base, frequency=frequency)
     run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive), duration=10)
     rig = ss.Rig()
     record = rig.stated(rig.measure(run, fs=4000, rng=7, start=8.0))
@@ -181,7 +181,7 @@ def measured(given: Given) -> ss.Record:
 def _experiments(given: Given) -> Iterator[Plate]:
     """Figures 4.1 to 4.3."""
     record, words = measured(given), "The virtual rig of chapter 2, on the contact of case 2."
-    v = ss.differentiate(record["x"], record.fs, method="five-point").values
+    v = ss.signals.differentiate(record["x"], record.fs, method="five-point").values
     motion = {"x": record["x"], "v": v, "a": record["a"], "friction": record["friction"]}
     part = slice(0, round(record.fs))
     yield figure("4.1", responses(record.time[part], {name: each[part] for name, each in motion.items()}), words)
@@ -242,7 +242,7 @@ def _map(given: Given) -> Any:
     return drawn
 
 
-def inertial_contact(given: Given, case: int) -> ss.SteadyState:
+def inertial_contact(given: Given, case: int) -> ss.solve.SteadyState:
     """z of equation 4.7 at its steady state, with the friction's sign set-valued at rest."""
     told = given["inertial"]
     alpha = told["amplitude"][case] * told["stiffness"] / told["kinetic"] * (told["ratio"] ** 2 - 1)
@@ -250,9 +250,9 @@ def inertial_contact(given: Given, case: int) -> ss.SteadyState:
 
 
 @functools.lru_cache(8)
-def _normalised(alpha: float, ratio: float) -> ss.SteadyState:
-    drive = ss.HarmonicForce(abs(alpha), ratio / (2 * math.pi), phase=math.pi * (alpha < 0))
-    return ss.steady_state(ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb(1.0), drive=drive))
+def _normalised(alpha: float, ratio: float) -> ss.solve.SteadyState:
+    drive = ss.drives.HarmonicForce(abs(alpha), ratio / (2 * math.pi), phase=math.pi * (alpha < 0))
+    return ss.steady_state(ss.Oscillator(mass=1, stiffness=1, law=ss.laws.Coulomb(1.0), drive=drive))
 
 
 def of_contact(given: Given, case: int, *, cycles: int = 1) -> tuple[Array, dict[str, Array]]:

@@ -29,14 +29,14 @@ def numbers(given: Given) -> Ours:
     """The chapter's numbers."""
     told, case1 = given["wavelet"], accelerations(given, "case1")
     near = (0.5 * told["transition"], 2 * told["transition"])
-    peaks = ss.local_maxima(ss.wavelet_map(case1, "a", frequencies=near, wavelet_frequency=told["centre"]))
+    peaks = ss.signals.local_maxima(ss.wavelet_map(case1, "a", frequencies=near, wavelet_frequency=told["centre"]))
     slow = ss.wavelet_map(case1, "a", frequencies=(1.6, 8.0), wavelet_frequency=told["centre"])
     strongest = np.unravel_index(int(np.argmax(np.abs(slow.values))), slow.shape)[0]
     return {
         "local maximum": float(np.median([peak.frequency for peak in peaks])),
         "global maximum": float(slow.frequency[strongest]),
         "spikes within a stick": [
-            round(ss.find_microslips(accelerations(given, name)).per_stick.value) for name in ("case1", "case2")
+            round(ss.contact.find_microslips(accelerations(given, name)).per_stick.value) for name in ("case1", "case2")
         ],
     }
 
@@ -68,7 +68,7 @@ def plates(given: Given) -> Iterator[Plate]:
         yield figure(number, _contours(given, accelerations(given, kind), (1.6, 200.0)), words + remark)
     for number, kind in (("5.10", "case1"), ("5.11", "case2")):
         record = accelerations(given, kind).between(0.35, 0.75)
-        slips = ss.find_microslips(accelerations(given, kind))
+        slips = ss.contact.find_microslips(accelerations(given, kind))
         yield figure(
             number,
             _contours(given, record, (20.0, 1000.0), span=120.0),
@@ -84,7 +84,7 @@ def accelerations(given: Given, kind: str) -> ss.Record:
         record = chapter4.measured(given)
         return ss.Record.of({"a": record["a"][: round(CYCLES / told["frequency"] * record.fs)]}, fs=record.fs)
     if kind == "coulomb":
-        drive = ss.HarmonicBase(told["base"], frequency=told["frequency"])
+        drive = ss.drives.HarmonicBase(told["base"], frequency=told["frequency"])
         orbit = _coulomb(told["mass"], told["spring"], told["kinetic"], drive)
     elif kind == "state variable":
         orbit = chapter4.state_variable(given, 0)
@@ -97,8 +97,8 @@ def accelerations(given: Given, kind: str) -> ss.Record:
 
 
 @functools.lru_cache(4)
-def _coulomb(mass: float, spring: float, kinetic: float, drive: Any) -> ss.SteadyState:
-    return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=ss.Coulomb(kinetic), drive=drive))
+def _coulomb(mass: float, spring: float, kinetic: float, drive: Any) -> ss.solve.SteadyState:
+    return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=ss.laws.Coulomb(kinetic), drive=drive))
 
 
 def _contours(given: Given, record: ss.Record, band: tuple[float, float], *, span: float = 80.0) -> Any:

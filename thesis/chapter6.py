@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.identify import extremes as ex
+from stickslip.decay import extremes as ex
 from stickslip.plot.decay import plot_bounds, plot_decay, plot_differences, plot_identified
 from stickslip.plot.plate import Plate
 from stickslip.plot.style import BLUE, ORANGE, styled
@@ -87,14 +87,14 @@ def plates(given: Given) -> Iterator[Plate]:
     )
 
 
-def motion(given: Given) -> ss.Trajectory:
+def motion(given: Given) -> ss.solve.Trajectory:
     """The free decay of section 6.3, by the exact solver."""
     return _motion(**given["decay"])
 
 
 @functools.cache
-def _motion(*, mass: float, stiffness: float, damping: float, kinetic: float, release: float) -> ss.Trajectory:
-    slider = ss.Oscillator(mass=mass, stiffness=stiffness, damping=damping, law=ss.Coulomb(kinetic))
+def _motion(*, mass: float, stiffness: float, damping: float, kinetic: float, release: float) -> ss.solve.Trajectory:
+    slider = ss.Oscillator(mass=mass, stiffness=stiffness, damping=damping, law=ss.laws.Coulomb(kinetic))
     return ss.simulate(slider, start={"x": release}, duration=8 / slider.frequency)
 
 
@@ -201,10 +201,10 @@ def _paper_record(
     mass: float, stiffness: float, ratio: float, kinetic: float, release: float, step: float, fs: float
 ) -> ss.Record:
     slider = ss.Oscillator(
-        mass=mass, stiffness=stiffness, damping=2 * ratio * math.sqrt(mass * stiffness), law=ss.Coulomb(kinetic)
+        mass=mass, stiffness=stiffness, damping=2 * ratio * math.sqrt(mass * stiffness), law=ss.laws.Coulomb(kinetic)
     )
     run = ss.simulate(slider, start={"x": release}, duration=(14 if ratio else 20) / slider.frequency)
-    rig = ss.Rig((ss.Sensor("x", noise=ss.Noise(step / 5), digitiser=ss.Digitiser(step=step)),))
+    rig = ss.Rig((ss.rig.Sensor("x", noise=ss.rig.Noise(step / 5), digitiser=ss.rig.Digitiser(step=step)),))
     return rig.measure(run, fs=fs, rng=1)
 
 
@@ -212,8 +212,8 @@ def _of_paper(given: Given) -> Ours:
     """Table 6.2: what twins of system I give back, and the errors between its printed values."""
     told = [given["paper"][f"case{case}"] for case in (1, 2)]
     both = [ss.decrement(on_paper(given, case, "both")) for case in (1, 2)]
-    viscous = [ss.log_decrement(on_paper(given, case, "viscous")) for case in (1, 2)]
-    dry = [ss.linear_decrement(on_paper(given, case, "dry")) for case in (1, 2)]
+    viscous = [ss.decay.log_decrement(on_paper(given, case, "viscous")) for case in (1, 2)]
+    dry = [ss.decay.linear_decrement(on_paper(given, case, "dry")) for case in (1, 2)]
     return {
         "paper.zeta": [found.damping_ratio.value for found in viscous],
         "paper.dry": [1e3 * found.dry_displacement.value for found in dry],

@@ -75,8 +75,8 @@ def record_of(given: Given, surface: str, load: str) -> ss.Record:
 
 @functools.lru_cache(8)
 def _record(surface: str, load: float, fs: float, frequency: float) -> ss.Record:
-    run = ss.simulate(ss.squeak_rig(surface, load), cycles=5)
-    return ss.squeak_record(run, fs=fs, snr=60, rng=1).between(3 / frequency, 5 / frequency)
+    run = ss.simulate(ss.squeak.squeak_rig(surface, load), cycles=5)
+    return ss.squeak.squeak_record(run, fs=fs, snr=60, rng=1).between(3 / frequency, 5 / frequency)
 
 
 def squeaks(given: Given, surface: str, load: str) -> bool:

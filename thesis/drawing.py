@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip import SteadyState, Trajectory
+    from stickslip.solve import SteadyState, Trajectory
 
 Array = NDArray[np.float64]
 

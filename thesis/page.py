@@ -12,8 +12,8 @@ from typing import Any
 
 from stickslip import __version__
 from stickslip.plot.plate import Plate
-from stickslip.reports.folder import check_folder, results_folder, write_figures
-from stickslip.reports.page import templates
+from stickslip.story.folder import check_folder, results_folder, write_figures
+from stickslip.story.page import templates
 from thesis.drawing import caption_of
 from thesis.printed import CHANGED, CORRECTED, NOT_REPRODUCIBLE, SAME, Given, Number, Ours, Table, given, judged, tables
 from thesis.starting import starts

@@ -20,8 +20,8 @@ from scipy.optimize import minimize
 from scipy.special import logsumexp
 
 import stickslip as ss
-from stickslip.identify.mechanism import COLUMNS, FASTEST, columns, features
-from stickslip.identify.ringing import find_ringing
+from stickslip.contact.mechanisms import COLUMNS, FASTEST, columns, features
+from stickslip.contact.ringing import find_ringing
 
 MASS, STIFFNESS, AMPLITUDE = 2.42, 2310.0, 0.65e-3
 NAMES = ("bare spikes", "oscillation without micro-slip", "double stick-slip", "non-sinusoidal oscillation")
@@ -34,22 +34,22 @@ RIDGE = 0.02
 def law_of(kind: str, kinetic: float, rng: np.random.Generator, *, near: bool) -> Any:
     """A law with random parameters; `near` those of the thesis, or far around them."""
     if kind == "rigid":
-        return ss.Coulomb(kinetic=kinetic)
+        return ss.laws.Coulomb(kinetic=kinetic)
     if kind == "state":
         rate, steepness = rng.uniform(60, 220) / kinetic, 10 ** rng.uniform(3.2, 3.8)
         if near:
             rate, steepness = rng.uniform(80, 125), rng.uniform(2200, 4000)
-        return ss.SmoothStateVariable(kinetic, rate=rate, steepness=steepness)
+        return ss.laws.SmoothStateVariable(kinetic, rate=rate, steepness=steepness)
     decades, ratio = rng.uniform(1.5, 2.4), 10 ** rng.uniform(-2.2, -0.45)
     if near:
         decades, ratio = rng.uniform(1.85, 2.0), rng.choice([rng.uniform(0.01, 0.08), rng.uniform(0.08, 0.28)])
     contact = STIFFNESS * 10**decades
-    return ss.CompliantContact(
+    return ss.laws.CompliantContact(
         kinetic=kinetic, stiffness=contact, damping=2 * ratio * math.sqrt(MASS * (STIFFNESS + contact))
     )
 
 
-def truth(kind: str, run: ss.Trajectory, after: float, cycles: float) -> str | None:
+def truth(kind: str, run: ss.solve.Trajectory, after: float, cycles: float) -> str | None:
     """The name of what was simulated; None where some sticks hold micro-slips and some do not."""
     if kind != "compliant":
         return NAMES[0] if kind == "rigid" else NAMES[3]
@@ -67,7 +67,7 @@ def draw(number: int, seed: int, file: Path) -> None:
             fs = 4000.0 if near else float(rng.choice([2000, 4000, 8000]))
             share = rng.uniform(0.65, 0.9) if near else rng.uniform(0.55, 0.9)
             law, level = law_of(kind, share * STIFFNESS * AMPLITUDE, rng, near=near), rng.uniform(22, 50)
-            drive = ss.HarmonicBase(amplitude=AMPLITUDE, frequency=frequency)
+            drive = ss.drives.HarmonicBase(amplitude=AMPLITUDE, frequency=frequency)
             try:
                 run = ss.simulate(ss.Oscillator(mass=MASS, stiffness=STIFFNESS, law=law, drive=drive), cycles=10)
                 clean = run.record(fs=fs).between(6 / frequency, 10 / frequency)["a"]

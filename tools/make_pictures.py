@@ -42,18 +42,18 @@ def squeak() -> None:
     """The squeaking rig: where sliding is stable, and the limit cycle over the load."""
 
     def rig(load: float, slope: float = -0.26) -> ss.Structure:
-        return ss.squeak_rig("wet", load).having(slope=slope)
+        return ss.squeak.squeak_rig("wet", load).having(slope=slope)
 
     grid = {"slope": np.linspace(-4, 4, 121), "load": np.linspace(0.5, 8, 151)}
-    stable = ss.stability_map(rig, grid=grid, speed=-0.1)
-    saved(ss.plot_stability(stable, labels=("slope of friction over speed [s/m]", "load [N]")), "stability.png")
-    branches = ss.limit_cycles(rig(2.0), rig, values=np.linspace(1.3, 6.5, 27), speed=-0.1)
-    saved(ss.plot_limit_cycles(branches, label="load [N]"), "limit_cycles.png")
+    stable = ss.squeak.stability_map(rig, grid=grid, speed=-0.1)
+    saved(ss.plot.plot_stability(stable, labels=("slope of friction over speed [s/m]", "load [N]")), "stability.png")
+    branches = ss.squeak.limit_cycles(rig(2.0), rig, values=np.linspace(1.3, 6.5, 27), speed=-0.1)
+    saved(ss.plot.plot_limit_cycles(branches, label="load [N]"), "limit_cycles.png")
 
 
 def decay() -> None:
     """The example of the page on free decay: its envelopes, and its amplitude differences."""
-    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
+    slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
     x = ss.simulate(slider, duration=20.0, start={"x": 1.0}).record(fs=100)["x"]
     noisy = x + 5e-3 * np.random.default_rng(1).standard_normal(len(x))
     findings = ss.analyze_decay(ss.Record.of({"x": noisy}, fs=100), stiffness=10.0)

@@ -173,7 +173,11 @@ def history_read(node: ast.AST) -> bool:
 
 
 def public_names(package: Path) -> int:
-    """The names that ``__init__`` offers, read from its list or its table of rooms."""
+    """The names that a package offers: those of its stub, of its list, or of its table of rooms."""
+    stub = package / "__init__.pyi"
+    if stub.exists():
+        imports = [node for node in ast.parse(stub.read_text("utf-8")).body if isinstance(node, ast.ImportFrom)]
+        return sum(len(node.names) for node in imports) + 1  # and the version
     tree = ast.parse((package / "__init__.py").read_text("utf-8"))
     for node in tree.body:
         name = getattr(node, "target", None) or (node.targets[0] if isinstance(node, ast.Assign) else None)

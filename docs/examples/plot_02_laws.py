@@ -10,16 +10,16 @@ import matplotlib.pyplot as plt
 import stickslip as ss
 
 laws = {
-    "Coulomb": ss.Coulomb(1.1),
-    "static above kinetic": ss.Coulomb(1.1, static=1.5),
-    "Stribeck": ss.Stribeck(kinetic=1.1, static=1.5, speed=5e-3),
-    "compliant contact": ss.CompliantContact(1.1, stiffness=20e3, damping=10.0),
-    "Dahl": ss.Dahl(kinetic=1.1, stiffness=20e3),
-    "state variable": ss.StateVariable(kinetic=1.1, rate=200.0),
+    "Coulomb": ss.laws.Coulomb(1.1),
+    "static above kinetic": ss.laws.Coulomb(1.1, static=1.5),
+    "Stribeck": ss.laws.Stribeck(kinetic=1.1, static=1.5, speed=5e-3),
+    "compliant contact": ss.laws.CompliantContact(1.1, stiffness=20e3, damping=10.0),
+    "Dahl": ss.laws.Dahl(kinetic=1.1, stiffness=20e3),
+    "state variable": ss.laws.StateVariable(kinetic=1.1, rate=200.0),
 }
 figure, axes = plt.subplots(2, 3, figsize=(9, 5), sharex=True, sharey=True, layout="constrained")
 for ax, (name, law) in zip(axes.flat, laws.items(), strict=True):
-    drive = ss.HarmonicBase(1.2e-3, frequency=2.5)
+    drive = ss.drives.HarmonicBase(1.2e-3, frequency=2.5)
     slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=5.0, law=law, drive=drive)
     run = ss.simulate(slider, cycles=6)
     motion = run.record(fs=4000).between(1.6, 2.4)

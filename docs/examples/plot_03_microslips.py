@@ -11,8 +11,8 @@ import numpy as np
 
 import stickslip as ss
 
-contact = ss.CompliantContact(1.1, stiffness=192_000, damping=23.9)
-drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+contact = ss.laws.CompliantContact(1.1, stiffness=192_000, damping=23.9)
+drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
 run = ss.simulate(ss.Oscillator(mass=2.42, stiffness=2310, law=contact, drive=drive), cycles=12)
 
 slips = [(event.time, event.kind) for event in run.events if event.time > 4.0]

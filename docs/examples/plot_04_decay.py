@@ -8,9 +8,9 @@ extremes two apart lose the dry part, and decay by the viscous one alone.
 
 import stickslip as ss
 
-slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.Coulomb(0.2))
+slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
 run = ss.simulate(slider, duration=20.0, start={"x": 1.0})
-record = ss.Rig((ss.Sensor("x", noise=ss.Noise(1e-3)),)).measure(run, fs=100, rng=1)
+record = ss.Rig((ss.rig.Sensor("x", noise=ss.rig.Noise(1e-3)),)).measure(run, fs=100, rng=1)
 
 found = ss.analyze_decay(record, stiffness=10.0, method="thesis")
 print(found.thesis.damping_ratio, "- true: 0.0316")

@@ -10,8 +10,8 @@ import matplotlib.pyplot as plt
 
 import stickslip as ss
 
-contact = ss.CompliantContact(1.1, stiffness=192_000, damping=23.9)
-drive = ss.HarmonicBase(0.65e-3, frequency=2.5)
+contact = ss.laws.CompliantContact(1.1, stiffness=192_000, damping=23.9)
+drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
 run = ss.simulate(ss.Oscillator(mass=2.42, stiffness=2310, law=contact, drive=drive), duration=5)
 rig = ss.Rig.air_track()
 record = rig.stated(rig.measure(run, fs=4000, rng=1, start=3.0))

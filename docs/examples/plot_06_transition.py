@@ -8,12 +8,12 @@ the other while the mass gathers speed. The speed at the end of that is the tran
 
 import stickslip as ss
 
-contact = ss.CompliantContact(1.1, stiffness=192_000, damping=23.9)
-slider = ss.Oscillator(mass=2.42, stiffness=2310, law=contact, drive=ss.HarmonicBase(1.1e-3, frequency=8.7))
+contact = ss.laws.CompliantContact(1.1, stiffness=192_000, damping=23.9)
+slider = ss.Oscillator(mass=2.42, stiffness=2310, law=contact, drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7))
 rig = ss.Rig.air_track()
 record = rig.stated(rig.measure(ss.simulate(slider, duration=6.0), fs=4000, rng=1, start=4.0))
 fused = ss.friction_force(record, mass=2.42, stiffness=2310, method="fusion")
 
-found = ss.transition_speed(fused)
+found = ss.contact.transition_speed(fused)
 print(found)
-axes = ss.plot_transition_speed(found)
+axes = ss.plot.plot_transition_speed(found)

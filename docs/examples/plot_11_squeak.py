@@ -7,8 +7,8 @@ A virtual rig of rubber on wet steel, driven slowly: each time it slides, couple
 
 import stickslip as ss
 
-run = ss.simulate(ss.squeak_rig("wet", load=6.13), duration=0.8)
-record = ss.squeak_record(run, snr=30, rng=1)
+run = ss.simulate(ss.squeak.squeak_rig("wet", load=6.13), duration=0.8)
+record = ss.squeak.squeak_record(run, snr=30, rng=1)
 found = ss.analyze_squeaks(record, name="wet, 6.13 N")
 print(found.squeaks)
 spectrogram = next(plate.figure for plate in ss.figures(found) if plate.name == "spectrogram")

@@ -8,7 +8,9 @@ smallest one by simulation.
 
 import stickslip as ss
 
-creeping = ss.Oscillator(mass=1, stiffness=1, law=ss.Coulomb(1.0, static=1.5), drive=ss.Belt(0.1), damping=0.02)
+creeping = ss.Oscillator(
+    mass=1, stiffness=1, law=ss.laws.Coulomb(1.0, static=1.5), drive=ss.drives.Belt(0.1), damping=0.02
+)
 found = ss.dither(creeping, frequency=5.0)
 print(found)
-figure = ss.plot_dither(found)
+figure = ss.plot.plot_dither(found)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from stickslip.drives import Drive, Release, require_drive
+from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law, finite
 from stickslip.laws.curved import CurvedLaw

@@ -26,7 +26,8 @@ def places(part: Any, within: Path = ()) -> dict[Path, Any]:
 
     Examples
     --------
-    >>> from stickslip import CompliantContact, Oscillator
+    >>> from stickslip import Oscillator
+    >>> from stickslip.laws import CompliantContact
     >>> slider = Oscillator(mass=1, stiffness=4, law=CompliantContact(kinetic=1, stiffness=1e5))
     >>> [".".join(path) for path in places(slider)][-4:]
     ['law.stiffness', 'law.damping', 'law.static', 'law.rule']
@@ -67,7 +68,9 @@ def unit(system: Any, name: str) -> str:
 
     Examples
     --------
-    >>> from stickslip import CompliantContact, HarmonicForce, Oscillator
+    >>> from stickslip import Oscillator
+    >>> from stickslip.drives import HarmonicForce
+    >>> from stickslip.laws import CompliantContact
     >>> contact = CompliantContact(kinetic=1, stiffness=1e5)
     >>> pushed = Oscillator(mass=1, stiffness=4, law=contact, drive=HarmonicForce(2, frequency=3))
     >>> unit(pushed, "law.damping"), unit(pushed, "drive.amplitude"), unit(contact, "kinetic")

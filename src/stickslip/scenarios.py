@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.drives import (
+from stickslip.drives.kinds import (
     Belt,
     Dithered,
     HarmonicBase,

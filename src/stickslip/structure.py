@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.drives import Drive, Release, require_drive
+from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row, finite
 from stickslip.laws.compliant import CompliantContact
@@ -192,7 +192,7 @@ class Structure:
     A mass on a belt, sprung along it and across it, pressed by the contact it slides on; above a critical friction
     coefficient both motions couple and grow:
 
-    >>> from stickslip.drives import Belt
+    >>> from stickslip.drives.kinds import Belt
     >>> from stickslip.solve.simulate import simulate
     >>> pad = Contact(Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
     >>> springs = [[23.25, 3.9], [3.9, 7.75]]

@@ -12,7 +12,7 @@ import stickslip as ss
 from stickslip.cli.options import pair
 
 if TYPE_CHECKING:
-    from stickslip import Case
+    from stickslip.systems import Case
 
 
 def case_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -37,7 +37,11 @@ def wanted_case(
     name: str, *, duration: str | None, cycles: float | None, changes: Sequence[str], fs: str | None = None
 ) -> Case:
     """The scenario or the file of that name, with what the command line changes."""
-    case = ss.read_system(name) if name.endswith(".toml") or Path(name).is_file() else ss.scenario_case(name)
+    case = (
+        ss.systems.read_system(name)
+        if name.endswith(".toml") or Path(name).is_file()
+        else ss.systems.scenario_case(name)
+    )
     case = case.having(**dict(pair(change, "--set") for change in changes))
     return case.lasting(duration=duration, cycles=cycles, fs=fs)
 

@@ -58,7 +58,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options:
     asked = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
     rig = rig_of(**options)
     if any(each.partition(":")[0] == "drift" for each in rig.repair):
-        raise ss.ModelError(
+        raise ss.errors.ModelError(
             "--repair drift of a free decay",
             "a drift is told from a steady oscillation, and would take what friction does for drift",
             "leave it out: what drifts is said, and the whole waveform bears it",
@@ -69,7 +69,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options:
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
         tell("drawing and writing", 2 * len(groups))
-        results = with_left_out(ss.compare_decays(found) if len(found) > 1 else found[0], refused)
+        results = with_left_out(ss.answers.compare_decays(found) if len(found) > 1 else found[0], refused)
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
     show(results, written, as_json=as_json)

@@ -15,7 +15,8 @@ from stickslip.cli.terminal import paragraph, print_table, say, say_json
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip import CurveFit, LawComparison, Record
+    from stickslip import Record
+    from stickslip.law import CurveFit, LawComparison
 
 
 CURVES = (
@@ -83,13 +84,13 @@ def fit(
         tell("reading", 0)
         records = [read(group, rig) for group in groups]
         tell("fitting", 1)
-        result, records = ss.fit_records(
+        result, records = ss.answers.fit_records(
             records, rig=rig, curve=curve, laws=names, system=_oscillator(system), calibration=calibration,
             progress=lambda share: tell(f"fitting and comparing {words}, {share:.0%}", 1 + share),
         )  # fmt: skip
         tell("drawing and writing", 2)
         name = name_of(groups[0]) if len(groups) == 1 else f"{len(groups)} records"
-        written = ss.publish_fit(result, folder=folder, records=records, name=name) if folder else None
+        written = ss.story.publish_fit(result, folder=folder, records=records, name=name) if folder else None
     _show(result, records, name, written, as_json=as_json)
 
 
@@ -104,16 +105,16 @@ def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked:
 
 def _oscillator(file: Path | None) -> object:
     """The system of a file; whether it is of one mass is for the fit to say."""
-    return None if file is None else ss.read_system(file).system
+    return None if file is None else ss.systems.read_system(file).system
 
 
 def _show(
     result: LawComparison | CurveFit, records: list[Record], name: str, written: Path | None, *, as_json: bool
 ) -> None:
     if as_json:
-        say_json(ss.fit_numbers(result))
+        say_json(ss.story.fit_numbers(result))
         return
-    summary = ss.fit_summary(result, records=records, name=name)
+    summary = ss.story.fit_summary(result, records=records, name=name)
     paragraph((f"\n{summary.title}", "bold"))
     for sentence in (*summary.headline, *summary.cautions):
         paragraph(spoken(sentence))

@@ -7,7 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 
-import stickslip as ss
+from stickslip.printing import printable
 
 PATIENCE = 2.0  # seconds of silence before a progress bar is shown
 
@@ -31,7 +31,7 @@ def progress(steps: int) -> Iterator[Callable[[str, float], None]]:
     if PATIENCE <= 0:
         patience.join()
     try:
-        yield lambda words, done: bar.update(task, completed=done, description=ss.printable(words), refresh=True)
+        yield lambda words, done: bar.update(task, completed=done, description=printable(words), refresh=True)
     finally:
         patience.cancel()
         bar.stop()

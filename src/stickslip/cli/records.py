@@ -19,19 +19,13 @@ import stickslip as ss
 from stickslip.cli.options import pair
 from stickslip.cli.terminal import complain
 from stickslip.cli.words import spoken
+from stickslip.printing import printable
 
 if TYPE_CHECKING:
-    from stickslip import (
-        Comparison,
-        DecayComparison,
-        DecayFindings,
-        Findings,
-        Record,
-        RigSettings,
-        SqueakComparison,
-        SqueakFindings,
-        Step,
-    )
+    from stickslip import Record
+    from stickslip.answers import Comparison, DecayComparison, DecayFindings, Findings, SqueakComparison, SqueakFindings
+    from stickslip.record import Step
+    from stickslip.rig import RigSettings
 
 Answer = TypeVar("Answer")
 
@@ -53,7 +47,7 @@ def rig_of(
 ) -> RigSettings:
     """The settings of the file, with those of the command line in front."""
     given: dict[str, Any] = {key: value for key, value in constants.items() if value is not None}
-    base = ss.read_rig(config).model_dump(exclude_unset=True) if config else {}
+    base = ss.rig.read_rig(config).model_dump(exclude_unset=True) if config else {}
     for key, pairs in (("channels", channels), ("units", units)):
         if pairs:
             given[key] = {**base.get(key, {}), **dict(pair(text, f"--{key}") for text in pairs)}
@@ -64,13 +58,13 @@ def rig_of(
         for load in loads.values():
             _require_load(load)
         given["normal"] = loads | {key: load for key, load in base.get("normal", {}).items() if key not in loads}
-    return ss.rig_settings({**base, **given}, source="the command line")
+    return ss.rig.rig_settings({**base, **given}, source="the command line")
 
 
 def _require_load(load: str) -> None:
     try:
-        ss.rig_settings({"normal": {"*": load}}, source="--normal")
-    except ss.ModelError as error:
+        ss.rig.rig_settings({"normal": {"*": load}}, source="--normal")
+    except ss.errors.ModelError as error:
         raise click.BadParameter(f"'{load}' is no load: {error.rule}", param_hint="--normal") from error
 
 
@@ -145,7 +139,7 @@ def folder_after(file: Path, ending: str) -> Path:
 def read(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = ()) -> Record:
     """The record, its files called by their names or by those given."""
     record = ss.read_record(_paths(files), rows=rig.row_range(), **_told(rig))
-    return ss.mend(_with_source(record, files, names), repairs=rig.repair)
+    return ss.answers.mend(_with_source(record, files, names), repairs=rig.repair)
 
 
 def is_long(files: Sequence[Path]) -> bool:
@@ -175,13 +169,13 @@ def _told(rig: RigSettings) -> dict[str, Any]:
 
 def _with_source(record: Record, files: Sequence[Path], names: Sequence[str]) -> Record:
     """The record with its files in the history, called as told; one that write_record kept comes back without."""
-    own = [ss.printable(path.name) for path in files]
-    called = dict(zip(own, map(ss.printable, names) if names else own, strict=True))
+    own = [printable(path.name) for path in files]
+    called = dict(zip(own, map(printable, names) if names else own, strict=True))
     known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
     if called.keys() <= known:
         return dataclasses.replace(record, history=tuple(_called(step, called) for step in record.history))
     sources = [{"name": name, "sha256": _checksum(path)} for name, path in zip(called.values(), files, strict=True)]
-    step = ss.Step("read_record", {"files": sources}, "a record as it was written")
+    step = ss.record.Step("read_record", {"files": sources}, "a record as it was written")
     return dataclasses.replace(record, history=(*record.history, step))
 
 
@@ -206,7 +200,7 @@ def collected(refused: list[ss.StickslipError], files: Sequence[Path], names: Se
     names = names or [path.name for path in files]
     try:
         yield
-    except ss.ModelError:
+    except ss.errors.ModelError:
         raise
     except ss.StickslipError as error:
         known = any(name in str(error) for name in names)

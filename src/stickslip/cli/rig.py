@@ -17,7 +17,9 @@ from stickslip.cli.terminal import print_table, say
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip import ExperimentPlan, Record, Rig, Trajectory
+    from stickslip import Record, Rig
+    from stickslip.answers import ExperimentPlan
+    from stickslip.solve import Trajectory
 
 FS, RATES = (4000.0,), (1000.0, 2000.0, 4000.0)  # Hz
 PRESETS = {"air-track": "air_track", "linear-bearing": "linear_bearing", "perfect": "perfect"}
@@ -95,13 +97,13 @@ def rig(case: str, output: Path | None, as_json: bool, plan: bool, **options: An
     form = options.pop("form")
     with progress(1) as tell:
         tell("simulating", 0)
-        run = ss.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", 0)).run
+        run = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", 0)).run
         results = _planned(run, bench, tell, options) if plan else _measured(run, bench, tell, options)
-        written = ss.publish_rig(results, folder=folder, form=form) if folder else None
+        written = ss.story.publish_rig(results, folder=folder, form=form) if folder else None
     if as_json:
         print_json(_told(results))
         return
-    if isinstance(results, ss.ExperimentPlan):
+    if isinstance(results, ss.answers.ExperimentPlan):
         _show_plan(results, needs)
     else:
         _show_record(results)
@@ -139,11 +141,11 @@ def _planned(
 ) -> ExperimentPlan:
     """Many."""
     chosen = {name: options[name] for name in ("draws", "seed", "start")}
-    return ss.plan_experiment(run, rig=bench, rates=options["rates"] or RATES, progress=tell, **chosen)
+    return ss.answers.plan_experiment(run, rig=bench, rates=options["rates"] or RATES, progress=tell, **chosen)
 
 
 def _told(results: Record | ExperimentPlan) -> dict[str, Any]:
-    if isinstance(results, ss.ExperimentPlan):
+    if isinstance(results, ss.answers.ExperimentPlan):
         return results.to_dict()
     return {"fs": results.fs, "truth": dict(results.truth), "faults": [str(fault) for fault in results.check()]}
 

@@ -14,16 +14,16 @@ from stickslip.cli.words import spoken
 if TYPE_CHECKING:
     from typing import TypeAlias
 
-    from stickslip import (
+    from stickslip.answers import (
         Comparison,
         DecayComparison,
         DecayFindings,
         Findings,
-        Outcome,
         SqueakComparison,
         SqueakFindings,
         TimeFrequency,
     )
+    from stickslip.story import Outcome
 
     Asked: TypeAlias = (
         Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | SqueakFindings | SqueakComparison
@@ -48,7 +48,7 @@ def show(
         print_json(results.to_dict())
         return
     parts = getattr(results, "findings", ())
-    if isinstance(results, ss.SqueakComparison):  # a line each: the page has the rest
+    if isinstance(results, ss.answers.SqueakComparison):  # a line each: the page has the rest
         _print_lines(parts)
         parts = ()
     for part in (*parts, results):

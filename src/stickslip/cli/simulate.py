@@ -56,11 +56,11 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
     wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
     folder = output or (None if as_json else folder_name(wanted, "stickslip"))
     if folder:
-        ss.require_output(wanted, folder=folder, **{key: options[key] for key in ("form", "animation")})
+        ss.story.require_output(wanted, folder=folder, **{key: options[key] for key in ("form", "animation")})
     with progress(4 if options["animation"] else 3) as tell:
         tell("simulating", 0)
-        result = ss.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", share))
-        written = ss.publish_run(result, folder=folder, tell=tell, **options) if folder else None
+        result = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", share))
+        written = ss.story.publish_run(result, folder=folder, tell=tell, **options) if folder else None
     show_run(result, written, as_json=as_json)
     if result.run.status == "interrupted":
         raise SystemExit(INTERRUPTED)
@@ -71,7 +71,7 @@ def _list_scenarios(*, as_json: bool) -> None:
     if as_json:
         say_json({name: each.about for name, each in found.items()})
         return
-    cases = [(ss.scenario_case(name), ", ".join(each.known).replace("_", " ")) for name, each in found.items()]
+    cases = [(ss.systems.scenario_case(name), ", ".join(each.known).replace("_", " ")) for name, each in found.items()]
     for (about, parts, known), group in itertools.groupby(
         cases, key=lambda each: (each[0].about, each[0].parts, each[1])
     ):

@@ -22,7 +22,8 @@ from stickslip.cli.records import (
 from stickslip.cli.show import show
 
 if TYPE_CHECKING:
-    from stickslip import Record, SqueakFindings
+    from stickslip import Record
+    from stickslip.answers import SqueakFindings
 
 
 @click.command()
@@ -69,7 +70,7 @@ def squeak(
 
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, ask, tell)
-        results = with_left_out(ss.compare_squeaks(found) if len(found) > 1 else found[0], refused)
+        results = with_left_out(ss.answers.compare_squeaks(found) if len(found) > 1 else found[0], refused)
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)

@@ -29,13 +29,13 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     \b
     stickslip sweep grid.toml --engine threads --store map.zarr --output maps
     """
-    asked = ss.read_sweep(file)
+    asked = ss.maps.read_sweep(file)
     place = store if store is not None else file.with_suffix(".zarr")
     found = ss.sweep(asked.case.system, asked.grid, measures=asked.measures, cycles=asked.cycles, settle=asked.settle,
                      start=asked.case.start, engine=engine, store=place)  # fmt: skip
     if output is not None:
-        ss.publish_map(found, folder=output, system=asked.case.system)
-    told, whole = ss.map_numbers(found), found.attrs["status"] == "complete"
+        ss.story.publish_map(found, folder=output, system=asked.case.system)
+    told, whole = ss.story.map_numbers(found), found.attrs["status"] == "complete"
     if as_json:
         say_json({**told, "store": str(place)})
         raise SystemExit(0 if whole else INTERRUPTED)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-import stickslip as ss
+from stickslip.printing import printable
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -63,4 +63,4 @@ def _print(what: RenderableType) -> None:
 
 def _shown(text: object, *, err: bool = False) -> str:
     stream = sys.stderr if err else sys.stdout
-    return ss.printable(str(text), encoding=getattr(stream, "encoding", None) or "utf-8")
+    return printable(str(text), encoding=getattr(stream, "encoding", None) or "utf-8")

@@ -61,7 +61,7 @@ def thesis(chapters: tuple[str, ...], source: Path | None, output: Path | None, 
 def _pages(source: Path) -> ModuleType:
     """The module that runs the chapters, of a checkout."""
     if not (source / "thesis" / "page.py").is_file():
-        raise ss.ModelError(
+        raise ss.errors.ModelError(
             f"{source} holds no thesis/",
             "the chapters stand in stickslip's source and are not installed with it",
             "get the source and name it with --source",

@@ -49,7 +49,7 @@ def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | No
         parts = _told_of(read_parts(groups[0], rig), tell)
         for name in ("mass", "stiffness"):
             asked[name] = asked[name] if asked[name] is not None else getattr(rig, name)
-        found = ss.time_frequency(parts, frequencies=frequencies, **asked)
+        found = ss.answers.time_frequency(parts, frequencies=frequencies, **asked)
         tell("drawing and writing", 2)
         written = ss.publish(found, folder=folder) if folder else None
     show(found, written, as_json=as_json)

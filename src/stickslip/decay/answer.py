@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.decay.release import RingDown
 from stickslip.decay.which_motion import DecayMotion
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
-from stickslip.identify.release import RingDown
 from stickslip.record.record import Step
 from stickslip.units import parse_value
 

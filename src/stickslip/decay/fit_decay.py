@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.decay.answer import DecayFit, beginning, constants, spring_of
+from stickslip.decay.release import CLIPPED, LOST, Releases, RingDown, find_releases
 from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.identify.release import CLIPPED, LOST, Releases, RingDown, find_releases
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
@@ -104,7 +104,7 @@ def fit_decay(
     Examples
     --------
     >>> import stickslip as ss
-    >>> slider = ss.Oscillator(mass=1.0, stiffness=1000.0, damping=2.0, law=ss.Coulomb(0.5))
+    >>> slider = ss.Oscillator(mass=1.0, stiffness=1000.0, damping=2.0, law=ss.laws.Coulomb(0.5))
     >>> run = ss.simulate(slider, duration=4.0, start={"x": 0.01})
     >>> noise = np.random.default_rng(1).normal(0, 2e-5, 2000)
     >>> record = Record.of({"x": run.record(fs=500)["x"][:2000] + noise}, fs=500)

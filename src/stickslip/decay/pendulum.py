@@ -11,10 +11,10 @@ from stickslip.decay.answer import DecayFit, beginning, spring_of
 from stickslip.decay.candidates import Fitted
 from stickslip.decay.choice import COLOURED, Candidate, lack_of_fit
 from stickslip.decay.motions import Restoring, free_decay
+from stickslip.decay.release import RingDown
 from stickslip.decay.which_motion import SWING, DecayMotion, choice_of, told, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
-from stickslip.identify.release import RingDown
 from stickslip.record.record import Step
 
 PLAIN = ("both", "static")

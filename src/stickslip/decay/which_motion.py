@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from stickslip.decay.choice import Candidate, Choice, choose, interval_of, kept_by_all
 from stickslip.decay.motions import MOTIONS, RESTORING, Restoring
+from stickslip.decay.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
-from stickslip.identify.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.record.record import Record
 
 Array = NDArray[np.float64]

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import stickslip as ss
 
 if TYPE_CHECKING:
-    from stickslip import Record, RigSettings
+    from stickslip import Record
+    from stickslip.rig import RigSettings
 
 LONG = 1 << 26  # bytes of files from which a record is asked part by part
 PART = 1 << 18  # rows of such a part
@@ -49,17 +50,17 @@ class Asked:
 
     def rig(self, number: int = 0) -> RigSettings:
         """The settings, with the normal load of one of the records."""
-        known = set(ss.RigSettings.model_fields)
+        known = set(ss.rig.RigSettings.model_fields)
         given = {name: value for name, value in {**self.reading, **self.options}.items() if name in known}
         loads = given.pop("normal", None)
         load = loads[number] if isinstance(loads, list) and number < len(loads) else None
-        return ss.rig_settings({**given, **({"normal": load} if load else {})}, source="the page")
+        return ss.rig.rig_settings({**given, **({"normal": load} if load else {})}, source="the page")
 
     def record(self, number: int = 0) -> Record:
         """One of the records, whole, mended as asked."""
         rig, files = self.rig(number), self.records[number]
         read = ss.read_record(_paths(files), rows=rig.row_range(), **_read_as(rig))
-        return ss.mend(self.named(read, files), repairs=rig.repair)
+        return ss.answers.mend(self.named(read, files), repairs=rig.repair)
 
     def parts(self, number: int = 0) -> Iterator[Record]:
         """One of the records in parts that fit into memory; whole if it is short, or rows or repairs are asked for."""
@@ -82,11 +83,11 @@ class Asked:
         steps = [_renamed(step, self.names) for step in record.history]
         if not any(file["name"] in ours for step in record.history for file in step.arguments.get("files", ())):
             told = [{"name": self.names[path.name]} for path in files]  # as write_record left it: it names no file
-            steps.append(ss.Step("read_record", {"files": told}, AS_WRITTEN))
+            steps.append(ss.record.Step("read_record", {"files": told}, AS_WRITTEN))
         return dataclasses.replace(record, history=tuple(steps))
 
 
-def _renamed(step: ss.Step, names: Mapping[str, str]) -> ss.Step:
+def _renamed(step: ss.record.Step, names: Mapping[str, str]) -> ss.record.Step:
     files = [{**file, "name": names.get(file["name"], file["name"])} for file in step.arguments.get("files", ())]
     return dataclasses.replace(step, arguments={**step.arguments, "files": files}) if files else step
 

@@ -43,7 +43,7 @@ Value = Text | Annotated[float, Field(allow_inf_nan=False)] | None
 
 
 class Reading(BaseModel):
-    """How files are read; the fields are those of :class:`~stickslip.RigSettings`."""
+    """How files are read; the fields are those of :class:`~stickslip.rig.RigSettings`."""
 
     model_config = ConfigDict(extra="forbid")
 

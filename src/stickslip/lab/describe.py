@@ -14,7 +14,8 @@ import stickslip as ss
 from stickslip.lab.asked import AS_WRITTEN, PART, Asked, on_the_page
 
 if TYPE_CHECKING:
-    from stickslip import Fault, Record
+    from stickslip import Record
+    from stickslip.record import Fault
 
 Array = NDArray[np.float64]
 
@@ -70,7 +71,7 @@ def _one(asked: Asked, number: int) -> tuple[dict[str, Any], list[str]]:
     """A record as the page shows it, and what reading it still needs."""
     try:
         return shown(asked.name(number), asked.parts(number)), []
-    except ss.RecordError as error:
+    except ss.errors.RecordError as error:
         if asked.reading.get("fs") or "sampling rate" not in error.value:
             raise
         guess = Asked(asked.records, asked.names, {**asked.reading, "fs": 1.0}, asked.options, asked.say)
@@ -114,7 +115,7 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _untold(channel: ss.Channel) -> bool:
+def _untold(channel: ss.record.Channel) -> bool:
     """Whether nobody stated a unit: what it is in is then not known, unless it may well have none."""
     return channel.assumed or (channel.unit == "1" and channel.name not in ("sound", "coefficient"))
 

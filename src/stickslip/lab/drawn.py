@@ -30,11 +30,11 @@ GROUPS = {"x": "displacement", "v": "velocity", "a": "acceleration", "friction":
 KINDS = ("slip", "microstick", "stick", "flight")
 
 
-def read_case(state: Any) -> ss.Case:
+def read_case(state: Any) -> ss.systems.Case:
     """The system of the page's state, if it is one that a page can play."""
     if not isinstance(state, Mapping):
-        raise ss.ModelError("a state that holds no tables", "it has the tables of a system's file", "send those")
-    case = ss.read_system(state)
+        raise ss.errors.ModelError("a state that holds no tables", "it has the tables of a system's file", "send those")
+    case = ss.systems.read_system(state)
     contacts = len(case.system.contacts) if isinstance(case.system, ss.Structure) else 1
     masses = case.system.size if isinstance(case.system, ss.Structure) else 1
     cycles = case.duration * max(_frequency(case), 1 / case.duration)
@@ -42,7 +42,9 @@ def read_case(state: Any) -> ss.Case:
         ("cycles", cycles, MOST_CYCLES), ("contacts", contacts, MOST_CONTACTS), ("masses", masses, MOST_MASSES),
     ):  # fmt: skip
         if count > most:
-            raise ss.ModelError(f"{count:g} {name}", f"the page plays up to {most} {name}", "use stickslip simulate")
+            raise ss.errors.ModelError(
+                f"{count:g} {name}", f"the page plays up to {most} {name}", "use stickslip simulate"
+            )
     return case
 
 
@@ -68,7 +70,7 @@ def run(request: Mapping[str, Any], go_on: GoOn) -> Answer:
 def tell(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """What the library says of the motion, in words and in numbers as it prints them."""
     case = read_case(request["state"])
-    found = ss.outcome(case, progress=go_on)
+    found = ss.story.outcome(case, progress=go_on)
     told = {"status": found.run.status, "sentences": found.sentences, "rows": found.rows}
     return {**told, **_state(case)}, {}  # in SI, whatever units it was asked in
 
@@ -78,7 +80,7 @@ def wavelet(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     case = read_case(request["state"])
     run = ss.simulate(case.system, start=case.start, progress=go_on, **case.run)  # type: ignore[arg-type]
     record = run.record(fs=MAP / run.duration)
-    wavelets = ss.wavelet_overview(record, run.labels("a")[0], columns=COLUMNS, voices=6)
+    wavelets = ss.signals.wavelet_overview(record, run.labels("a")[0], columns=COLUMNS, voices=6)
     level = np.abs(wavelets.values)
     decibel = 20 * np.log10(np.maximum(level / (level.max() or 1.0), 1e-12))
     counts = np.clip(255 * (1 + decibel / SPAN), 0, 255).astype(np.uint8)
@@ -92,7 +94,7 @@ def sound(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     case = read_case(request["state"])
     run = ss.simulate(case.system, start=case.start, progress=go_on, **case.run)  # type: ignore[arg-type]
     if isinstance(run.system, ss.Structure) and run.system.size > 1:
-        heard = ss.sound_pressure(run, fs=HEARD)["sound"][-int(LASTS * HEARD) :]
+        heard = ss.squeak.sound_pressure(run, fs=HEARD)["sound"][-int(LASTS * HEARD) :]
         words = f"sound pressure 10 cm away, in true time, {len(heard) / HEARD:.2g} s of it"
     else:
         quicker = max(1.0, PITCH * _cycle(run))
@@ -106,13 +108,13 @@ def sound(request: Mapping[str, Any], go_on: GoOn) -> Answer:
 
 def preset(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """The state of a scenario."""
-    return _state(ss.scenario_case(str(request["name"]))), {}
+    return _state(ss.systems.scenario_case(str(request["name"]))), {}
 
 
 def export(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """The texts that reproduce what is on screen."""
     case = read_case(request["state"])
-    return {form: ss.export_system(case, format=form) for form in ("toml", "python")}, {}
+    return {form: ss.systems.export_system(case, format=form) for form in ("toml", "python")}, {}
 
 
 def opened(request: Mapping[str, Any], go_on: GoOn) -> Answer:
@@ -121,7 +123,7 @@ def opened(request: Mapping[str, Any], go_on: GoOn) -> Answer:
         tables = tomllib.loads(str(request["text"]))
     except (ValueError, RecursionError) as error:  # no TOML, a number of thousands of digits, or nested as deeply
         reason = str(error)[:80]
-        raise ss.ModelError(
+        raise ss.errors.ModelError(
             f"the text is no TOML ({reason})", "a system is a TOML file", "correct that line"
         ) from error
     return _state(read_case(tables)), {}
@@ -133,16 +135,16 @@ ANSWERS: dict[str, Callable[[Mapping[str, Any], GoOn], Answer]] = {
 }  # fmt: skip
 
 
-def _state(case: ss.Case) -> dict[str, Any]:
-    return {"state": json.loads(ss.export_system(case, format="json"))}
+def _state(case: ss.systems.Case) -> dict[str, Any]:
+    return {"state": json.loads(ss.systems.export_system(case, format="json"))}
 
 
-def _frequency(case: ss.Case) -> float:
+def _frequency(case: ss.systems.Case) -> float:
     period = case.system.drive.motion().period
     return 1 / period if math.isfinite(period) else case.system.frequency
 
 
-def _cycle(run: ss.Trajectory) -> float:
+def _cycle(run: ss.solve.Trajectory) -> float:
     """The time after which the motion repeats, or would [s]: the drive's, that of the events themselves, or natural."""
     motion, same = run.table.motion, np.flatnonzero(run.modes == run.modes[-1])
     if math.isfinite(motion.period):
@@ -152,7 +154,7 @@ def _cycle(run: ss.Trajectory) -> float:
     return min(1 / run.system.frequency, run.duration) if run.system.frequency else run.duration
 
 
-def _window(run: ss.Trajectory, cycle: float) -> tuple[float, float]:
+def _window(run: ss.solve.Trajectory, cycle: float) -> tuple[float, float]:
     """First and last instant drawn: of a motion that comes to rest, of all that moved."""
     last = run.duration
     if run.status == "at rest" and len(run.starts) > 1:
@@ -161,7 +163,7 @@ def _window(run: ss.Trajectory, cycle: float) -> tuple[float, float]:
     return max(0.0, last - SHOWN * cycle), last
 
 
-def _instants(run: ss.Trajectory, first: float, last: float, cycle: float) -> Array:
+def _instants(run: ss.solve.Trajectory, first: float, last: float, cycle: float) -> Array:
     """Even ones, and both sides of every event, so that jumps stay upright."""
     cells = int(np.count_nonzero(run.cells[0] >= first))  # as many as the fastest motion asks for
     count = int(np.clip(max(A_CYCLE * (last - first) / cycle, A_CELL * cells), LEAST, MOST))
@@ -176,7 +178,7 @@ def _instants(run: ss.Trajectory, first: float, last: float, cycle: float) -> Ar
     return np.clip(np.unique(np.concatenate(parts)), first, last)
 
 
-def _series(run: ss.Trajectory, times: Array) -> tuple[list[dict[str, str]], dict[str, Array]]:
+def _series(run: ss.solve.Trajectory, times: Array) -> tuple[list[dict[str, str]], dict[str, Array]]:
     """Each line of the traces with its group and unit, and what moves it; "way" and "slip" are the loops' abscissae."""
     moved = [name for name, part in (("z", "base"), ("force", "force")) if getattr(run.table.motion, part)]
     names = [*GROUPS, *moved, "slip"]
@@ -191,7 +193,7 @@ def _series(run: ss.Trajectory, times: Array) -> tuple[list[dict[str, str]], dic
     return [{"name": label, "group": of.get(name, name), "unit": unit} for name, label, unit in lines], held
 
 
-def _marks(run: ss.Trajectory, first: float, last: float) -> tuple[dict[str, Any], Array]:
+def _marks(run: ss.solve.Trajectory, first: float, last: float) -> tuple[dict[str, Any], Array]:
     """What the contact does from when to when (several: together), and the middles of the micro-slips."""
     number = {kind: j for j, kind in enumerate(KINDS)}
     kinds = np.array([number.get(mode.kind, 0) for mode in run.table.modes])[run.modes]
@@ -225,7 +227,7 @@ def _springs(system: ss.Oscillator | ss.Structure) -> list[list[int]]:
     return own + [[i, j] for i in range(len(matrix)) for j in range(i + 1, len(matrix)) if abs(matrix[i, j]) > least]
 
 
-def _spectrum(run: ss.Trajectory, last: float, cycle: float) -> tuple[Array, Array]:
+def _spectrum(run: ss.solve.Trajectory, last: float, cycle: float) -> tuple[Array, Array]:
     """Amplitude [m/s^2] of the acceleration over the frequency [Hz], of whole cycles in the later half, by Hann."""
     cycles = max(1, min(OF_SPECTRUM, math.floor(last / cycle / 2 * (1 + 1e-9)))) if run.status != "at rest" else 0
     length = min(cycles * cycle or last, last)

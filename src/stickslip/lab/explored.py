@@ -36,7 +36,7 @@ def sweep(request: Mapping[str, Any], go_on: GoOn) -> Answer:
 def refine(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """The same between two values of each parameter, halved where the answer changes."""
     system, grid, options = _read(request)
-    found = ss.refine(system, grid, measure=request["measure"], halvings=int(request["halvings"]), **options)
+    found = ss.maps.refine(system, grid, measure=request["measure"], halvings=int(request["halvings"]), **options)
     return _values(found, request["measure"])
 
 
@@ -59,10 +59,10 @@ def _read(request: Mapping[str, Any]) -> tuple[Any, dict[str, list[float]], dict
     case = read_case(request["state"])
     grid = {str(name): [float(value) for value in values] for name, values in request["grid"].items()}
     if request["measure"] not in SHOWN:
-        raise ss.ModelError(f"a map of '{request['measure']}'", f"there are {', '.join(SHOWN)}", "choose one")
+        raise ss.errors.ModelError(f"a map of '{request['measure']}'", f"there are {', '.join(SHOWN)}", "choose one")
     size = int(np.prod([len(values) for values in grid.values()]))
     if len(grid) != 2 or not 0 < size <= MOST:
-        raise ss.ModelError(
+        raise ss.errors.ModelError(
             f"{size} points over {len(grid)} parameters", f"a part has two and up to {MOST}", "ask less"
         )
     return case.system, grid, {"cycles": CYCLES, "settle": SETTLE, "start": case.start, "engine": "serial"}

@@ -40,13 +40,15 @@ def catalog(request: Mapping[str, Any], go_on: Any) -> Answer:
 
 def first_state() -> dict[str, Any]:
     """What plays when the page opens: few cycles, so that one sees their shape."""
-    held: dict[str, Any] = json.loads(ss.export_system(ss.scenario_case(FIRST).lasting(cycles=8), format="json"))
+    held: dict[str, Any] = json.loads(
+        ss.systems.export_system(ss.systems.scenario_case(FIRST).lasting(cycles=8), format="json")
+    )
     return held
 
 
 def _presets() -> list[dict[str, Any]]:
     """The scenarios, those together that are told alike."""
-    cases = [ss.scenario_case(name) for name in ss.scenarios.names()]
+    cases = [ss.systems.scenario_case(name) for name in ss.scenarios.names()]
     alike = itertools.groupby(cases, key=lambda case: (case.about, case.parts))
     return [{"about": about, "names": [case.name for case in each]} for (about, _), each in alike]
 

@@ -26,7 +26,7 @@ def each(asked: Asked, answer: Callable[[int], Any]) -> tuple[list[Any], list[st
         asked.say(f"analysing {asked.name(number)}", number / (len(asked.records) + 1))
         try:
             found.append(answer(number))
-        except ss.ModelError:
+        except ss.errors.ModelError:
             raise
         except ss.StickslipError as error:
             left_out.append(error)
@@ -71,7 +71,7 @@ def analyze(asked: Asked) -> dict[str, Any]:
         def tell(words: str) -> None:
             asked.say(f"analysing {asked.name(number)}, {words}", number / (len(asked.records) + 1))
 
-        return ss.analyze_blocks(asked.parts(number), rig=rig, method=method, progress=tell)
+        return ss.answers.analyze_blocks(asked.parts(number), rig=rig, method=method, progress=tell)
 
     return published(asked, *each(asked, one), ss.compare)
 
@@ -80,7 +80,7 @@ def decay(asked: Asked) -> dict[str, Any]:
     """How a released mass dies away."""
     told = {name: value for name, value in asked.options.items() if value is not None}
     found, left_out = each(asked, lambda number: ss.analyze_decay(asked.record(number), **told))
-    answer = published(asked, found, left_out, ss.compare_decays)
+    answer = published(asked, found, left_out, ss.answers.compare_decays)
     return {**answer, "overlay": [curve for each in found for curve in _decay_curves(each)]}
 
 
@@ -103,14 +103,14 @@ def squeak(asked: Asked) -> dict[str, Any]:
         load = rig.normal_load(found.name)
         return found if load is None else dataclasses.replace(found, normal=load)
 
-    return published(asked, *each(asked, one), ss.compare_squeaks)
+    return published(asked, *each(asked, one), ss.answers.compare_squeaks)
 
 
 def wavelet(asked: Asked) -> dict[str, Any]:
     """A channel over time and frequency."""
     options = {name: value for name, value in asked.options.items() if value is not None}
     asked.say(f"mapping {asked.name(0)}", 0.1)
-    found = ss.time_frequency(asked.parts(), **options)
+    found = ss.answers.time_frequency(asked.parts(), **options)
     return published(asked, [found], [], list)
 
 
@@ -119,21 +119,21 @@ def fit(asked: Asked) -> dict[str, Any]:
     rig = asked.rig()
     asked.say("reading", 0.0)
     records = [asked.record(number) for number in range(len(asked.records))]
-    found, records = ss.fit_records(
+    found, records = ss.answers.fit_records(
         records, rig=rig, curve=asked.options.get("curve"), laws=_listed(asked.options.get("laws")),
         calibration=asked.options.get("calibration") or 0.01,
         progress=lambda share: asked.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
     )  # fmt: skip
     name = asked.name(0) if len(records) == 1 else f"{len(records)} records"
-    ss.publish_fit(found, folder=FOLDER, records=records, name=name)
-    told = _told(ss.fit_summary(found, records=records, name=name))
+    ss.story.publish_fit(found, folder=FOLDER, records=records, name=name)
+    told = _told(ss.story.fit_summary(found, records=records, name=name))
     curves = [*_law_curves(asked, records, found)]
     return {**told, "overlay": curves, "state": fitted_system(Path(FOLDER, "law", "law.toml"))}
 
 
 def _law_curves(asked: Asked, records: Sequence[Record], found: Any) -> Iterator[dict[str, Any]]:
     """What the best law's sensors would have read, over what was measured; nothing of a curve."""
-    for number, traces in enumerate(found.fit.traces if isinstance(found, ss.LawComparison) else ()):
+    for number, traces in enumerate(found.fit.traces if isinstance(found, ss.law.LawComparison) else ()):
         for name, values in traces.measured.items():
             unit = records[number].channels[name].unit
             yield curve(asked.name(number), name, unit, traces.time[name], values, traces.fitted[name])
@@ -144,8 +144,8 @@ def fitted_system(file: Path) -> dict[str, Any] | None:
     if not file.exists():
         return None
     try:
-        system: dict[str, Any] = json.loads(ss.export_system(ss.read_system(file), format="json"))
-    except ss.ModelError:
+        system: dict[str, Any] = json.loads(ss.systems.export_system(ss.systems.read_system(file), format="json"))
+    except ss.errors.ModelError:
         return None
     return system
 

@@ -29,14 +29,14 @@ def listening(port: int) -> socket.socket:
         door.bind((HOST, port))
     except PermissionError as error:
         door.close()
-        raise ss.ModelError(
+        raise ss.errors.ModelError(
             f"port {port} may not be used",
             "the lowest ports are for the administrator",
             "choose one above 1023 with --port",
         ) from error
     except OSError as error:
         door.close()
-        raise ss.ModelError(
+        raise ss.errors.ModelError(
             f"port {port} is taken ({error.strerror})", "the lab needs one of its own", "choose another with --port"
         ) from error
     return door
@@ -64,7 +64,7 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) ->
         from stickslip.lab.patience import PatientProtocol
         from stickslip.lab.server import lab_app
     except ImportError as error:
-        raise ss.ModelError(
+        raise ss.errors.ModelError(
             f"the lab needs the package {error.name}",
             "it comes with the extra [lab]",
             'pip install ".[lab]" in the checkout',

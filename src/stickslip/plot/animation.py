@@ -83,7 +83,8 @@ def animate(run: Trajectory, path: str | Path, *, tell: Callable[[int, int], Non
     Examples
     --------
     >>> import tempfile
-    >>> from stickslip import Coulomb, Oscillator, simulate
+    >>> from stickslip import Oscillator, simulate
+    >>> from stickslip.laws import Coulomb
     >>> decay = simulate(Oscillator(mass=1, stiffness=4, law=Coulomb(1.0)), duration=5, start={"x": 1.25})
     >>> animate(decay, Path(tempfile.mkdtemp()) / "decay.gif").stat().st_size > 10_000
     True

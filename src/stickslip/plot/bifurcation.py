@@ -10,6 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.maps.attractor import Attractor
+from stickslip.maps.basins import Basins
+from stickslip.maps.bifurcation import Bifurcation
+from stickslip.maps.boundaries import Boundary
+from stickslip.maps.dither import Dither, dithered_friction
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import UNITS
 from stickslip.plot.plate import Plate, plate
@@ -32,11 +37,6 @@ from stickslip.plot.style import (
     spelled,
     styled,
 )
-from stickslip.regimes.attractor import Attractor
-from stickslip.regimes.basins import Basins
-from stickslip.regimes.bifurcation import Bifurcation
-from stickslip.regimes.boundary import Boundary
-from stickslip.regimes.dither import Dither, dithered_friction
 from stickslip.solve.tables import Array, System
 from stickslip.solve.trajectory import Trajectory
 
@@ -224,7 +224,7 @@ def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     found : Boundary
-        What :func:`stickslip.boundary` returned with ``along=``.
+        What :func:`stickslip.maps.boundary` returned with ``along=``.
     ax : Axes, optional
         Where to draw; a new figure where left out.
 
@@ -236,11 +236,12 @@ def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
     --------
     >>> import stickslip as ss
     >>> slider = ss.scenarios.forced(0.8, 0.5)
-    >>> found = ss.boundary(slider, "kinetic", between=(0.05, 0.99), along={"frequency": [0.1, 0.2]}, precision=1e-3)
+    >>> along = {"frequency": [0.1, 0.2]}
+    >>> found = ss.maps.boundary(slider, "kinetic", between=(0.05, 0.99), along=along, precision=1e-3)
     >>> plot_boundary(found).get_lines()[1].get_label()
     'Den Hartog (1931)'
     """
-    from stickslip.identify.sliding_balance import Slider
+    from stickslip.consistent.sliding_balance import Slider
 
     ax = axes_of(ax)
     system = next(each for each in found.low if each is not None).orbit.orbit.system
@@ -308,7 +309,7 @@ def plot_dither(found: Dither) -> Figure:
     Examples
     --------
     >>> import stickslip as ss
-    >>> slider = ss.Oscillator(1, 1, ss.Coulomb(1.0, static=1.5), ss.Belt(0.5), damping=0.02)
+    >>> slider = ss.Oscillator(1, 1, ss.laws.Coulomb(1.0, static=1.5), ss.drives.Belt(0.5), damping=0.02)
     >>> len(plot_dither(ss.dither(slider, frequency=5.0)).axes)
     2
     """

@@ -11,7 +11,7 @@ from stickslip.plot.style import BLUE, INK, ORANGE, axes_of, axis_label, prefixe
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from stickslip.analysis.comparison import Comparison
+    from stickslip.answers.comparison import Comparison
 
 
 @styled

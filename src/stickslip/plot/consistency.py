@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from stickslip.identify.checks import APART
+from stickslip.consistent.checks import APART
 from stickslip.plot.style import BLUE, FAINT, INK, ORANGE, axes_of, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from stickslip.identify.consistency import Consistency
+    from stickslip.consistent.contradictions import Consistency
 
 LEAST, MOST = 0.1, 1e3  # standard deviations between which the bars are drawn
 COLOURS = {"holds": BLUE, "fails": ORANGE, "can not be told": FAINT}
@@ -24,7 +24,7 @@ def plot_consistency(found: Consistency, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     found : Consistency
-        From :func:`~stickslip.consistency`.
+        From :func:`~stickslip.consistent.consistency`.
     ax : Axes, optional
         Where to draw.
 
@@ -37,7 +37,7 @@ def plot_consistency(found: Consistency, *, ax: Axes | None = None) -> Axes:
     >>> import stickslip as ss
     >>> row = {"mass": 2.42, "stiffness": 2310, "forcing frequency": 5.61, "base amplitude": "0.51 mm",
     ...        "amplitude": "0.49 mm", "sliding friction": "1.06 N"}
-    >>> [label.get_text() for label in plot_consistency(ss.consistency(row)).get_yticklabels()][0]
+    >>> [label.get_text() for label in plot_consistency(ss.consistent.consistency(row)).get_yticklabels()][0]
     'energy'
     """
     checks = found.checks

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.identify.motion import contact_motion
+from stickslip.balance.motion import contact_motion
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.analysis.findings import Findings
-    from stickslip.analysis.squeaks import SqueakFindings
-    from stickslip.identify.transition_speed import TransitionSpeed
+    from stickslip.answers.findings import Findings
+    from stickslip.answers.squeaks import SqueakFindings
+    from stickslip.contact.sliding_onset import TransitionSpeed
     from stickslip.record.record import Record
 
 MARGIN = 0.25  # of a stick's duration, drawn on either side of it
@@ -131,7 +131,7 @@ def plot_transition_speed(found: TransitionSpeed, *, ax: Axes | None = None) -> 
     Parameters
     ----------
     found : TransitionSpeed
-        From :func:`~stickslip.transition_speed`.
+        From :func:`~stickslip.contact.transition_speed`.
     ax : Axes, optional
         Where to draw.
 
@@ -142,11 +142,12 @@ def plot_transition_speed(found: TransitionSpeed, *, ax: Axes | None = None) -> 
     Examples
     --------
     >>> import stickslip as ss
-    >>> contact = ss.CompliantContact(1.1, stiffness=192000, damping=23.9)
-    >>> slider = ss.Oscillator(mass=2.42, stiffness=2310, law=contact, drive=ss.HarmonicBase(1.1e-3, frequency=8.7))
+    >>> contact = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    >>> drive = ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
+    >>> slider = ss.Oscillator(mass=2.42, stiffness=2310, law=contact, drive=drive)
     >>> record = ss.Rig.perfect().having("x", white=1e-7).measure(ss.simulate(slider, cycles=20), fs=4000, rng=1)
     >>> record = ss.friction_force(record.between(1.0, 2.2), mass=2.42, stiffness=2310, method="fusion")
-    >>> plot_transition_speed(ss.transition_speed(record)).get_ylabel()
+    >>> plot_transition_speed(ss.contact.transition_speed(record)).get_ylabel()
     'friction [N]'
     """
     ax = axes_of(ax)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.identify import extremes as ex
+from stickslip.decay import extremes as ex
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import (
     BLUE,
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.analysis.decay_comparison import DecayComparison
-    from stickslip.analysis.decays import DecayFindings
-    from stickslip.identify.decrement import Decrement
-    from stickslip.identify.release import RingDown
+    from stickslip.answers.decay_comparison import DecayComparison
+    from stickslip.answers.decays import DecayFindings
+    from stickslip.decay.decrement import Decrement
+    from stickslip.decay.release import RingDown
 
 Array = NDArray[np.float64]
 
@@ -204,7 +204,7 @@ def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio"
     Parameters
     ----------
     comparison : DecayComparison
-        What :func:`~stickslip.compare_decays` returned.
+        What :func:`~stickslip.answers.compare_decays` returned.
     quantity : {"damping_ratio", "dry_displacement", "frequency"}
         Which.
     ax : Axes, optional

@@ -22,7 +22,7 @@ from stickslip.plot.style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip.analysis.experiment import ExperimentPlan
+    from stickslip.answers.experiment import ExperimentPlan
 
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 MARKS = ("o", "s", "^", "D")
@@ -35,7 +35,7 @@ def plot_plan(plan: ExperimentPlan) -> Figure:
     Parameters
     ----------
     plan : ExperimentPlan
-        From :func:`~stickslip.plan_experiment`.
+        From :func:`~stickslip.answers.plan_experiment`.
 
     Returns
     -------
@@ -44,8 +44,9 @@ def plot_plan(plan: ExperimentPlan) -> Figure:
     Examples
     --------
     >>> import stickslip as ss
-    >>> slider = ss.Oscillator(mass=1, stiffness=100, law=ss.Coulomb(0.2), drive=ss.HarmonicBase(0.01, frequency=1))
-    >>> plan = ss.plan_experiment(ss.simulate(slider, cycles=8), rates=[250], draws=1)
+    >>> drive = ss.drives.HarmonicBase(0.01, frequency=1)
+    >>> slider = ss.Oscillator(mass=1, stiffness=100, law=ss.laws.Coulomb(0.2), drive=drive)
+    >>> plan = ss.answers.plan_experiment(ss.simulate(slider, cycles=8), rates=[250], draws=1)
     >>> len(plot_plan(plan).axes)
     3
     """

@@ -5,16 +5,16 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from stickslip.analysis.comparison import Comparison
-from stickslip.analysis.decay_comparison import DecayComparison
-from stickslip.analysis.decays import DecayFindings
-from stickslip.analysis.findings import Findings
-from stickslip.analysis.squeak_comparison import SqueakComparison
-from stickslip.analysis.squeaks import SqueakFindings
-from stickslip.analysis.time_frequency import TimeFrequency
+from stickslip.answers.comparison import Comparison
+from stickslip.answers.decay_comparison import DecayComparison
+from stickslip.answers.decays import DecayFindings
+from stickslip.answers.findings import Findings
+from stickslip.answers.frequencies import TimeFrequency
+from stickslip.answers.squeak_comparison import SqueakComparison
+from stickslip.answers.squeaks import SqueakFindings
+from stickslip.balance.felt_and_computed import UNLIKE
+from stickslip.balance.force import FUSIONS
 from stickslip.errors import ModelError
-from stickslip.identify.compare_force import UNLIKE
-from stickslip.identify.force import FUSIONS
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.consistency import plot_consistency
 from stickslip.plot.contact import (
@@ -36,13 +36,13 @@ from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_for
 UNSURE = "not stated"  # in the status of what sensors that are not known may have made
 
 if TYPE_CHECKING:
-    from stickslip.curves.fit_curve import CurveFit
-    from stickslip.fit.law import LawFit
-    from stickslip.fit.which_law import LawComparison
-    from stickslip.regimes.basins import Basins
-    from stickslip.regimes.bifurcation import Bifurcation
-    from stickslip.regimes.boundary import Boundary
-    from stickslip.regimes.dither import Dither
+    from stickslip.law.fit_curve import CurveFit
+    from stickslip.law.law import LawFit
+    from stickslip.law.which_law import LawComparison
+    from stickslip.maps.basins import Basins
+    from stickslip.maps.bifurcation import Bifurcation
+    from stickslip.maps.boundaries import Boundary
+    from stickslip.maps.dither import Dither
     from stickslip.solve.trajectory import Trajectory
 
 
@@ -119,11 +119,11 @@ def figures(
 
 
 def _of_regimes(result: Bifurcation | Basins | Boundary | Dither) -> tuple[Plate, ...]:
+    from stickslip.maps.basins import Basins
+    from stickslip.maps.bifurcation import Bifurcation
+    from stickslip.maps.boundaries import Boundary
+    from stickslip.maps.dither import Dither
     from stickslip.plot.bifurcation import plates_of
-    from stickslip.regimes.basins import Basins
-    from stickslip.regimes.bifurcation import Bifurcation
-    from stickslip.regimes.boundary import Boundary
-    from stickslip.regimes.dither import Dither
 
     if isinstance(result, Bifurcation | Basins | Boundary | Dither):
         return plates_of(result)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.identify.compare_force import ForceComparison
+    from stickslip.balance.felt_and_computed import ForceComparison
 
 NAMES = {"direct": "load cell", "indirect": "from the motion", "difference": "difference"}
 CYCLES = 3.0  # of the lowest line that are drawn
@@ -41,7 +41,7 @@ def plot_force_comparison(comparison: ForceComparison) -> Figure:
     Parameters
     ----------
     comparison : ForceComparison
-        From :func:`~stickslip.compare_force`.
+        From :func:`~stickslip.balance.compare_force`.
 
     Returns
     -------
@@ -51,10 +51,10 @@ def plot_force_comparison(comparison: ForceComparison) -> Figure:
     --------
     >>> import stickslip as ss
     >>> slider = ss.Oscillator(
-    ...     mass=2.42, stiffness=2310, law=ss.Coulomb(1.1), drive=ss.HarmonicBase(1.1e-3, frequency=8.7)
+    ...     mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
     ... )
     >>> record = ss.Rig().measure(ss.simulate(slider, duration=4), fs=2000, rng=1, start=2)
-    >>> len(plot_force_comparison(ss.compare_force(record, mass=2.42, stiffness=2310)).axes)
+    >>> len(plot_force_comparison(ss.balance.compare_force(record, mass=2.42, stiffness=2310)).axes)
     3
     """
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.curves.fit_curve import CurveFit
-from stickslip.fit.law import LawFit
-from stickslip.fit.which_law import LawComparison
+from stickslip.law.fit_curve import CurveFit
+from stickslip.law.law import LawFit
+from stickslip.law.which_law import LawComparison
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import (
     BLUE,

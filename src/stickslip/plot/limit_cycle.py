@@ -54,7 +54,10 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
 
     Examples
     --------
-    >>> from stickslip import Belt, Coulomb, Oscillator, limit_cycles
+    >>> from stickslip import Oscillator
+    >>> from stickslip.drives import Belt
+    >>> from stickslip.laws import Coulomb
+    >>> from stickslip.squeak import limit_cycles
     >>> block = Oscillator(1.0, 1.0, Coulomb(1.0, static=1.5), Belt(0.5), damping=0.1)
     >>> drawn = plot_limit_cycles(limit_cycles(block, "drive.speed", values=[0.3, 0.5, 0.6]), label="belt speed [m/s]")
     >>> [axes.get_ylabel() for axes in drawn.axes]
@@ -119,7 +122,10 @@ def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = No
 
     Examples
     --------
-    >>> from stickslip import Belt, LinearSlope, Oscillator, stability_map
+    >>> from stickslip import Oscillator
+    >>> from stickslip.drives import Belt
+    >>> from stickslip.laws import LinearSlope
+    >>> from stickslip.squeak import stability_map
     >>> block = Oscillator(1.0, 100.0, LinearSlope(1.0, slope=-0.1), Belt(0.2), damping=0.3)
     >>> found = stability_map(block, grid={"slope": [-0.5, -0.1, 0.1], "stiffness": [50.0, 100.0]})
     >>> plot_stability(found).axes[0].get_xlabel()

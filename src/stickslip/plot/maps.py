@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.consistent.sliding_balance import Slider
 from stickslip.errors import ModelError
-from stickslip.identify.sliding_balance import Slider
+from stickslip.maps.measures import UNKNOWN
 from stickslip.oscillator import Oscillator
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import BLUE, INK, ORANGE, Array, axes_of, axis_label, plain_decades, prefixed, styled
 from stickslip.solve.tables import System
-from stickslip.sweeps.measures import UNKNOWN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

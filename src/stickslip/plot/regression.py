@@ -22,7 +22,7 @@ from stickslip.plot.style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip.analysis.findings import Findings
+    from stickslip.answers.findings import Findings
 
 
 @styled

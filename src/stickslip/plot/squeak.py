@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.analysis.squeak_comparison import SqueakComparison
-    from stickslip.analysis.squeaks import SqueakFindings
+    from stickslip.answers.squeak_comparison import SqueakComparison
+    from stickslip.answers.squeaks import SqueakFindings
     from stickslip.record.record import Record
     from stickslip.squeak.bursts import Squeak, Squeaks
     from stickslip.squeak.spectra import BurstSpectra
@@ -122,7 +122,7 @@ def plot_burst_spectra(spectra: BurstSpectra, *, channel: str, record: Record) -
     Parameters
     ----------
     spectra : BurstSpectra
-        What :func:`~stickslip.burst_spectra` returned.
+        What :func:`~stickslip.squeak.burst_spectra` returned.
     channel : str
         Where the bursts were heard.
     record : Record
@@ -271,7 +271,7 @@ def plot_conditions(comparison: SqueakComparison) -> Figure:
     Parameters
     ----------
     comparison : SqueakComparison
-        What :func:`~stickslip.compare_squeaks` returned, friction in one condition at least.
+        What :func:`~stickslip.answers.compare_squeaks` returned, friction in one condition at least.
 
     Returns
     -------

@@ -24,13 +24,13 @@ from stickslip.plot.style import (
     prefixed,
     styled,
 )
-from stickslip.signals.differentiate import differentiate
+from stickslip.signals.derivatives import differentiate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.analysis.findings import Findings
+    from stickslip.answers.findings import Findings
     from stickslip.record.record import Record
 
 PANELS = (("x", "z"), ("theta",), ("v",), ("a",), ("force",), ("load",), ("friction",), ("normal",), ("y",), ("sound",))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.contact.mechanisms import UNTOLD
 from stickslip.errors import RecordError
-from stickslip.identify.mechanism import UNTOLD
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import (
     BLUE,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.analysis.time_frequency import TimeFrequency
+    from stickslip.answers.frequencies import TimeFrequency
     from stickslip.record.record import Record
 
 SPAN = 80.0  # dB between the largest modulus and the threshold

@@ -78,8 +78,8 @@ class Rig:
     --------
     >>> import stickslip as ss
     >>> slider = ss.Oscillator(
-    ...     mass=2.42, stiffness=2310, law=ss.CompliantContact(1.1, stiffness=192000, damping=23.9),
-    ...     drive=ss.HarmonicBase(0.65e-3, frequency=2.5),
+    ...     mass=2.42, stiffness=2310, law=ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9),
+    ...     drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5),
     ... )
     >>> record = Rig().measure(ss.simulate(slider, cycles=4), fs=4000, rng=1)
     >>> list(record), record.truth["contact stiffness"]

@@ -65,7 +65,7 @@ def steady_state(
 
     Examples
     --------
-    >>> from stickslip.drives import HarmonicForce
+    >>> from stickslip.drives.kinds import HarmonicForce
     >>> from stickslip.laws.coulomb import Coulomb
     >>> drive = HarmonicForce(1.0, frequency=0.8 / 6.283185307)
     >>> from stickslip.oscillator import Oscillator
@@ -125,7 +125,7 @@ def attractors(
 
     Examples
     --------
-    >>> from stickslip.drives import HarmonicForce
+    >>> from stickslip.drives.kinds import HarmonicForce
     >>> from stickslip.laws.coulomb import Coulomb
     >>> from stickslip.oscillator import Oscillator
     >>> drive = HarmonicForce(1.0, frequency=0.8 / 6.283185307)

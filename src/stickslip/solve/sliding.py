@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.drives import Belt
+from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
@@ -44,7 +44,7 @@ def steady_sliding(system: Oscillator) -> SteadySliding:
     Parameters
     ----------
     system : Oscillator
-        A mass with a curved law on a :class:`~stickslip.drives.Belt`.
+        A mass with a curved law on a :class:`~stickslip.drives.kinds.Belt`.
 
     Returns
     -------

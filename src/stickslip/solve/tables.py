@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import OPTIONS, compiled
-from stickslip.drives import Drive, Motion
+from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law, Mode
 from stickslip.laws.curved import CurvedLaw

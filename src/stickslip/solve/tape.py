@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.drives import Motion
+from stickslip.drives.kinds import Motion
 from stickslip.errors import ModelError
 from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
 from stickslip.oscillator import Oscillator

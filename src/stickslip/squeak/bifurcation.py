@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.drives import Belt
+from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
-from stickslip.squeak.limit_cycle import LimitCycle, limit_cycle, separating_cycle
+from stickslip.squeak.cycles import LimitCycle, limit_cycle, separating_cycle
 from stickslip.squeak.sliding import System
 from stickslip.squeak.stability import stability
 from stickslip.squeak.threshold import Threshold, critical_value, numbers
@@ -121,7 +121,11 @@ def limit_cycles(
     --------
     Friction that is larger at rest: a mass that sticks and slips goes on so at speeds at which it may slide as well.
 
-    >>> from stickslip import Belt, Coulomb, Oscillator
+    >>> from stickslip import Oscillator
+
+    >>> from stickslip.drives import Belt
+
+    >>> from stickslip.laws import Coulomb
     >>> block = Oscillator(1.0, 1.0, Coulomb(1.0, static=1.5), Belt(0.5), damping=0.1)
     >>> found = limit_cycles(block, "drive.speed", values=[0.3, 0.4, 0.5, 0.6])
     >>> {one.status for one in found.up}, [one.status for one in found.down], found.both

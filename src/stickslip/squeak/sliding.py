@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.drives import Belt
+from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, finite
 from stickslip.laws.curved import lifted, symbol

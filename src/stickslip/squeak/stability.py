@@ -124,7 +124,11 @@ def stability(system: System, *, speed: float | None = None) -> Stability:
     --------
     A pad pressed on a belt, sprung along it and across it (the minimal model of Hoffmann and others):
 
-    >>> from stickslip import Belt, Contact, Coulomb, Structure
+    >>> from stickslip import Contact, Structure
+
+    >>> from stickslip.drives import Belt
+
+    >>> from stickslip.laws import Coulomb
     >>> pad = Contact(Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
     >>> springs, none = [[23.25, 3.9], [3.9, 7.75]], [[0, 0], [0, 0]]
     >>> found = stability(Structure([[1, 0], [0, 1]], none, springs, contacts=[pad], drive=Belt(1.0)))

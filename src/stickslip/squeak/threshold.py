@@ -85,7 +85,9 @@ def critical_value(
 
     Examples
     --------
-    >>> from stickslip import Belt, LinearSlope, Oscillator
+    >>> from stickslip import Oscillator
+    >>> from stickslip.drives import Belt
+    >>> from stickslip.laws import LinearSlope
     >>> block = Oscillator(1.0, 100.0, LinearSlope(1.0, slope=-0.1), Belt(0.2), damping=0.3)
     >>> round(critical_value(block, "slope", between=(-1, 0)).value, 9)
     -0.3
@@ -148,7 +150,9 @@ def stability_map(
 
     Examples
     --------
-    >>> from stickslip import Belt, LinearSlope, Oscillator
+    >>> from stickslip import Oscillator
+    >>> from stickslip.drives import Belt
+    >>> from stickslip.laws import LinearSlope
     >>> block = Oscillator(1.0, 100.0, LinearSlope(1.0, slope=-0.1), Belt(0.2), damping=0.3)
     >>> found = stability_map(block, grid={"slope": [-0.5, -0.1], "stiffness": [50.0, 100.0]})
     >>> found.mechanism.values.tolist()

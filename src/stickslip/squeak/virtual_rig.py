@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.drives import HarmonicBase
+from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import ModelError
 from stickslip.laws.base import finite
 from stickslip.laws.linear_slope import LinearSlope

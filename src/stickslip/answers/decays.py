@@ -1,0 +1,360 @@
+"""Everything that is asked of a free decay, together: the releases, the decrements, the whole waveform."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+import numpy as np
+
+from stickslip.answers.asked import Asked
+from stickslip.answers.findings import plain, record_name
+from stickslip.decay.answer import DecayFit, rig_units
+from stickslip.decay.decrement import Decrement, decrement
+from stickslip.decay.envelope import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
+from stickslip.decay.fit_decay import fit_decay
+from stickslip.decay.motions import Restoring
+from stickslip.decay.release import Releases, find_releases
+from stickslip.decay.swings import SEEN
+from stickslip.decay.which_motion import DecayMotion, choose_motion
+from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import Estimate, Result
+from stickslip.record.record import Record
+from stickslip.units import parse_value
+
+if TYPE_CHECKING:
+    from stickslip.record.check import Fault
+
+
+EXTREMES = "extremes alone"
+LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
+PLAIN = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
+CLEAR = 1e-3  # p-value below which a motion's rejection is no chance of one true motion in twenty
+METHODS = ("thesis", "waveform", "all")
+OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
+    "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, EXTREMES: extreme_decay,
+    "Hilbert envelope": hilbert_decay,
+}  # fmt: skip
+FOR_PENDULUMS = {EXTREMES: partial(extreme_decay, restoring="pendulum")}
+
+
+class BothFrictions(Protocol):
+    """What every answer tells."""
+
+    @property
+    def damping_ratio(self) -> Estimate: ...
+    @property
+    def dry_displacement(self) -> Estimate: ...
+    @property
+    def frequency(self) -> Estimate: ...
+    @property
+    def model(self) -> str: ...
+    @property
+    def status(self) -> str: ...
+    @property
+    def estimates(self) -> tuple[Estimate, ...]: ...
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DecayFindings(Result):
+    """What a record says about the damping of a free decay.
+
+    Attributes
+    ----------
+    name : str
+        The record's name.
+    record : Record
+        The record.
+    faults : tuple of Fault
+        What the check-up found in it.
+    releases : Releases
+        Where something is let go.
+    waveform : DecayFit or None
+        By the whole waveform.
+    thesis : Decrement or None
+        By the decrements of the extremes.
+    motion : DecayMotion or None
+        Which motion it was, of all those that a decay may follow.
+    older : mapping of str to EnvelopeDecay
+        What the older methods say, for comparison.
+    notes : tuple of str
+        What could not be asked, and why.
+    settings : mapping
+        What was chosen and stated.
+    """
+
+    name: str
+    record: Record
+    faults: tuple[Fault, ...]
+    releases: Releases
+    waveform: DecayFit | None = None
+    thesis: Decrement | None = None
+    motion: DecayMotion | None = None
+    older: Mapping[str, EnvelopeDecay] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def best(self) -> BothFrictions:
+        """The surest answer: of the whole waveform where there is one; of a pendulum without one, of its extremes.
+
+        Where the record speaks against viscous and dry friction and for another of the motions tried, of that one.
+        """
+        if self.motion is not None and self.against < CLEAR and self.motion.choice.status == "ok":
+            return self.motion
+        swings = cast(BothFrictions | None, self.older.get(EXTREMES))  # of extremes alone, and they tell both
+        found = next((each for each in (self.waveform, self.thesis, self.motion, swings) if each is not None), None)
+        assert found is not None
+        return found
+
+    @property
+    def against(self) -> float:
+        """How likely a record like this is if viscous and dry friction are the motion: the greatest p-value of them."""
+        tried = () if self.motion is None else self.motion.choice.candidates
+        return max((each.p_value for each in tried if each.name in PLAIN), default=1.0)
+
+    @property
+    def rest(self) -> float:
+        """Where the spring is at rest, in the record's zero."""
+        if self.motion is not None and self.best is self.motion:
+            return self.motion.choice.chosen.fitted.value("rest")
+        told = next((each.bias.value for each in (self.waveform, self.thesis) if each is not None), None)
+        return self.releases.ring_downs[0].rest if told is None else told
+
+    @property
+    def whichever(self) -> tuple[Estimate, ...]:
+        """Damping ratio and dry friction with the intervals that hold whichever motion not rejected it was, if any."""
+        fit = self.waveform if self.waveform is not None and self.waveform.motions else self.motion
+        both = () if fit is None else (fit.damping_ratio_any, fit.dry_displacement_any)
+        return tuple(each for each in both if each is not None)
+
+    @property
+    def viscous_residual(self) -> float | None:
+        """What viscous damping alone leaves of the motion, over what it leaves together with dry friction (RMS)."""
+        fits = {} if self.motion is None else {each.name: each.fitted for each in self.motion.choice.candidates}
+        if not {"viscous", "both"} <= set(fits) or fits["both"].cost == 0:
+            return None
+        return math.sqrt(fits["viscous"].cost / fits["both"].cost)
+
+    @property
+    def dry_force(self) -> Estimate | None:
+        """The dry friction as a force, where the mass or the stiffness is stated."""
+        dry = self.best.dry_displacement
+        return None if dry.interval == (0.0, 0.0) else self.as_force(dry, "dry friction force")
+
+    def as_force(self, displacement: Estimate, name: str) -> Estimate | None:
+        """A displacement of the spring as its force, where the mass or the stiffness is stated."""
+        spring = self.settings.get("stiffness")
+        if spring is None and self.settings.get("mass") is not None:
+            spring = self.settings["mass"] * (2 * math.pi * self.best.frequency.value) ** 2
+        if spring is None:
+            return None
+        unit, word = ("N m", "torque") if displacement.unit == "rad" else ("N", "force")
+        return displacement.scaled(spring, unit, name.replace("force", word))
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every number found, the best answer first; the decrements' are named so where both methods answer."""
+        force = self.dry_force
+        found = [] if force is None else [force]
+        if self.motion is not None and self.best is self.motion:
+            found += [*self.motion.terms, self.motion.frequency, *self.whichever]
+        elif self.waveform is None and self.thesis is None:
+            found += self.best.estimates
+        elif self.waveform is not None:
+            found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
+            found += [] if self.waveform.motions else self.whichever
+        if self.thesis is not None:
+            also = ", by decrements" if self.best is not self.thesis else ""
+            found += [replace(each, name=f"{each.name}{also}") for each in self.thesis.estimates]
+        return tuple(found)
+
+    @property
+    def comparisons(self) -> tuple[Estimate, ...]:
+        """What the older methods say, each with what it gets wrong; not to be relied on."""
+        by_extremes = self.waveform is None and self.thesis is None and self.motion is None
+        return tuple(
+            replace(estimate, name=f"{estimate.name}, {name}", method=f"for comparison: {each.bias}", status="ok")
+            for name, each in self.older.items()
+            if name != EXTREMES or not by_extremes
+            for estimate in (each.damping_ratio, each.dry_displacement)
+            if estimate is not None
+        )
+
+    def true_value(self, estimate: Estimate) -> float | None:
+        """The true value of what was estimated, where the record is simulated and tells it."""
+        true = self.record.truth.get(estimate.name.removesuffix(", by decrements"))
+        return None if true is None else float(true)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: settings, releases, estimates, bounds, faults, notes and history."""
+        told: dict[str, Any] = {
+            "name": self.name,
+            "faults": [str(fault) for fault in self.faults],
+            "settings": dict(self.settings),
+            "model": self.best.model,
+            "status": self.best.status,
+            "releases": [
+                {
+                    "release": each.release, "stop": each.stop, "held": each.held, "stopped": each.stopped,
+                    "channel": each.channel, "unit": each.unit, "amplitude": each.amplitude, "rest": each.rest,
+                    "noise": each.noise, "step": each.step, "extremes": len(each.turns), "status": each.status,
+                }
+                for each in self.releases.ring_downs
+            ],
+            "estimates": [estimate.to_dict() for estimate in self.estimates],
+            "motions": [] if self.motion is None else [
+                {"name": name, "words": words, "verdict": verdict} for name, words, verdict in self.motion.candidates
+            ],
+            "viscous_residual": self.viscous_residual,
+            "comparisons": [estimate.to_dict() for estimate in self.comparisons],
+            "decrements": None if self.thesis is None else _decrements(self.thesis),
+            "truth": dict(self.record.truth),
+            "notes": list(self.notes),
+            "history": [step.to_dict() for step in self.record.history],
+        }  # fmt: skip
+        return {key: plain(value) for key, value in told.items()}
+
+
+def _decrements(found: Decrement) -> dict[str, Any]:
+    """Extremes, and the table of the bounds, for JSON."""
+    bounds = found.bounds
+    rows = ("m", "rate", "rate_first_order", "rate_worst", "dry", "dry_first_order", "dry_worst")
+    return {
+        "extremes": {"time": found.time.tolist(), "value": found.extremes.tolist(), "sd": found.sd.tolist()},
+        "differences": found.differences.tolist(),
+        "bounds": {
+            "i": bounds.i, "best_m": bounds.best, "error": bounds.error,
+            **{name: getattr(bounds, name).tolist() for name in rows},
+        },
+        "scatter": {
+            name: {"mean": float(values.mean()), "sd": float(values.std())}
+            for name, values in vars(found.scatter).items() if len(values)
+        },
+    }  # fmt: skip
+
+
+def analyze_decay(
+    record: Record,
+    *,
+    method: str = "all",
+    channel: str | None = None,
+    mass: float | str | None = None,
+    stiffness: float | str | None = None,
+    restoring: Restoring = "linear",
+) -> DecayFindings:
+    """How much viscous and how much dry friction does a free decay show, by every way of asking?
+
+    The check-up, the releases (:func:`find_releases`), the whole waveform (:func:`fit_decay`), the decrements of the
+    extremes (:func:`decrement`), which motion it was (:func:`choose_motion`) and, for comparison, what older methods
+    say. A question that can not be answered becomes a note while another can.
+
+    Parameters
+    ----------
+    record : Record
+        With ``x``, ``theta``, ``v`` or ``a`` of something that was let go.
+    method : {"all", "waveform", "thesis"}
+        Which questions are asked: all, those of the whole waveform, or the decrements alone.
+    channel : str, optional
+        Which channel; the first of these when left out.
+    mass, stiffness : float or str, optional
+        Mass [kg] or stiffness [N/m] (of an angle: kg m^2, N m/rad), for the dry friction as a force.
+    restoring : {"linear", "pendulum"}
+        The spring's law: x, or sin x of a pendulum's angle. The decrements hold for x alone: a pendulum's extremes are
+        read by :func:`extreme_decay`.
+
+    Returns
+    -------
+    DecayFindings
+
+    Raises
+    ------
+    EstimateError
+        None of the questions could be answered; the sentence says why.
+    RecordError
+        A channel that is missing or broken.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
+    >>> run = ss.simulate(slider, duration=40.0, start={"x": 1.0})
+    >>> found = analyze_decay(run.record(fs=100), method="thesis", stiffness=10.0)
+    >>> round(found.best.damping_ratio.value, 3), round(found.dry_force.value, 2)
+    (0.032, 0.2)
+    """
+    if method not in METHODS:
+        raise EstimateError(f"method = '{method}'", f"it is {', '.join(METHODS)}", "choose one of them")
+    if restoring == "pendulum" and method == "thesis":
+        raise EstimateError(
+            "method = 'thesis' of a pendulum",
+            "the decrements of the extremes hold for a linear spring",
+            "choose method = 'waveform', or ask extreme_decay(record)",
+        )
+    releases = find_releases(record, channel=channel)
+    used, displaced = releases.ring_downs[0].channel, releases.ring_downs[0].order == 0
+    faults = tuple(each for each in record.check() if (each.kind, each.channel) != ("drift", used))  # a hold is none
+    constants = _constants(used, mass=mass, stiffness=stiffness)
+    asked = Asked(list(releases.notes))
+    waveform = thesis = motion = None
+    if method != "thesis":
+        way: dict[str, Any] = {"channel": used, "restoring": restoring}
+        waveform, motion = _by_waveform(record, asked, way, constants, displaced=displaced)
+    if method != "waveform" and restoring == "linear":
+        thesis = asked.ask("The decrements", partial(decrement, record, channel=used))
+    last = asked.refusals[-1:]
+    ways = {} if method != "all" or not displaced else OLDER if restoring == "linear" else FOR_PENDULUMS
+    older = {
+        name: found
+        for name, way in ways.items()
+        if (found := asked.ask(name.capitalize(), partial(way, record, channel=used))) is not None
+    }
+    if waveform is None and thesis is None and motion is None and (restoring == "linear" or not older):
+        raise last[0]
+    return DecayFindings(
+        record_name(record), record, faults, releases, waveform, thesis, motion, older,
+        tuple(dict.fromkeys(asked.notes)), {"method": method, "channel": used, "restoring": restoring, **constants},
+    )  # fmt: skip
+
+
+def _constants(channel: str, **stated: float | str | None) -> dict[str, Any]:
+    """Mass and stiffness where stated, in SI."""
+    units = rig_units(channel)
+    constants = {name: parse_value(value, units[name]) for name, value in stated.items() if value is not None}
+    for name, value in constants.items():
+        if not value > 0:
+            raise ModelError(f"{name} = {value:g}", f"a {name} is positive", f"correct the {name}")
+    return constants
+
+
+def _by_waveform(
+    record: Record, asked: Asked, way: dict[str, Any], constants: dict[str, Any], *, displaced: bool
+) -> tuple[DecayFit | None, DecayMotion | None]:
+    """The whole waveform, and of a displacement which motion it was; the latter alone where nothing fits the former."""
+    fit = partial(fit_decay, record, **way, **constants)
+    waveform = asked.ask("Which motion", partial(fit, candidates="all")) if displaced else None
+    waveform = waveform or asked.ask("The whole waveform", fit)
+    if waveform is None:
+        return None, asked.ask("Which motion", partial(choose_motion, record, **way)) if displaced else None
+    motion = waveform.motions[0] if waveform.motions else None
+    waveform = asked.ask("The whole waveform", partial(_followed, waveform, way["restoring"]))
+    unsure = motion is not None and motion.choice.status != "ok"
+    return waveform, None if waveform is None and unsure else motion
+
+
+def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:
+    """The fit, where it follows the motion; refused where it leaves much of it."""
+    left, moved = np.concatenate(fit.residual), np.concatenate(fit.measured) - fit.bias.value
+    share = float(np.linalg.norm(left) / np.linalg.norm(moved))
+    if share > LOST and float(np.std(left)) > SEEN * fit.ring_downs[0].noise:
+        straight = restoring == "linear" and fit.channel == "theta"
+        raise EstimateError(
+            f"the fit leaves {100 * share:.0f} % of the motion",
+            "a waveform is read where the clock is even and the spring is the one that was chosen",
+            ('choose restoring="pendulum" of a pendulum, ' if straight else "") + "mend the clock, or trust the "
+            "extremes, which need none",
+        )
+    return fit

@@ -1,0 +1,254 @@
+"""What a channel holds over time and frequency: the map, what stands out in it, and what the sticks tell."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.answers.findings import record_name
+from stickslip.balance.motion import is_measured
+from stickslip.contact.frequency_transition import Transition, transition_of
+from stickslip.contact.mechanisms import UNTOLD, Mechanism, mechanism_of
+from stickslip.contact.microslip import MicroSlips, microslips_of
+from stickslip.contact.ringing import Ringing, checked_mass, find_ringing
+from stickslip.cycle.slips import SlipRinging, slip_ringing
+from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import Estimate, Result
+from stickslip.record.record import Record
+from stickslip.signals.ridges import Ridge, Spike, find_ridges, find_spikes
+from stickslip.signals.wavelet import wavelet_map, wavelet_overview
+from stickslip.signals.wavelet_grid import CENTRE
+from stickslip.units import parse_range
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Answer = TypeVar("Answer")
+Array = NDArray[np.float64]
+
+CHOSEN = ("a", "sound", "force", "load", "friction", "v", "x")  # the channel that is looked at, the first that is there
+LONG = 400_000  # samples, from which on the largest moduli of each stretch of time are kept
+LEAST = 256  # samples, below which there is a map alone
+QUESTION = "time and frequency"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TimeFrequency(Result):
+    """A channel over time and frequency.
+
+    Attributes
+    ----------
+    name : str
+        The record's name.
+    record : Record
+        The record; of one that came in parts, its begin.
+    channel : str
+        The channel that was looked at.
+    wavelets : xarray.DataArray
+        Its map: of a long record, the largest moduli of each stretch of time.
+    ridges : tuple of Ridge
+        The five strongest lines of the map.
+    spikes : tuple of Spike
+        Jumps and kinks.
+    ringing : Ringing or None
+        The sticks in pieces, of an acceleration.
+    transition, microslips : Transition, MicroSlips or None
+        What the sticks of an acceleration tell.
+    mechanism : Mechanism or None
+        The mechanism that they show.
+    slip_ringing : SlipRinging or None
+        How a measured friction rings after slips begin.
+    notes : tuple of str
+        What could not be asked, and why.
+    """
+
+    name: str
+    record: Record
+    channel: str
+    wavelets: xr.DataArray
+    ridges: tuple[Ridge, ...] = ()
+    spikes: tuple[Spike, ...] = ()
+    ringing: Ringing | None = None
+    transition: Transition | None = None
+    microslips: MicroSlips | None = None
+    mechanism: Mechanism | None = None
+    slip_ringing: SlipRinging | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every number found in the sticks, and after the slips begin."""
+        answers = (self.transition, self.microslips, self.slip_ringing)
+        return tuple(each for answer in answers if answer is not None for each in answer.estimates)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: the answers, not the map."""
+        ridges = [
+            {"from": float(r.time[0]), "to": float(r.time[-1]), "frequency": float(np.median(r.frequency)),
+             "lowest": float(r.frequency.min()), "highest": float(r.frequency.max())}
+            for r in self.ridges
+        ]  # fmt: skip
+        return {
+            "name": self.name,
+            "channel": self.channel,
+            "mechanism": None if self.mechanism is None else self.mechanism.to_dict(),
+            "estimates": [estimate.to_dict() for estimate in self.estimates],
+            "slip_ringing": None if self.slip_ringing is None else self.slip_ringing.verdict,
+            "agreement": None if self.transition is None else self.transition.agreement,
+            "sticks": [] if self.transition is None else [_stick(stick) for stick in self.transition.sticks],
+            "micro_slips": [] if self.microslips is None else [vars(event) for event in self.microslips.events],
+            "ridges": ridges,
+            "spikes": [vars(spike) for spike in self.spikes],
+            "notes": list(self.notes),
+            "history": [str(step) for step in self.record.history],
+        }
+
+
+def time_frequency(
+    source: Record | Iterable[Record],
+    *,
+    channel: str | None = None,
+    frequencies: ArrayLike | str | None = None,
+    wavelet_frequency: float = CENTRE,
+    normalisation: str = "energy",
+    mass: float | str | None = None,
+    stiffness: float | str | None = None,
+) -> TimeFrequency:
+    """Ask a channel everything about time and frequency: the map, ridges, spikes, and what the sticks tell.
+
+    Parameters
+    ----------
+    source : Record or iterable of Record
+        At one rate; or the parts of a long one in order, as :func:`read_blocks` yields them, to be held one at a time.
+    channel : str, optional
+        Which channel; the first of a, sound, force, load, friction, v, x, or any other that does not only rise or only
+        fall, as times do, when not given. The sticks are
+        asked of an acceleration, the ringing after slips begin of a measured friction beside a motion.
+    frequencies : array_like or str, optional
+        As in :func:`wavelet_map`; or a range in words, "500:8000" or "0.5 kHz:8 kHz".
+    wavelet_frequency : float
+        As in :func:`wavelet_map`.
+    normalisation : {"energy", "amplitude"}
+        As in :func:`wavelet_map`.
+    mass, stiffness : float or str, optional
+        Oscillating mass [kg] and spring [N/m], for the contact's stiffness.
+
+    Returns
+    -------
+    TimeFrequency
+        Of more than 400,000 samples the map keeps the largest moduli of each stretch of time, and the first 400,000
+        alone are asked about spikes and sticks.
+
+    Raises
+    ------
+    RecordError
+        As :func:`wavelet_map`; or no part at all, or no channel that moves to and fro.
+    EstimateError
+        A mass that is not positive, a negative spring.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> case = ss.scenarios.get("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)")
+    >>> record = ss.simulate(case.system, cycles=8).record(fs=4000).between(1.0, 3.2)
+    >>> found = time_frequency(record, mass=2.42, stiffness=2310)
+    >>> found.mechanism.name, found.microslips.kind
+    ('double stick-slip', 'double stick-slip')
+    """
+    checked_mass(mass, stiffness)
+    if isinstance(frequencies, str):
+        frequencies = parse_range(frequencies, "Hz")
+    parts = iter([source] if isinstance(source, Record) else source)
+    first, second = next(parts, None), next(parts, None)
+    if first is None:
+        raise RecordError("no part at all", f"{QUESTION} needs one at least", "check the file")
+    name = chosen_channel(first, channel)
+    options: dict[str, Any] = {
+        "frequencies": frequencies, "wavelet_frequency": wavelet_frequency, "normalisation": normalisation,
+    }  # fmt: skip
+    if second is None and len(first) <= LONG:
+        wavelets = wavelet_map(first, name, **options)
+        found, notes = _spikes_and_sticks(first, name, mass, stiffness)
+        ridges = tuple(find_ridges(wavelets)[:5])
+        return TimeFrequency(record_name(first), first, name, wavelets, ridges, **found, notes=tuple(notes))
+    wavelets = wavelet_overview(
+        itertools.chain([first], () if second is None else (second,), parts), name, **options
+    )  # fmt: skip
+    begin = first.rows(0, min(LONG, len(first)))
+    found, notes = _spikes_and_sticks(begin, name, mass, stiffness)
+    long = (
+        "The record is long: of the map the largest moduli of each stretch of time are kept, without ridges; spikes "
+        f"and sticks are those of its first {begin.duration:.4g} s."
+    )
+    return TimeFrequency(
+        record_name(first), first if second is None else begin, name, wavelets, **found, notes=(long, *notes)
+    )  # fmt: skip
+
+
+def _spikes_and_sticks(
+    record: Record, name: str, mass: float | str | None, stiffness: float | str | None
+) -> tuple[dict[str, Any], list[str]]:
+    """What is asked beside the map, and why some of it has no answer."""
+    if len(record) < LEAST:
+        return {}, [f"{len(record)} samples are mapped, and too few to ask about spikes and sticks: give {LEAST}."]
+    found: dict[str, Any] = {"spikes": find_spikes(record, name)}
+    clocks = [each for each in record if name not in CHOSEN and _runs_on(record[each])]
+    notes = [f"Channel {each} only rises or only falls, as times do: {name} is mapped." for each in clocks[:1]]
+
+    def asked(what: str, question: Callable[[], Answer]) -> Answer | None:
+        try:
+            return question()
+        except EstimateError as error:
+            notes.append(f"{what}: {error}")
+            return None
+
+    if name == "friction" and is_measured(record, name) and any(each in record for each in ("x", "v", "theta")):
+        found["slip_ringing"] = asked("Ringing after slips", lambda: slip_ringing(record))
+        return found, notes
+    if record.channels[name].unit != "m/s^2":
+        notes.append(f"Channel {name} is no acceleration: what the sticks tell was not asked.")
+        return found, notes
+    ringing = asked("Sticks", lambda: find_ringing(record, name, question=QUESTION, mass=mass, stiffness=stiffness))
+    if ringing is None:
+        found["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=notes.pop().partition(": ")[2])
+        return found, notes
+    found["ringing"] = ringing
+    found["mechanism"] = mechanism_of(ringing)
+    found["transition"] = asked("Transition", lambda: transition_of(ringing, mass, stiffness))
+    if found["transition"] is not None:  # where nothing rings, nothing cuts a ring off
+        found["microslips"] = asked("Micro-slips", lambda: microslips_of(ringing))
+    return found, notes
+
+
+def chosen_channel(record: Record, channel: str | None) -> str:
+    """The channel asked for, or the first that is usual, or else the first that is no clock."""
+    if channel is not None:
+        record.require(channel, question=QUESTION)
+        return channel
+    usual = next((name for name in CHOSEN if name in record), None)
+    if usual is not None:
+        return usual
+    swings = next((name for name in record if not _runs_on(record[name])), None)
+    if swings is None:
+        raise RecordError(
+            f"channels {', '.join(record)} only rise or only fall", "a clock or a ramp is no vibration to be mapped",
+            "name the channels of the file, or the one that is meant",
+        )  # fmt: skip
+    return swings
+
+
+def _runs_on(values: Array) -> bool:
+    """Whether values only rise or only fall, as a column of times does."""
+    steps = np.diff(values)
+    return bool(len(steps) > 1 and ((steps > 0).all() or (steps < 0).all()))
+
+
+def _stick(stick: Any) -> dict[str, Any]:
+    told = {key: value for key, value in vars(stick).items() if not isinstance(value, Estimate)}
+    told["wavelet_frequency"] = stick.wavelet_frequency if np.isfinite(stick.wavelet_frequency) else None
+    return {**told, **{key: value.to_dict() for key, value in vars(stick).items() if isinstance(value, Estimate)}}

@@ -1,0 +1,372 @@
+"""A record made ready for the questions: sensors, delays, and its friction by the way that its channels allow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.answers.asked import Asked
+from stickslip.balance.felt_and_computed import UNLIKE, ForceComparison, compare_force
+from stickslip.balance.force import friction_force
+from stickslip.balance.lag import SensorDelay, sensor_delay
+from stickslip.balance.mass import mass_and_stiffness
+from stickslip.balance.motion import is_measured
+from stickslip.errors import StickslipError
+from stickslip.record.channels import Channel
+from stickslip.record.flaws import constant
+from stickslip.record.record import Record, Step
+from stickslip.rig.settings import RigSettings
+from stickslip.signals.delay import without_delays
+
+MOTION = ("x", "v", "theta")
+USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
+SENSED = ("x", "v", "theta", "a", "load")  # what no rig holds still while its mass moves
+CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
+STRETCH = 1 << 14  # samples from the middle in which a delay is looked for, and the forces are compared
+AT_ONCE = 1 << 18  # samples of which all sensors are put together unasked
+REPEATS = "the motion repeats itself"  # so that other delays would do as well, the shortest being taken
+STRANGE = "differ by more than noise"
+LEFT_OUT = "it may be wrong by some per cent, which the interval leaves out"
+FOUND = " (found in this record)"
+QUIETER = 3.0  # times less noise for which sensors of unknown mounts are taken: what they add is not in it
+EXPLAINED = 1.25  # of the noise of the motion's friction, that the two may be apart; a ringing mount leaves them at 2.3
+AS_LARGE = 0.05  # of the friction, by which the two may differ in size: a load cell in the wrong unit differs by more
+SURE = 3.0  # standard deviations from which a delay is taken out
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A record with its friction, and what was found on the way.
+
+    Attributes
+    ----------
+    record : Record
+        Delays taken out; with ``friction`` where there is a way to it.
+    delay : SensorDelay or None
+        Of the accelerometer behind the displacement, where it was looked for.
+    comparison : ForceComparison or None
+        The friction felt against the friction computed, where there are both.
+    doubt : str
+        What is not known of the sensors that a contact's stiffness hangs on.
+    """
+
+    record: Record
+    delay: SensorDelay | None
+    comparison: ForceComparison | None
+    doubt: str = ""
+
+
+def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
+    """The record with its sensors stated, without its delays, with its friction."""
+    for name, told in rig.sensors.items():
+        if name in record:
+            record = record.with_details(name, **told.model_dump(exclude_unset=True))
+        else:
+            asked.notes.append(f"A sensor {name} is described, but the record has no such channel.")
+    record, stated = _without_dead(record, asked), rig
+    given = record
+    record, delay = _aligned(record, asked)
+    known = [name for name in USED if name in record]
+    whole = (asked.ask("Stated delays", lambda: without_delays(record, *known)) if known else None) or record
+    comparison = None
+    if is_measured(whole, "friction"):
+        _tell_unused(rig, asked)
+    else:
+        rig = _weighed(whole, rig, asked)
+        if "x" in whole and _enough(whole, rig):
+            if "load" in whole and ("a" in whole or not _base_seen(whole)):
+                comparison = asked.ask(
+                    "Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig)), aside=True
+                )
+                whole = _with_mounts(whole, comparison, asked)
+            if method == "auto" and _base_moves(whole, comparison, asked):
+                whole, comparison = without(whole, "z"), None
+            else:
+                whole = _balanced(whole, rig, method, asked)
+    if "friction" not in whole:
+        whole = _by_load(whole, rig, asked)
+    return Ready(whole, delay, comparison, _doubt(whole, given, stated, aligned=record is not given))
+
+
+def middle(record: Record, samples: int) -> Record:
+    """At most so many samples, from the middle of a record."""
+    first = (len(record) - samples) // 2
+    return record.rows(first, first + samples) if first > 0 else record
+
+
+def _enough(record: Record, rig: RigSettings) -> bool:
+    """Whether the balance can be drawn up: one of mass and spring is found from the other where more than x is read."""
+    stated = sum(each is not None for each in (rig.mass, rig.stiffness))
+    return stated == 2 or (stated == 1 and not {"a", "load"}.isdisjoint(record))
+
+
+def _without_dead(record: Record, asked: Asked) -> Record:
+    """The record without sensors that read one value throughout."""
+    dead = [name for name in SENSED if name in record and constant(record[name])]
+    asked.notes.extend(f"{unmoved(record, name)}: it is left out." for name in dead)
+    return without(record, *dead)
+
+
+def unmoved(record: Record, name: str) -> str:
+    """That a channel does not change, in words."""
+    return f"{name} does not change, it reads {record[name][0]:.4g} {record.channels[name].unit} throughout"
+
+
+def without(record: Record, *names: str) -> Record:
+    """The record without these channels, unless nothing else is in it."""
+    kept = [name for name in record if name not in names]
+    if not kept or len(kept) == len(record.samples):
+        return record
+    return replace(
+        record, samples={name: record[name] for name in kept}, channels={n: record.channels[n] for n in kept}
+    )  # fmt: skip
+
+
+def _weighed(record: Record, rig: RigSettings, asked: Asked) -> RigSettings:
+    """The rig with its mass and its spring by what the load cell feels, where neither was stated."""
+    if rig.mass is not None or rig.stiffness is not None or "friction" in record:
+        return rig
+    if not {"x", "load"} <= set(record) or not _base_seen(record):
+        return rig
+    ends = {"damper": rig.damper, "contact": rig.contact}
+    found = asked.ask(
+        "Mass and stiffness",
+        lambda: mass_and_stiffness(middle(record, STRETCH), damping=rig.damping or 0.0, **ends),
+        aside=True,
+    )
+    if found is None:
+        return rig
+    mass, stiffness = found
+    asked.notes.append(
+        f"No mass and no stiffness were stated: {mass.value:.4g} kg and {stiffness.value:.4g} N/m are found from what "
+        "the load cell feels."
+    )
+    return rig.model_copy(update={"mass": mass.value, "stiffness": stiffness.value})
+
+
+def _base_seen(record: Record) -> bool:
+    """Whether the record has a base that moves."""
+    return "z" in record and not constant(record["z"])
+
+
+def _base_moves(record: Record, comparison: ForceComparison | None, asked: Asked) -> bool:
+    """Whether a base that is not measured can not have been at rest, by the load cell."""
+    moves = not _base_seen(record) and comparison is not None and UNLIKE in comparison.status
+    if moves:
+        asked.notes.append(
+            f"{'z does not change' if 'z' in record else 'There is no channel z'}, and with the spring's other end at "
+            "rest the motion leaves another force than the load cell feels: mass and spring are not used."
+        )
+    return moves
+
+
+def _constants(rig: RigSettings) -> dict[str, Any]:
+    return {
+        "mass": rig.mass, "stiffness": rig.stiffness, "damping": rig.damping or 0.0, "damper": rig.damper
+    }  # fmt: skip
+
+
+def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
+    """The record with the delay of displacement against acceleration stated, where it was not."""
+    if not {"x", "a"} <= set(record) or any(record.channels[name].delay for name in ("x", "z", "a") if name in record):
+        return record, None
+    found = asked.ask("Sensor delay", lambda: sensor_delay(middle(record, STRETCH)), aside=True)
+    if found is None:
+        return record, None
+    if found.gain.value < 0:
+        asked.notes.append(
+            "The accelerometer runs against the displacement: one of the two has the wrong sign. Turn it round, as in "
+            'channels={"a": "-COLUMN [m/s^2]"}.'
+        )
+        return record, found
+    late = -found.delay.value
+    if found.status != "ok" and (not found.status.startswith(REPEATS) or STRANGE in found.status):
+        asked.notes.append(f"The delay of x against a, {1e3 * late:.3g} ms, is not taken out: {found.status}.")
+        return record, found
+    if abs(late) < SURE * found.delay.sd:
+        return record, found
+    for name in ("x", "z"):
+        if name in record:
+            record = record.with_details(name, delay=late)
+    late_ones = "x, and z as a sensor of its kind, come" if "z" in record else "x comes"
+    asked.notes.append(
+        f"{late_ones} {1e3 * late:.3g} ms after a, by the phase of their lines: taken out. State what is known "
+        "of the sensors' delays to have that taken instead."
+    )
+    return record, found
+
+
+def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Asked) -> Record:
+    """The record with the mounts stated that the comparison of forces shows, where they were not."""
+    differ = comparison is not None and any(word in comparison.status for word in ("opposite", "differ"))
+    for each in () if comparison is None or differ else comparison.resonances:
+        name = "a" if "accelerometer" in each.name else "load"
+        if "mount" in each.name and record.channels[name].mount is None:
+            record = record.with_details(name, mount=(each.frequency.value, each.damping.value))
+            asked.notes.append(f"The {each.name} is taken to ring at {each.frequency.value:.4g} Hz: {each.evidence}.")
+    return record
+
+
+def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) -> str:
+    """What is not known of the rig and its sensors behind a friction force that was not measured."""
+    if "friction" in record and record.channels["friction"].source not in ("friction_force", "load"):
+        return ""
+    unknown = [
+        f"the mount of {name}{FOUND if record.channels[name].mount is not None else ''}"
+        for name in ("a", "load")
+        if is_measured(record, name) and given.channels[name].mount is None
+    ]
+    if aligned:
+        unknown.append(f"the delay of x{FOUND}")
+    told = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
+    unknown += [
+        f"the {name}{FOUND}"
+        for name in ("mass", "stiffness")
+        if getattr(rig, name) is None and told and told[0].get(name) is not None
+    ]
+    if not unknown:
+        return ""
+    return f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated: {LEFT_OUT}"
+
+
+def _tell_unused(rig: RigSettings, asked: Asked) -> None:
+    unused = [key for key in CONSTANTS if key in rig.model_fields_set and getattr(rig, key) is not None]
+    if unused:
+        verb = "is" if len(unused) == 1 else "are"
+        asked.notes.append(f"The friction was measured: {' and '.join(unused)} as stated {verb} not used.")
+
+
+def described(sensor: Channel) -> bool:
+    """Whether anything is known of what it makes of a motion."""
+    return sensor.mount is not None or sensor.discharge is not None or sensor.inertia != 0
+
+
+def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
+    """By which method the friction is found, and why."""
+    helps = [name for name in ("a", "load") if name in record]
+    if len(record) > AT_ONCE:
+        return (
+            "smoother",
+            f"{len(record)} samples are many; the method fusion takes them all together if it is asked to",
+        )
+    known = [name for name in helps if described(record.channels[name])]
+    if known and rig.contact == "ground":
+        return "fusion", f"{' and '.join(helps)} beside x: all sensors together by a Kalman smoother"
+    if "load" in helps and rig.contact == "ground" and (quieter := _quieter(record, rig)):
+        return "fusion", quieter
+    why = "there is neither an accelerometer nor a load cell"
+    if helps:
+        why = f"of {' and '.join(helps)} no mount is stated: state it to have all sensors put together"
+    if helps and rig.contact == "base":
+        why = "the contact is on the moving base"
+    return "smoother", f"{why}: the displacement differentiated by a smoother"
+
+
+def _quieter(record: Record, rig: RigSettings) -> str:
+    """Why all sensors together find the friction better than the motion alone, though no mount is stated; else empty.
+
+    Their friction must be much less noisy by their own measure, and no further from that of the motion than this one's
+    noise is, be it for a mount that rings, and as large.
+    """
+    part = middle(record, STRETCH)
+    try:
+        alone, together = (
+            friction_force(part, contact=rig.contact, method=method, **_constants(rig))
+            for method in ("smoother", "fusion")
+        )
+    except StickslipError:
+        return ""  # the method that is taken then says what it lacks
+    noise, least = (float(np.sqrt(np.mean(each["friction_sd"] ** 2))) for each in (alone, together))
+    power = float(together["friction"] @ together["friction"])
+    if not (0 < least < noise / QUIETER and power > 0):
+        return ""
+    apart = float(np.sqrt(np.mean((alone["friction"] - together["friction"]) ** 2)))
+    gain = float(together["friction"] @ alone["friction"]) / power
+    if apart > EXPLAINED * noise or abs(gain - 1) > AS_LARGE:
+        return ""
+    return (
+        f"all sensors together leave {noise / least:.3g} times less noise in the friction than the motion alone, whose "
+        "noise explains all between them, though no mount is stated"
+    )
+
+
+def _balanced(record: Record, rig: RigSettings, method: str, asked: Asked) -> Record:
+    """The record with its friction by the balance of forces."""
+    why = "as asked"
+    if method == "auto":
+        method, why = chosen_method(record, rig)
+    found = asked.ask(
+        "Friction force", lambda: friction_force(record, contact=rig.contact, method=method, **_constants(rig))
+    )
+    if found is None:
+        return record
+    lost = [part for part in found.history[-1].outcome.split("; ") if part.endswith("left to the others")]
+    asked.notes.append(f"Friction force: {'; '.join([f'by the method {method}', why, *lost])}.")
+    made = found.history[-1].arguments
+    for name, unit in (("mass", "kg"), ("stiffness", "N/m")):
+        if getattr(rig, name) is None:
+            asked.notes.append(f"No {name} was stated: {made[name]:.4g} {unit} is found from how the mass slides.")
+    if "z" not in record:
+        asked.notes.append("There is no channel z: the spring's other end is taken to be at rest.")
+    if rig.damping is None:
+        asked.notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
+    return found
+
+
+def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
+    """The record with what its load cell reads as its friction, or with a note of what is lacking."""
+    moves = any(name in record for name in MOTION)
+    if "load" in record and "force" not in record and moves:
+        if described(record.channels["load"]) and "x" in record:
+            return _by_cell(record, asked)
+        asked.notes.append(
+            "The load cell's reading is taken as the friction force; inertia between both is part of it, and what "
+            "its mount adds, of which nothing is stated."
+        )
+        step = Step("analyze", {"friction": "load"}, "the load cell's reading taken as the friction force")
+        unit = record.channels["load"].unit
+        return record.with_channel("friction", record["load"], unit=unit, source="load", step=step)
+    if {"x", "a"} <= set(record) and rig.mass is None and rig.stiffness is None and "load" not in record:
+        _tell_per_mass(record, rig, asked)
+    lacking = [key for key in ("mass", "stiffness") if getattr(rig, key) is None]
+    lacking = lacking if "x" in record else ["a displacement x", *lacking]
+    if lacking and "force" not in record and (moves or "load" not in record):
+        asked.notes.append(
+            f"Friction force: without a measured friction or load it needs {' and '.join(lacking)}, not given."
+        )
+    return record
+
+
+def _tell_per_mass(record: Record, rig: RigSettings, asked: Asked) -> None:
+    """What can be said without mass, spring and load cell."""
+    found = asked.ask(
+        "Friction per mass", lambda: friction_force(record, contact=rig.contact, method="motion"), aside=True
+    )
+    if found is not None:
+        level = float(np.median(np.abs(found["friction_per_mass"])))
+        asked.notes.append(f"Friction per mass: {level:.4g} m/s^2 (median); {found.history[-1].outcome}.")
+
+
+def _by_cell(record: Record, asked: Asked) -> Record:
+    """The record with its friction by the load cell alone, less what is stated of it."""
+    found = asked.ask("Friction force", lambda: friction_force(record, method="load"))
+    if found is None:
+        return record
+    asked.notes.append(f"Friction force: {found.history[-1].outcome}.")
+    return found
+
+
+def normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> float | None:
+    """The normal load as measured, by its magnitude, or as stated for the file."""
+    if "normal" in record:
+        finite = record["normal"][np.isfinite(record["normal"])]
+        mean = float(finite.mean()) if len(finite) else 0.0
+        if mean < 0:
+            notes.append(f"The normal load reads {mean:.4g} N: its magnitude is taken.")
+        if mean:
+            return abs(mean)
+        notes.append("The channel normal tells no load: it holds " + ("zeros." if len(finite) else "no numbers."))
+    loads = (rig.normal_load(part) for part in [*name.split(" + "), name])
+    return next((load for load in loads if load is not None), None)

@@ -1,0 +1,281 @@
+"""Which questions are asked of a record, in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from stickslip.answers.asked import Asked
+from stickslip.answers.doubts import doubted
+from stickslip.answers.findings import Findings, record_name
+from stickslip.answers.preparation import (
+    AT_ONCE,
+    CONSTANTS,
+    MOTION,
+    described,
+    middle,
+    normal_load,
+    ready,
+    unmoved,
+)
+from stickslip.balance.force import FUSIONS, friction_force
+from stickslip.balance.motion import is_measured, slid_on
+from stickslip.balance.pull import pulled_slider
+from stickslip.consistent.contradictions import consistency
+from stickslip.contact.cause import lag_or_compliance
+from stickslip.contact.contact import contact_damping, contact_stiffness
+from stickslip.contact.sliding_onset import coupled_frequency, transition_speed
+from stickslip.cycle.before_slip import presliding
+from stickslip.cycle.loops import Loops, friction_loops
+from stickslip.cycle.onset import breakaway
+from stickslip.cycle.regression import regress_friction
+from stickslip.cycle.sticks import find_sticks
+from stickslip.errors import EstimateError, StickslipError
+from stickslip.record.flaws import constant
+from stickslip.record.record import Record
+from stickslip.rig.settings import RigSettings
+
+STRETCH = 1 << 14  # samples in which the contact is fitted
+
+
+def analyze(
+    record: Record,
+    *,
+    rig: RigSettings | None = None,
+    mass: float | str | None = None,
+    stiffness: float | str | None = None,
+    damping: float | str | None = None,
+    damper: str | None = None,
+    contact: str | None = None,
+    method: str = "auto",
+) -> Findings:
+    """Ask a record every question about friction that its channels allow.
+
+    In this order: the check-up; the delay between displacement and acceleration, where none is stated; the friction
+    force (as measured, or from the force balance ``f = k z - k x - c v - m a``, compared with the load cell's where
+    there is one); the friction loops; sticks and slips; the breakaway, and what the contact does before; the contact's
+    stiffness and damping, where all sensors are put together; the regression of an applied force on acceleration,
+    velocity and direction; of a force without any motion, how a slider moves that is pulled through a spring. A
+    question that can not be answered becomes a note, not an error.
+
+    Parameters
+    ----------
+    record : Record
+        Displacement ``x`` [m] with `mass` and `stiffness`, or a measured ``friction`` or ``load`` [N], or an
+        applied ``force`` [N].
+    rig : RigSettings, optional
+        The rig's constants, as :func:`read_rig` returns them; the arguments below go before it.
+    mass, stiffness, damping : float or str, optional
+        Oscillating mass [kg], spring [N/m], viscous damping [N s/m]; or text with a unit ("250 g").
+    damper, contact : {"ground", "base"}, optional
+        What the damper ends on, and what the mass slides on; the ground unless stated.
+    method : str
+        How the friction is found: one of :func:`friction_force`'s, or "auto": all sensors together where there is an
+        accelerometer or a load cell beside x whose mount is stated or shows, or where a load cell leaves far less noise
+        in the friction and else what the motion alone leaves; else the displacement differentiated by a smoother. The
+        notes say which, and why.
+
+    Returns
+    -------
+    Findings
+
+    Raises
+    ------
+    EstimateError
+        None of the questions could be answered; the sentence says why.
+    ModelError
+        A constant that has no meaning.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.arange(4000) / 500
+    >>> v = np.cos(2 * np.pi * time)
+    >>> rng = np.random.default_rng(1)
+    >>> friction = 1.5 * np.sign(v) + rng.normal(0, 0.01, time.size)
+    >>> record = Record.of({"x": np.sin(2 * np.pi * time) / (2 * np.pi), "friction": friction}, fs=500)
+    >>> round(analyze(record).level.value, 2)
+    1.5
+    """
+    given = {"mass": mass, "stiffness": stiffness, "damping": damping, "damper": damper, "contact": contact}
+    rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
+    asked, name, faults = Asked(), record_name(record), tuple(record.check())
+    made = ready(record, rig, method, asked)
+    whole = made.record
+    slid = slid_on(whole, rig.contact if "contact" in rig.model_fields_set else None)
+    answers: dict[str, Any] = {}
+    for each in QUESTIONS:
+        led = not each.follows or answers.get(each.follows) is not None
+        if led and answers.get(each.unless) is None and each.fits(whole):
+            answers[each.key] = asked.ask(each.name, partial(each.ask, whole, slid))
+    answers = doubted(answers, whole, unknown=made.doubt, refusals=asked.refusals)
+    answers["loops"] = _late(answers.get("loops"), record, rig)
+    if all(answer is None for answer in answers.values()):
+        raise _nothing(name, record, asked.refusals)
+    return Findings(
+        name, whole, faults, **answers, delay=made.delay, comparison=made.comparison,
+        normal=normal_load(record, rig, name, asked.notes), notes=tuple(asked.notes),
+        settings={**_told(whole), "contact": slid},
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Question:
+    """One of the questions.
+
+    Attributes
+    ----------
+    key : str
+        The attribute of :class:`Findings` that holds the answer.
+    name : str
+        In words.
+    needs : tuple of tuple of str
+        Channels: one of each group.
+    ask : callable
+        Answers it, given the record and what the mass slides on.
+    without : tuple of str
+        Channels with which it is not asked: others answer it better.
+    follows : str
+        The question that must have been answered before, where there is one.
+    unless : str
+        The question whose answer makes this one idle.
+    fused : bool
+        Whether the friction must come from all sensors together.
+    derived : bool
+        Whether there must be a balance of forces, or a load cell to hold one against.
+    """
+
+    key: str
+    name: str
+    needs: tuple[tuple[str, ...], ...]
+    ask: Callable[[Record, str], Any]
+    without: tuple[str, ...] = ()
+    follows: str = ""
+    unless: str = ""
+    fused: bool = False
+    derived: bool = False
+
+    def fits(self, record: Record) -> bool:
+        """Whether the record has the channels."""
+        return (
+            all(any(name in record for name in group) for group in self.needs)
+            and not any(name in record for name in self.without)
+            and (not self.fused or _can_be_fused(record, again=not self.follows))
+            and (not self.derived or bool(_told(record)) or "load" in record)
+        )
+
+
+FORCE = ("load", "force", "friction")
+QUESTIONS = (
+    Question("loops", "Friction loops", (("friction",), MOTION), lambda r, on: friction_loops(r, contact=on)),
+    Question("sticks", "Sticks and slips", (MOTION,), lambda r, on: find_sticks(r, contact=on)),
+    Question("breakaway", "Breakaway", (("friction",), MOTION), lambda r, on: breakaway(r, contact=on)),
+    Question(
+        "stiffness", "Contact stiffness", (("friction",), ("x",)), lambda r, on: contact_stiffness(_fused(r)),
+        fused=True,
+    ),
+    Question(
+        "contact_damping", "Contact damping", (("friction",), ("x",)), lambda r, on: contact_damping(_fused(r)),
+        follows="stiffness", fused=True,
+    ),
+    Question(
+        "transition", "Transition speed", (("friction",), ("x",)), lambda r, on: transition_speed(_fused(r)),
+        follows="stiffness", fused=True,
+    ),
+    Question(
+        "coupled", "Coupled frequency", (("friction",), ("x",)), lambda r, on: coupled_frequency(_fused(r)),
+        follows="stiffness", fused=True,
+    ),
+    Question(
+        "cause", "Sensor lag or compliance", (("friction",), ("x",)), lambda r, on: lag_or_compliance(_fused(r)),
+        follows="stiffness", fused=True,
+    ),
+    Question(
+        "consistency", "Consistency", (("friction",), ("x",)), lambda r, on: consistency(middle(r, STRETCH)),
+        follows="loops", derived=True,
+    ),
+    Question(
+        "presliding", "Presliding", (("friction",), MOTION), lambda r, on: presliding(r, contact=on),
+        unless="stiffness",
+    ),
+    Question("regression", "Regression", (("force",), MOTION), lambda r, on: regress_friction(r)),
+    Question(
+        "asymmetric", "Regression of each direction", (("force",), MOTION),
+        lambda r, on: regress_friction(r, symmetric=False), follows="regression",
+    ),
+    Question(
+        "pull", "Pulled slider", (FORCE,),
+        lambda r, on: pulled_slider(r, channel=next(name for name in FORCE if name in r)), without=(*MOTION, "a"),
+    ),
+)  # fmt: skip
+
+
+def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
+    from stickslip.rig.settings import rig_settings
+
+    return rig_settings({**(rig.model_dump(exclude_unset=True) if rig is not None else {}), **given}, source="the call")
+
+
+def _can_be_fused(record: Record, *, again: bool) -> bool:
+    """Whether the friction comes from all sensors together; or might have, `again`, if the record were not so long."""
+    method = _told(record).get("differentiation")
+    sensors = any(is_measured(record, name) and described(record.channels[name]) for name in ("a", "load"))
+    return method in FUSIONS or (
+        again and method == "smoother" and len(record) > AT_ONCE and sensors and slid_on(record, None) == "ground"
+    )
+
+
+def _late(loops: Loops | None, record: Record, rig: RigSettings) -> Loops | None:
+    """The loops, flagged where a sensor is stated to come later than a cycle of the motion."""
+    delays = {name: channel.delay for name, channel in record.channels.items()}
+    delays |= {name: told.delay for name, told in rig.sensors.items() if "delay" in told.model_fields_set}
+    cycles = {name: abs(late) * loops.frequency.value for name, late in delays.items()} if loops is not None else {}
+    far = [name for name, count in cycles.items() if count > 1]
+    if loops is None or not far:
+        return loops
+    words = (
+        f"{' and '.join(far)} {'is' if len(far) == 1 else 'are'} stated to come {delays[far[0]]:.4g} s late, "
+        f"{cycles[far[0]]:.2g} cycles of the motion (milliseconds taken for seconds, perhaps)"
+    )
+    return replace(loops, status=words if loops.status == "ok" else f"{words}; {loops.status}")
+
+
+def _fused(record: Record) -> Record:
+    """The middle of a record, enough to fit a contact by its likelihood, with all sensors put together."""
+    cut = middle(record, STRETCH)
+    told = [step.arguments for step in record.history if step.action == "friction_force"][-1]
+    return cut if told["method"] in FUSIONS else friction_force(
+        cut, method="fusion", **{key: told[key] for key in CONSTANTS}
+    )  # fmt: skip
+
+
+def _told(record: Record) -> dict[str, Any]:
+    """The constants and the method behind the friction force, where it comes from a balance of forces."""
+    if "friction" not in record or is_measured(record, "friction"):
+        return {}
+    told = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
+    return {
+        key.replace("method", "differentiation"): made[key]
+        for made in told if made["mass"] is not None
+        for key in (*CONSTANTS, "method")
+    }  # fmt: skip
+
+
+def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:
+    value = f"{name} answers no question about friction"
+    still = [each for each in MOTION if each in record and constant(record[each])]
+    if still:
+        return EstimateError(
+            f"{value}: {unmoved(record, still[0])}",
+            "friction is found from a contact that moves",
+            "look at its cable, range and column",
+        )
+    if refusals:
+        return EstimateError(f"{value}: {refusals[0].value}", refusals[0].rule, refusals[0].next_step)
+    return EstimateError(
+        f"{value}: its channels are {', '.join(f'{c.name} [{c.unit}]' for c in record.channels.values())}",
+        "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
+        'name the columns, as in channels={"x": "COLUMN [mm]"}',
+    )

@@ -1,0 +1,166 @@
+"""The balance of forces on the mass: the rig's constants, what each channel adds, and the record with the friction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.balance.motion import is_measured
+from stickslip.errors import ModelError
+from stickslip.record.record import Record, Step
+from stickslip.signals.derivatives import Filter, differentiate, noise_along
+from stickslip.units import parse_value
+
+Array = NDArray[np.float64]
+
+FRICTION = "the friction force"
+ENDS = ("ground", "base")
+SPAN = 24  # samples from an end within which averages and differences feel it
+
+
+@dataclass(frozen=True)
+class Balance:
+    """m a = k (z - x) - c (v - dz/dt or 0) + P - f."""
+
+    mass: float
+    stiffness: float
+    damping: float
+    damper: str
+
+    @classmethod
+    def told(cls, rig: Mapping[str, Any]) -> Balance:
+        """As the arguments of friction_force say."""
+        return cls(rig["mass"], rig["stiffness"], rig["damping"], rig["damper"])
+
+    def pull(self, record: Record) -> Array:
+        """What spring, applied force and a damper to the base do to the mass [N]; not what its own velocity does."""
+        pull = np.array(record["force"]) if "force" in record else np.zeros(len(record))
+        if "z" in record:
+            pull += self.stiffness * record["z"]
+            if self.damper == "base" and self.damping:
+                pull += self.damping * differentiate(record["z"], record.fs).values
+        return np.asarray(pull - self.stiffness * record["x"])
+
+
+@dataclass(frozen=True)
+class Rig(Balance):
+    """A balance of forces, and what the mass slides on."""
+
+    contact: str
+
+    @classmethod
+    def stated(cls, constants: Mapping[str, Any], damper: str, contact: str) -> Rig:
+        """The constants with their units read; refused where they have no meaning."""
+        units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
+        values = {name: parse_value(constants[name], unit) for name, unit in units.items()}
+        for name, value in values.items():
+            if value < 0 or (name == "mass" and value == 0):
+                raise ModelError(
+                    f"{name} = {constants[name]}",
+                    "a mass is positive, a stiffness or damping not negative",
+                    f"state the rig's {name} in {units[name]}",
+                )
+        for word, end in (("damper", damper), ("contact", contact)):
+            if end not in ENDS:
+                raise ModelError(f"{word} = '{end}'", f"a {word} goes to the {' or the '.join(ENDS)}", "choose one")
+        return cls(damper=damper, contact=contact, **values)
+
+    def terms(self, record: Record) -> dict[str, dict[int, float]]:
+        """Per channel, the coefficient of each order of its derivative in the friction force."""
+        velocity = ("v", 0) if "v" in record else ("x", 1)
+        acceleration = ("a", 0) if "a" in record else (velocity[0], velocity[1] + 1)
+        terms: dict[str, dict[int, float]] = {"x": {0: -self.stiffness}}
+        for (name, order), constant in ((velocity, self.damping), (acceleration, self.mass)):
+            terms.setdefault(name, {})[order] = -constant
+        if "z" in record:
+            terms["z"] = {0: self.stiffness, 1: self.damping if self.damper == "base" else 0.0}
+        if "force" in record:
+            terms["force"] = {0: 1.0}
+        return terms
+
+    def words(self, record: Record, method: str, width: float, *, one_filter: bool) -> list[str]:
+        """What was assumed and how derivatives were taken, for the history."""
+        said = [
+            "f = k z - k x - c v - m a"
+            if "z" in record
+            else "no channel z: the base is taken to be fixed, f = - k x - c v - m a"
+        ]
+        if "force" in record:
+            said.append("the applied force is added")
+        measured = [name for name in ("v", "a") if name in record]
+        if measured:
+            said.append(f"{' and '.join(measured)} as measured")
+        if one_filter:
+            said.append(f"all channels smoothed to {width:.4g} Hz (-3 dB)")
+        elif method == "smoother" and len(measured) < 2:
+            said.append(f"the velocity smoothed to {width:.4g} Hz (-3 dB)")
+        elif method == "five-point":
+            said.append("derivatives by central differences and five-point averages")
+        said.append(f"contact against the {self.contact}")
+        return said
+
+
+def told_rig(record: Record, **given: Any) -> dict[str, Any]:
+    """The rig's constants for :func:`friction_force`: as given, or as the record's last balance was told."""
+    last = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
+    names = ("mass", "stiffness", "damping", "damper", "contact")
+    told = {name: step.get(name) for step in last for name in names}
+    known = {**told, **{name: value for name, value in given.items() if value is not None}}
+    return {name: value for name, value in known.items() if value is not None}
+
+
+def paths(
+    terms: Mapping[str, Mapping[int, float]], derive: Filter, *, one_filter: bool
+) -> Iterator[tuple[str, Filter, dict[int, float]]]:
+    """Which channel goes through which filter, with which coefficients."""
+    unchanged = replace(derive, method="five-point")  # passes order 0 unchanged
+    for name, orders in terms.items():
+        if one_filter or derive.method == "five-point":
+            yield name, derive, dict(orders)
+            continue
+        # Apart, for the smoother would smooth order 0 too; odd derivatives do not correlate with the sample itself.
+        yield name, unchanged, {0: orders.get(0, 0.0)}
+        if any(orders.get(order) for order in (1, 2)):
+            yield name, derive, {order: c for order, c in orders.items() if order}
+
+
+def averaged_gain(size: int, derive: Filter, terms: Mapping[int, float], last: Callable[[Array], Array]) -> Array:
+    """Standard deviation of each of `size` values for white noise of unit standard deviation."""
+    rows = np.linalg.norm(last(derive.apply(np.eye(min(size, 2 * SPAN)), terms)), axis=1)
+    return rows if size <= len(rows) else np.insert(rows, SPAN, np.full(size - len(rows), rows[SPAN]))
+
+
+def as_measured(record: Record) -> Record:
+    """The record without what an earlier balance made, which would be taken for measured."""
+    measured = {name: record[name] for name in record if is_measured(record, name)}
+    return replace(record, samples=measured) if measured else record
+
+
+def with_motion(record: Record, derive: Filter) -> Record:
+    """The record with v and a, each differentiated where it was not measured."""
+    source, order = ("v", 0) if "v" in record else ("x", 1)
+    wanted = {"v": (source, order), "a": (source, order + 1)}
+    made = record
+    for (name, (origin, times)), unit in zip(wanted.items(), ("m/s", "m/s^2"), strict=True):
+        if name not in record:
+            noise = noise_along(record[origin], record.fs, record.channels[origin].noise)
+            level = derive.inner_gain({times: 1.0}) * float(np.sqrt(np.mean(noise**2)))
+            values = derive.apply(record[origin], {times: 1.0})
+            made = made.with_channel(name, values, unit=unit, source="friction_force", noise=level)
+    return made
+
+
+def with_friction(record: Record, force: Array, sd: Array, step: Step) -> Record:
+    """The record with the friction, its standard deviation at each sample, and how it was found."""
+    made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
+    noise = float(np.median(sd))
+    return made.with_channel("friction", force, unit="N", source="friction_force", noise=noise, step=step)
+
+
+def stretch(record: Record) -> Array:
+    """Of the spring between mass and base [m]."""
+    return record["z"] - record["x"] if "z" in record else -record["x"]

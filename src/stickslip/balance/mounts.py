@@ -1,0 +1,189 @@
+"""Resonances that sensors see: those of the mounts they stand on, from a forced motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.balance.lines import Complex, Lines
+from stickslip.estimate import Estimate
+from stickslip.record.record import Record
+from stickslip.signals.derivatives import noise_along
+from stickslip.signals.response import resonance
+
+Array = NDArray[np.float64]
+
+ACCELEROMETER, CELL = "mount of the accelerometer", "mount of the load cell"
+COARSE = 12  # frequencies of each mount that the search begins with
+STARTS = 4  # of them that are refined
+TOLD = 30.0  # by how much a mount must lower the scaled sum of squares: two parameters by chance lower it by 2
+FIRST_DAMPING = 0.07
+HEARD = 3.0  # standard deviations of its noise from which a line counts
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """Something that swings.
+
+    Attributes
+    ----------
+    name : str
+        "mount of the accelerometer", "mount of the load cell" or "coupled contact".
+    frequency : Estimate
+        Undamped natural frequency [Hz].
+    damping : Estimate
+        Damping ratio.
+    channels : tuple of str
+        Which channels show it.
+    evidence : str
+        Why it bears its name.
+    """
+
+    name: str
+    frequency: Estimate
+    damping: Estimate
+    channels: tuple[str, ...]
+    evidence: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "name": self.name, "frequency": self.frequency.to_dict(), "damping": self.damping.to_dict(),
+            "channels": list(self.channels), "evidence": self.evidence,
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        frequency, damping = (str(each).replace(f" of the {self.name}", "") for each in (self.frequency, self.damping))
+        return f"{self.name}: {frequency}, {damping}; {self.evidence}"
+
+
+@dataclass(frozen=True, eq=False)
+class _MeanLines:
+    """Mean lines of a forced motion: what the accelerometer and the load cell read, and what pulls the mass."""
+
+    frequency: Array
+    acceleration: Complex
+    load: Complex
+    pull: Complex
+    sd: Array
+    load_sd: Array
+    mass: float
+    inertia: float
+
+    def misfit(self, accelerometer: tuple[float, float] | None, cell: tuple[float, float] | None) -> Array:
+        """What the accelerometer reads beyond what the load cell lets expect, in standard deviations."""
+        unit = np.ones(len(self.frequency), dtype=complex)
+        swung = resonance(*accelerometer).at(self.frequency) if accelerometer else unit
+        felt = resonance(*cell).at(self.frequency) if cell else unit
+        share = self.inertia / self.mass
+        friction = (self.load / felt - share * self.pull) / (1 - share)
+        rest = self.acceleration - swung * (self.pull - friction) / self.mass
+        sd = np.hypot(self.sd, np.abs(swung / felt) * self.load_sd / self.mass)
+        return np.concatenate([rest.real / sd, rest.imag / sd])
+
+
+def find_mounts(lines: Lines, record: Record, rig: Mapping[str, Any]) -> tuple[Resonance, ...]:
+    r"""Which mounts swing, if the accelerometer and the load cell are to tell one motion?
+
+    With the pull :math:`p = k(z - x) - c\dot x + P` and :math:`\mu` the flange's mass over m, the friction is
+    :math:`f = (L/H_l - \mu p)/(1 - \mu)` from the load cell's reading L, and the accelerometer reads
+    :math:`H_a (p - f)/m`. Frequency and damping of both mounts are those that bring every line of the two readings
+    together, by least squares. A mount is named only where the lines can not do without it.
+    """
+    balance = _balance(lines, record, rig)
+    if len(balance.frequency) < 8:
+        return ()
+    fits = {kinds: _fitted(balance, kinds) for kinds in ("", "a", "l", "al")}
+    best = fits["al"]
+    scale = max(1.0, best.cost / max(1, 2 * len(balance.frequency) - 4))
+    shown = [k for k, other in (("a", "l"), ("l", "a")) if (fits[other].cost - best.cost) / scale > TOLD]
+    kept = fits["".join(shown)]
+    return tuple(resonance for kind in shown for resonance in _named(kept, kind, balance))
+
+
+def _balance(lines: Lines, record: Record, rig: Mapping[str, Any]) -> _MeanLines:
+    """The mean lines, those that stand out of the noise in both readings."""
+    s = 2j * np.pi * lines.frequency
+    mean = {name: values.mean(axis=0) for name, values in lines.amplitudes.items()}
+    nothing = np.zeros(len(s), dtype=complex)
+    base = mean.get("z", nothing)
+    driven = rig["damping"] * s * (mean["x"] - (base if rig["damper"] == "base" else 0.0))
+    pull = rig["stiffness"] * (base - mean["x"]) - driven + mean.get("force", nothing)
+    points = 2.0 * (len(lines.frequency) + 1) * lines.count * lines.worth
+    level = {}
+    for name in ("x", "z", "a", "load"):
+        noise = noise_along(record[name], record.fs, record.channels[name].noise) if name in mean else np.zeros(1)
+        level[name] = math.sqrt(2 * float(np.mean(noise**2)) / points)  # of the real part of a mean line
+    pulled = rig["stiffness"] * math.hypot(level["x"], level["z"])
+    heard = (np.abs(mean["a"]) > HEARD * level["a"]) & (np.abs(mean["load"]) > HEARD * level["load"])
+    heard &= lines.frequency < 0.4 * record.fs
+    size = int(heard.sum())
+    return _MeanLines(
+        lines.frequency[heard], mean["a"][heard], mean["load"][heard], pull[heard],
+        np.full(size, math.hypot(level["a"], pulled / rig["mass"])), np.full(size, level["load"]),
+        rig["mass"], record.channels["load"].inertia,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    kinds: str
+    cost: float
+    values: Array  # log frequency and log damping of each mount
+    covariance: Array
+
+
+def _fitted(balance: _MeanLines, kinds: str) -> _Fitted:
+    """The best mounts of these kinds ("a", "l"), from a coarse search."""
+    from itertools import product
+
+    from scipy.optimize import least_squares
+
+    def misfit(values: Array) -> Array:
+        pairs = {kind: (np.exp(values[2 * j]), np.exp(values[2 * j + 1])) for j, kind in enumerate(kinds)}
+        return balance.misfit(pairs.get("a"), pairs.get("l"))
+
+    if not kinds:
+        return _Fitted(kinds, float(np.sum(misfit(np.empty(0)) ** 2)), np.empty(0), np.empty((0, 0)))
+    low, high = math.log(2 * balance.frequency[0]), math.log(2 * balance.frequency[-1])
+    places = np.linspace(low, high, COARSE)
+    grid = [
+        np.array([value for place in chosen for value in (place, math.log(FIRST_DAMPING))])
+        for chosen in product(places, repeat=len(kinds))
+    ]
+    grid.sort(key=lambda values: float(np.sum(np.abs(misfit(values)))))
+    bounds = ([low - 1, math.log(1e-4)] * len(kinds), [high + 1, math.log(2.0)] * len(kinds))
+    solve: Any = least_squares
+    fits = [solve(misfit, start, bounds=bounds, x_scale=0.05) for start in grid[:STARTS]]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    curved = best.jac.T @ best.jac
+    scale = max(1.0, 2 * best.cost / max(1, len(best.fun) - len(best.x)))
+    return _Fitted(kinds, float(2 * best.cost), best.x, scale * np.linalg.pinv(curved))
+
+
+def _named(fit: _Fitted, kind: str, balance: _MeanLines) -> list[Resonance]:
+    """The mount as a resonance, if its frequency lies among the lines."""
+    at = 2 * fit.kinds.index(kind)
+    frequency, damping = np.exp(fit.values[at : at + 2])
+    if not balance.frequency[0] < frequency < balance.frequency[-1]:
+        return []
+    sd = np.sqrt(np.diag(fit.covariance))[at : at + 2]
+    name, channel = (ACCELEROMETER, "a") if kind == "a" else (CELL, "load")
+    method = f"{len(balance.frequency)} lines of acceleration and load, by least squares"
+    other = "load" if kind == "a" else "a"
+    return [
+        Resonance(
+            name,
+            Estimate.normal(f"frequency of the {name}", frequency, sd=frequency * sd[0], unit="Hz", method=method),
+            Estimate.normal(
+                f"damping ratio of the {name}", damping, sd=damping * sd[1], unit="1", method=method
+            ).within(0),
+            (channel,),
+            f"{channel} swings where {other} does not",
+        )
+    ]

@@ -1,1 +1,0 @@
-"""Curves of friction over velocity, displacement, load and time, against a record."""

@@ -1,0 +1,13 @@
+from stickslip.cycle.before_slip import Presliding as Presliding
+from stickslip.cycle.before_slip import presliding as presliding
+from stickslip.cycle.onset import Breakaway as Breakaway
+from stickslip.cycle.onset import breakaway as breakaway
+from stickslip.cycle.parts import Stretch as Stretch
+from stickslip.cycle.parts import join_sticks as join_sticks
+from stickslip.cycle.parts import overlapping as overlapping
+from stickslip.cycle.slips import SlipRinging as SlipRinging
+from stickslip.cycle.slips import slip_ringing as slip_ringing
+from stickslip.cycle.sticks import StickEvent as StickEvent
+from stickslip.cycle.sticks import Sticks as Sticks
+
+__all__: list[str]

@@ -1,0 +1,417 @@
+"""How large is the friction just before a contact slips, against the friction while it slides?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.balance.balance import Balance
+from stickslip.balance.force import FUSIONS
+from stickslip.balance.load_cell import ALONE
+from stickslip.balance.motion import is_measured
+from stickslip.cycle.slips import ringing_of
+from stickslip.cycle.strokes import FAST, Stroke, Strokes, find_strokes
+from stickslip.errors import EstimateError
+from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.record.record import Record
+from stickslip.signals.derivatives import noise_along
+from stickslip.signals.noise import noise_level
+from stickslip.statistics import mean_of_cycles
+
+Array = NDArray[np.float64]
+
+QUESTION = "the friction at breakaway"
+SIDES = ((1, "forward"), (-1, "back"))
+TRAVEL = 0.05  # of a stroke: how far the start of a slip is followed
+BEFORE = 5  # a stick's last fifth tells what it bears at its end
+ROWS = 256  # of the start of a slip that are looked at
+PULL, PEAK = "pull at the start of the slip", "peak before the slip"
+STRAYS = 1.5  # deviations of its noise by which the displacement of a mass at rest strays at most; a rig's at rest: 1.0
+FINEST = 1e-6  # of the motion: a displacement without noise
+FEW = 4  # samples from a reversal to the slip
+BLUNT = {"load": 1, "a": 4, "x": 12}  # samples in which a corner of the friction is known by the best of its sensors
+ROUNDED = {"load": 0.15, "a": 0.3, "x": 0.6}  # share of a sudden fall of the friction that smoothing takes off its peak
+PULLED = 0.025  # share by which smoothing and lags move the level that a pull is held against, on simulated rigs
+NOTHING = 0.9  # of its level, by which a friction that tells nothing of its peak strays after a slip
+NEAR = 12  # samples before a slip in which the friction's rise is looked for
+CREEPS = 0.1  # of a stroke's largest speed, below which it does not slide for good
+RINGS = 1.5  # times what a mount's ring is after half a cycle it is at its start, at most
+LEAST = 8  # samples in which a stick's end and a slip's start can be told
+STEADY = 0.3  # of the sliding friction: one that swings by more is no friction to be quoted
+UNSURE = 0.2  # of the noise's variance, by which what is taken off may be wrong (95 %)
+QUARTILE = 0.6744897501960817  # of the normal distribution
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Breakaway(Result):
+    """The friction at which a contact breaks away.
+
+    Attributes
+    ----------
+    forward, back : Estimate or None
+        Static friction: what the contact bears just before it slips, in either direction.
+    ratio : Estimate
+        That over the sliding friction of the same stroke, of both directions.
+    ringing_forward, ringing_back : Estimate or None
+        Frequency [Hz] at which the friction rings after slip has begun, where it was measured and does; more of it
+        tells :func:`slip_ringing`.
+    ringing_difference : Estimate or None
+        Forward less back [Hz].
+    swing_forward, swing_back : Estimate or None
+        How much the friction swings about its level while it slides, over that level, its noise taken off; a friction
+        that is steady enough to be called one does so by less than 30 %.
+    count : int
+        Strokes looked at.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    forward: Estimate | None
+    back: Estimate | None
+    ratio: Estimate
+    ringing_forward: Estimate | None
+    ringing_back: Estimate | None
+    ringing_difference: Estimate | None
+    swing_forward: Estimate | None
+    swing_back: Estimate | None
+    count: int
+    status: str
+
+
+def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
+    r"""How large is the friction just before the contact slips, against the friction while it slides?
+
+    A mass at rest has no inertia force: the contact bears exactly what pulls, :math:`p = k (z - x) + c\,\dot z + P`
+    (the second term for a damper on the base), which is known without any differentiation. When the slip begins is
+    found, to a sample, from its first travel, :math:`m\ddot x = p - f` with f constant so early, by least squares over
+    the instant and f; the pull can not be less than f then. Static friction is the pull at that instant, from a line
+    through the stick's last fifth. Of a friction that was measured, or found by all sensors together, it is the largest
+    value before the contact moves, which noise makes too large by two of its deviations at most: the interval's low end
+    goes as far down. Where the mass moves before friction is near its level it is the first peak thereafter.
+
+    A mass that is not at rest while it sticks, ringing on a contact that gives way, bears its own inertia beside the
+    pull: then it is the friction's peak, and the interval reaches from the pull on. The interval of a peak that was
+    not measured has what sensors and smoothing do to it: as much as the friction rises in a sample before it (in four
+    without a load cell, in twelve from the displacement alone) or 15 % (30 %, 60 %) of what it then falls, for a
+    corner is not sharper known; as much as the
+    friction strays from its level while it slides; and where a sensor's mount is not stated one and a half times as
+    much as it strays and rings after the slip.
+
+    Parameters
+    ----------
+    record : Record
+        With ``friction`` and ``x`` (or ``theta``, or ``v``), as for :func:`friction_loops`.
+    contact : {"ground", "base"}, optional
+        What the mass slides on; as :func:`friction_force` was told, or the ground, when not given.
+
+    Returns
+    -------
+    Breakaway
+
+    Raises
+    ------
+    RecordError
+        A channel is missing, broken or too short, or the units of friction and motion do not belong together.
+    EstimateError
+        No motion, no stroke in which the contact turns round and slides, a hold of less than four samples, or a
+        friction that strays from its level by nearly as much as that after each slip, as a mount that rings makes it.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> drive = ss.drives.HarmonicBase(3e-3, frequency=1.0)
+    >>> slider = ss.Oscillator(3.0, 1200, law=ss.laws.Coulomb(1.0, static=1.3), drive=drive)
+    >>> record = ss.simulate(slider, cycles=12).record(fs=500)
+    >>> found = breakaway(ss.friction_force(record.rows(1000, 6000), mass=3.0, stiffness=1200))
+    >>> bool(abs(found.ratio.value - 1.3) < 0.03)
+    True
+    """
+    strokes = find_strokes(record, contact=contact, question=QUESTION)
+    borne = _borne(record, strokes)
+    levels = [_level(borne, strokes, way, side) for way, side in SIDES]
+    sliding = float(np.median([each.level for each in borne.strokes]))
+    ratio = mean_of_cycles(
+        "static over sliding friction",
+        [friction / each.level for each, friction in zip(borne.strokes, borne.friction, strict=True)],
+        unit="1", method=f"{borne.method} over the median of the stroke, mean of strokes",
+    )  # fmt: skip
+    ratio = _widened(ratio, borne.below / sliding, borne.above / sliding)
+    status = borne.status
+    if status == "ok" and borne.method == PULL and ratio.interval[1] < 1:
+        status = (
+            "below the sliding friction: either that grows with speed, or the mass still rings on its contact when it "
+            'slips, and the pull is not what it bears: take friction_force(record, ..., method="fusion")'
+        )
+    rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
+    heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
+    swings = [_swing(record, [each for each in borne.strokes if each.way == way], side) for way, side in SIDES]
+    return Breakaway(
+        _flagged(levels[0], status), _flagged(levels[1], status), _flagged(ratio, status) or ratio, *heard,
+        swings[0], swings[1], len(borne.strokes), status,
+    )  # fmt: skip
+
+
+def _level(borne: _Borne, strokes: Strokes, way: int, side: str) -> Estimate | None:
+    values = [
+        friction + way * strokes.offset
+        for each, friction in zip(borne.strokes, borne.friction, strict=True)
+        if each.way == way
+    ]
+    if not values:
+        return None
+    how = f"{borne.method}, mean of strokes"
+    found = mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=how)
+    return _widened(found, borne.below, borne.above)
+
+
+def _flagged(estimate: Estimate | None, status: str) -> Estimate | None:
+    return estimate if estimate is None or status == "ok" else replace(estimate, status=status)
+
+
+@dataclass(frozen=True, eq=False)
+class _Borne:
+    """What the contact bears just before it slips [N], stroke by stroke, and how far off all of it may be."""
+
+    strokes: Sequence[Stroke]
+    friction: Sequence[float]
+    method: str
+    below: float = 0.0
+    above: float = 0.0
+    status: str = "ok"
+
+
+def _borne(record: Record, strokes: Strokes) -> _Borne:
+    """By the pull where the mass rests; else by the friction's peak, and, where the pull is known, from there on."""
+    pulled, rested = _by_pull(record, strokes), [each for each in strokes.strokes if each.rests]
+    mostly = 2 * len(rested) > len(strokes.strokes)
+    strays = _strays(rested, strokes, record.fs)
+    if pulled is not None and mostly and strays < STRAYS:
+        return pulled
+    peak = _by_peak(record, strokes)
+    if not mostly:
+        words = "the mass moves before the friction has come near its level: the first peak holds the ring that follows"
+        return replace(peak, status=_and(words, peak.status))
+    if pulled is None:
+        return peak
+    words = (
+        f"the mass is not at rest while it sticks (it strays by {strays:.2g} times its displacement's noise), so that "
+        "the pull is not what the contact bears: told from the pull to the balance of forces"
+    )
+    apart = float(np.median(peak.friction)) - float(np.median(pulled.friction))
+    return replace(
+        peak, below=max(peak.below, apart + pulled.below), above=max(peak.above, pulled.above - apart),
+        status=_and(words, peak.status),
+    )  # fmt: skip
+
+
+def _and(words: str, status: str) -> str:
+    """Words, and a status where there is one."""
+    return words if status == "ok" else f"{words}; {status}"
+
+
+def _strays(rested: Sequence[Stroke], strokes: Strokes, fs: float) -> float:
+    """How far the mass moves with its load in the middle of its sticks, in deviations of its displacement's noise."""
+    held = [each.displacement[: each.slip] for each in rested if each.slip >= 2 * LEAST]
+    if not held:
+        return 0.0
+    quarters = [np.array_split(each, 4) for each in held]
+    if np.median([last.mean() - first.mean() for first, *_, last in quarters]) < 0:
+        return 0.0  # against its load something else moves, slowly
+    found = [float(np.std(each[len(each) // 4 : 3 * len(each) // 4])) for each in held]
+    reach = float(np.median([np.ptp(each.displacement) for each in rested]))
+    return float(np.median(found)) / max(noise_level(strokes.motion.displacement, fs), FINEST * reach)
+
+
+def _by_pull(record: Record, strokes: Strokes) -> _Borne | None:
+    """What pulls when each slip begins, where friction was found by a balance of forces and no sensor did better."""
+    balance = _balance(record)
+    if balance is None:
+        return None
+    pull = balance.pull(record) - strokes.offset
+    rested = [each for each in strokes.strokes if each.rests]
+    found = [(each, *told) for each in rested if (told := _begun(each, pull, balance.mass, record.fs))]
+    if not found:
+        return None
+    chosen, friction, change = zip(*found, strict=True)
+    level = float(np.median([each.level for each in chosen]))
+    unsure = float(np.median(change)) + PULLED * level  # the instant is known to a sample
+    return _Borne(chosen, friction, PULL, unsure, unsure)
+
+
+def _by_peak(record: Record, strokes: Strokes) -> _Borne:
+    """The friction's largest value before each slip, with what sensors and smoothing do to it."""
+    chosen = strokes.strokes
+    friction = [float(each.friction[each.slip]) for each in chosen]
+    noise = 2 * (record.channels["friction"].noise or noise_level(record["friction"], record.fs))
+    if is_measured(record, "friction"):
+        return _Borne(chosen, friction, PEAK, noise)
+    rows = float(np.median([each.slip for each in chosen]))
+    if rows < FEW:
+        raise EstimateError(
+            f"{rows:g} samples from a reversal to the slip at {record.fs:g} Hz",
+            f"what the contact bears before it slips takes {FEW} at least",
+            "sample faster",
+        )
+    told = [step.arguments for step in record.history if step.action == "friction_force"]
+    method = told[-1]["method"] if told else ""
+    unknown = _unstated(record, method)
+    strays = [_stray(each, wide=bool(unknown)) for each in chosen]
+    stray = (RINGS if unknown else 1.0) * float(np.median(strays))
+    level = float(np.median([each.level for each in chosen]))
+    if stray > NOTHING * level:
+        raise EstimateError(
+            f"the friction strays by {stray:.2g} after each slip, from a level of {level:.2g}",
+            f"static friction is told where it strays by less than {NOTHING:.0%} of its level",
+            unknown or "give a record with less noise",
+        )
+    best = next(iter(_used(record, method)), "x")
+    fall = float(np.median(friction)) - level
+    corner = max(BLUNT[best] * float(np.median([_steepest(each) for each in chosen])), ROUNDED[best] * fall)
+    status = unknown or ("told from the displacement alone, which blurs a peak" if best == "x" else "ok")
+    return _Borne(chosen, friction, PEAK, max(noise, corner / 4) + stray, corner + stray, status)
+
+
+def _used(record: Record, method: str) -> list[str]:
+    """The sensors behind a friction that a method found, without its displacements."""
+    asked = ("load",) if method == ALONE else FUSIONS.get(method, ("a",))
+    return [name for name in ("load", "a") if name in asked and is_measured(record, name)]
+
+
+def _unstated(record: Record, method: str) -> str:
+    """What of the sensors behind the friction is taken as it reads, in words."""
+    names = _used(record, method)
+    if method in (*FUSIONS, ALONE):
+        names = [name for name in names if record.channels[name].mount is None]
+        how = "is not stated, and its ringing is in it: state it, by with_details or under [sensors] in the rig file"
+    elif method and not names:
+        return "a balance of forces smooths and overshoots its peak"
+    else:
+        how = 'is not used, and its ringing is in it: state it and take friction_force(record, ..., method="fusion")'
+    return f"the mount of {' and '.join(names)} {how}" if names else ""
+
+
+def _steepest(stroke: Stroke) -> float:
+    """By how much the friction rises in a sample at most, shortly before the slip [N]."""
+    return float(np.max(np.diff(stroke.friction[max(0, stroke.slip - NEAR) : stroke.slip + 1]), initial=0.0))
+
+
+def _stray(stroke: Stroke, *, wide: bool) -> float:
+    """How far the friction strays from its level while it slides, once it has come back to it [N].
+
+    `wide` from the slip on, with all that rings there; else from where it slides for good.
+    """
+    speed = np.gradient(stroke.displacement)
+    fast = np.flatnonzero(speed > FAST * speed.max())
+    slow = np.flatnonzero(speed[: fast[0]] < CREEPS * speed.max())
+    first = stroke.slip if wide or not len(slow) else max(stroke.slip, int(slow[-1]) + 1)
+    off = stroke.friction[first : int(fast[-1]) + 1] - stroke.level
+    back = np.flatnonzero(off <= 0)
+    return float(np.max(np.abs(off[back[0] :]))) if len(back) else 0.0
+
+
+def _widened(estimate: Estimate, below: float, above: float) -> Estimate:
+    """The estimate, its interval as far as noise and the instant of a sample may have moved it."""
+    low, high = estimate.interval
+    wide = replace(estimate, interval=(low - below, high + above), sd=float(np.hypot(estimate.sd, (below + above) / 4)))
+    return wide.within(0.0)
+
+
+def _balance(record: Record) -> Balance | None:
+    """By which friction was found, where no sensor did better than that and the mass rests on the ground."""
+    told = [step.arguments for step in record.history if step.action == "friction_force"]
+    made = record.channels["friction"].source == "friction_force"
+    if not (made and told and told[-1].get("mass") and told[-1].get("contact") == "ground"):
+        return None
+    return None if told[-1]["method"] in FUSIONS else Balance.told(told[-1])
+
+
+def _begun(stroke: Stroke, pull: Array, mass: float, fs: float) -> tuple[float, float] | None:
+    """What pulls when the slip begins, and by how much that changes from a sample to the next."""
+    if stroke.slip < LEAST:
+        return None
+    first = stroke.slip // 2
+    way = stroke.displacement - np.median(stroke.displacement[first : stroke.slip + 1])
+    last = int(np.argmax(way > TRAVEL * np.ptp(way))) + 1
+    if last - first < LEAST:
+        return None
+    force = stroke.way * pull[stroke.first + first : stroke.first + last]
+    begins = _start(way[first:last], force, mass, fs)
+    if begins is None:
+        return None
+    rows = np.arange(max(0, int(begins) - max(4, (first + int(begins)) // BEFORE)), int(begins) + 1)
+    slope, value = np.polyfit(rows - begins, force[rows], 1) if len(rows) > 1 else (0.0, force[rows[0]])
+    return float(value), float(abs(slope))
+
+
+def _start(travel: Array, pull: Array, mass: float, fs: float) -> float | None:
+    """When, in samples, a slip begins of which the first travel is known."""
+    every = len(travel) // ROWS + 1
+    travel, pull, count = travel[::every], pull[::every], len(travel[::every])
+    begins = np.arange(1, count - 3)
+    since = np.maximum(np.arange(count) - begins[:, None], 0.0)
+    once = _summed(pull)
+    twice = _summed(once)
+    # by the pull alone, and by a force of 1 N, from each begin on
+    pulled = np.where(since > 0, twice - twice[begins, None] - once[begins, None] * since, 0.0)
+    step = every**2 / (mass * fs**2)
+    held, rest = step * since**2 / 2, travel - step * pulled
+    held_about, rest_about = (each - each.mean(axis=1, keepdims=True) for each in (held, rest))
+    friction = -np.sum(held_about * rest_about, axis=1) / np.sum(held_about**2, axis=1)
+    cost = np.sum((rest_about + friction[:, None] * held_about) ** 2, axis=1)
+    cost[pull[begins] < friction] = np.inf
+    best = int(np.argmin(cost))
+    if not np.isfinite(cost[best]):
+        return None
+    around = cost[max(best - 1, 0) : best + 2]
+    moved = 0.0
+    if len(around) == 3 and np.isfinite(around).all() and (curved := around[0] - 2 * around[1] + around[2]) > 0:
+        moved = (around[0] - around[2]) / (2 * curved)
+    return float(every * (begins[best] + moved))
+
+
+def _summed(values: Array) -> Array:
+    """The integral, by trapezoids of one sample."""
+    return np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2)])
+
+
+def _swing(record: Record, strokes: Sequence[Stroke], side: str) -> Estimate | None:
+    """Median deviation of the friction from its median while it slides, as a normal law's, less that of its noise."""
+    noise, squares, noises = _noise(record), [], []
+    for stroke in strokes:
+        speed = np.gradient(stroke.displacement)
+        rows = stroke.slip + np.flatnonzero(speed[stroke.slip :] > FAST * speed.max())
+        if len(rows):
+            friction = stroke.friction[rows]
+            swing = float(np.median(np.abs(friction - np.median(friction)))) / QUARTILE
+            noises.append((float(np.median(noise[stroke.first + rows])) / stroke.level) ** 2)
+            squares.append((swing / stroke.level) ** 2 - noises[-1])
+    if not squares:
+        return None
+    square = mean_of_cycles(
+        f"swing of the friction while sliding {side}", squares, unit="1",
+        method="median deviation from the median, less the noise",
+    )  # fmt: skip
+    half = UNSURE * float(np.mean(noises))
+    low, high = square.interval
+    found = _root(replace(square, interval=(low - half, high + half), sd=float(np.hypot(square.sd, half / 2))))
+    swings = f"the friction swings by {100 * found.value:.0f} % of its level while it slides: a vibration of the rig"
+    return replace(found, status=f"{swings} or a faulty record, no steady friction") if found.value >= STEADY else found
+
+
+def _noise(record: Record) -> Array:
+    """Standard deviation of the friction's noise at each sample: as its balance tells it, as stated, or as it shows."""
+    if "friction_sd" in record and not is_measured(record, "friction"):
+        return record["friction_sd"]
+    return noise_along(record["friction"], record.fs, record.channels["friction"].noise)
+
+
+def _root(square: Estimate) -> Estimate:
+    """The square root of an estimate that can not be below zero."""
+    possible = square.within(0.0, otherwise="its noise is larger than all that the friction swings by")
+    low, high = (float(np.sqrt(end)) for end in possible.interval)
+    return replace(
+        possible, value=float(np.sqrt(possible.value)), interval=(low, high), sd=(high - low) / (2 * NORMAL_95)
+    )

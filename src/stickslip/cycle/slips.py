@@ -1,0 +1,287 @@
+"""How the friction rings after a slip begins, and whether it does so alike in both directions."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.balance.motion import is_measured
+from stickslip.cycle.strokes import Stroke, find_strokes
+from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import Estimate, Result
+from stickslip.record.record import Record
+from stickslip.statistics import FEW_CYCLES, mean_of_cycles, student
+
+Array = NDArray[np.float64]
+
+QUESTION = "the ringing after slip begins"
+SOON = 4  # after slip begins: a quarter of the stroke
+DEGREES = (4, 6, 8)  # of polynomials that are not the ring; the last is taken off before its line is looked for
+SLOW, STIFF = DEGREES[0], DEGREES[-1]
+MIXED = 0.02  # of the frequency: polynomials that change it by more are said to
+FASTER = 5.0  # cycles in that quarter: a slower ring is not told from the polynomial
+LEAST = 48  # samples in which a ring can be told
+SAMPLES = 5  # a cycle, at least
+MOST = 60  # strokes of a direction looked at, evenly chosen: their mode is known well enough
+PARTS = 20  # in which strokes are left out in turn, at most
+LOUD = 0.03  # of the sliding friction: a ring of a smaller amplitude is none
+EXPLAINED = 0.25  # of what the polynomial leaves: a mode that explains less is none
+ALIKE = 0.25  # of the strongest line's frequency: a mode that is farther off is another
+PADDED = 4  # times the samples of the spectrum
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlipRinging(Result):
+    """How the friction rings after a slip begins.
+
+    Attributes
+    ----------
+    forward, back : Estimate or None
+        Frequency [Hz]; None where a direction does not ring.
+    damping_forward, damping_back : Estimate or None
+        Damping ratio; about zero where the ring goes on, negative where it grows.
+    amplitude_forward, amplitude_back : Estimate or None
+        At the breakaway, or the first peak after it, over the sliding friction.
+    difference : Estimate or None
+        Frequency forward less back [Hz].
+    verdict : str
+        "higher forward", "higher back", "no difference can be told", "forward alone" or "back alone".
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    forward: Estimate | None
+    back: Estimate | None
+    damping_forward: Estimate | None
+    damping_back: Estimate | None
+    amplitude_forward: Estimate | None
+    amplitude_back: Estimate | None
+    difference: Estimate | None
+    verdict: str
+    status: str
+
+
+def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
+    r"""At which frequency does a measured friction ring once a slip has begun, and is it the same in both directions?
+
+    A contact that gives way, or the rig that holds it, is let go when the slip begins, and rings about the sliding
+    friction: :math:`f(t) = q(t) + \mathrm{Re}\, c\, e^{pt}`, with a polynomial q for the friction's own course, in the
+    quarter of the stroke after the breakaway. One pole p is fitted to all strokes of a direction by least squares,
+    with c and q of each stroke eliminated (variable projection; Golub and Pereyra 1973), from the strongest line of
+    them all. The frequency :math:`\mathrm{Im}\, p / 2\pi` and the damping ratio :math:`-\mathrm{Re}\, p / |p|` are
+    the means of what they are beside polynomials of degree 4, 6 and 8, as sure as these agree and as the answers
+    without some of the strokes do (jackknife). A direction rings where the mode explains a quarter of the swings or
+    more, by 3 % of the sliding friction at least. The interval of the difference follows from both intervals (MOVER;
+    Zou and Donner 2008).
+
+    Parameters
+    ----------
+    record : Record
+        With ``friction`` that was measured, and ``x`` (or ``theta``, or ``v``).
+    contact : {"ground", "base"}, optional
+        What the mass slides on; the ground, when not given.
+
+    Returns
+    -------
+    SlipRinging
+
+    Raises
+    ------
+    RecordError
+        A channel is missing, broken or too short; or friction came from a balance, whose smoothing rings by itself.
+    EstimateError
+        No stroke in which the contact slides, or "no ringing" after the slips of either direction.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> time = np.arange(8000) / 1000
+    >>> since, way = np.mod(time + 0.5, 1.0), np.sign(np.cos(np.pi * time))
+    >>> ring = np.where(way > 0, np.cos(2 * np.pi * 47 * since), np.cos(2 * np.pi * 54 * since))
+    >>> friction = way * (2 + 0.6 * np.exp(-since / 0.1) * ring)
+    >>> found = slip_ringing(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": friction}, fs=1000))
+    >>> round(found.forward.value, 1), round(found.back.value, 1), found.verdict
+    (47.0, 54.0, 'higher back')
+    """
+    record.require("friction", question=QUESTION)
+    if not is_measured(record, "friction"):
+        raise RecordError(
+            "friction came from a balance of forces", f"{QUESTION} needs one that was measured: smoothing rings itself",
+            "give the load cell's channel as friction",
+        )  # fmt: skip
+    strokes = find_strokes(record, contact=contact, question=QUESTION)
+    found = ringing_of(strokes.strokes, record.fs)
+    if found is None:
+        raise EstimateError(
+            f"no ringing: the friction of {len(strokes.strokes)} strokes swings about its level by less than "
+            f"{LOUD:.0%} of it, or in each stroke otherwise",
+            f"{QUESTION} needs {FASTER:g} cycles at least in the quarter of a stroke after the breakaway",
+            "sample faster, or look at the map",
+        )
+    return found
+
+
+def ringing_of(strokes: Sequence[Stroke], fs: float) -> SlipRinging | None:
+    """How the friction of some strokes rings; None where it does not."""
+    forward, back = (_direction([each for each in strokes if each.way == way], side, fs)
+                     for way, side in ((1, "forward"), (-1, "back")))  # fmt: skip
+    if forward is None and back is None:
+        return None
+    difference = None if forward is None or back is None else _difference(forward[0], back[0])
+    (f, z, a), (g, y, b) = forward or (None, None, None), back or (None, None, None)
+    flags = [each.status for each in (f, g) if each is not None and each.status != "ok"]
+    verdict = ("back alone" if f is None else "forward alone") if difference is None else _verdict(difference)
+    return SlipRinging(f, g, z, y, a, b, difference, verdict, flags[0] if flags else "ok")
+
+
+def _verdict(difference: Estimate) -> str:
+    low, high = difference.interval
+    return "higher forward" if low > 0 else "higher back" if high < 0 else "no difference can be told"
+
+
+def _difference(forward: Estimate, back: Estimate) -> Estimate:
+    """Forward less back, its interval by both intervals' halves in squares."""
+    value = forward.value - back.value
+    (low, high), (under, over) = forward.interval, back.interval
+    below, above = (
+        math.hypot(forward.value - low, over - back.value),
+        math.hypot(high - forward.value, back.value - under),
+    )
+    flags = [each.status for each in (forward, back) if each.status != "ok"]
+    return Estimate(
+        "ringing after slip begins, forward less back", value, interval=(value - below, value + above),
+        sd=math.hypot(forward.sd, back.sd), unit="Hz", method="difference of both directions",
+        status=flags[0] if flags else "ok",
+    )  # fmt: skip
+
+
+def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimate, Estimate, Estimate] | None:
+    """Frequency, damping ratio and amplitude of the strokes of one direction; None where they do not ring alike."""
+    chosen = strokes[:: len(strokes) // MOST + 1]
+    cuts = [values for each in chosen if len(values := _after(each)) >= LEAST]
+    start = _strongest([_swings(values, STIFF) for values in cuts], fs)
+    if start is None or 2 * len(cuts) <= len(chosen):
+        return None
+    swings = [_swings(values, SLOW) for values in cuts]
+    turn = 2 * math.pi * start
+    mode = _mode(swings, np.array([-0.03 * turn, turn]), fs)
+    total = sum(float(each @ each) for each in swings)
+    amplitudes = [_amplitude(each, mode.x, fs) for each in swings]
+    if (
+        abs(mode.x[1] / turn - 1) > ALIKE
+        or float(mode.fun @ mode.fun) > (1 - EXPLAINED) * total
+        or np.median(amplitudes) < LOUD
+    ):
+        return None
+    parts = np.array_split(np.arange(len(swings)), min(len(swings), PARTS))
+    without = [
+        _told(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
+        for part in parts if len(parts) > 1
+    ]  # fmt: skip
+    degrees = np.array([
+        _told(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES
+    ])  # fmt: skip
+    frequency, damping = _told_surely(degrees, np.reshape(without, (-1, 2)), len(cuts), side)
+    amplitude = mean_of_cycles(
+        f"amplitude of that ringing over the friction, {side}",
+        amplitudes,
+        unit="1",
+        method="where each slip begins, mean of strokes",
+    )
+    return frequency, damping, amplitude
+
+
+def _told_surely(degrees: Array, without: Array, count: int, side: str) -> list[Estimate]:
+    """Frequency and damping ratio, as sure as the answers agree: those of the polynomials, those without some strokes.
+
+    The two parts of the interval are added in squares; the second is a jackknife's.
+    """
+    parts = len(without)
+    sd = np.sqrt((parts - 1) / parts * ((without - without.mean(axis=0)) ** 2).sum(axis=0)) if parts else [math.inf] * 2
+    told, spread = degrees.mean(axis=0), degrees.std(axis=0, ddof=1)
+    quantile = student(max(parts - 1, 1))
+    status = (
+        "ok" if count >= FEW_CYCLES else f"only {count} stroke{'s' * (count > 1)} a direction: the interval is crude"
+    )
+    low, high = degrees[:, 0].min(), degrees[:, 0].max()
+    if spread[0] > max(sd[0], MIXED * told[0]):
+        status = f"the friction's own course takes part of the ring: {low:.4g} to {high:.4g} Hz by what is taken for it"
+    checks = (f"{count} strokes", f"{low:.4g} to {high:.4g} Hz beside polynomials of degree {SLOW} to {STIFF}")
+    found = []
+    for row, (what, unit) in enumerate((("ringing after slip begins", "Hz"), ("damping ratio of that ringing", "1"))):
+        half = math.hypot(quantile * sd[row], 2 * spread[row])
+        found.append(
+            Estimate(
+                f"{what}, {side}", float(told[row]), interval=(told[row] - half, told[row] + half),
+                sd=math.hypot(sd[row], spread[row]), unit=unit, status=status, checks=checks,
+                method="one decaying mode in all strokes, least squares; jackknife over strokes, and polynomials",
+            )
+        )  # fmt: skip
+    return found
+
+
+def _told(parameters: Array) -> tuple[float, float]:
+    """Frequency [Hz] and damping ratio of a pole."""
+    decay, turn = map(float, parameters)
+    return turn / (2 * math.pi), -decay / math.hypot(decay, turn)
+
+
+def _after(stroke: Stroke) -> Array:
+    """The friction in the quarter of the stroke after its breakaway, over the sliding friction."""
+    soon = (len(stroke.friction) - stroke.slip) // SOON
+    return stroke.friction[stroke.slip : stroke.slip + soon] / stroke.level
+
+
+@functools.lru_cache(maxsize=64)
+def _slow(count: int, degree: int) -> Array:
+    """Polynomials over some samples, orthonormal."""
+    return np.asarray(np.linalg.qr(np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, count), degree))[0])
+
+
+def _swings(values: Array, degree: int) -> Array:
+    slow = _slow(len(values), degree)
+    return np.asarray(values - slow @ (slow.T @ values))
+
+
+def _strongest(swings: Sequence[Array], fs: float) -> float | None:
+    """Frequency [Hz] of the strongest line of all strokes together."""
+    if not swings:
+        return None
+    longest = max(map(len, swings))
+    powers = np.sum([np.abs(np.fft.rfft(each, PADDED * longest)) ** 2 for each in swings], axis=0)
+    frequencies = np.fft.rfftfreq(PADDED * longest, 1 / fs)
+    allowed = (frequencies >= FASTER * fs / longest) & (frequencies <= fs / SAMPLES)
+    if not allowed.any() or powers[allowed].max() == 0:
+        return None
+    return float(frequencies[allowed][powers[allowed].argmax()])
+
+
+def _waves(parameters: Array, count: int, fs: float, degree: int = SLOW) -> Array:
+    """Cosine and sine of a decaying mode, less what a polynomial takes of them."""
+    wave = np.exp(complex(*parameters) * np.arange(count) / fs)
+    columns, slow = np.column_stack([wave.real, wave.imag]), _slow(count, degree)
+    return np.asarray(columns - slow @ (slow.T @ columns))
+
+
+def _mode(swings: Sequence[Array], start: Array, fs: float, degree: int = SLOW) -> Any:
+    """The one pole whose rings leave least of all strokes."""
+    from scipy.optimize import least_squares
+
+    def left(parameters: Array) -> Array:
+        rests = []
+        for each in swings:
+            basis = np.linalg.qr(_waves(parameters, len(each), fs, degree))[0]
+            rests.append(each - basis @ (basis.T @ each))
+        return np.concatenate(rests)
+
+    return least_squares(left, start, x_scale=[start[1], start[1]], method="lm", max_nfev=60)
+
+
+def _amplitude(swings: Array, parameters: Array, fs: float) -> float:
+    return float(np.linalg.norm(np.linalg.lstsq(_waves(parameters, len(swings), fs), swings, rcond=None)[0]))

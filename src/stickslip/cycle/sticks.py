@@ -1,0 +1,452 @@
+"""When does a contact stick, for how long, and how often?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.balance.force import FUSIONS
+from stickslip.balance.motion import (
+    AUDIBLE,
+    CREEP,
+    Cycles,
+    Motion,
+    contact_motion,
+    find_cycles,
+    motion_channels,
+    slid_on,
+    stretches,
+)
+from stickslip.cycle.holds import Hold, Trace, find_holds
+from stickslip.errors import EstimateError
+from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.record.record import Record
+from stickslip.signals.delay import without_delays
+from stickslip.statistics import mean_of_cycles
+from stickslip.units import parse_value
+
+Array = NDArray[np.float64]
+
+QUESTION = "sticks and slips"
+METHODS = ("fusion", "speed")
+SLIPPED = 3.0  # times the threshold: a motion that never gets there is creep or noise within a stick
+DWELL = 2.5  # times the duration of a passage through zero, from which on it is a stick
+SHORT = 8.0  # samples of a hold below which others are likely missed
+FASTEST = 3  # samples: nothing shorter is told from a reversal
+
+
+@dataclass(frozen=True)
+class StickEvent:
+    """One stick or slip.
+
+    Attributes
+    ----------
+    time : float
+        When it begins [s].
+    kind : str
+        "stick", "slip", "microslip" (within the stick before it), or "microstick" (the contact holds while the motion
+        only reverses: too short for a stick).
+    duration : float
+        How long it lasts [s]; a stick with the micro-slips in it.
+    whole : bool
+        False where the record begins or ends within it.
+    time_sd, duration_sd : float
+        Standard deviations of both [s].
+    """
+
+    time: float
+    kind: str
+    duration: float
+    whole: bool = True
+    time_sd: float = math.nan
+    duration_sd: float = math.nan
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sticks(Result):
+    """Sticks and slips of a contact.
+
+    Attributes
+    ----------
+    share : Estimate
+        Share of the time that the contact holds. By fusion: all holds, those at a mere reversal too; a micro-slip
+        within a stick is no hold (so does a simulated record's truth count). By speed, which sees neither micro-slips
+        nor short holds: the time that the speed is below the threshold, as such records are commonly counted; at most
+        so much of it sticks. The interval's low end is then what is left if every slip began and ended when its speed,
+        carried on to zero, did: linearly before a stick, and after it as a square (with static friction above the
+        sliding one linearly too, so that the low end errs to the low side). `sd` is that of a normal law as wide as
+        the interval.
+    per_cycle : Estimate
+        Stops per cycle.
+    microslips : Estimate or None
+        Micro-slips per stick; None where they can not be seen.
+    kind : str
+        "double stick-slip" where most sticks hold a micro-slip, "stick-slip", or "sliding" where nothing sticks.
+    events : tuple of StickEvent
+        Sticks and slips in turn, each stick followed by the micro-slips within it.
+    threshold : float
+        Speed [m/s or rad/s] below which the contact may stick.
+    noise : float
+        Standard deviation of the velocity's noise [m/s or rad/s].
+    frequency : Estimate
+        Cycles per second [Hz].
+    method : str
+        "fusion": onsets from the friction of all sensors together, to a part of a sample; or "speed".
+    lost : tuple of str
+        What could not be told, and why.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    share: Estimate
+    per_cycle: Estimate
+    microslips: Estimate | None
+    kind: str
+    events: tuple[StickEvent, ...]
+    threshold: float
+    noise: float
+    frequency: Estimate
+    method: str
+    lost: tuple[str, ...]
+    status: str
+
+
+def find_sticks(
+    record: Record,
+    *,
+    contact: str | None = None,
+    threshold: float | str | None = None,
+    frequency: float | str | None = None,
+    method: str | None = None,
+) -> Sticks:
+    """When does the contact stick, for what share of the time, how often per cycle?
+
+    By "fusion" a stick begins where the velocity turns and the friction leaves its sliding value, and ends where the
+    friction, carried on with the contact's spring, reaches it again (see
+    :func:`~stickslip.cycle.holds.find_holds`); where the mass gives way a little and holds again, it is a micro-slip
+    within the stick. On a rig like the thesis's (4 kHz) sticks begin within 0.015 ms and slips within 0.03 ms, by
+    motion sensors alone within 0.1 ms and 0.2 ms; an error of a sensor's lag is not in that.
+
+    By "speed" alone:
+
+    The contact may stick where its speed is below a threshold: five standard deviations of the velocity's noise, or 4
+    % of the typical peak speed where that is larger, for below that creep and presliding of a compliant contact are
+    not told from sticking. A motion that stays below three thresholds is part of the stick around it. A passage
+    through zero is not a stick: at the acceleration with which the speed falls to the threshold before, and rises
+    from it after, it would last ``(t_in + t_out) / 2``, with t_in and t_out the times between one and three
+    thresholds; a stick lasts 2.5 times that at least, and longer than the smoothing of the velocity spreads a jump.
+
+    Parameters
+    ----------
+    record : Record
+        With ``x`` (or ``theta``, or ``v``); ``z`` for a contact on the base. Stated delays are taken out first. Onsets
+        to a part of a sample, and micro-slips, need ``friction_force(record, ..., method="fusion")`` before, or
+        "motion".
+    contact : {"ground", "base"}, optional
+        What the mass slides on, the speed being that against it; as :func:`friction_force` was told, or the ground,
+        when not given.
+    threshold : float or str, optional
+        Speed [m/s or rad/s] below which the contact may stick; found from the record when not given.
+    frequency : float or str, optional
+        Forcing frequency [Hz]; found from the record when not given.
+    method : {"fusion", "speed"}, optional
+        By fusion where the record's friction allows it, when not given.
+
+    Returns
+    -------
+    Sticks
+        Where the method falls back, `lost` says what is lost by it.
+
+    Raises
+    ------
+    RecordError
+        A channel is missing, broken or too short.
+    EstimateError
+        No motion, no complete cycle, or a threshold without meaning.
+
+    Examples
+    --------
+    >>> t = np.arange(8000) / 1000
+    >>> drive = np.sin(2 * np.pi * t)
+    >>> v = np.maximum(np.abs(drive) - 0.5, 0) * np.sign(drive)  # stuck a third of the time
+    >>> x = np.cumsum(v) / 1000 + 1e-6 * np.random.default_rng(0).standard_normal(t.size)
+    >>> sticks = find_sticks(Record.of({"x": x}, fs=1000), threshold=0.01)
+    >>> round(sticks.share.value, 1), round(sticks.per_cycle.value)
+    (0.3, 2)
+    """
+    if method not in (None, *METHODS):
+        raise EstimateError(f"method = '{method}'", f"it is one of {', '.join(METHODS)}", "choose one of them")
+    record = without_delays(record, *motion_channels(record, contact), question=QUESTION)
+    motion = contact_motion(record, contact=contact, question=QUESTION)
+    holds, lost = ((), ()) if method == "speed" else _fused_holds(record, contact)
+    if holds:
+        noise = float(np.median(record["v_sd"])) if "v_sd" in record else motion.noise
+        motion = replace(motion, velocity=record["v"], noise=noise, bandwidth=record.fs / 2)
+    cycles = find_cycles(record, motion, frequency=frequency)
+    limit, rule = _threshold(motion, cycles, threshold)
+    stuck, certain = _stuck(motion, limit)
+    if holds:
+        events = _events_of(holds, stuck, motion, SLIPPED * limit)
+        share = _share_of(events, cycles, motion)
+    else:
+        events = _events(stuck, certain, motion)
+        stated = f"the velocity's noise is {_words(motion.noise, motion)}", *_sensitivity(motion, cycles, limit)
+        share = _share(stuck, certain, cycles, rule, stated)
+    sticks = [event for event in events if event.kind == "stick"]
+    microslips = _microslips(events) if holds and any(event.whole for event in sticks) else None
+    return Sticks(
+        share=share,
+        per_cycle=_per_cycle_of(sticks, cycles, motion, rule),
+        microslips=microslips,
+        kind=_kind(sticks, microslips),
+        events=events,
+        threshold=limit,
+        noise=motion.noise,
+        frequency=cycles.frequency,
+        method="fusion" if holds else "speed",
+        lost=lost,
+        status=_within_noise(limit, motion) or cycles.status,
+    )
+
+
+def _within_noise(limit: float, motion: Motion) -> str:
+    noisy = AUDIBLE * motion.noise
+    if limit >= noisy:
+        return ""
+    return f"the threshold is within the velocity's noise ({_words(noisy, motion)} is five deviations)"
+
+
+def _per_cycle_of(sticks: Sequence[StickEvent], cycles: Cycles, motion: Motion, rule: str) -> Estimate:
+    method = f"sticks begun in each cycle; {rule}"
+    return mean_of_cycles("stops per cycle", _counted(sticks, cycles, motion), unit="1", method=method).within(0.0)
+
+
+def _kind(sticks: Sequence[StickEvent], microslips: Estimate | None) -> str:
+    if microslips is not None and microslips.value > 0.5:
+        return "double stick-slip"
+    return "stick-slip" if sticks else "sliding"
+
+
+def _threshold(motion: Motion, cycles: Cycles, threshold: float | str | None) -> tuple[float, str]:
+    """Speed below which the contact may stick, and the rule in words."""
+    noisy, creep = AUDIBLE * motion.noise, CREEP * cycles.peak
+    limit = max(noisy, creep) if threshold is None else parse_value(threshold, f"{motion.unit}/s")
+    if not 0 < limit < cycles.peak and threshold is not None:
+        raise EstimateError(
+            f"threshold = {_words(limit, motion)}",
+            f"it lies between 0 and the typical peak speed, {_words(cycles.peak, motion)}",
+            "leave it out to have it found",
+        )
+    if SLIPPED * limit >= cycles.peak:
+        raise EstimateError(
+            f"the typical peak speed is {_words(cycles.peak, motion)}, the threshold {_words(limit, motion)}",
+            "slips are told from sticks where they are three times as fast as the threshold",
+            "give a record with less noise or more motion",
+        )
+    told = "five deviations of its noise" if noisy >= creep else f"{100 * CREEP:g} % of its peak, to pass over creep"
+    return limit, f"time with the speed below {_words(limit, motion)} ({'given' if threshold is not None else told})"
+
+
+def _words(speed: float, motion: Motion) -> str:
+    return f"{1e3 * speed:.3g} mm/s" if motion.unit == "m" else f"{speed:.3g} rad/s"
+
+
+def _stuck(motion: Motion, limit: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Where the contact sticks; and where it still does if each slip's speed is carried on to zero."""
+    speed = np.abs(motion.velocity)
+    size = len(speed)
+    slow = speed < limit
+    begins, ends = stretches(~slow)
+    slips = np.maximum.reduceat(np.append(speed, 0.0), np.column_stack([begins, ends]).ravel())[::2] >= SLIPPED * limit
+    begins, ends = begins[slips], ends[slips]
+    stuck, certain = np.ones(size, dtype=bool), np.ones(size, dtype=bool)
+    # from one slip to the next: when the one falls from three thresholds to one, and the next rises back
+    fast = np.flatnonzero(speed >= SLIPPED * limit)
+    before = fast[np.searchsorted(fast, ends) - 1] if len(ends) else ends
+    after = fast[np.searchsorted(fast, begins)] if len(begins) else begins
+    for first, last in zip(begins, ends, strict=True):
+        stuck[first:last] = False
+    certain[:] = stuck
+    rising, falling = after - begins, ends - 1 - before
+    for index in range(len(begins) - 1):
+        first, last = ends[index], begins[index + 1]
+        passage = (falling[index] + rising[index + 1]) / 2
+        if last - first < max(DWELL * passage, FASTEST, motion.blur):
+            stuck[first:last] = certain[first:last] = False
+            continue
+        # deceleration is steady into a stick (v ~ t), acceleration grows out of it (v ~ t^2)
+        certain[first : min(last, first + falling[index] // 2)] = False
+        certain[max(first, last - round(rising[index + 1] / (math.sqrt(SLIPPED) - 1))) : last] = False
+    return stuck, certain
+
+
+def _share(
+    stuck: NDArray[np.bool_], certain: NDArray[np.bool_], cycles: Cycles, rule: str, stated: tuple[str, ...]
+) -> Estimate:
+    name = "stuck share of the time"
+    above, below = (
+        mean_of_cycles(name, _per_cycle(part, cycles), unit="1", method=f"mean of cycles; {rule}", checks=stated)
+        for part in (stuck, certain)
+    )
+    low, high = max(0.0, below.interval[0]), min(1.0, above.interval[1])
+    sd = (high - low) / (2 * NORMAL_95)
+    return Estimate(name, above.value, (low, high), sd, "1", above.method, above.status, above.checks)
+
+
+def _sensitivity(motion: Motion, cycles: Cycles, limit: float) -> tuple[str, ...]:
+    shares = []
+    for factor in (0.5, 2.0):
+        if SLIPPED * factor * limit < cycles.peak and (factor > 1 or factor * limit > motion.noise):
+            stuck, _ = _stuck(motion, factor * limit)
+            share = float(np.mean(_per_cycle(stuck, cycles)))
+            shares.append(f"at {'half' if factor < 1 else 'twice'} the threshold the share is {share:.2f}")
+    return tuple(shares)
+
+
+def _per_cycle(stuck: NDArray[np.bool_], cycles: Cycles) -> Array:
+    """Share of each cycle in which `stuck` holds; a sample counts for the time around it."""
+    total = np.concatenate([[0.0], np.cumsum(stuck)])
+    at = np.interp(cycles.edges + 0.5, np.arange(len(total)), total)
+    return np.asarray(np.diff(at) / np.diff(cycles.edges))
+
+
+def _counted(sticks: Sequence[StickEvent], cycles: Cycles, motion: Motion) -> Array:
+    middle = np.array([event.time + event.duration / 2 for event in sticks])
+    counts, _ = np.histogram((middle - motion.start) * motion.fs, cycles.edges)
+    return counts.astype(float)
+
+
+def _events(stuck: NDArray[np.bool_], certain: NDArray[np.bool_], motion: Motion) -> tuple[StickEvent, ...]:
+    """Sticks and slips by speed; a stick begins between where the speed is low and where it would reach zero."""
+    turns = np.flatnonzero(np.diff(stuck)) + 1
+    edges = np.concatenate([[0], turns, [len(stuck)]])
+    sure, ends = stretches(certain & stuck)
+    sds = np.zeros(len(edges))
+    for j, turn in enumerate(turns, start=1):
+        near = sure if stuck[turn] else ends  # a stick begins, or ends
+        apart = float(np.min(np.abs(near - turn))) if len(near) else 0.0
+        sds[j] = math.hypot(apart, motion.blur) / math.sqrt(3) / motion.fs
+    return tuple(
+        StickEvent(
+            float(motion.start + first / motion.fs),
+            "stick" if stuck[first] else "slip",
+            float((last - first) / motion.fs),
+            bool(first > 0 and last < len(stuck)),
+            float(begin_sd),
+            math.hypot(begin_sd, end_sd),
+        )
+        for first, last, begin_sd, end_sd in zip(edges[:-1], edges[1:], sds[:-1], sds[1:], strict=True)
+    )
+
+
+# ---- from the holds of the contact
+
+
+def _fused_holds(record: Record, contact: str | None) -> tuple[tuple[Hold, ...], tuple[str, ...]]:
+    """The holds of a contact whose friction was found by all sensors together; and what is lost where it was not."""
+    told = [step for step in record.history if step.action == "friction_force"]
+    unseen = "onsets are told to the threshold only and micro-slips not at all"
+    if "friction" not in record or not told or told[-1].arguments.get("method") not in FUSIONS:
+        return (), (f'{unseen}: for them call friction_force(record, ..., method="fusion") first',)
+    if slid_on(record, contact) == "base":
+        return (), (
+            f"{unseen}: the contact is on the moving base, and the sensors together tell what rubs on the ground",
+        )
+    holds = find_holds(Trace.of(record))
+    if not holds:
+        return (), (
+            f"{unseen}: the contact's holds are shorter than four samples at {record.fs:g} Hz, or there are none",
+        )
+    cell = "load" in record and told[-1].arguments["method"] != "motion"
+    lost = [] if cell else ["without a load cell onsets are three to ten times less sure"]
+    shortest = record.fs * min(hold.end - hold.begin for hold in holds)
+    if shortest < SHORT:
+        lost.append(f"holds last {shortest:.0f} samples at {record.fs:g} Hz, and shorter ones are missed")
+    lost += [said for said in told[-1].outcome.split("; ") if "left to the others" in said]
+    return holds, tuple(lost)
+
+
+def _events_of(
+    holds: tuple[Hold, ...], stuck: NDArray[np.bool_], motion: Motion, fast: float
+) -> tuple[StickEvent, ...]:
+    """Sticks, the micro-slips within them, short holds and slips, in turn; a slip is micro where it never gets fast."""
+
+    def rows(begin: float, end: float) -> slice:
+        return slice(max(0, math.ceil((begin - motion.start) * motion.fs)), math.ceil((end - motion.start) * motion.fs))
+
+    spells: list[list[Hold]] = [[holds[0]]]
+    for hold in holds[1:]:
+        between = np.abs(motion.velocity[rows(spells[-1][-1].end, hold.begin)])
+        if between.max(initial=0.0) < fast:
+            spells[-1].append(hold)
+        else:
+            spells.append([hold])
+    first, last = motion.start, motion.start + len(stuck) / motion.fs
+    begins, ends = (motion.start + each / motion.fs for each in stretches(stuck))
+    unseen = motion.blur / motion.fs
+    edges = [  # a stick that the record cuts has no hold of its own
+        [Hold(begin, end, unseen, unseen)]
+        for begin, end in zip(begins, ends, strict=True)
+        if not any(spell[0].begin < end and begin < spell[-1].end for spell in spells)
+    ]
+    found: list[StickEvent] = []
+    free = Hold(first, first, 0.0, 0.0)
+    for spell in sorted(spells + edges, key=lambda each: each[0].begin):
+        found += _slip(free, spell[0], first, last)
+        begin, end = spell[0], spell[-1]
+        kind = "stick" if stuck[rows(begin.begin, end.end)].any() else "microstick"
+        whole = begin.begin > first and end.end < last
+        found.append(_event(kind, (begin.begin, begin.begin_sd), (end.end, end.end_sd), whole))
+        found += [
+            _event("microslip", (one.end, one.end_sd), (next_.begin, next_.begin_sd), True)
+            for one, next_ in pairwise(spell)
+        ]
+        free = end
+    return (*found, *_slip(free, Hold(last, last, 0.0, 0.0), first, last))
+
+
+def _slip(before: Hold, after: Hold, first: float, last: float) -> list[StickEvent]:
+    if after.begin <= before.end:
+        return []
+    whole = before.end > first and after.begin < last
+    return [_event("slip", (before.end, before.end_sd), (after.begin, after.begin_sd), whole)]
+
+
+def _event(kind: str, begin: tuple[float, float], end: tuple[float, float], whole: bool) -> StickEvent:
+    return StickEvent(
+        float(begin[0]), kind, float(end[0] - begin[0]), bool(whole), float(begin[1]), math.hypot(begin[1], end[1])
+    )
+
+
+def _share_of(events: tuple[StickEvent, ...], cycles: Cycles, motion: Motion) -> Estimate:
+    """Share of each cycle's time in which the contact holds; a micro-slip is taken off the stick it lies in."""
+    held = _time_in(("stick", "microstick"), events, cycles, motion) - _time_in(("microslip",), events, cycles, motion)
+    return mean_of_cycles(
+        "stuck share of the time", held / np.diff(cycles.edges), unit="1",
+        method="mean of cycles; the contact holds from where the velocity turns to where the friction reaches its "
+        "limit, a micro-slip within a stick taken off",
+    ).within(0.0, 1.0)  # fmt: skip
+
+
+def _time_in(kinds: tuple[str, ...], events: tuple[StickEvent, ...], cycles: Cycles, motion: Motion) -> Array:
+    """Samples of each cycle within events of some kinds, which do not overlap."""
+    inside = [event for event in events if event.kind in kinds]
+    begins = motion.fs * np.array([event.time - motion.start for event in inside])
+    lengths = motion.fs * np.array([event.duration for event in inside])
+    knots = np.column_stack([begins, begins + lengths]).ravel()
+    total = np.column_stack([np.cumsum(lengths) - lengths, np.cumsum(lengths)]).ravel()
+    return np.asarray(np.diff(np.interp(cycles.edges, [0.0, *knots], [0.0, *total])))
+
+
+def _microslips(events: tuple[StickEvent, ...]) -> Estimate:
+    """How many lie in each whole stick."""
+    slips = np.array([event.time for event in events if event.kind == "microslip"])
+    sticks = [event for event in events if event.kind == "stick" and event.whole]
+    counts = [float(np.sum((each.time < slips) & (slips < each.time + each.duration))) for each in sticks]
+    method = "turns of the velocity within a stick"
+    return mean_of_cycles("micro-slips per stick", counts, unit="1", method=method).within(0.0)

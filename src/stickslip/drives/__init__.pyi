@@ -1,0 +1,11 @@
+from stickslip.drives.kinds import Belt as Belt
+from stickslip.drives.kinds import Dithered as Dithered
+from stickslip.drives.kinds import HarmonicBase as HarmonicBase
+from stickslip.drives.kinds import HarmonicForce as HarmonicForce
+from stickslip.drives.kinds import MultiTone as MultiTone
+from stickslip.drives.kinds import Ramp as Ramp
+from stickslip.drives.kinds import RecordedBase as RecordedBase
+from stickslip.drives.kinds import Release as Release
+from stickslip.drives.kinds import SpeedProfile as SpeedProfile
+
+__all__: list[str]

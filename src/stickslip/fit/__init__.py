@@ -1,1 +1,0 @@
-"""Friction laws against a record, with the exact engine in the loop."""

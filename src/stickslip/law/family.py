@@ -1,0 +1,246 @@
+"""A family of curves, linear in its forces and not in its shape, and its best member for some samples."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
+from stickslip.law.data import BLOCKS, Samples
+from stickslip.law.nonlinear import inverse_normal, minimise, slopes
+from stickslip.laws.base import Law
+from stickslip.laws.curved import CurvedLaw
+from stickslip.statistics import FEW_CYCLES, INSEPARABLE, correlation_time, mean_uncertainty, student
+
+Array = NDArray[np.float64]
+
+SETTLED = 1e-8  # of a parameter: far below what any record tells
+MOST = 60  # steps: more are taken along a valley that has no lowest point
+FEW, RUN = 4000, 20000  # samples that a start is sought with: of all, or in a row
+WANDERS = 0.1  # of the velocity's square, that differs between cycles: more is no motion that repeats
+QUARTERS = 4  # of a cycle: the parts whose scatter tells, where cycles are few
+
+
+@dataclass(frozen=True)
+class Family:
+    """Friction as a sum of columns, each by its coefficient; the columns' shape by logarithms of lengths and powers.
+
+    Attributes
+    ----------
+    formula : str
+        In words and letters.
+    along : str
+        What it is drawn over: "v", "x" or "t".
+    columns : callable
+        Takes samples and the shape's logarithms, gives an array (n, q).
+    parameters : callable
+        Takes the coefficients and the shape (no logarithms), gives each parameter by name.
+    units : mapping
+        Unit of each parameter along a path.
+    law : callable
+        Takes the parameters by name, gives the law, or raises ModelError where there is none of these values.
+    starts : callable
+        Takes samples, gives for each part of the shape the logarithms to begin with.
+    beware : callable
+        Takes the estimates by name and the samples, gives which of them are not told, and why.
+    instead : Family or None
+        What is fitted where a parameter in `positive` comes out below zero.
+    positive : tuple of str
+        Parameters that mean nothing below zero.
+    fitted : callable or None
+        Solves for the coefficients where they are bound; None: by least squares.
+    """
+
+    formula: str
+    along: str
+    columns: Callable[[Samples, Array], Array]
+    parameters: Callable[[Array, Array], dict[str, float]]
+    units: Mapping[str, str]
+    law: Callable[[dict[str, float]], Law | CurvedLaw | None]
+    starts: Callable[[Samples], Sequence[Array]] = lambda samples: ()
+    beware: Callable[[dict[str, Estimate], Samples], list[tuple[tuple[str, ...], str]]] = lambda found, samples: []
+    instead: Family | None = None
+    positive: tuple[str, ...] = ()
+    fitted: Callable[[Array, Array], Array] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """The best member of a family.
+
+    Attributes
+    ----------
+    values : dict
+        Parameters by name.
+    sd, freedom : ndarray, shape (p,)
+        Their standard deviations, and the degrees of freedom of these.
+    correlations : ndarray, shape (p, p)
+        Of the parameters.
+    samples : Samples
+        What it was held against.
+    fitted : ndarray, shape (n,)
+        The curve at the samples.
+    """
+
+    values: dict[str, float]
+    sd: Array
+    freedom: Array
+    correlations: Array
+    samples: Samples
+    fitted: Array
+
+
+def best_member(family: Family, samples: Samples) -> tuple[Family, Member]:
+    """The best of a family, or of the one that stands in where its parameters come out below zero."""
+    member = _least_squares(family, samples)
+    if family.instead is not None and any(member.values[name] < 0 for name in family.positive):
+        return family.instead, _least_squares(family.instead, samples)
+    return family, member
+
+
+def _least_squares(family: Family, samples: Samples) -> Member:
+    """The least squares of a family, from the best of its starts; how sure by what the residuals do."""
+    skip, compared = samples.skipped, samples.compared
+    friction, logs = compared.friction, _start(family, samples)
+    columns = family.columns(samples, logs)[skip:]
+    count = columns.shape[1]
+    coefficients = _coefficients(family, columns, friction)
+    if len(logs):
+        found = minimise(
+            lambda raw: family.columns(samples, raw[count:])[skip:] @ raw[:count], friction,
+            np.concatenate([coefficients, logs]), settled_at=SETTLED, most=MOST,
+        )  # fmt: skip
+        raw, jacobian, residual = found.parameters, found.jacobian, found.residual
+    else:
+        raw, jacobian, residual = coefficients, columns, friction - columns @ coefficients
+
+    def physical(values: Array) -> Array:
+        return np.array(list(family.parameters(values[:count], np.exp(values[count:])).values()))
+
+    _require_separable(jacobian, family)
+    values = {name: float(value) for name, value in family.parameters(raw[:count], np.exp(raw[count:])).items()}
+    turned = slopes(physical, raw)
+    bread = inverse_normal(jacobian) @ turned.T
+    covariance = turned @ bread
+    lengths = np.sqrt(np.diag(covariance))
+    alone = lengths * float(np.sqrt(np.mean(residual**2)))
+    sd, freedom = scatter((jacobian * residual[:, None]) @ bread, alone, residual, compared)
+    correlations = covariance / np.outer(lengths, lengths)
+    return Member(values, sd, freedom, correlations, compared, friction - residual)
+
+
+def _coefficients(family: Family, columns: Array, friction: Array) -> Array:
+    if family.fitted is not None:
+        return family.fitted(columns, friction)
+    return np.asarray(np.linalg.lstsq(columns, friction, rcond=None)[0])
+
+
+def _start(family: Family, samples: Samples) -> Array:
+    """The start whose columns leave least, of every combination."""
+    grids = family.starts(samples)
+    if not grids:
+        return np.empty(0)
+    few = _few(samples, family.along)
+    friction = few.compared.friction
+    best, least = np.empty(0), np.inf
+    for logs in itertools.product(*grids):
+        columns = family.columns(few, np.array(logs))[few.skipped :]
+        if not np.isfinite(columns).all():
+            continue
+        left = friction - columns @ _coefficients(family, columns, friction)
+        if float(left @ left) < least:
+            best, least = np.array(logs), float(left @ left)
+    if not len(best):
+        raise EstimateError(
+            f"no start of {family.formula.partition(',')[0]} gives finite friction", "a fit begins at one",
+            "give a record that slides more steadily",
+        )  # fmt: skip
+    return best
+
+
+def _few(samples: Samples, along: str) -> Samples:
+    """Fewer samples to begin with: some of all, or, where the way is remembered, the first."""
+    if along == "v":
+        return samples.rows(slice(None, None, max(1, len(samples.friction) // FEW)))
+    return samples.rows(slice(samples.skipped + RUN)) if along == "x" else samples
+
+
+def _require_separable(jacobian: Array, family: Family) -> None:
+    lengths = np.linalg.norm(jacobian, axis=0)
+    condition = np.linalg.cond(jacobian / np.where(lengths > 0, lengths, 1.0)) if np.all(lengths > 0) else np.inf
+    if condition > INSEPARABLE and family.along == "x":
+        raise EstimateError(
+            "the contact's stiffness does not show in this record: its friction is that of sliding alone",
+            "a stiffness is told by readings in which the contact holds, next to the reversals",
+            "measure smaller strokes, or sample faster and x more finely, or fit a curve over the speed",
+        )
+    if condition > INSEPARABLE:
+        raise EstimateError(
+            f"this record can not tell the parameters of {family.formula.partition(',')[0]} from each other",
+            "other values of them would leave as little",
+            "choose a curve with fewer parameters, or give a record of slower and faster motion",
+        )
+
+
+def scatter(influence: Array, alone: Array, residual: Array, samples: Samples) -> tuple[Array, Array]:
+    """Standard deviation of each parameter, and its freedom, by what each sample does to it (n, p).
+
+    Of three, the widest counts. What differs from cycle to cycle (of quarters, where cycles are few) is noise and
+    drift. What the curve can not follow repeats in every cycle: it shows in how residuals stray along the mean cycle,
+    whose neighbours are alike. Both are the long-run deviation of the influences in order. Where few samples tell a
+    parameter, that knows little: no less than `alone`, the deviation if residuals were independent and alike, for as
+    many as they are worth.
+    """
+    parts = samples.cycle if samples.cycle.max(initial=0) + 1 >= FEW_CYCLES else _quarters(samples)
+    independent = len(residual) / correlation_time(residual)
+    terms = influence.shape[1]
+    left = max(1.0, independent - terms)
+    shrinkage = np.sqrt(independent / left)
+    sd, freedom = np.empty(terms), np.empty(terms)
+    for index in range(terms):
+        told = [_of_parts(influence[:, index], group) for group in (parts, samples.block)]
+        told = [(each * shrinkage, q) for each, q in told] + [(alone[index] * np.sqrt(len(residual) / left), left)]
+        sd[index], freedom[index] = max(told, key=lambda each: student(each[1]) * each[0])
+    return sd, freedom
+
+
+def model_error(residual: Array, samples: Samples) -> float:
+    """Root mean square of what a curve leaves and noise does not explain [N].
+
+    Where the motion repeats, what is left of the mean cycle, less what the scatter between cycles lets it be; else what
+    stands above the broadband noise.
+    """
+    cells = np.unique(samples.cycle * BLOCKS + samples.block, return_inverse=True)[1]
+    block = samples.block[np.unique(cells, return_index=True)[1]]
+    count = np.bincount(block, minlength=BLOCKS)
+    several = count > 1
+
+    def between(values: Array) -> tuple[Array, Array]:
+        """Mean over the cycles of each block's mean, and its variance between them."""
+        means = np.bincount(cells, values) / np.bincount(cells)
+        mean = np.bincount(block, means, BLOCKS) / np.maximum(count, 1)
+        squares = np.bincount(block, (means - mean[block]) ** 2, BLOCKS)
+        return mean, squares / np.maximum(count - 1, 1)
+
+    weight = np.bincount(samples.block, minlength=BLOCKS) * several
+    _, wander = between(samples.velocity)
+    if weight.sum() < len(residual) / 2 or weight @ wander > WANDERS * weight.sum() * np.mean(samples.velocity**2):
+        return math.sqrt(max(0.0, float(np.mean(residual**2)) - samples.noise**2))
+    mean, scatter_ = between(residual)
+    repeats = weight @ (mean**2 - scatter_ / np.maximum(count, 1)) / weight.sum()
+    return math.sqrt(max(0.0, float(repeats)))
+
+
+def _quarters(samples: Samples) -> NDArray[np.intp]:
+    return samples.cycle * QUARTERS + samples.block * QUARTERS // BLOCKS
+
+
+def _of_parts(influence: Array, part: NDArray[np.intp]) -> tuple[float, float]:
+    sums = np.bincount(part, influence)[np.bincount(part) > 0]
+    return mean_uncertainty(len(sums) * sums)

@@ -1,0 +1,349 @@
+"""Which friction curve, with which numbers, do loops of friction follow?"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.cycle.loops import LEAST_SPREAD, Loops
+from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import Estimate, Result
+from stickslip.law import presliding as presliding_curves
+from stickslip.law import speed as speed_curves
+from stickslip.law.data import Samples, require_resisting, require_reversals, require_speeds, samples_of
+from stickslip.law.family import Family, Member, best_member, model_error
+from stickslip.law.velocity_step import velocity_step
+from stickslip.laws.base import Law, finite
+from stickslip.laws.curved import CurvedLaw
+from stickslip.record.record import Record
+from stickslip.settings import nearest
+from stickslip.statistics import student
+from stickslip.units import parse_value
+
+Array = NDArray[np.float64]
+
+LEAVES = 0.3  # of the friction's norm: more than that is worth a word
+MISSES = 0.1  # of the friction that is missed beyond noise and scatter, from which on it does not follow the curve
+FILLED = 0.1  # of the samples, that were not measured: more than that is worth a word
+LOST = 7.0  # half an interval of a logarithm from which on nothing is known of its number
+TIED = 0.99  # correlation of two parameters from which on they are told together alone
+ONE_WAY = "motion goes one way: a constant force is not told from friction"
+TOO_NOISY = "the friction's noise is above the friction: give more cycles, or a quieter sensor"
+NOT_FOLLOWED = "of a curve that the friction does not follow"
+OVER_WAY = ("dahl", "jenkins", "iwan", "maxwell")
+POSITIVE = ("speed", "exponent", "width", "distance")  # found by their logarithm: so is their interval
+NAMES = {
+    "kinetic": "sliding friction", "static": "static friction", "viscous": "viscous friction",
+    "offset": "constant force", "speed": "Stribeck speed", "exponent": "exponent",
+    "kinetic_forward": "sliding friction forward", "kinetic_back": "sliding friction back",
+    "viscous_forward": "viscous friction forward", "viscous_back": "viscous friction back",
+    "friction": "coefficient of friction", "direct": "direct effect a", "evolution": "evolution effect b",
+    "rate_dependence": "rate dependence a - b", "distance": "slip that renews the contact Dc",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CurveFit(Result):
+    """A curve of friction, with its numbers.
+
+    Attributes
+    ----------
+    curve : str
+        Which one.
+    parameters : dict of str to Estimate
+        Its parameters by name.
+    law : Law or None
+        The friction law of these values, to simulate with; None where there is none (an uneven contact, or values
+        that no law can have: `status` says why).
+    formula : str
+        The curve, in the parameters' names.
+    unit : str
+        Of the friction: "N", "N m", or "1" for a coefficient.
+    residual : float
+        Root mean square of what is left, in that unit.
+    unexplained : float
+        Norm of what is left over the norm of the friction.
+    model_error : float
+        Share of the friction's norm that the curve misses beyond noise: what repeats in every cycle and is not in the
+        curve; where the motion does not repeat, what stands above the sensor's noise.
+    correlations : ndarray, shape (p, p)
+        Of the parameters, in their order.
+    along : str
+        What `at` is: "v" (velocity), "x" (displacement) or "t" (time).
+    at, measured, fitted : ndarray, shape (n,)
+        Where friction was compared, what it was, and what the curve says.
+    status : str
+        "ok", or in words what to beware of, and what experiment would tell.
+    """
+
+    curve: str
+    parameters: dict[str, Estimate]
+    law: Law | CurvedLaw | None
+    formula: str
+    unit: str
+    residual: float
+    unexplained: float
+    model_error: float
+    correlations: Array
+    along: str
+    at: Array
+    measured: Array
+    fitted: Array
+    status: str
+
+    @property
+    def follows(self) -> bool:
+        """Whether friction follows the curve."""
+        return self.model_error < MISSES
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every number found."""
+        return tuple(self.parameters.values())
+
+    @property
+    def name(self) -> str:
+        """Of the curve, with its formula."""
+        return f"{self.curve}, {self.formula}"
+
+
+class Request(NamedTuple):
+    """What is asked: a curve by name, of all samples or of those that slide, of how many elements, under which load."""
+
+    curve: str
+    whole: Samples
+    sliding: Samples
+    elements: int
+    normal: float
+
+
+def fit_curve(
+    data: Record | Loops,
+    *,
+    curve: str = "stribeck",
+    contact: str | None = None,
+    frequency: float | str | None = None,
+    elements: int = 8,
+    normal: float | str | None = None,
+) -> CurveFit:
+    r"""Which numbers of a friction curve explain a measured friction best?
+
+    By least squares. Over the velocity, of every sample that slides, away from the reversals:
+
+    * ``"coulomb"``: :math:`f = f_k\,\mathrm{sgn}\,v`;
+    * ``"viscous"``: :math:`f = f_k\,\mathrm{sgn}\,v + \sigma v`;
+    * ``"stribeck"``: :math:`f = (f_k + (f_s-f_k)\,e^{-(|v|/v_s)^\delta})\,\mathrm{sgn}\,v + \sigma v`
+      (Bo and Pavelescu, Wear 82, 1982), the exponent free, begun from 36 pairs of speed and exponent;
+      without :math:`\sigma` where it comes out below zero;
+    * ``"asymmetric"``: Coulomb and viscous friction of their own in each direction;
+    * ``"tabulated"``: a polygon that rises, or falls, all the way.
+
+    Over the displacement, of all samples but those of the first cycle, which sets the contact's memory:
+
+    * ``"dahl"``: :math:`df/dx = \sigma_0 (1 - (f/f_k)\,\mathrm{sgn}\,v)^n` (Dahl 1968), n free;
+    * ``"jenkins"``: a spring that slips at :math:`f_k`; ``"iwan"``: classes of them, alike in stiffness, yielding
+      evenly up to a width; ``"maxwell"``: elements that yield at given deflections, those kept that bear something.
+
+    A constant force beside these is fitted too, where motion both ways tells it. After a step of the driving velocity,
+    where ``x`` is the drive's and friction is felt through a spring:
+
+    * ``"aging"``, ``"slip"``: :math:`f = N [\mu_0 + a \ln(v/V_1) + b \ln(V_1\theta/D_c)]`, with the age of either law
+      (Dieterich 1979, Ruina 1983), the spring's stiffness and a trend along the way.
+
+    The intervals admit the error of the model: they are as wide as the scatter between cycles says, or as the residuals
+    along the mean cycle, which repeat, and which no scatter shows; whichever is wider.
+
+    Parameters
+    ----------
+    data : Record or Loops
+        With ``friction``, or the ``coefficient`` of friction, and the motion, as for :func:`friction_loops`; or its
+        answer, whose mean cycle is then fitted.
+    curve : str
+        One of the names above.
+    contact : {"ground", "base"}, optional
+        What the mass slides on; as :func:`friction_force` was told, or the ground, when not given.
+    frequency : float or str, optional
+        Forcing frequency [Hz]; found from the record when not given.
+    elements : int
+        Points of a tabulated curve; classes of Iwan's; elements of Maxwell's to begin with.
+    normal : float or str, optional
+        Normal load N [N], by which a coefficient becomes a force. Where it is not given, the numbers
+        are those of the coefficient, and the law is that under 1 N.
+
+    Returns
+    -------
+    CurveFit
+
+    Raises
+    ------
+    RecordError
+        A channel is missing, broken or too short, or the units of friction and motion do not belong together.
+    EstimateError
+        The record can not tell: no sliding, one speed alone, no reversal; no such curve; or contact, frequency or
+        normal load of loops, which were told these.
+
+    Examples
+    --------
+    >>> t = np.arange(20000) / 2000
+    >>> v = 0.1 * np.sin(2 * np.pi * t)
+    >>> f = np.sign(v) * (1.0 + 0.4 * np.exp(-np.abs(v) / 0.02)) + np.random.default_rng(0).normal(0, 0.02, t.size)
+    >>> found = fit_curve(Record.of({"v": v, "friction": f}, fs=2000), curve="stribeck")
+    >>> round(found.parameters["kinetic"].value, 2), found.parameters["exponent"].includes(1.0)
+    (1.0, True)
+    """
+    if curve not in CURVES:
+        raise EstimateError(f"curve = '{curve}'", f"it is one of {', '.join(CURVES)}", nearest(str(curve), CURVES))
+    if not isinstance(elements, (int, np.integer)) or not 2 <= elements <= 50:
+        raise EstimateError(f"elements = {elements}", "points of a table, or elements, are 2 to 50", "leave it at 8")
+    load = None if normal is None else finite("normal", parse_value(normal, "N"), unit="N", positive=True)
+    whole, sliding = samples_of(
+        data, contact=contact, frequency=frequency, smoothed=curve in OVER_WAY, normal=load
+    )  # fmt: skip
+    family, member = best_member(*CURVES[curve](Request(curve, whole, sliding, int(elements), load or 1.0)))
+    return _answer(curve, family, member, filled=_filled(data))
+
+
+def _over_speed(family: Family) -> Callable[[Request], tuple[Family, Samples]]:
+    def chosen(asked: Request) -> tuple[Family, Samples]:
+        require_speeds(asked.sliding, asked.curve)
+        return family, asked.sliding
+
+    return chosen
+
+
+def _uneven(asked: Request) -> tuple[Family, Samples]:
+    require_reversals(asked.sliding, asked.curve)
+    return _over_speed(speed_curves.UNEVEN)(asked)
+
+
+def _table(asked: Request) -> tuple[Family, Samples]:
+    return _over_speed(speed_curves.table(asked.sliding, asked.elements))(asked)
+
+
+def _over_way(family: Callable[[Samples, int], Family]) -> Callable[[Request], tuple[Family, Samples]]:
+    def chosen(asked: Request) -> tuple[Family, Samples]:
+        require_reversals(asked.whole, asked.curve)
+        require_resisting(asked.whole)
+        return family(asked.whole, asked.elements), asked.whole
+
+    return chosen
+
+
+def _step(law: str) -> Callable[[Request], tuple[Family, Samples]]:
+    def chosen(asked: Request) -> tuple[Family, Samples]:
+        return velocity_step(asked.whole, law=law, normal=asked.normal), asked.whole
+
+    return chosen
+
+
+CURVES: dict[str, Callable[[Request], tuple[Family, Samples]]] = {
+    "coulomb": lambda asked: (speed_curves.COULOMB, asked.sliding),
+    "viscous": _over_speed(speed_curves.VISCOUS),
+    "stribeck": _over_speed(speed_curves.STRIBECK),
+    "asymmetric": _uneven,
+    "tabulated": _table,
+    "dahl": _over_way(lambda samples, elements: presliding_curves.DAHL),
+    "jenkins": _over_way(lambda samples, elements: presliding_curves.JENKINS),
+    "iwan": _over_way(lambda samples, elements: presliding_curves.iwan(elements)),
+    "maxwell": _over_way(presliding_curves.maxwell_slip),
+    "aging": _step("aging"),
+    "slip": _step("slip"),
+}
+
+
+def _filled(data: Record | Loops) -> float:
+    """Share of the friction's samples that were filled in for measured ones."""
+    if isinstance(data, Loops):
+        return 0.0
+    filled = sum(max(step.arguments.get("filled", {}).values(), default=0) for step in data.history)
+    return min(1.0, filled / len(data))
+
+
+def _answer(curve: str, family: Family, member: Member, *, filled: float) -> CurveFit:
+    samples = member.samples
+    left = samples.friction - member.fitted
+    missed = model_error(left, samples) / float(np.sqrt(np.mean(samples.friction**2)))
+    method = f"least squares of '{curve}'"
+    checks = (f"{len(left)} samples in {samples.cycles} cycles",)
+    found = {
+        name: _estimate(name, value, sd, freedom, samples.in_units(family.units[name]), method, checks)
+        for (name, value), sd, freedom in zip(member.values.items(), member.sd, member.freedom, strict=True)
+    }
+    worries = _worries(member, samples, family.along, missed)
+    for name, each in found.items():
+        if not all(map(math.isfinite, each.interval)):
+            found[name] = replace(each, status="the record tells nothing of it")
+    if missed > MISSES:
+        found = {name: replace(each, status=NOT_FOLLOWED) for name, each in found.items()}
+    if TOO_NOISY in worries:
+        found = {name: replace(each, status=TOO_NOISY) if each.status == "ok" else each for name, each in found.items()}
+    if filled > FILLED:
+        worries.append(f"{filled:.0%} of the samples were not measured, but filled in between others")
+    for names, word in family.beware(found, samples):
+        worries.append(word)
+        found |= {name: replace(found[name], status=word) for name in names}
+    if family.along != "t" and not samples.reverses:
+        forces = [name for name, unit in family.units.items() if unit == "N" and name in found]
+        found |= {name: replace(found[name], status=ONE_WAY) for name in forces if found[name].status == "ok"}
+    try:
+        law = family.law(member.values)
+    except ModelError as refused:
+        law = None
+        rounded = re.sub(r"\d+\.\d{6,}", lambda number: f"{float(number[0]):.6g}", refused.value)
+        worries.append(f"no law has these values: {rounded}")
+    return CurveFit(
+        curve=curve, parameters=found, law=law, formula=family.formula, unit=samples.force,
+        residual=float(np.sqrt(np.mean(left**2))),
+        unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)), model_error=missed,
+        correlations=member.correlations, along=family.along,
+        at={"v": samples.velocity, "x": samples.displacement, "t": samples.time}[family.along],
+        measured=samples.friction, fitted=member.fitted, status="; ".join(worries) or "ok",
+    )  # fmt: skip
+
+
+def _estimate(
+    name: str, value: float, sd: float, freedom: float, unit: str, method: str, checks: tuple[str, ...]
+) -> Estimate:
+    words = NAMES.get(name, name.replace("_", " "))
+    made = Estimate.normal(words, value, sd=sd, unit=unit, method=method, quantile=student(freedom), checks=checks)
+    if name not in POSITIVE:
+        return made
+    log_half = (made.interval[1] - value) / value
+    times = math.exp(log_half) if log_half < LOST else math.inf
+    return replace(made, interval=(value / times, value * times))
+
+
+def _worries(member: Member, samples: Samples, along: str, missed: float) -> list[str]:
+    """What the samples can not bear."""
+    names, words = list(member.values), []
+    cyclic = along != "t"
+    if cyclic and samples.cycles < len(names):
+        many = f"{samples.cycles} cycle{'s' * (samples.cycles > 1)}"
+        words.append(f"{many} for {len(names)} parameters: give more of them")
+    if samples.noise > float(np.sqrt(np.mean(member.fitted**2))):
+        words.append(TOO_NOISY)
+    if cyclic and not samples.reverses:
+        words.append(f"{ONE_WAY}; let it reverse")
+    if along == "v" and samples.speed_spread < LEAST_SPREAD:
+        words.append("one speed alone: whether friction changes with speed is not told; let the speed vary")
+    if cyclic and samples.drives:
+        words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
+    left = float(np.linalg.norm(samples.friction - member.fitted) / np.linalg.norm(samples.friction))
+    if missed > MISSES:
+        words.append(
+            f"the friction does not follow the curve: {missed:.0%} of it is neither in the curve nor noise; "
+            "another curve may leave less, or another mass"
+        )
+    elif left > LEAVES:
+        words.append(f"the curve leaves {100 * left:.0f} % of the friction: another one, or less noise, may leave less")
+    for i, j in zip(*np.nonzero(np.triu(np.abs(member.correlations), 1) > TIED), strict=True):
+        words.append(
+            f"{names[i]} and {names[j]} can only be told together (correlation {member.correlations[i, j]:.3f})"
+        )
+    return words

@@ -1,0 +1,365 @@
+"""A friction law fitted to records, with the exact engine in the loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import Estimate, Result
+from stickslip.law.search import TRUSTED, Knob, Point, Problem, descend
+from stickslip.law.start import (
+    Shown,
+    best_start,
+    better_start,
+    bounded,
+    free_names,
+    knob,
+    require_apart,
+    seen_profile,
+    thinned_out,
+    too_few,
+    value_of,
+)
+from stickslip.law.stretch import channels_of
+from stickslip.law.surety import Surety, surety
+from stickslip.laws.base import Law
+from stickslip.laws.curved import CurvedLaw
+from stickslip.oscillator import Oscillator
+from stickslip.parameters import unit as unit_of
+from stickslip.record.record import Record
+from stickslip.statistics import mean_uncertainty, student
+
+Array = NDArray[np.float64]
+
+WORDS = {
+    "kinetic": "sliding friction", "static": "static friction", "law.stiffness": "contact stiffness",
+    "law.damping": "contact damping", "speed": "Stribeck speed", "law.mass": "contact mass",
+}  # fmt: skip
+METHOD = "least squares of what the sensors read, the motion simulated"
+MISFIT = 1.2  # times its noise that a channel's residual may be
+STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
+WORK = 60.0  # calls of progress that a fit is taken for
+
+
+@dataclass(frozen=True, eq=False)
+class Traces:
+    """What was measured and what the fitted law predicts, by channel.
+
+    Attributes
+    ----------
+    time : mapping of str to ndarray
+        Time [s] of the rows that were fitted, on the record's clock.
+    measured, fitted : mapping of str to ndarray
+        Readings, and what the sensor would have read.
+    """
+
+    time: Mapping[str, Array]
+    measured: Mapping[str, Array]
+    fitted: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LawFit(Result):
+    """A fitted law.
+
+    Attributes
+    ----------
+    oscillator : Oscillator
+        The oscillator with the fitted values.
+    parameters : mapping of str to Estimate
+        What was fitted, by the names of :meth:`Oscillator.having`; of a sensor ``x.gain`` and ``x.delay``.
+    correlations : ndarray (p, p)
+        Between the parameters, in their order; of a rough surface without its sliding friction.
+    noise : mapping of str to float
+        Standard deviation of each channel's noise, as stated or found.
+    residual : mapping of str to float
+        Root mean square of what is left of each channel.
+    chi2 : float
+        Sum of squares of what is left, in units of the noise.
+    samples : int
+        Number of readings.
+    count : int
+        Number of parameters, those of the starts and the sensors' offsets left out.
+    traces : tuple of Traces
+        One for each record.
+    surface : str
+        "even" or "rough", see :func:`fit_law`.
+    status : str
+        "ok", or why the fit should not be trusted.
+    checks : tuple of str
+        What was checked, with the numbers.
+    """
+
+    oscillator: Oscillator
+    parameters: Mapping[str, Estimate]
+    correlations: Array
+    noise: Mapping[str, float]
+    residual: Mapping[str, float]
+    chi2: float
+    samples: int
+    count: int
+    traces: tuple[Traces, ...]
+    surface: str
+    status: str = "ok"
+    checks: tuple[str, ...] = field(default=())
+
+    @property
+    def law(self) -> Law | CurvedLaw:
+        """The fitted law."""
+        return self.oscillator.law
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every parameter fitted."""
+        return tuple(self.parameters.values())
+
+    @property
+    def misfit(self) -> Mapping[str, float]:
+        """Residual of each channel over its noise; 1 where the law explains everything but the noise."""
+        return {name: self.residual[name] / self.noise[name] for name in self.residual}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "law": type(self.law).__name__,
+            "values": {key: value for key, value in vars(self.law).items() if isinstance(value, float)},
+            "surface": self.surface,
+            "misfit": dict(self.misfit),
+            "status": self.status,
+            "checks": list(self.checks),
+            "estimates": [each.to_dict() for each in self.estimates],
+        }
+
+
+def fit_law(
+    record: Record | Sequence[Record],
+    oscillator: Oscillator,
+    *,
+    free: Sequence[str] | None = None,
+    nuisance: Sequence[str] = (),
+    channels: Sequence[str] | None = None,
+    surface: str = "even",
+    intervals: bool = True,
+    progress: Callable[[float], object] | None = None,
+) -> LawFit:
+    r"""Which parameters of a friction law explain what the sensors read?
+
+    The oscillator is simulated exactly, its motion passed through the sensors as their channels state them (delay,
+    mount, inertia, discharge), and the parameters p are those for which
+
+    .. math:: \chi^2(p) = \sum_{c, t} \left(\frac{y_c(t) - \hat y_c(t; p)}{\sigma_c}\right)^2
+
+    is least over channels c and instants t, sigma the noise. Each record's displacement, velocity and memory at its
+    first slide are fitted with them, as are an offset of each channel and what its mount still rings with. Static
+    friction, Stribeck speed, contact stiffness and rate, in which chi squared has several valleys, are tried at values
+    spread over their range before the descent. The intervals are the sandwich's, which hold when what is left is
+    correlated; where a parameter is hardly seen they are the likelihood's, and may be open to one side.
+
+    Parameters
+    ----------
+    record : Record or sequence of Record
+        With x or v, and what else was measured: a, load, friction. The base's motion z drives the oscillator where it
+        was measured, or a periodic force; otherwise the oscillator's own drive does, from the first sample on.
+    oscillator : Oscillator
+        Mass, spring and damper; the law with values to start from.
+    free : sequence of str, optional
+        Parameters to fit, as :meth:`Oscillator.having` names them; all the law's that are not zero where left out.
+        Empty: only the starts are fitted, to predict another record.
+    nuisance : sequence of str
+        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay".
+    channels : sequence of str, optional
+        Channels to explain; all that were measured where left out.
+    surface : {"even", "rough"}
+        "even": the friction is the same everywhere. "rough": the friction forces are multiplied by a profile along the
+        surface, which is fitted too; the law is Coulomb's or the CompliantContact, and its sliding friction the mean of
+        the profile, as sure as that mean is for another part of the surface.
+    intervals : bool
+        Whether to ask how sure the parameters are; without, the fit is quicker.
+    progress : callable, optional
+        Called with the share of the work that is done, 0 to 1.
+
+    Returns
+    -------
+    LawFit
+
+    Raises
+    ------
+    RecordError
+        A channel is missing or broken.
+    EstimateError
+        No motion above the noise, no sliding, or sliding at one speed alone.
+    ModelError
+        A parameter that the oscillator does not have, or is named twice; a channel that is not fitted.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(
+    ...     mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
+    ... )
+    >>> rig = ss.Rig.perfect("x", "z").having("x", white=1e-6)
+    >>> record = rig.measure(ss.simulate(slider, cycles=20), fs=2000, rng=1)
+    >>> found = fit_law(record.rows(2000, len(record)), slider.having(kinetic=1.0))
+    >>> bool(abs(found.law.kinetic / 1.1 - 1) < 0.01)
+    True
+    """
+    records = [record] if isinstance(record, Record) else list(record)
+    if not records:
+        raise EstimateError("no record", "a law is fitted to one record at least", "give one")
+    if surface not in ("even", "rough"):
+        raise ModelError(f"surface = '{surface}'", "a surface is 'even' or 'rough'", "choose one, or leave it out")
+    tell = _teller(progress)
+    names = free_names(oscillator, free)
+    shown = [Shown.of(each, channels_of(each, channels), oscillator) for each in records]
+    require_apart(oscillator, names, nuisance, shown)
+    stretches = []
+    for number, each in enumerate(shown):
+        each.require_sliding()
+        rows = each.slides()
+        stretches.append(each.stretch(number, (int(rows[0]), len(each.record) - 1)))
+    fastest = max(each.fastest for each in shown)
+    oscillator, profile = better_start(oscillator, names, shown), None
+    if names:
+        oscillator = best_start(oscillator, names, stretches, fastest, tell)
+    if surface == "rough":
+        profile = seen_profile(shown, value_of(oscillator, "kinetic"))
+        names = tuple(name for name in names if name != "kinetic")
+    knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in (*names, *nuisance)]
+    if profile:
+        knobs += [Knob(f"profile {j}", "profile", value, 0.01) for j, value in enumerate(profile.values)]
+    problem = Problem.of(oscillator, stretches, knobs, profile)
+    point = problem.begin(np.zeros(len(knobs)))
+    if profile:
+        few = thinned_out(problem)
+        first = descend(few, few.begin(point.u), tell=tell)
+        states = zip(first.starts, point.starts, strict=True)
+        point = problem.at(first.u, tuple(np.append(a, b[len(a) :]) for a, b in states))
+    point = descend(problem, point, tell=tell)
+    if not math.isfinite(point.chi2):
+        raise EstimateError(
+            f"{oscillator.law!r} can not be simulated along this record", "the search starts from a motion that exists",
+            "start from other values of the law",
+        )  # fmt: skip
+    sure = surety(problem, point, tell) if intervals else None
+    if progress:
+        progress(1.0)
+    return answered(problem, point, sure, shown)
+
+
+def _teller(progress: Callable[[float], object] | None) -> Callable[[], None]:
+    """Progress that comes nearer to its end with each call, as nobody knows how many there will be."""
+    calls = 0
+
+    def tell() -> None:
+        nonlocal calls
+        calls += 1
+        if progress:
+            progress(1 - math.exp(-2.5 * calls / WORK))
+
+    return tell
+
+
+def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequence[Shown]) -> LawFit:
+    """What a search has found, as it is told."""
+    system = replace(problem, profile=None).system(point.u)
+    gains = problem.sensor_knobs(point.u, "gain")
+    traces, sums, counts, noise = [], dict[str, float](), dict[str, int](), dict[str, float]()
+    for j, stretch in enumerate(problem.stretches):
+        time, measured, fitted = {}, {}, {}
+        for sensor, raw in zip(stretch.sensors, point.raw[j], strict=True):
+            name = sensor.channel.name
+            left = sensor.readings - gains.get(name, 1.0) * raw
+            left = left - sensor.known @ (sensor.known.T @ left)
+            time[name] = shown[stretch.record].record.time[sensor.rows]
+            measured[name], fitted[name] = sensor.readings, sensor.readings - left
+            sums[name] = sums.get(name, 0.0) + float(left @ left)
+            counts[name] = counts.get(name, 0) + len(left)
+            noise[name] = math.hypot(noise.get(name, 0.0), sensor.noise * math.sqrt(len(left)))
+        traces.append(Traces(time, measured, fitted))
+    residual = {name: math.sqrt(sums[name] / counts[name]) for name in sums}
+    noise = {name: noise[name] / math.sqrt(counts[name]) for name in sums}
+    parameters = _parameters(problem, point, sure, system)
+    if problem.profile:
+        level = _mean_friction(problem, point, value_of(system, "kinetic"))
+        parameters = {"kinetic": level, **parameters}
+        system = system.having(kinetic=level.value)
+    checks = tuple(f"{name} is left with {residual[name] / noise[name]:.3g} times its noise" for name in residual)
+    worst = max(residual, key=lambda name: residual[name] / noise[name])
+    worries = [too_few(shown, sum(knob.kind not in TRUSTED for knob in problem.knobs))]
+    if residual[worst] > MISFIT * noise[worst]:
+        times = residual[worst] / noise[worst]
+        worries.append(
+            f"{worst} is left with {times:.3g} times its noise: the law is not the whole of it, or mass=, stiffness= "
+            "or a unit is wrong"
+        )
+    return LawFit(
+        replace(system, drive=problem.oscillator.drive), parameters, _between(problem, sure), noise, residual,
+        point.chi2, sum(counts.values()), len(problem.knobs), tuple(traces), "rough" if problem.profile else "even",
+        "; ".join(filter(None, worries)) or "ok", checks,
+    )  # fmt: skip
+
+
+def _between(problem: Problem, sure: Surety | None) -> Array:
+    """Correlations of what is reported."""
+    told = [k for k, knob in enumerate(problem.knobs) if knob.kind != "profile"]
+    return sure.correlations[np.ix_(told, told)] if sure else np.eye(len(told))
+
+
+def _mean_friction(problem: Problem, point: Point, level: float) -> Estimate:
+    """The mean of the profile; how sure, by how the profile varies along the surface."""
+    values = level * np.array([k.value(u) for k, u in zip(problem.knobs, point.u, strict=True) if k.kind == "profile"])
+    sd, freedom = mean_uncertainty(values[1:-1])
+    return Estimate.normal(
+        WORDS["kinetic"], float(values[1:-1].mean()), sd=sd, unit="N", quantile=student(freedom),
+        method="mean of the friction along the surface",
+        checks=(f"it varies by {100 * np.std(values[1:-1]) / values[1:-1].mean():.2g} % along the surface",),
+    )  # fmt: skip
+
+
+def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Oscillator) -> dict[str, Estimate]:
+    found = {}
+    for k, each in enumerate(problem.knobs):
+        if each.kind == "profile":
+            continue
+        values = [_value(each, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
+        unit = {"gain": "1", "delay": "s"}.get(each.kind) or unit_of(system, each.name)
+        sd = abs(_value(each, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
+        interval = (values[1], values[2]) if sure else (math.nan, math.nan)
+        found[each.name] = Estimate(
+            _words(each.name), values[0], interval, sd, unit, METHOD, _told(each, values, unit, sure)
+        )
+    return found
+
+
+def _words(name: str) -> str:
+    """What a parameter is called."""
+    head, _, tail = name.rpartition(".")
+    return f"{tail} of {head}" if tail in ("gain", "delay") else WORDS.get(name, name)
+
+
+def _value(knob: Knob, u: float, system: Oscillator) -> float:
+    if knob.kind == "log" and math.isinf(u):
+        return math.inf if u > 0 else 0.0
+    value = knob.value(u)
+    return float(getattr(system.law, "kinetic", 1.0)) * (1 + value) if knob.kind == "above" else value
+
+
+def _told(knob: Knob, values: Sequence[float], unit: str, sure: Surety | None) -> str:
+    """What the records can say of a parameter, in words."""
+    if sure is None:
+        return "not asked how sure"
+    _, low, high = values
+    word = _words(knob.name)
+    if not math.isinf(high) and not math.isinf(low) and (low > 0 or knob.kind != "log"):
+        return "ok"
+    if low > 0 and math.isinf(high):
+        return f"{word} above {low:.2g} {unit} can not be told from infinite here"
+    if math.isfinite(high):
+        return f"{word} below {high:.2g} {unit} can not be told from none here"
+    return f"{word} can not be told from these records"

@@ -1,0 +1,213 @@
+"""A stretch of a record as a fit of a law sees it: what each sensor read, and what it would have read of a motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.drives.kinds import Release
+from stickslip.errors import ModelError, SolveError
+from stickslip.law.drive import DriveFrom
+from stickslip.oscillator import Oscillator
+from stickslip.record.channels import Channel
+from stickslip.record.record import Record
+from stickslip.signals.response import Response, leak, resonance, respond
+from stickslip.solve.simulate import simulate
+from stickslip.solve.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+SENSED = {"x": "x", "v": "v", "a": "a", "friction": "friction", "load": "friction"}  # of a channel, in the run
+JUMPS = ("a", "friction")
+RTOL = 1e-9  # of curved laws
+NODES = 3  # of the quadrature through a mount, which turns little between two samples
+GLIDE, HEAVY = 0.5, 1e9  # s and kg: a mass that slides on at a steady speed until the law has no memory of before
+
+
+class Motion:
+    """What sensors feel of a run: those that ask for the same instants share the answer."""
+
+    def __init__(self, run: Trajectory, outputs: tuple[str, ...]) -> None:
+        self.run, self.outputs, self.breaks = run, outputs, run.starts
+        self.known: dict[bytes, tuple[dict[str, Array], NDArray[np.int64]]] = {}
+
+    def __call__(self, at: Array) -> tuple[dict[str, Array], NDArray[np.int64]]:
+        """Values by name, and the piece that each instant falls in."""
+        key = at.tobytes()
+        if key not in self.known:
+            values, piece = self.run.sample(np.clip(at, 0.0, self.run.duration), self.outputs)
+            self.known[key] = dict(zip(self.outputs, values, strict=True)), piece
+        return self.known[key]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """One channel over one stretch.
+
+    Attributes
+    ----------
+    channel : Channel
+        What is known of the sensor.
+    rows : slice
+        Rows of the record that are read.
+    time : ndarray (n,)
+        Instant [s] from the stretch's start that each row is of, the stated delay taken out.
+    readings : ndarray (n,)
+        What was read.
+    noise : float
+        Its standard deviation.
+    known : ndarray (n, q)
+        Orthonormal columns of what is free in any reading: an offset, and what the mount still rings with.
+    """
+
+    channel: Channel
+    rows: slice
+    time: Array
+    readings: Array
+    noise: float
+    known: Array
+
+    @classmethod
+    def of(cls, record: Record, name: str, span: tuple[float, float], noise: float) -> Sensor:
+        """The rows of a channel whose instants lie in a span of the record's clock."""
+        channel = record.channels[name]
+        first = max(0, math.ceil((span[0] + channel.delay) * record.fs - 1e-9))
+        last = min(len(record), math.floor((span[1] + channel.delay) * record.fs + 1e-9) + 1)
+        time = np.arange(first, last) / record.fs - channel.delay - span[0]
+        columns = [np.ones(len(time))]
+        for pole in _response(channel).poles:
+            if pole.imag >= 0:
+                ringing = np.exp(pole * time)
+                columns += [ringing.real, ringing.imag] if pole.imag > 0 else [ringing.real]
+        known, triangle = np.linalg.qr(np.column_stack(columns))
+        sizes = np.abs(np.diag(triangle))
+        return cls(
+            channel, slice(first, last), time, record[name][first:last], noise, known[:, sizes > 1e-6 * sizes[0]]
+        )
+
+    def predicted(self, run: Motion, late: float) -> tuple[Array, NDArray[np.int64] | None]:
+        """What it would read of a run, but for its gain and what is `known`; `late` [s] beyond the stated delay.
+
+        Of what may jump from one sample to the next, also the piece of the run that each sample falls in.
+        """
+        source, inertia = SENSED[self.channel.name], self.channel.inertia
+
+        def sensed(at: Array) -> Array:
+            values, _ = run(at)
+            return values[source] + inertia * values["a"] if inertia else values[source]
+
+        at = self.time - late
+        if self.response.poles:
+            return respond(sensed, breaks=run.breaks, times=at, response=self.response, nodes=NODES), None
+        return sensed(at), run(at)[1] if source in JUMPS else None
+
+    @cached_property
+    def response(self) -> Response:
+        """Of its mount and its discharge."""
+        return _response(self.channel)
+
+    def freed(self, values: Array) -> Array:
+        """Values in units of the noise, less what is known; columns where there are several."""
+        return np.asarray((values - self.known @ (self.known.T @ values)) / self.noise)
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """What all sensors read between two instants, and how the motion may have begun.
+
+    Attributes
+    ----------
+    record : int
+        Number of the record.
+    span : tuple of (float, float)
+        First and last instant [s] on the record's clock.
+    sensors : tuple of Sensor
+        What was read.
+    drive : callable
+        The drive from an instant on.
+    start : mapping
+        Displacement and velocity at the first instant, as estimated from the record.
+    scales : ndarray (2,)
+        Half the displacement's range [m] and the largest speed [m/s] of the record.
+    """
+
+    record: int
+    span: tuple[float, float]
+    sensors: tuple[Sensor, ...]
+    drive: DriveFrom
+    start: Mapping[str, float]
+    scales: Array
+
+    def run(self, oscillator: Oscillator, start: Mapping[str, float | str], off: Array) -> Trajectory:
+        """The motion from a start on, to the last instant that a sensor read, under a drive that is `off`."""
+        end = max(float(sensor.time[-1]) for sensor in self.sensors)
+        driven = replace(oscillator, drive=self.drive(self.span[0], self.span[0] + end, off))
+        return simulate(driven, duration=end, start=start, rtol=RTOL)
+
+    def told(self, run: Trajectory, delays: Mapping[str, float]) -> list[tuple[Array, NDArray[np.int64] | None]]:
+        """What each sensor would read of a run, as :meth:`Sensor.predicted`; `delays` [s] by channel."""
+        motion = self.motion(run)
+        return [sensor.predicted(motion, delays.get(sensor.channel.name, 0.0)) for sensor in self.sensors]
+
+    def motion(self, run: Trajectory) -> Motion:
+        """What the sensors feel of a run."""
+        outputs = {SENSED[sensor.channel.name] for sensor in self.sensors}
+        outputs |= {"a"} if any(sensor.channel.inertia for sensor in self.sensors) else set()
+        return Motion(run, tuple(sorted(outputs)))
+
+    def face_speed(self, oscillator: Oscillator) -> float:
+        """Velocity [m/s] of the counter-face at the first instant."""
+        motion = self.drive(*self.span).motion()
+        rates = {"1": 1.0, **motion.start}
+        slopes = {name: sum(c * rates[n] for n, c in row.items()) for name, row in motion.rates.items()}
+        return sum(c * slopes.get(name, 0.0) for name, c in motion.face.items())
+
+
+def remembered(law: object, speed: float, place: float) -> dict[str, float | str]:
+    """Mode and memory of a law after sliding steadily at a speed [m/s], at a place [m]."""
+    glider = Oscillator(mass=HEAVY, stiffness=0.0, law=law, drive=Release())  # type: ignore[arg-type]
+    run = simulate(glider, duration=GLIDE, start={"v": speed}, rtol=RTOL)
+    last = run.state(GLIDE)
+    law_places = getattr(law, "places", ())
+    found: dict[str, float | str] = {"mode": run.table.modes[int(last["mode"])].name}
+    for name in run.table.names[2 : run.table.physical]:
+        found[name] = last[name] + (place - last["x"] if name in law_places else 0.0)
+    return found
+
+
+def attempted(
+    stretch: Stretch, oscillator: Oscillator, start: Mapping[str, float | str], off: Array
+) -> Trajectory | None:
+    """The run, or None where the engine refuses such values."""
+    try:
+        return stretch.run(oscillator, start, off)
+    except (SolveError, ModelError):
+        return None
+
+
+def _response(channel: Channel) -> Response:
+    mount = resonance(*channel.mount) if channel.mount else Response()
+    return mount.then(leak(channel.discharge)) if channel.discharge else mount
+
+
+def channels_of(record: Record, wanted: Sequence[str] | None) -> tuple[str, ...]:
+    """The channels to fit: those asked for, or all that were measured."""
+    if wanted is not None:
+        record.require(*wanted, question="a fitted law")
+        if strange := [name for name in wanted if name not in SENSED]:
+            raise ModelError(
+                f"channels = {', '.join(wanted)}", f"a law explains {', '.join(SENSED)}; z and force drive the motion",
+                f"leave {' and '.join(strange)} out",
+            )  # fmt: skip
+        if not wanted:
+            raise ModelError("channels = []", "a law explains one channel at least", "name one, or leave channels= out")
+        return tuple(wanted)
+    names = [name for name in ("x", "v", "a", "load") if name in record]
+    if not {"a", "load"} & set(names) and "friction" in record:
+        names.append("friction")
+    return tuple(names)

@@ -1,0 +1,551 @@
+"""Which friction law is it: several laws fitted to the same records, and what the records say of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.law.choice import CALIBRATIONS, Misfit, Standing, standings, times, undescribed
+from stickslip.law.guess import GUESSES, Seen
+from stickslip.law.law import LawFit, answered
+from stickslip.law.search import descend
+from stickslip.law.start import Shown, require_apart, too_few
+from stickslip.law.stretch import Stretch, channels_of
+from stickslip.law.surety import surety
+from stickslip.law.trials import (
+    CONTENDING,
+    PASSES,
+    Trial,
+    evidence_of,
+    from_simpler,
+    predicted,
+    resumed,
+    searched,
+    squares,
+    tuned,
+    unexplained,
+    weighed,
+    with_static,
+)
+from stickslip.laws.coulomb import Coulomb
+from stickslip.oscillator import Oscillator
+from stickslip.record.record import Record, Step
+
+Array = NDArray[np.float64]
+
+CLASSES = {
+    "Coulomb": "Coulomb",
+    "Stribeck": "Stribeck",
+    "CompliantContact": "compliant",
+    "StateVariable": "state variable",
+    "SmoothStateVariable": "state variable",
+    "LuGre": "LuGre",
+}
+CALIBRATION = 0.01  # by which gains are wrong, if nothing is known
+CALLS = 40.0  # of progress that the trial of a law is taken for
+SAID = {
+    "rigid": "that of a rigid contact",
+    "compliant": "that of a compliant contact",
+    "state variable": "that of a state variable, which lags behind the velocity",
+    "LuGre": "that of bristles (LuGre)",
+}
+BAD = 0.3  # of a channel's own size: a law that leaves more beyond the noise describes little
+LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
+RETUNED = 8  # times that mounts and law are found in turn
+LEFT = 0.05  # of it: so much comes of more than the chance that an interval knows
+SCALED = ("kinetic", "static", "speed", "rate", "steepness")  # parameters in proportion to the motion, or against it
+OFF = 0.05  # of a gain, beyond which it is no calibration's error
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One law that was tried.
+
+    Attributes
+    ----------
+    standing : Standing
+        How it stands among the others.
+    oscillator : Oscillator
+        With the law's fitted values.
+    left : mapping of str to float
+        Root mean square of what it leaves of each channel [unit of the channel].
+    """
+
+    standing: Standing
+    oscillator: Oscillator
+    left: Mapping[str, float]
+
+    @property
+    def name(self) -> str:
+        """Of the law."""
+        return self.standing.name
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LawComparison(Result):
+    """What records say of several friction laws.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        The laws tried, the best one first.
+    law : str or None
+        The law, where the records leave one alone.
+    family : str or None
+        "rigid", "compliant", "state variable" or "LuGre", where the records leave one alone.
+    kept : tuple of str
+        The laws that are not rejected.
+    confidence : float
+        Probability that the true law is among those kept, were it among the laws tried.
+    verdict : str
+        The answer, in a sentence or two for a report.
+    fit : LawFit
+        The best law's fit to all records, with intervals.
+    excess : Estimate or None
+        By what part static friction exceeds the kinetic, where a rigid contact is the best.
+    status : str
+        "ok", or why the answer should not be trusted.
+    checks : tuple of str
+        What was checked, with the numbers.
+    history : tuple of Step
+        How it was found.
+    """
+
+    candidates: tuple[Candidate, ...]
+    law: str | None
+    family: str | None
+    kept: tuple[str, ...]
+    confidence: float
+    verdict: str
+    fit: LawFit
+    excess: Estimate | None
+    status: str
+    checks: tuple[str, ...]
+    history: tuple[Step, ...]
+
+    @property
+    def best(self) -> Candidate:
+        """The law that stands first."""
+        return self.candidates[0]
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """The best law's parameters."""
+        return (*self.fit.estimates, *([self.excess] if self.excess else []))
+
+    def __repr__(self) -> str:
+        return f"{self.verdict}\n{super().__repr__()}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "verdict": self.verdict,
+            "law": self.law,
+            "family": self.family,
+            "not_rejected": list(self.kept),
+            "confidence": self.confidence,
+            "status": self.status,
+            "checks": list(self.checks),
+            "laws": [_told(each) for each in self.candidates],
+            "estimates": [each.to_dict() for each in self.estimates],
+            "history": [step.to_dict() for step in self.history],
+        }
+
+
+def _told(candidate: Candidate) -> dict[str, Any]:
+    standing = candidate.standing
+    values = {"misfit": standing.misfit, "criterion": standing.criterion, "prediction": standing.prediction}
+    law = candidate.oscillator.law
+    return {
+        "name": standing.name, "family": standing.family, "verdict": standing.verdict, "kept": standing.kept,
+        **{key: value if math.isfinite(value) else None for key, value in values.items()},
+        "values": {key: value for key, value in vars(law).items() if isinstance(value, float)},
+        "left": dict(candidate.left),
+    }  # fmt: skip
+
+
+def compare_laws(
+    record: Record | Sequence[Record],
+    oscillator: Oscillator,
+    *,
+    laws: Sequence[Any] | None = None,
+    nuisance: Sequence[str] | None = None,
+    calibration: float = CALIBRATION,
+    leave_out: bool = True,
+    progress: Callable[[float], object] | None = None,
+) -> LawComparison:
+    r"""Which friction law is it?
+
+    Each law is fitted to all records, the exact engine in the loop, from starts that the friction tells without any
+    law and from the ends of the simpler laws' searches. A law's misfit is the mean square of what it leaves over the
+    least that any law leaves, each channel by its own measure: the error of the model is larger than the noise, and its
+    variance is what the best law leaves. The laws are ranked by Schwarz's criterion with that variance,
+
+    .. math:: \sum_c n_c \log S_c + p \log \sum_c n_c
+
+    S_c the mean square left of channel c, n_c the number of samples that tell a story of their own, p the number of
+    parameters. The odds between two families are exp(-C/4) where their best laws' criteria differ by C (the exponent
+    would be C/2, did what laws leave over come of chance alone); another family is rejected where they are below 1 in
+    20, unless it has no more parameters and predicts records that were left out better. Rigid laws are told apart by
+    the friction around rest, and an effect within three times the calibration's error is not told from it.
+
+    Parameters
+    ----------
+    record : Record or sequence of Record
+        As :func:`fit_law` takes them; several excitations tell laws apart that one does not.
+    oscillator : Oscillator
+        Mass, spring, damper, and the drive where the base's motion z was not measured. Its own law does not matter.
+    laws : sequence, optional
+        Names ("Coulomb", "static", "Stribeck", "compliant", "state variable", "LuGre"), classes, or laws with the
+        values to start from. All six names where left out.
+    nuisance : sequence of str, optional
+        What is fitted beside each law, as :func:`fit_law` takes it; all gains and the delay of x where left out.
+    calibration : float
+        By what part gains and constants may be wrong.
+    leave_out : bool
+        Whether to predict each record by a fit to the others.
+    progress : callable, optional
+        Called with the share of the work that is done, 0 to 1; an exception from it, as Ctrl-C, ends the comparison.
+
+    Returns
+    -------
+    LawComparison
+
+    Raises
+    ------
+    EstimateError
+        The records can not tell of a law: no sliding, no reversal, noise above the signal.
+    ModelError
+        A law that is not known, or none; a nuisance of no channel that is fitted, or of the drive.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(
+    ...     mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
+    ... )
+    >>> rig = ss.Rig.perfect("x", "z", "load").having("x", white=1e-6).having("load", white=2e-3)
+    >>> record = rig.measure(ss.simulate(slider, cycles=12), fs=1000, rng=1, start=0.7)
+    >>> compare_laws(record, slider, laws=["Coulomb", "compliant"]).family
+    'rigid'
+    """
+    records = [record] if isinstance(record, Record) else list(record)
+    if not records:
+        raise EstimateError("no record", "laws are compared by one record at least", "give one")
+    if not 0 <= calibration < 1:
+        raise ModelError(f"calibration = {calibration}", "it is a part of 1, as 0.01 for 1 %", "correct calibration=")
+    kinds = _kinds(laws)
+    shown = [Shown.of(each, channels_of(each, None), oscillator) for each in records]
+    for each in shown:
+        each.require_sliding()
+    require_apart(oscillator, (), nuisance or (), shown)
+    tell = _teller(progress, len(kinds))
+    seen = Seen.of(records, oscillator)
+
+    def stretch(each: Shown, number: int) -> Stretch:
+        return weighed(each, number, calibration)
+
+    def tried(names: Sequence[tuple[str, list[Any]]], passes: int, before: Mapping[str, Trial]) -> dict[str, Trial]:
+        stretches = [stretch(each, number) for number, each in enumerate(shown)]
+        known = tuple(nuisance) if nuisance is not None else _nuisance(shown)
+        found: dict[str, Trial] = {}
+        for name, given in names:
+            least = min((each.point.chi2 for each in {**before, **found}.values()), default=math.inf)
+            trial = resumed(before[name], stretches, least, passes, tell) if name in before else None
+            if trial is None:
+                begun = [*(given or GUESSES[name](seen)), *from_simpler(name, found)]
+                trial = searched(name, begun, oscillator, stretches, known, least, passes, tell)
+            if trial is not None:
+                found[name] = trial
+        return found
+
+    rough, silent, stated = tried(kinds, LOOK, {}), dict[str, float](), shown
+    if rough:
+        nearest = min(rough.values(), key=lambda each: each.point.chi2)
+        silent = unexplained(nearest, shown)
+        shown = [replace(each, channels=tuple(n for n in each.channels if n not in silent)) for each in shown]
+        stated, shown = shown, tuned(shown, nearest, stretch, tell)
+    trials = tried(kinds, PASSES, {} if silent else rough)
+    if not trials:
+        raise EstimateError(
+            "no law can be simulated along these records", "a search starts from a motion that exists",
+            "check mass= and stiffness=, or give laws with their values",
+        )  # fmt: skip
+    first = min(trials.values(), key=lambda each: each.point.chi2)
+    rigid, likely = seen.rests.fall, seen.rests.probabilities(calibration, CALIBRATIONS * calibration)
+    misfits = []
+    for trial in trials.values():
+        left, near = squares(trial.left), trial.point.chi2 < CONTENDING * first.point.chi2
+        ahead = squares(predicted(trial, tell)) if leave_out and len(records) > 1 and near else None
+        misfits.append(Misfit(trial.name, trial.count, left, ahead, trial.stiff))
+    told, confidence = standings(misfits, evidence_of(first, shown), likely=likely)
+    best = trials[told[0].name]
+    if best.name == "static" and rigid is not None:
+        best = with_static(best, rigid.value)
+    for _ in range(RETUNED if rough else 0):  # the mounts by the law that was found, not by the first look
+        before, shown = shown, tuned(stated, best, stretch, tell)
+        if [each.record.channels for each in before] == [each.record.channels for each in shown]:
+            break
+        again = resumed(best, [stretch(each, number) for number, each in enumerate(shown)], math.inf, PASSES, tell)
+        best = again or best
+    whole = [weighed(each, number, calibration, whole=True) for number, each in enumerate(shown)]
+    fit = _fit(best, shown, whole, tell)
+    if best.name == "static" and rigid is not None:
+        fit = _with_static(fit, rigid)
+    doubt = _doubt(fit, calibration)
+    if doubt:
+        told, confidence = undescribed(told), 0.0
+        fit = _flagged(fit, "none of the laws tried describes these records")
+    if told[0].name == "Stribeck":
+        rigid = _excess(fit)
+    fit = _calibrated(fit, records, calibration)
+    if progress:
+        progress(1.0)
+    candidates = tuple(
+        Candidate(each, fit.oscillator if each is told[0] else trials[each.name].system, _left(trials[each.name]))
+        for each in told
+    )
+    worries = [
+        f"{name} is left out: the best law leaves {share:.0%} of it, and no mount or delay of its sensor is stated"
+        for name, share in silent.items()
+    ]
+    worries += filter(None, [too_few(shown, best.count)])
+    return _answer(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
+
+
+def _excess(fit: LawFit) -> Estimate:
+    """By what part the static friction of a fitted Stribeck curve exceeds the kinetic."""
+    level, static = fit.parameters["kinetic"].value, fit.parameters["static"]
+    low, high = (end / level - 1 for end in static.interval)
+    return replace(
+        static, name="excess of static friction", value=static.value / level - 1, interval=(max(0.0, low), high),
+        sd=static.sd / level, unit="1",
+    )  # fmt: skip
+
+
+def _with_static(fit: LawFit, excess: Estimate) -> LawFit:
+    """The fit with the static friction that the releases tell."""
+    level = fit.parameters["kinetic"].value
+    low, high = (level * (1 + end) for end in excess.interval)
+    static = replace(
+        excess, name="static friction", value=level * (1 + excess.value), interval=(low, high), sd=level * excess.sd,
+        unit="N",
+    )  # fmt: skip
+    correlations = np.eye(len(fit.correlations) + 1)
+    correlations[1:, 1:] = fit.correlations
+    return replace(fit, parameters={"static": static, **fit.parameters}, correlations=correlations)
+
+
+def _left(trial: Trial) -> dict[str, float]:
+    """Root mean square of what is left of each channel."""
+    found: dict[str, list[float]] = {}
+    for (name, _), square in squares(trial.left).items():
+        found.setdefault(name, []).append(square)
+    return {name: math.sqrt(float(np.mean(values))) for name, values in found.items()}
+
+
+def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tell: Callable[[], None]) -> LawFit:
+    """The law's parameters with their intervals, by all readings; of its misfit the noise alone is the measure."""
+    problem = replace(trial.problem, stretches=tuple(stretches))
+    begun = problem.at(trial.point.u, problem.own(trial.point.starts))
+    # channels counted by their calibration leave a sum of squares that is small, and by far more than it can settle
+    point = descend(problem, begun, passes=PASSES, settled=0.0, tell=tell)
+    with np.errstate(all="ignore"):  # of a parameter without effect
+        fit = answered(problem, point, surety(problem, point, tell), shown)
+    noise = {name: max(each.noise(name) for each in shown if name in each.channels) for name in fit.residual}
+    checks = tuple(
+        f"{name} is left with {left / noise[name]:.3g} times its noise" for name, left in fit.residual.items()
+    )
+    name, share = _worst(fit, noise)
+    if share > LEFT:
+        fit = _flagged(fit, f"the interval does not count that the law misses {share:.0%} of {name}")
+    return replace(fit, noise=noise, checks=checks)
+
+
+def _flagged(fit: LawFit, words: str) -> LawFit:
+    """The fit with a reason why its parameters should not be trusted, where none is told yet."""
+    told = {key: replace(one, status=words) if one.status == "ok" else one for key, one in fit.parameters.items()}
+    return replace(fit, parameters=told)
+
+
+def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> LawFit:
+    """The fit whose forces and speeds are no surer than the measured base is calibrated, by which all motion scales."""
+    if not any(name in record for record in records for name in ("z", "force")):
+        return fit
+    told = {key: _widened(one, calibration) if key in SCALED else one for key, one in fit.parameters.items()}
+    return replace(fit, parameters=told)
+
+
+def _widened(estimate: Estimate, share: float) -> Estimate:
+    """The estimate, unsure by a share of its value besides."""
+    more, (low, high) = share * abs(estimate.value), estimate.interval
+    ends = (estimate.value - low, high - estimate.value)
+    below, above = (math.hypot(end, NORMAL_95 * more) for end in ends)
+    return replace(
+        estimate, interval=(estimate.value - below, estimate.value + above), sd=math.hypot(estimate.sd, more)
+    )
+
+
+def _worst(fit: LawFit, noise: Mapping[str, float]) -> tuple[str, float]:
+    """The channel of which a law leaves the largest share beyond the noise, and that share."""
+    shares = {}
+    for name, left in fit.residual.items():
+        size = float(np.std(np.concatenate([each.measured[name] for each in fit.traces])))
+        shares[name] = math.sqrt(max(0.0, left**2 - noise[name] ** 2)) / max(size, 1e-300)
+    return max(shares.items(), key=lambda each: each[1])
+
+
+def _nuisance(shown: Sequence[Shown]) -> tuple[str, ...]:
+    """The gains of all channels, and the delay of the displacement against the others."""
+    channels = dict.fromkeys(name for each in shown for name in each.channels)
+    return (*(f"{name}.gain" for name in channels), *(["x.delay"] if "x" in channels and len(channels) > 1 else []))
+
+
+def _teller(progress: Callable[[float], object] | None, laws: int) -> Callable[[], None]:
+    """Progress that comes nearer to its end with each call, as nobody knows how many there will be."""
+    calls = 0
+
+    def tell() -> None:
+        nonlocal calls
+        calls += 1
+        if progress:
+            progress(1 - math.exp(-calls / (CALLS * laws)))
+
+    return tell
+
+
+def _kinds(laws: Sequence[Any] | None) -> list[tuple[str, list[Any]]]:
+    """The laws to try: name, and the values to start from where they are given."""
+    found: dict[str, list[Any]] = {}
+    for each in GUESSES if laws is None else [laws] if isinstance(laws, str) else laws:
+        name = _name(each)
+        found.setdefault(name, []).extend([] if isinstance(each, str | type) else [each])
+    if not found:
+        raise ModelError("no law", "laws are compared by trying some", f"name some of {', '.join(GUESSES)}")
+    order = list(GUESSES)
+    return sorted(found.items(), key=lambda each: order.index(each[0]) if each[0] in order else len(order))
+
+
+def _name(law: Any) -> str:
+    if isinstance(law, str):
+        plain = law.strip().lower().replace("-", " ").replace("_", " ")
+        fits = [name for name in GUESSES if name.lower() == plain]
+        if not fits:
+            raise ModelError(f"law '{law}'", f"laws are {', '.join(GUESSES)}", "choose among these, or give a law")
+        return fits[0]
+    kind = law if isinstance(law, type) else type(law)
+    if isinstance(law, Coulomb) and law.static is not None:
+        return "static"
+    if kind.__name__ in CLASSES:
+        return CLASSES[kind.__name__]
+    if isinstance(law, type) or not (hasattr(law, "modes") or hasattr(law, "rates")):
+        raise ModelError(
+            f"law {law!r}", "a law without a guess of its own needs values to start from", "give it with its values"
+        )
+    return kind.__name__
+
+
+def _answer(
+    candidates: tuple[Candidate, ...],
+    confidence: float,
+    fit: LawFit,
+    excess_: Estimate | None,
+    calibration: float,
+    records: Sequence[Record],
+    doubt: str,
+    worries: Sequence[str],
+) -> LawComparison:
+    told = [each.standing for each in candidates]
+    kept = [each for each in told if each.kept]
+    families = list(dict.fromkeys(each.family for each in kept))
+    excess_ = excess_ if told[0].family == "rigid" else None
+    checks = tuple(
+        f"{each.name}: misfit {times(each.misfit)} the least"
+        + (f", of records left out {times(each.prediction)} the best one's" if math.isfinite(each.prediction) else "")
+        for each in told
+    )
+    step = Step(
+        "compare_laws", {"laws": [each.name for each in candidates], "calibration": calibration},
+        f"{', '.join(each.name for each in kept)} not rejected",
+    )  # fmt: skip
+    return LawComparison(
+        candidates, kept[0].name if len(kept) == 1 and not doubt else None,
+        families[0] if len(families) == 1 and not doubt else None,
+        tuple(each.name for each in kept), confidence,
+        f"None of the laws tried describes these records: {doubt}." if doubt
+        else " ".join(_sentences(told, families, excess_, calibration, confidence)),
+        fit, excess_, doubt or "; ".join(worries) or "ok", checks,
+        (*records[0].history, step),
+    )  # fmt: skip
+
+
+def _doubt(fit: LawFit, calibration: float) -> str:
+    """Why even the best law is none for these records; nothing where it is."""
+    gains = {name[:-5]: each.value for name, each in fit.parameters.items() if name.endswith(".gain")}
+    far = [name for name, gain in gains.items() if abs(gain - 1) > max(OFF, 5 * calibration)]
+    if far:
+        told = ", ".join(f"the gain of {name} comes out as {gains[name]:.3g}" for name in far)
+        return (
+            f"{told}, where calibrations are off by {calibration:.0%}: check mass=, stiffness= and the channels' units"
+        )
+    name, share = _worst(fit, fit.noise)
+    if share <= BAD:
+        return ""
+    return f"even the best law leaves {share:.0%} of {name}: the friction may follow none of those tried"
+
+
+def _sentences(
+    laws: Sequence[Standing], families: Sequence[str], excess_: Estimate | None, calibration: float, confidence: float
+) -> Iterator[str]:
+    """The verdict, to be pasted into a report."""
+    best = laws[0]
+    kept = [each.name for each in laws if each.kept]
+    rivals = [each for each in laws if each.family != best.family and not each.limit]
+    limits = [each.name for each in laws if each.limit]
+    if len(families) > 1:
+        yield (
+            f"These records can not tell {_either(kept)} apart: what they leave over differs too little. "
+            "A record in which the contact sticks and slips, with a load cell, would tell more."
+        )
+    else:
+        said = []
+        if rivals:
+            least = min(each.misfit for each in rivals) / best.misfit
+            larger = f"the misfit of any other family tried is at least {times(least)} as large"
+            said.append(larger if least > 1 else "another family leaves no less where the records tell most")
+        if limits:
+            said.append(f"{_either(limits)} would have to be so stiff that it says the same")
+        told = "; ".join(said) or "no law of another family was tried"
+        yield f"The friction is {SAID.get(best.family, best.family)}: {told}."
+    if best.family == "rigid" and len(families) == 1 and excess_ is not None:
+        low, high = excess_.interval
+        exceeds = (
+            f"by {excess_.value:.1%} (95 %: {low:.1%} to {high:.1%})"
+            if math.isfinite(high)
+            else f"by {low:.1%} or more"
+            if low > 0
+            else "by what can not be told"
+        )
+        if len(kept) > 1:
+            yield (
+                f"Within it {_either(kept)} can not be told apart: static friction exceeds the kinetic {exceeds}, "
+                f"where calibrations within {calibration:.0%} hide {CALIBRATIONS * calibration:.0%}."
+            )
+        elif best.name == "Coulomb" or kept == ["Coulomb"]:
+            yield f"One level of friction explains it: static friction exceeds the kinetic by {high:.1%} at most."
+        else:
+            falls = "at once" if kept == ["static"] else "with the speed, along a Stribeck curve"
+            yield f"Static friction exceeds the kinetic {exceeds} and falls {falls}."
+    if len(kept) == 1:
+        yield f"Confidence {confidence:.1%}."
+
+
+def _either(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1])] * (len(names) > 1) + [names[-1]])

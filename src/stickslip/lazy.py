@@ -1,0 +1,40 @@
+"""Public names, imported when they are first used: a package names them once, in the stub beside its ``__init__``."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import importlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+
+def attached(package: str, *own: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """``__getattr__``, ``__dir__`` and ``__all__`` of a package, by the imports that its ``__init__.pyi`` lists.
+
+    `own` are names that the package defines itself.
+    """
+    sources = named(Path(str(sys.modules[package].__file__)).with_suffix(".pyi"))
+
+    def find(name: str) -> Any:
+        if name not in sources:
+            near = difflib.get_close_matches(name, sources, n=3, cutoff=0.5)
+            hint = f"the nearest are {', '.join(near)}" if near else f"dir({package}) lists what it has"
+            raise AttributeError(f"module '{package}' has no attribute '{name}'; {hint}")
+        module = sources[name]
+        return importlib.import_module(f"{module}.{name}") if module == "stickslip" else _member(module, name)
+
+    listed = [*sources, *own]
+    return find, lambda: listed, listed
+
+
+def _member(module: str, name: str) -> Any:
+    return getattr(importlib.import_module(module), name)
+
+
+def named(stub: Path) -> dict[str, str]:
+    """Where each name of a stub comes from."""
+    imports = [node for node in ast.parse(stub.read_text("utf-8")).body if isinstance(node, ast.ImportFrom)]
+    return {alias.asname or alias.name: str(node.module) for node in imports for alias in node.names}

@@ -1,0 +1,196 @@
+"""Which start leads to which motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stickslip.errors import ModelError, SolveError
+from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.maps.attractor import Attractor, Start, as_start, numbers, require_period, same, settled
+from stickslip.record.exchange import labelled_arrays
+from stickslip.solve.poincare import Table, end_of, extent, lap, tables
+from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, System
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NEAR = 1e-6  # of an orbit's size: what comes this near, with the orbit's own events, and nearer still, belongs to it
+ENDLESS = ("not periodic", "unbounded")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Basins:
+    """Which start leads to which motion.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The two start coordinates.
+    axes : tuple of ndarray
+        Their values.
+    attractors : tuple of Attractor
+        The motions, that of most starts first.
+    which : ndarray (n, m)
+        Number of the attractor to which each start leads; the first coordinate runs down the rows. -1: not followed.
+    shares : tuple of Estimate
+        Share of the starts that lead to each.
+    lost : tuple of str
+        Why starts could not be followed, a sentence for each.
+    """
+
+    names: tuple[str, str]
+    axes: tuple[Array, Array]
+    attractors: tuple[Attractor, ...]
+    which: NDArray[np.int64]
+    shares: tuple[Estimate, ...]
+    lost: tuple[str, ...]
+
+    @property
+    def data(self) -> xr.DataArray:
+        """The map as an xarray.DataArray with the starts as coordinates; the attractors in words in its attributes."""
+        xarray = labelled_arrays("basins")
+        result: xr.DataArray = xarray.DataArray(
+            self.which,
+            dims=self.names,
+            coords=dict(zip(self.names, self.axes, strict=True)),
+            name="attractor",
+            attrs={
+                "attractors": [each.regime for each in self.attractors],
+                "shares": [share.value for share in self.shares],
+                "system": repr(self.attractors[0].orbit.orbit.system),
+            },
+        )
+        return result
+
+    def __repr__(self) -> str:
+        head = f"Basins({' x '.join(self.names)}, {' x '.join(map(str, self.which.shape))} starts)"
+        told = [f"{len(self.lost)} starts could not be followed"] if self.lost else []
+        return "\n  ".join([head, *map(str, self.shares), *told])
+
+
+def basins(
+    system: System,
+    *,
+    grid: Mapping[str, ArrayLike],
+    start: Start | None = None,
+    transient: int = 64,
+    orders: int = 4,
+) -> Basins:
+    """To which motion does each start lead?
+
+    Every start is followed through a transient. It belongs to an attractor that is known if its next period has the
+    attractor's own events in their order, ends nearer to it than it began, and begins within a millionth of the orbit's
+    size; else its steady motion is found by ``steady_state`` and is compared, or is a new one. No distance in a picture
+    decides. Equilibria count as one attractor, and so does a family of orbits.
+
+    Parameters
+    ----------
+    system : Oscillator or Structure
+        What moves, with a periodic drive.
+    grid : mapping
+        Two start coordinates by name, as ``simulate`` takes them ("x" [m], "v" [m/s], ...), with their values.
+    start : mapping, optional
+        The rest of the start.
+    transient, orders : int
+        As in ``steady_state``.
+
+    Returns
+    -------
+    Basins
+
+    Raises
+    ------
+    ModelError
+        The grid has no meaning, or the drive does not repeat.
+    SolveError
+        No start could be followed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from stickslip.scenarios import forced
+    >>> bistable = forced(0.8, 0.7, static_ratio=1.5)
+    >>> found = basins(bistable, grid={"x": np.linspace(-3, 3, 7), "v": np.linspace(-3, 3, 7)})
+    >>> [(each.regime, round(share.value, 2)) for each, share in zip(found.attractors, found.shares)]
+    [('no stops', 0.96), ('held', 0.04)]
+    """
+    require_period(system, "a basin")
+    names, axes = _axes(grid)
+    table = tables(system)
+    found: list[Attractor] = []
+    lost: list[str] = []
+    which = np.full((len(axes[0]), len(axes[1])), -1, dtype=np.int64)
+    for (i, j), _ in np.ndenumerate(which):
+        begin = {**(start or {}), names[0]: float(axes[0][i]), names[1]: float(axes[1][j])}
+        try:
+            which[i, j] = _number(system, table, found, begin, (transient, orders))
+        except SolveError as stopped:
+            lost.append(f"{names[0]} = {begin[names[0]]:g}, {names[1]} = {begin[names[1]]:g}: {stopped}")
+    if not found:
+        raise SolveError("no start of the grid could be followed", lost[0], "see which motion is meant")
+    counts = np.bincount(which[which >= 0], minlength=len(found))
+    order = np.argsort(-counts, kind="stable")
+    shares = tuple(_share(found[k].regime, int(counts[k]), which.size) for k in order)
+    ranks = np.append(np.argsort(order), -1)  # the last for those that were not followed
+    return Basins(names, axes, tuple(found[k] for k in order), ranks[which], shares, tuple(lost))
+
+
+def _axes(grid: Mapping[str, ArrayLike]) -> tuple[tuple[str, str], tuple[Array, Array]]:
+    if len(grid) != 2:
+        raise ModelError(
+            f"a grid of {', '.join(grid) or 'nothing'}", "two start coordinates are needed",
+            'give grid={"x": np.linspace(-1, 1, 50), "v": np.linspace(-1, 1, 50)}',
+        )  # fmt: skip
+    axes = [numbers(name, values) for name, values in grid.items()]
+    first, second = grid
+    return (first, second), (axes[0], axes[1])
+
+
+def _number(system: System, table: Table, found: list[Attractor], start: Start, patience: tuple[int, int]) -> int:
+    """Which of the attractors found so far a start leads to; a new one is added."""
+    transient, orders = patience
+    state, mode = end_of(lap(system, table, *opening(table, start), transient))
+    for number, each in enumerate(found):
+        if _belongs(system, table, state, mode, each):
+            return number
+    new = settled(system, as_start(table, state, mode), transient=transient, orders=orders)
+    for number, each in enumerate(found):
+        if same(new, each):
+            return number
+    found.append(new)
+    return len(found) - 1
+
+
+def _belongs(system: System, table: Table, state: Array, mode: int, attractor: Attractor) -> bool:
+    """Whether a motion is on its last way to an attractor."""
+    if attractor.status in (*ENDLESS, "not unique", "grazing"):
+        return False
+    if attractor.status == "rest":
+        course = lap(system, table, state, mode, 1)
+        return len(course.modes) == 1 and table.modes[mode].friction is None and table.modes[mode].side == 0
+    physical, size = table.physical, extent(attractor.orbit.orbit)
+    gaps = np.max(np.abs(attractor.points - state[:physical]) / np.where(size > 0, size, 1.0), axis=1)
+    if np.min(gaps) > NEAR:
+        return False
+    course = lap(system, table, state, mode, attractor.orbit.order)
+    after = np.abs(end_of(course)[0][:physical] - attractor.points[int(np.argmin(gaps))]) / np.where(size > 0, size, 1)
+    if np.max(after) > max(np.min(gaps), 1e-12):
+        return False
+    return attractor.orbit.order > 1 or list(course.modes) == list(attractor.orbit.orbit.modes)
+
+
+def _share(words: str, count: int, total: int) -> Estimate:
+    """A share with Wilson's interval: as of starts drawn at random, which scatter more than a grid."""
+    share, square = count / total, NORMAL_95**2 / total
+    middle = (share + square / 2) / (1 + square)
+    half = math.sqrt(square * (share * (1 - share) + square / 4)) / (1 + square)
+    interval = (max(0.0, middle - half), min(1.0, middle + half))
+    sd = math.sqrt(share * (1 - share) / total)
+    return Estimate(f"share of '{words}'", share, interval, sd, "1", f"count of {total} starts, Wilson's interval")

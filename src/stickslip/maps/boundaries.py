@@ -1,0 +1,235 @@
+"""Where one kind of motion ends and another begins, to a set precision."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stickslip.errors import ModelError, SolveError
+from stickslip.maps.attractor import Attractor, Start, numbers, require_number, require_period, settled
+from stickslip.parameters import find
+from stickslip.record.exchange import labelled_arrays
+from stickslip.solve.tables import Array, System
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Kind = Callable[[Attractor], object]
+
+
+def sticking(attractor: Attractor) -> str:
+    """Whether a contact ever holds."""
+    modes = attractor.orbit.orbit.table.modes
+    held = any(modes[m].friction is None or modes[m].side == 0 for m in attractor.orbit.orbit.modes)
+    return "stops" if held else "no stops"
+
+
+KINDS: dict[str, Kind] = {
+    "sticking": sticking,
+    "regime": lambda attractor: attractor.regime,
+    "period": lambda attractor: attractor.orbit.order,
+    "held": lambda attractor: "held" if attractor.status == "rest" else "moves",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """Where one kind of motion ends and another begins.
+
+    Attributes
+    ----------
+    parameter : str
+        What was bisected.
+    along : str
+        What it was followed along; "" where at one place.
+    places : ndarray (n,)
+        Values of `along`; NaN at one place.
+    values : ndarray (n,)
+        The parameter on the boundary; NaN where none lies in the range.
+    errors : ndarray (n,)
+        How far off each may be.
+    low, high : tuple of Attractor
+        The motions on either side, a hair's breadth below and above; None where there is no boundary.
+    kinds : tuple of tuple
+        What they are, as the chosen question answers.
+    """
+
+    parameter: str
+    along: str
+    places: Array
+    values: Array
+    errors: Array
+    low: tuple[Attractor | None, ...]
+    high: tuple[Attractor | None, ...]
+    kinds: tuple[tuple[object, object], ...]
+
+    @property
+    def value(self) -> float:
+        """The parameter on the boundary, at the first place."""
+        return float(self.values[0])
+
+    @property
+    def multipliers(self) -> Array:
+        """Largest modulus of the orbit's multipliers on either side (n, 2): below 1 it is stable."""
+        return np.array([
+            [math.nan if each is None else float(np.max(np.abs(each.orbit.multipliers))) for each in pair]
+            for pair in zip(self.low, self.high, strict=True)
+        ])  # fmt: skip
+
+    @property
+    def data(self) -> xr.Dataset:
+        """The curve as an xarray.Dataset."""
+        xarray = labelled_arrays("boundaries")
+        along = self.along or "place"
+        result: xr.Dataset = xarray.Dataset(
+            {
+                self.parameter: (along, self.values),
+                "error": (along, self.errors),
+                "multiplier": ((along, "side"), self.multipliers),
+                "kind": ((along, "side"), np.array([[str(kind) for kind in pair] for pair in self.kinds])),
+            },
+            coords={along: self.places, "side": ["low", "high"]},
+        )
+        return result
+
+    def __repr__(self) -> str:
+        found = np.isfinite(self.values)
+        if not self.along:
+            kinds = " | ".join(map(str, self.kinds[0]))
+            return f"Boundary({self.parameter} = {self.value:.10g} +- {self.errors[0]:.1g}: {kinds})"
+        return f"Boundary({self.parameter} over {self.along}, found at {found.sum()} of {len(found)} places)"
+
+
+def boundary(
+    system: System,
+    parameter: str,
+    *,
+    between: tuple[float, float],
+    along: Mapping[str, ArrayLike] | None = None,
+    kind: str | Kind = "sticking",
+    start: Start | None = None,
+    precision: float = 1e-9,
+    transient: int = 64,
+) -> Boundary:
+    """At which value of a parameter does the motion begin to stick, or change its kind in another way?
+
+    The steady motion is exact, and so are its stops, the shortest too: bisection of the range finds the boundary to the
+    precision asked for. Each motion begins at the same start, so that of two attractors the same one is asked. Without
+    viscous damping and with equal static friction the boundary of sliding without stops under a harmonic force is Den
+    Hartog's, :math:`r_b = V / \\sqrt{S^2 + U^2}`, with :math:`V = 1/(1-b^2)`, :math:`U = \\tan(\\pi/2b)/b` and S the
+    largest of q(t)/p(t) (Den Hartog 1931; Shaw 1986).
+
+    Parameters
+    ----------
+    system : Oscillator or Structure
+        What moves, with a periodic drive.
+    parameter : str
+        What is bisected, a name that ``having`` takes.
+    between : tuple of float
+        Range in which the boundary lies.
+    along : mapping, optional
+        One other parameter with its values: the boundary as a curve.
+    kind : str or callable
+        What differs on either side: "sticking" (stops or none), "regime" (stops per period, period), "period", "held",
+        or a function of an :class:`Attractor`.
+    start : mapping, optional
+        Where motions begin, as in ``simulate``.
+    precision : float
+        Width left of the range, relative to the value.
+    transient : int
+        As in ``steady_state``.
+
+    Returns
+    -------
+    Boundary
+
+    Raises
+    ------
+    ModelError
+        A parameter or its values have no meaning, or the drive does not repeat.
+    SolveError
+        Both ends of the range are of one kind, at every place.
+
+    Examples
+    --------
+    >>> from stickslip.scenarios import forced
+    >>> found = boundary(forced(0.8, 0.5), "kinetic", between=(0.5, 0.95))
+    >>> round(found.value, 8), found.kinds[0], found.multipliers.round(3)
+    (0.81740639, ('no stops', 'stops'), array([[0.5, 0.5]]))
+    """
+    find(system, parameter)
+    require_number(parameter)
+    require_period(system, "a boundary")
+    low, high = map(float, between)
+    if not (math.isfinite(low) and math.isfinite(high) and low < high and 0 < precision < 1):
+        raise ModelError(
+            f"between = {between}, precision = {precision}", "a range has two different values, the lower one first, "
+            "and 0 < precision < 1", "correct them",
+        )  # fmt: skip
+    name, places = _along(system, parameter, along)
+    ask = _question(kind)
+
+    def row(place: float) -> Row:
+        there = system.having(**{name: place}) if name else system
+
+        def at(value: float) -> Attractor:
+            return settled(there.having(**{parameter: value}), start or {}, transient=transient, orders=4)
+
+        return _bisected(at, low, high, ask, precision)
+
+    rows = [row(float(place)) for place in places]
+    if all(below is None for _, _, below, _, _ in rows):
+        raise SolveError(
+            f"at {parameter} = {low:g} and {high:g} the motion is '{rows[0][4][0]}'",
+            "a boundary lies between two kinds of motion", "widen between=, or give another start= or kind=",
+        )  # fmt: skip
+    values, errors, lows, highs, kinds = zip(*rows, strict=True)
+    return Boundary(parameter, name, places, np.array(values), np.array(errors), lows, highs, kinds)
+
+
+def _along(system: System, parameter: str, along: Mapping[str, ArrayLike] | None) -> tuple[str, Array]:
+    if along is None:
+        return "", np.array([math.nan])
+    if len(along) != 1:
+        raise ModelError(f"along = {', '.join(along)}", "a boundary is followed along one parameter", "name one")
+    [(name, values)] = along.items()
+    find(system, name)
+    require_number(name)
+    places = numbers(name, values)
+    if name == parameter:
+        raise ModelError(f"along = {name}", "that is what is bisected", "name another parameter, or leave it out")
+    return name, places
+
+
+def _question(kind: str | Kind) -> Kind:
+    if callable(kind):
+        return kind
+    if kind not in KINDS:
+        raise ModelError(f"kind = '{kind}'", f"there are {', '.join(KINDS)}, or a function", "choose one")
+    return KINDS[kind]
+
+
+Row = tuple[float, float, Attractor | None, Attractor | None, tuple[object, object]]
+
+
+def _bisected(at: Callable[[float], Attractor], low: float, high: float, ask: Kind, precision: float) -> Row:
+    """The boundary at one place: value, error, the motions on both sides, their kinds."""
+    below, above = at(low), at(high)
+    kinds = (ask(below), ask(above))
+    if kinds[0] == kinds[1]:
+        return math.nan, math.nan, None, None, kinds
+    while high - low > precision * max(abs(low), abs(high)):
+        middle = (low + high) / 2
+        if not low < middle < high:
+            break
+        found = at(middle)
+        if ask(found) == kinds[0]:
+            low, below = middle, found
+        else:
+            high, above = middle, found
+    return (low + high) / 2, (high - low) / 2, below, above, (kinds[0], ask(above))

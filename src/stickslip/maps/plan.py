@@ -1,0 +1,223 @@
+"""What a sweep is to do, with everything that decides its answer, cut into blocks; and the labelled map it ends as."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip import __version__
+from stickslip.errors import ModelError
+from stickslip.maps.grid import Axis, coordinates, placed
+from stickslip.maps.measures import Measure, Variable, own_name, variables
+from stickslip.solve.tables import System
+
+BLOCK = 4096  # points at most that are run together
+LEAST = 16  # blocks, where there are points enough: so that several workers share the work and progress is seen
+Arrays = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sweep before it is run; everything that decides the answer, and nothing else.
+
+    Attributes
+    ----------
+    system : Oscillator or Structure
+        What moves.
+    axes : tuple of Axis
+        What changes.
+    measures : tuple of str or callable
+        What is asked of each motion.
+    cycles, settle : int
+        Periods of the drive that are measured, and those before that are not.
+    start : mapping
+        State at time 0, as :func:`simulate` takes it.
+    chunks : tuple of int
+        Points of a block along each axis.
+    """
+
+    system: System
+    axes: tuple[Axis, ...]
+    measures: tuple[Measure, ...]
+    cycles: int
+    settle: int
+    start: Mapping[str, float | str] = field(default_factory=dict)
+    chunks: tuple[int, ...] = ()
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the dimensions."""
+        return tuple(axis.dim for axis in self.axes)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Points along each dimension."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def size(self) -> int:
+        """Points of the grid."""
+        return math.prod(self.shape)
+
+    @property
+    def tiles(self) -> tuple[int, ...]:
+        """Blocks along each dimension."""
+        return tuple(-(-count // chunk) for count, chunk in zip(self.shape, self.chunks, strict=True))
+
+    @property
+    def blocks(self) -> range:
+        """Numbers of the blocks."""
+        return range(math.prod(self.tiles))
+
+    def slices(self, number: int) -> tuple[slice, ...]:
+        """Where a block lies in the grid."""
+        tile = np.unravel_index(number, self.tiles)
+        return tuple(
+            slice(int(t) * chunk, min((int(t) + 1) * chunk, count))
+            for t, chunk, count in zip(tile, self.chunks, self.shape, strict=True)
+        )
+
+    def points(self, number: int) -> list[tuple[int, ...]]:
+        """The steps along each axis of every point of a block, in its own order."""
+        return list(itertools.product(*(range(part.start, part.stop) for part in self.slices(number))))
+
+    def at(self, steps: Sequence[int]) -> tuple[System, dict[str, float | str]]:
+        """System and start at one point."""
+        return placed(self.system, self.start, self.axes, steps)
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """What the answer holds of each point."""
+        return variables(self.measures)
+
+    @property
+    def coordinates(self) -> dict[str, tuple[str, NDArray[Any], str]]:
+        """Coordinates of the answer: dimension, values, unit."""
+        return coordinates(self.system, self.axes)
+
+    @cached_property
+    def attributes(self) -> dict[str, Any]:
+        """The settings, in plain data."""
+        return {
+            "system": repr(self.system), "start": json.dumps(dict(self.start), default=repr, sort_keys=True),
+            "measures": [_named(measure) for measure in self.measures], "cycles": self.cycles, "settle": self.settle,
+            "version": __version__,
+        }  # fmt: skip
+
+    @cached_property
+    def checksum(self) -> str:
+        """A sha256 of everything that decides the answer."""
+        text = [self.attributes, self.chunks, [(axis.dim, axis.names) for axis in self.axes]]
+        found = hashlib.sha256(json.dumps(text, sort_keys=True).encode())
+        for value in (self.system, *(axis.values for axis in self.axes), *(_source(m) for m in self.measures)):
+            found.update(_content(value).encode())
+        return found.hexdigest()
+
+
+def chunked(shape: Sequence[int]) -> tuple[int, ...]:
+    """Points of a block along each axis: much the same along each, `BLOCK` points at most, some `LEAST` blocks.
+
+    The motions of a square block share more of their laws and drives than those of a row.
+    """
+    room = max(1, min(BLOCK, math.prod(shape) // LEAST))
+    chunks = [0] * len(shape)
+    for left, axis in zip(range(len(shape), 0, -1), np.argsort(shape, kind="stable"), strict=True):
+        chunks[axis] = min(shape[axis], max(1, round(room ** (1 / left))))
+        room = max(1, room // chunks[axis])
+    return tuple(chunks)
+
+
+def blank(plan: Plan) -> Arrays:
+    """The arrays of the answer before anything is known."""
+    return {name: np.full(plan.shape, variable.fill, variable.dtype) for name, variable in plan.variables.items()}
+
+
+def assemble(plan: Plan, arrays: Mapping[str, NDArray[Any]], *, status: str = "complete") -> Any:
+    """The labelled map: an xarray.Dataset with the settings, the version and the checksum in its attributes."""
+    xarray = required("xarray")
+    data = {
+        name: (plan.dims, arrays[name], {"units": variable.unit, "long_name": variable.words, **variable.attributes})
+        for name, variable in plan.variables.items()
+        if name in arrays
+    }
+    known = {
+        name: (dim, values, {"units": unit} if unit else {}) for name, (dim, values, unit) in plan.coordinates.items()
+    }
+    attributes = {**plan.attributes, "checksum": plan.checksum, "status": status}
+    return xarray.Dataset(data, coords=known, attrs=attributes)
+
+
+def required(package: str) -> Any:
+    """A package of the extra `maps`."""
+    import importlib
+
+    try:
+        return importlib.import_module(package)
+    except ImportError as absent:
+        raise ModelError(
+            f"{package} is not installed",
+            "maps are made with the extra 'maps'",
+            'pip install ".[maps]" in the checkout',
+        ) from absent
+
+
+def _named(measure: Measure) -> str:
+    return measure if isinstance(measure, str) else str(getattr(measure, "__qualname__", own_name(measure)))
+
+
+def _source(value: Any, above: tuple[FunctionType, ...] = ()) -> Any:
+    """What decides a user's function: its code, its defaults, and what it holds or asks by name of its own module."""
+    if isinstance(value, partial):
+        return "partial", _source(value.func, above), value.args, value.keywords
+    if not isinstance(value, FunctionType):
+        own = callable(value) and not isinstance(value, type | ModuleType | BuiltinFunctionType)
+        if own and isinstance(call := type(value).__call__, FunctionType):
+            return type(value).__qualname__, _source(call, above), getattr(value, "__dict__", repr(value))
+        return getattr(value, "__name__", value)
+    if value in above or (above and value.__module__ != above[0].__module__):
+        return value.__module__, value.__qualname__
+    code = value.__code__
+    known = {name: value.__globals__[name] for name in _asked(code) if name in value.__globals__}
+    known |= {name: cell.cell_contents for name, cell in zip(code.co_freevars, value.__closure__ or (), strict=True)}
+    said = [(name, _source(known[name], (*above, value))) for name in sorted(known)]
+    return value.__qualname__, _said(code), value.__defaults__, value.__kwdefaults__, said
+
+
+def _asked(code: CodeType) -> set[str]:
+    """Names that a function asks for, also within it."""
+    return {*code.co_names}.union(*(_asked(inner) for inner in code.co_consts if isinstance(inner, CodeType)))
+
+
+def _said(code: CodeType) -> tuple[Any, ...]:
+    return (code.co_code.hex(), *code.co_names, *(_said(c) if isinstance(c, CodeType) else c for c in code.co_consts))
+
+
+def _content(value: Any) -> str:
+    """A text in which two values that differ in a bit differ."""
+    if isinstance(value, np.ndarray):
+        return f"array{value.shape}{value.dtype}{hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()}"
+    if isinstance(value, float | np.floating):
+        return float(value).hex()
+    if isinstance(value, tuple | list):
+        return f"({','.join(_content(item) for item in value)})"
+    if isinstance(value, set | frozenset):
+        return f"{{{','.join(sorted(map(_content, value)))}}}"  # in whatever order this process has them
+    if isinstance(value, Mapping):
+        return f"{{{','.join(f'{key}:{_content(item)}' for key, item in value.items())}}}"
+    if hasattr(value, "__dataclass_fields__"):
+        own = {name: getattr(value, name) for name in value.__dataclass_fields__}
+        return f"{type(value).__qualname__}{_content(own)}"
+    return repr(value)
+
+
+Keep = Callable[[int, Arrays, "Arrays | None"], None]

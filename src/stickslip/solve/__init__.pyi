@@ -1,0 +1,13 @@
+from stickslip.solve.continuation import Branch as Branch
+from stickslip.solve.continuation import continue_orbit as continue_orbit
+from stickslip.solve.energies import EnergyFlow as EnergyFlow
+from stickslip.solve.energies import energy as energy
+from stickslip.solve.energies import energy_flow as energy_flow
+from stickslip.solve.exponents import lyapunov as lyapunov
+from stickslip.solve.orbit import SteadyState as SteadyState
+from stickslip.solve.periodic import attractors as attractors
+from stickslip.solve.sliding import SteadySliding as SteadySliding
+from stickslip.solve.sliding import steady_sliding as steady_sliding
+from stickslip.solve.trajectory import Trajectory as Trajectory
+
+__all__: list[str]

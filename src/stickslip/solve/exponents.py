@@ -1,0 +1,113 @@
+"""How fast neighbouring motions part for good."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from stickslip.errors import ModelError, SolveError
+from stickslip.estimate import Estimate
+from stickslip.solve.curved import CurvedTrajectory
+from stickslip.solve.poincare import carried, end_of, extent, lap, tables
+from stickslip.solve.simulate import opening
+from stickslip.solve.tables import Array, System
+from stickslip.solve.tape import Tape
+from stickslip.solve.trajectory import Trajectory
+
+BATCHES = 25  # of which the scatter gives the interval
+STUDENT = 2.064  # two-sided 95 % quantile at 24 degrees of freedom
+
+
+def lyapunov(
+    system: System,
+    *,
+    cycles: int = 5000,
+    transient: int = 100,
+    start: Mapping[str, float | str] | None = None,
+) -> Estimate:
+    """Does the motion forget its beginning, or does it part from its neighbours (chaos)?
+
+    The largest Lyapunov exponent that differs from the neutral one of time: the growth rate of a small difference of
+    the state at fixed phase of the drive, carried along the exact motion, saltation at events included; of a curved
+    law, by central differences of the map.
+
+    A stick forgets the velocity and with it one direction; a rigid contact that sticks in every period may forget
+    everything, and the exponent is minus infinity.
+
+    Parameters
+    ----------
+    system : Oscillator or Structure
+        What moves, with a periodic drive.
+    cycles : int
+        Periods over which the growth is averaged.
+    transient : int
+        Periods before that.
+    start : mapping, optional
+        As in ``simulate``.
+
+    Returns
+    -------
+    Estimate
+        In 1/s; positive for chaos.
+
+    Raises
+    ------
+    SolveError
+        The drive has no period.
+
+    Examples
+    --------
+    >>> from stickslip.drives.kinds import HarmonicForce
+    >>> from stickslip.laws.coulomb import Coulomb
+    >>> drive = HarmonicForce(1.0, frequency=0.6 / 6.283185307)
+    >>> from stickslip.oscillator import Oscillator
+    >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(0.3), drive=drive)
+    >>> lyapunov(slider, cycles=500).value < 0
+    True
+    """
+    if cycles < BATCHES or transient < 0:
+        raise ModelError(f"cycles = {cycles}", f"the interval needs {BATCHES} cycles at least", "raise cycles=")
+    table = tables(system)
+    period = table.motion.period
+    if not math.isfinite(period):
+        raise SolveError("the drive has no period", "growth is counted from period to period", "use a periodic drive")
+    state, mode = opening(table, start or {})
+    difference = np.linspace(1.0, 0.5, table.physical)
+    weights = np.ones(table.physical)
+    growth: list[float] = []
+    how = "differences of the map" if isinstance(table, Tape) else "exact tangent"
+    for number in range(transient + cycles):
+        orbit = lap(system, table, state, mode, 1)
+        state, mode = end_of(orbit)
+        if number == 0:
+            weights = _weights(system, orbit)
+            difference /= weights
+        difference = carried(orbit, mode, difference)
+        length = float(np.linalg.norm(difference * weights))
+        if length == 0.0:
+            return Estimate("Lyapunov exponent", -math.inf, (-math.inf, -math.inf), 0.0, "1/s", how,
+                            checks=(f"every difference was forgotten in lap {number}",))  # fmt: skip
+        difference /= length
+        if number >= transient:
+            growth.append(math.log(length) / period)
+    batches = np.array([np.mean(part) for part in np.array_split(growth, BATCHES)])
+    spread = float(np.std(batches, ddof=1) / math.sqrt(BATCHES))
+    method = f"{how} over {cycles} periods, scatter of {BATCHES} batches"
+    return Estimate.normal(
+        "Lyapunov exponent", float(np.mean(growth)), sd=spread, unit="1/s", method=method, quantile=STUDENT
+    )
+
+
+def _weights(system: System, orbit: Trajectory) -> Array:
+    """What makes the entries of the state comparable: their size, or a time for velocities."""
+    if isinstance(orbit, CurvedTrajectory):
+        sizes = extent(orbit)
+        return np.asarray(1 / np.where(sizes > 0, sizes, 1.0))
+    table = orbit.table
+    weights = np.ones(table.physical)
+    weights[table.degrees : 2 * table.degrees] = (
+        1 / system.frequency / (2 * math.pi) if system.frequency else table.motion.period
+    )
+    return weights

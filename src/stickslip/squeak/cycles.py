@@ -1,0 +1,350 @@
+"""What becomes of steady sliding that does not last: the limit cycle, its swing, its sticks and flights, its energy."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.drives.kinds import Belt
+from stickslip.errors import ModelError
+from stickslip.laws.base import finite
+from stickslip.solve.autonomous import settled_cycle
+from stickslip.solve.energies import EnergyFlow, energy_flow
+from stickslip.solve.poincare import Table, end_of, stretch, tables
+from stickslip.solve.simulate import opening
+from stickslip.solve.trajectory import Trajectory
+from stickslip.squeak.sliding import System
+from stickslip.squeak.stability import Stability, stability
+from stickslip.structure import Structure
+
+Array = NDArray[np.float64]
+
+FIRST = 64  # cycles of a small vibration before a cycle is looked for
+SMALL = 1e-5  # of the vibration that would lift or stop a contact: what the growth is measured on
+LEAST = 1e-2  # of that vibration: a cycle is looked for beyond it
+DYING = 0.3  # of the vibration at the beginning: what is left of one that dies away
+UNSETTLED = 0.1  # change of the size in the last round of a motion that has no size of its own yet
+SAMPLES = 4096  # of a cycle whose extremes are looked for
+HALVINGS = 14  # of the starts between one that dies away and one that lasts
+NEAR = (4, 8, 16, 32)  # cycles after which such a start is still close to the unstable cycle
+
+
+@dataclass(frozen=True, eq=False)
+class LimitCycle:
+    """The motion that a small vibration about steady sliding, or another start, ends in.
+
+    Attributes
+    ----------
+    status : str
+        "periodic", "steady sliding" (the vibration dies away), "held" (every contact sticks or has lifted off),
+        "not periodic" (it lasts and does not repeat), "not settled" (it still grew or died away when it was left, or
+        does neither for want of damping), or "unstable" (it repeats, and every small deviation leads away from it).
+    frequency : float
+        At which the motion repeats [Hz]; of one that does not, of its strongest line; 0 where nothing vibrates.
+    amplitudes : ndarray (n,)
+        Half the swing of each displacement [m, or rad of an angle].
+    amplitude : float
+        Half the swing of the contact that slides to and fro most [m].
+    stick_share, separation_share : tuple of float
+        Share of the time that each contact holds, and is lifted off.
+    growth : float
+        Of a small vibration about steady sliding, as simulated [1/s]; nan where there is no such sliding.
+    energy : EnergyFlow
+        What every motion takes up and loses in a cycle [J]; of a motion that does not repeat, over what is kept of it.
+    multipliers : ndarray of complex
+        Of a small deviation over a cycle, largest first; within 1: the cycle is stable. Empty where nothing repeats.
+    sliding : Stability
+        Of the steady sliding it has left.
+    motion : Trajectory
+        One cycle; the last stretch of a motion that does not repeat.
+    """
+
+    status: str
+    frequency: float
+    amplitudes: Array
+    amplitude: float
+    stick_share: tuple[float, ...]
+    separation_share: tuple[float, ...]
+    growth: float
+    energy: EnergyFlow
+    multipliers: NDArray[np.complex128]
+    sliding: Stability
+    motion: Trajectory
+
+    @property
+    def vibrates(self) -> bool:
+        """Whether a vibration lasts."""
+        return self.status in ("periodic", "not periodic", "not settled")
+
+    def __repr__(self) -> str:
+        if not self.vibrates:
+            return f"LimitCycle: {self.status}"
+        named = {"sticks": self.stick_share, "lifted": self.separation_share}
+        shares = [f"{name} {', '.join(f'{one:.3g}' for one in each)} of the time"
+                  for name, each in named.items() if any(each)]  # fmt: skip
+        head = f"LimitCycle: {self.status}, {self.frequency:.5g} Hz, contacts slide {self.amplitude:.4g} m to and fro"
+        return "\n  ".join([head, *shares])
+
+
+def limit_cycle(
+    system: System,
+    *,
+    speed: float | None = None,
+    start: Mapping[str, float | str] | None = None,
+    push: float = 1e-3,
+    patience: int = 16_384,
+) -> LimitCycle:
+    """Into which motion does steady sliding go over, and how does it sound?
+
+    The exact engine follows a small vibration until it dies away or repeats; Newton's method on state and period closes
+    the cycle to rounding, and its derivative over the cycle, events included, says whether it is stable.
+
+    Parameters
+    ----------
+    system : Structure or Oscillator
+        What slides: on a belt, or at the speed given.
+    speed : float, optional
+        Of the counter-face [m/s], in place of the system's drive; that of its Belt where left out.
+    start : mapping, optional
+        State at the beginning, as ``simulate`` takes it; another start can lead to another cycle.
+    push : float
+        Size of the vibration at the beginning where no start is given: a share of the one that would just lift or stop
+        a contact, in the mode that grows fastest.
+    patience : int
+        Cycles of the small vibration after which the motion is taken as it is.
+
+    Returns
+    -------
+    LimitCycle
+
+    Raises
+    ------
+    ModelError
+        Nothing slides, no spring holds it, or as in :func:`stability`.
+
+    Examples
+    --------
+    A mass on a belt whose friction falls with the speed sticks and slips:
+
+    >>> from stickslip import Oscillator
+
+    >>> from stickslip.drives import Belt
+
+    >>> from stickslip.laws import LinearSlope
+    >>> found = limit_cycle(Oscillator(1.0, 1.0, LinearSlope(1.0, slope=-0.1), Belt(0.5)))
+    >>> found.status, found.stick_share[0] > 0, round(found.growth / found.sliding.growth, 6)
+    ('periodic', True, 1.0)
+    """
+    sliding = stability(system, speed=speed)
+    if speed is not None:
+        system = system.having(drive=Belt(speed))
+    if not np.all(np.isfinite(sliding.place)):
+        raise ModelError(
+            "a system that no spring holds", "a limit cycle is about steady sliding", "give it a stiffness"
+        )
+    if not (isinstance(patience, int | np.integer) and patience >= FIRST):
+        raise ModelError(f"patience = {patience}", f"it is a whole number of at least {FIRST} cycles", "raise it")
+    finite("push", push, unit="of what lifts or stops a contact", positive=True)
+    table = tables(system)
+    cycle = 1 / (sliding.frequency or system.frequency)
+    begin = _pushed(system, table, sliding, push) if start is None else opening(table, start)
+    return _told(system, sliding, *_followed(system, table, sliding, begin, cycle, patience))
+
+
+def separating_cycle(system: System, lasting: LimitCycle) -> LimitCycle | None:
+    """The unstable cycle between stable sliding and a vibration that lasts beside it; None where none is found.
+
+    Of the starts on the line from steady sliding to that vibration the last one that dies away is bisected. From there
+    the motion stays close to the cycle that separates both for a while, and Newton's method closes it. There is none
+    where all that separates them is whether a contact just sticks.
+    """
+    sliding, table = lasting.sliding, tables(system)
+    cycle = 1 / (sliding.frequency or system.frequency)
+    count = 2 * len(sliding.place)
+    rest = np.append(sliding.place, np.zeros(len(sliding.place)))
+    away = lasting.motion.states[0, :count] - rest
+
+    def start(share: float) -> dict[str, float]:
+        return dict(zip(table.names, map(float, rest + share * away), strict=False))
+
+    dies, lasts = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (dies + lasts) / 2
+        vibrates = limit_cycle(system, start=start(middle)).vibrates
+        dies, lasts = (dies, middle) if vibrates else (middle, lasts)
+    for share, cycles in itertools.product((lasts, dies), NEAR):
+        near = stretch(system, table, *opening(table, start(share)), span=(0.0, cycles * cycle))
+        found = settled_cycle(near, cycle)
+        if found is not None and abs(found[1][0]) > 1:
+            return _told(system, sliding, "unstable", *found)
+    return None
+
+
+def _told(
+    system: System, sliding: Stability, status: str, motion: Trajectory, multipliers: NDArray[np.complex128]
+) -> LimitCycle:
+    """What there is to say of a motion."""
+    shares, still = _shares(motion), status in ("steady sliding", "held")
+    swing, slide = (np.zeros(len(sliding.place)), 0.0) if still else _swings(motion)
+    return LimitCycle(
+        status=status,
+        frequency=_frequency(status, motion, sliding),
+        amplitudes=swing,
+        amplitude=slide,
+        stick_share=shares[0],
+        separation_share=shares[1],
+        growth=_growth(system, tables(system), sliding, 1 / (sliding.frequency or system.frequency)),
+        energy=energy_flow(motion),
+        multipliers=multipliers,
+        sliding=sliding,
+        motion=motion,
+    )
+
+
+def _followed(
+    system: System, table: Table, sliding: Stability, begin: tuple[Array, int], cycle: float, patience: int
+) -> tuple[str, Trajectory, NDArray[np.complex128]]:
+    """Status, one cycle or the last stretch, multipliers."""
+    state, mode = begin
+    none, physical = np.zeros(0, dtype=np.complex128), table.physical
+    done, count, opened = 0, FIRST, 0.0
+    while True:
+        motion = stretch(system, table, state, mode, span=(0.0, count * cycle))
+        end, after = end_of(motion)
+        part = count / 4
+        first, last = (_size(motion, sliding, begin * cycle, part, cycle) for begin in (0.0, count - part))
+        if _held(motion):
+            return "held", motion, none
+        opened = opened or first
+        if sliding.stable and last < DYING * min(opened, 1.0):
+            return "steady sliding", motion, none
+        if last > LEAST:
+            found = settled_cycle(motion, cycle)
+            if found is not None and abs(found[1][0]) < 1 and _size(found[0], sliding, 0.0, 1.0, cycle) > LEAST:
+                return "periodic", *found
+        done += count
+        if done >= patience:
+            settled = abs(last / first - 1) < UNSETTLED and sliding.growth != 0
+            return "not periodic" if settled else "not settled", motion, none
+        state = state.copy()
+        state[:physical], mode, count = end[:physical], after, min(done, patience - done)
+
+
+def _held(motion: Trajectory) -> bool:
+    """Whether the last piece is a rest on the counter-face that lasts."""
+    mode = motion.table.modes[motion.modes[-1]]
+    return mode.friction is None and bool(motion.durations[-1] > 0.5 * motion.duration)
+
+
+def _vector(sliding: Stability) -> tuple[int, Array]:
+    """The fastest growing mode as (q, v) about steady sliding, and where it moves most."""
+    mode = sliding.modes[0]
+    value = complex(mode.growth, 2 * math.pi * mode.frequency)
+    return int(np.argmax(np.abs(mode.shape))), np.concatenate([mode.shape.real, (value * mode.shape).real])
+
+
+def _reach(sliding: Stability, system: System) -> float:
+    """Size of that mode's vibration at which a contact would lift off or stop: what every size is measured by."""
+    mode, speed = sliding.modes[0], system.drive.speed  # type: ignore[attr-defined]
+    rate = abs(complex(mode.growth, 2 * math.pi * mode.frequency))
+    if not isinstance(system, Structure):
+        return float(abs(speed) / (rate * abs(mode.shape[0])))
+    limits = []
+    for contact, load in zip(system.contacts, sliding.loads, strict=True):
+        limits.append((abs(contact.carried * speed), rate * abs(np.asarray(contact.tangent) @ mode.shape)))
+        if contact.normal is not None:
+            limits.append((abs(load), contact.stiffness * abs(np.asarray(contact.normal) @ mode.shape)))
+    return float(min((limit / share for limit, share in limits if share > 0 and limit > 0), default=1.0))
+
+
+def _pushed(system: System, table: Table, sliding: Stability, push: float) -> tuple[Array, int]:
+    """State and mode at the start of a vibration: what is compliant slides already, as it does in steady sliding."""
+    rest = np.append(sliding.place, np.zeros(len(sliding.place)))
+    start = rest + push * _reach(sliding, system) * _vector(sliding)[1]
+    state, mode = opening(table, dict(zip(table.names, map(float, start), strict=False)))
+    carried = [one.carried for one in system.contacts] if isinstance(system, Structure) else [1.0]
+    sides = [-np.sign(share * system.drive.speed) for share in carried]  # type: ignore[attr-defined]
+    slides = [
+        j
+        for j, joint in enumerate(table.modes)
+        if all(part.kind == "slip" and part.side == side for part, side in zip(_parts(joint), sides, strict=True))
+    ]
+    return state, slides[0] if len(slides) == 1 and push < 1 else mode
+
+
+def _parts(mode: Any) -> tuple[Any, ...]:
+    """The mode of each contact."""
+    return tuple(getattr(mode, "parts", (mode,)))
+
+
+def _size(motion: Trajectory, sliding: Stability, begin: float, cycles: float, cycle: float) -> float:
+    """Of the vibration in cycles from `begin`, as a share of the one that would lift or stop a contact."""
+    most, _ = _vector(sliding)
+    times = np.linspace(begin, min(begin + cycles * cycle, motion.duration), 1 + int(64 * cycles))
+    path = motion.sample(times, ("x",))[0][most] - sliding.place[most]
+    return float(np.max(np.abs(path))) / _reach(sliding, motion.system)
+
+
+def _growth(system: System, table: Table, sliding: Stability, cycle: float) -> float:
+    """Of a small vibration [1/s]: how fast its share in the fastest mode grows as simulated."""
+    if sliding.status != "ok":
+        return math.nan
+    state, mode = _pushed(system, table, sliding, SMALL)
+    duration = min(8 * cycle, 2 / abs(sliding.growth) if sliding.growth else math.inf)
+    run = stretch(system, table, state, mode, span=(0.0, duration))
+    path = run.sample([0.0, duration], ("x", "v"))[0].T - np.append(sliding.place, np.zeros(len(sliding.place)))
+    columns = []
+    for one in sliding.modes:
+        value = complex(one.growth, 2 * math.pi * one.frequency)
+        vector = np.concatenate([one.shape, value * one.shape])
+        columns += [vector, vector.conj()] if one.frequency else [vector]
+    shares = [abs(np.linalg.lstsq(np.array(columns).T, deviation, rcond=None)[0][0]) for deviation in path]
+    return math.log(shares[1] / shares[0]) / duration
+
+
+def _swings(motion: Trajectory) -> tuple[Array, float]:
+    """Half the swing of each displacement, and of the contact that slides to and fro most."""
+    times = np.linspace(0.0, motion.duration, SAMPLES)
+    x = motion.sample(times, ("x",))[0]
+    system = motion.system
+    slides = system.tangents @ x if isinstance(system, Structure) else x
+    return _half(x), float(np.max(_half(slides)))
+
+
+def _half(paths: Array) -> Array:
+    """Half of greatest less least, each at the top of the parabola through three samples."""
+
+    def top(path: Array) -> float:
+        j = int(np.clip(np.argmax(path), 1, len(path) - 2))
+        before, here, after = path[j - 1 : j + 2]
+        bend = before - 2 * here + after
+        return float(here - (after - before) ** 2 / (8 * bend)) if bend < 0 else float(np.max(path))
+
+    return np.array([(top(path) + top(-path)) / 2 for path in paths])
+
+
+def _frequency(status: str, motion: Trajectory, sliding: Stability) -> float:
+    """At which the motion repeats, or rises through its mean where it moves most [Hz]."""
+    if status in ("periodic", "unstable"):
+        return 1 / motion.duration
+    if status in ("steady sliding", "held"):
+        return 0.0
+    times = np.linspace(0.0, motion.duration, 16 * SAMPLES)
+    path = motion.sample(times, ("x",))[0][_vector(sliding)[0]]
+    path = path - np.mean(path)
+    rises = times[1:][(path[:-1] < 0) & (path[1:] >= 0)]
+    return float((len(rises) - 1) / (rises[-1] - rises[0])) if len(rises) > 1 else 0.0
+
+
+def _shares(motion: Trajectory) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Share of the time that each contact holds, and is lifted off."""
+    kinds = np.array([[part.kind for part in _parts(mode)] for mode in motion.table.modes])[motion.modes]
+    weights = motion.durations / motion.duration
+    held = weights @ ((kinds == "stick") | (kinds == "microstick"))
+    return tuple(map(float, held)), tuple(map(float, weights @ (kinds == "flight")))

@@ -1,0 +1,255 @@
+"""A free decay in sentences that a person understands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from stickslip.answers.decay_comparison import DecayComparison
+from stickslip.answers.decays import CLEAR, DecayFindings
+from stickslip.decay.answer import beginning, rig_units
+from stickslip.decay.choice import SIZE
+from stickslip.decay.release import CAUGHT
+from stickslip.estimate import Estimate
+from stickslip.story.words import WITHIN_DIGIT, interval_of, number, value_of
+
+MOST = 0.5  # of the power of what is left over
+OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
+LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
+WAVEFORM = "The whole waveform: "
+FAR = 0.2  # rad: a pendulum's swing that a straight spring does not follow
+METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
+
+
+def headline(result: DecayFindings | DecayComparison) -> list[str]:
+    """What was found, in a few sentences."""
+    return list(_together(result) if isinstance(result, DecayComparison) else _sentences(result))
+
+
+def settings(findings: DecayFindings) -> dict[str, str]:
+    """Choices and constants, as text."""
+    units = rig_units(findings.settings["channel"])
+    told = {key: number(value, 0.0, units[key]) for key, value in findings.settings.items() if key in units}
+    record = findings.record
+    return {
+        "methods": METHODS[findings.settings["method"]],
+        "channel": findings.settings["channel"],
+        "spring": findings.settings["restoring"],
+        **told,
+        "sampling rate": f"{record.fs:g} Hz",
+        "length": f"{len(record)} samples, {record.duration:g} s",
+    }
+
+
+def _sentences(findings: DecayFindings) -> Iterator[str]:
+    yield from _frictions(findings)
+    yield from _left_over(findings)
+    for note in findings.notes:
+        if findings.waveform is None and findings.best is not findings.motion and note.startswith(WAVEFORM):
+            yield f"It is read from its extremes alone, for of the whole waveform {note.removeprefix(WAVEFORM)}"
+    force = findings.dry_force
+    word = "torque" if findings.settings["channel"] == "theta" else "force"
+    if force is not None:
+        yield f"That is a dry friction {word} of {value_of(force)} (95 % sure: {interval_of(force)})."
+    elif findings.best.dry_displacement.interval[0] > 0:
+        yield f"The dry friction {word} is that displacement times the spring's stiffness; state stiffness= or mass=."
+    yield from _motion(findings)
+    yield from _chosen(findings)
+    yield from _compared(findings)
+
+
+def _frictions(findings: DecayFindings) -> Iterator[str]:
+    """What makes it die away, and what the record says against that."""
+    yield _dying(findings)
+    if CLEAR <= findings.against < SIZE:
+        yield (
+            f"The motions tried speak against viscous and dry friction, but weakly (p = {findings.against:.1g}): of "
+            "true ones too one in twenty does so."
+        )
+    swings = findings.releases.ring_downs
+    far = max(abs(each.amplitude) for each in swings)
+    straight = findings.settings["channel"] == "theta" and findings.settings["restoring"] == "linear"
+    if straight and far > FAR and (findings.against < CLEAR or not swings[0].isochronous):
+        yield f'A swing of {far:.2g} rad is far for a straight spring: of a pendulum ask with restoring="pendulum".'
+
+
+def _dying(findings: DecayFindings) -> str:
+    """By which frictions it dies away, and how large they are."""
+    ratio, dry = findings.best.damping_ratio, findings.best.dry_displacement
+    viscous, rubs = ratio.interval[0] > 0, dry.interval[0] > 0
+    shown = _both(ratio, dry)
+    curved = findings.best is findings.thesis and not findings.releases.ring_downs[0].isochronous
+    if findings.motion is not None and findings.best is findings.motion:
+        words = findings.motion.choice.chosen.fitted.motion.words
+        return f"The motion dies away by {words}: {_listed([_told(each) for each in findings.motion.terms])}."
+    if findings.against < CLEAR or dry.interval[1] < 0 or curved:
+        return f"Read as viscous and dry friction, which the record speaks against, it shows {shown}."
+    if viscous and rubs:
+        model = findings.best.model
+        return f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
+    if viscous:
+        return f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(dry, 'dry friction')}"
+    if rubs:
+        return f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
+    return "Neither viscous nor dry friction can be told from zero."
+
+
+def _listed(parts: list[str]) -> str:
+    return " and ".join([", ".join(parts[:-1])] * (len(parts) > 1) + parts[-1:])
+
+
+def _chosen(findings: DecayFindings) -> Iterator[str]:
+    """Which motions the record leaves possible, and what counting them does to the dry friction."""
+    motion = findings.motion
+    if motion is None:
+        return
+    kept = [each.fitted.motion.words for each in motion.choice.candidates if each.kept]
+    tried = len(motion.candidates)
+    nearest = max(motion.choice.candidates, key=lambda each: each.p_value)
+    if kept and motion.choice.status == "ok":
+        yield f"Of {tried} motions tried the record does not speak against {len(kept)}: {'; '.join(kept)}."
+    elif kept:
+        yield f"Of {tried} motions tried {len(kept)} can not be excluded, but what they leave over is not noise alone."
+    elif nearest.p_value < CLEAR:
+        yield f"The record speaks against each of the {tried} motions tried: there is friction of another kind too."
+    else:
+        yield (
+            f"The record speaks against each of the {tried} motions tried, least against "
+            f"{nearest.fitted.motion.words} (p = {nearest.p_value:.1g}), which may be chance."
+        )
+    more = findings.viscous_residual
+    if more is not None and more > LEAVES_MORE:
+        yield f"Viscous damping alone leaves {more:.3g} times the residual that it leaves together with dry friction."
+    dry = findings.whichever[1]
+    force = findings.as_force(dry, "")
+    also = f", its {'torque' if force.unit == 'N m' else 'force'} {_reach(force)}" if force is not None else ""
+    which = "Whichever of them it is" if kept else "By all that leave at most twice the least residual"
+    yield f"{which}, the dry friction displacement is {_reach(dry)}{also}."
+
+
+def _reach(estimate: Estimate) -> str:
+    """The interval; the value where it is narrower than the digits shown."""
+    low, high = estimate.interval
+    words = interval_of(estimate)
+    if words == WITHIN_DIGIT:
+        return value_of(estimate)
+    two_sided = -math.inf < low < high < math.inf and not estimate.is_bound
+    return f"within {words}" if two_sided else words
+
+
+def verdicts(findings: DecayFindings) -> list[tuple[str, str]]:
+    """The motions that were tried, in words, and what the record says of each."""
+    return [] if findings.motion is None else [(words, verdict) for _, words, verdict in findings.motion.candidates]
+
+
+def _both(ratio: Estimate, dry: Estimate) -> str:
+    return f"{_told(ratio)} and {_told(dry)}"
+
+
+def _told(estimate: Estimate) -> str:
+    return f"a {estimate.name} of {value_of(estimate)} (95 % sure: {interval_of(estimate)})"
+
+
+def _hidden(estimate: Estimate, words: str) -> str:
+    least = value_of(estimate, max(0.0, estimate.interval[1]))
+    return f"That there is {words} too can not be told: a {estimate.name} below {least} would not be seen."
+
+
+def _left_over(findings: DecayFindings) -> Iterator[str]:
+    """Where the fit leaves more than noise: whether that drifts, or swings at a frequency of its own."""
+    fit = findings.waveform
+    if fit is None or "residual" not in fit.status:
+        return
+    time, left = max(zip(fit.time, fit.residual, strict=True), key=lambda each: float(np.std(each[1])))
+    power = np.abs(np.fft.rfft((left - left.mean()) * np.hanning(len(left)))) ** 2
+    frequency = np.fft.rfftfreq(len(left), float(time[1] - time[0]))
+    own, total = fit.frequency.value, float(power.sum())
+    near = slice(max(0, int(np.argmax(power)) - 2), int(np.argmax(power)) + 3)
+    line = float(power[near].sum())
+    at = float(power[near] @ frequency[near]) / line
+    if float(power[frequency < own / 3].sum()) > MOST * total:
+        yield "Most of what the fit leaves over is slower than the oscillation: the rest position drifts."
+    elif line > MOST * total and abs(at / own - round(at / own)) > OTHER:
+        yield (
+            f"Most of what the fit leaves over swings at {number(at, frequency[1] / 10, 'Hz')}: another mode of "
+            "the rig, or something that drives it; hold it still, or filter it out."
+        )
+
+
+def _motion(findings: DecayFindings) -> Iterator[str]:
+    rings = findings.releases.ring_downs
+    many = f"{len(rings)} releases were found; the first" if len(rings) > 1 else "The motion"
+    first = rings[0]
+    end = f"comes to rest at {first.stop:.4g} s" if first.stopped else "is still going on at the end"
+    end = f"is caught at {first.stop:.4g} s" if CAUGHT in first.notes else end
+    begin, far = _begin(findings)
+    yield (
+        f"{many} {begin}, swings at {value_of(findings.best.frequency)} through {len(first.turns)} extremes from "
+        f"{far}, and {end}."
+    )
+
+
+def _begin(findings: DecayFindings) -> tuple[str, str]:
+    """When the motion begins, and from how far; as it is fitted, where it is."""
+    first, fit = findings.releases.ring_downs[0], findings.waveform
+    begin = f"begins at {first.release:.4g} s" if first.held else "is under way when the record begins"
+    if fit is None:
+        return begin, number(abs(first.amplitude), abs(first.amplitude) / 1000, first.unit)
+    at, far = value_of(fit.release_time), value_of(fit.amplitude, abs(fit.amplitude.value))
+    if fit.release_time.name == beginning(True)[0]:
+        return f"begins at {at}", far
+    less = "swings are left out: " if first.held else ""
+    return f"{begin} ({less}it is fitted from its turn at {at})", far
+
+
+def _compared(findings: DecayFindings) -> Iterator[str]:
+    """Where two methods answer: whether they agree."""
+    if findings.waveform is None or findings.thesis is None or findings.best is findings.motion:
+        return
+    apart = []
+    for name in ("damping_ratio", "dry_displacement"):
+        mine, theirs = getattr(findings.waveform, name), getattr(findings.thesis, name)
+        gap = abs(mine.value - theirs.value)
+        reach = max(abs(end - theirs.value) for end in theirs.interval) + max(
+            abs(end - mine.value) for end in mine.interval
+        )
+        if gap > reach:
+            apart.append(f"{mine.name} {value_of(theirs)}")
+    if apart:
+        yield (
+            f"The decrements of the extremes give another {' and '.join(apart)}: neither interval knows of friction "
+            "that is of another kind than these two."
+        )
+    else:
+        yield "The decrements of the extremes agree within their intervals."
+
+
+def _together(comparison: DecayComparison) -> Iterator[str]:
+    many = len(comparison.findings)
+    found = {each.name: each for each in comparison.estimates}
+    ratio, dry = found.get("damping ratio"), found.get("dry friction displacement")
+    if comparison.apart:
+        gaps = ", ".join(f"{name} by {gap:.{1 if gap < 10 else 0}f} times" for name, gap in comparison.apart.items())
+        yield f"The {many} records are not alike: they differ in {gaps} what their own intervals allow."
+        way = "Their means, with intervals that hold the scatter between them, are"
+    else:
+        yield f"The {many} records agree within their own intervals."
+        way = "Fitted at once they give" if comparison.joint else "Their means are"
+    if ratio is not None and dry is not None:
+        yield f"{way} {_both(ratio, dry)}."
+    if comparison.dry_force is not None:
+        force = comparison.dry_force
+        yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
+    either = found.get("dry friction displacement, whichever motion")
+    if either is not None:
+        yield f"Whichever motion it was, the dry friction displacement is {_reach(either)}."
+    static = found.get("static friction displacement")
+    if static is not None:
+        alone = [each.waveform.static_displacement for each in comparison.findings if each.waveform is not None]
+        least = min(alone, key=lambda each: each.interval[1] - each.interval[0])
+        yield (
+            f"The static friction displacement lies within {_reach(static).removeprefix('within ')}; the surest record "
+            f"alone leaves {interval_of(least)}."
+        )

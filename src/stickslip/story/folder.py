@@ -1,0 +1,144 @@
+"""The folder of results: report, numbers and figures, there as a whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from stickslip import __version__
+from stickslip.errors import ModelError, RecordError
+from stickslip.plot.plate import Plate
+from stickslip.printing import printable
+from stickslip.squeak.listening import Clip
+from stickslip.story.page import Asked, render, sections_of
+from stickslip.whole import whole_folder
+
+PROGRAM = "stickslip"
+NUMBERS = "results.json"
+
+
+def publish(
+    results: Asked,
+    *,
+    folder: str | Path,
+) -> Path:
+    """Write ``report.html``, ``results.json``, the figures as SVG and PNG, and the bursts as WAV into a folder.
+
+    The folder appears when all is written, and is on the disk itself then. An earlier one of ours is replaced in one
+    step where the system can do that (Linux, macOS); a folder that holds anything else is left alone. A file that
+    somebody puts there meanwhile stays.
+
+    Parameters
+    ----------
+    results : Findings, Comparison, TimeFrequency, DecayFindings, DecayComparison, SqueakFindings or SqueakComparison
+        What :func:`analyze`, :func:`compare`, :func:`time_frequency`, :func:`analyze_decay`, :func:`compare_decays`,
+        :func:`analyze_squeaks` or :func:`compare_squeaks` returned.
+    folder : path
+        The folder to make.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ModelError
+        The folder holds something that is not ours.
+    RecordError
+        The folder can not be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import stickslip as ss
+    >>> record = ss.datasets.demo()
+    >>> rig = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
+    >>> folder = publish(ss.analyze(record, **rig), folder=Path(tempfile.mkdtemp()) / "results")
+    >>> sorted(path.name for path in folder.iterdir())
+    ['figures', 'report.html', 'results.json']
+    """
+    folder = Path(folder)
+    check_folder(folder)
+    sections = sections_of(results, png=True)
+    with results_folder(folder, results.to_dict()) as draft:
+        (draft / "report.html").write_text(render(sections), encoding="utf-8")
+        for number, section in enumerate(sections):
+            prefix = f"{number}-{_fit_for_a_file(section.words.title)}-" if len(sections) > 1 else ""
+            write_figures(draft / "figures", prefix, section.plates)
+            _write_sounds(draft / "sounds", prefix, section.clips)
+    return folder
+
+
+def _write_sounds(folder: Path, prefix: str, clips: Sequence[Clip]) -> None:
+    """Each burst to listen to."""
+    if clips:
+        folder.mkdir(exist_ok=True)
+    for clip in clips:
+        (folder / f"{prefix}{clip.name}.wav").write_bytes(clip.wav)
+
+
+@contextmanager
+def results_folder(folder: Path, results: Mapping[str, Any]) -> Iterator[Path]:
+    """A folder to fill; with `results` and the list of its files in ``results.json`` it appears at the end, whole."""
+    check_folder(folder)
+    with _written(folder) as draft:
+        yield draft
+        files = sorted(str(path.relative_to(draft).as_posix()) for path in draft.rglob("*") if path.is_file())
+        told = {"program": PROGRAM, "version": __version__, "files": [*files, NUMBERS], **results}
+        text = printable(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
+        (draft / NUMBERS).write_text(text + "\n", encoding="utf-8")
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that holds anything that an earlier run did not write."""
+    if not folder.exists():
+        return
+    strangers = ["it is a file"] if not folder.is_dir() else _strangers(folder)
+    if strangers:
+        raise ModelError(
+            f"{folder} holds something that stickslip did not write ({strangers[0]})",
+            "results go into a new folder, an empty one, or one of earlier results",
+            "name another folder with --output",
+        )
+
+
+def _strangers(folder: Path) -> list[str]:
+    present = {
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir() or path.is_symlink()
+    }
+    try:
+        told = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
+        ours = set(told["files"]) if told["program"] == PROGRAM else set()
+    except (OSError, ValueError, KeyError, TypeError):  # absent or not ours: then every file is a stranger's
+        ours = set()
+    return sorted(present - ours)
+
+
+@contextmanager
+def _written(folder: Path) -> Iterator[Path]:
+    """A folder to fill that takes the place of `folder` at the end; what else came there meanwhile stays there."""
+    try:
+        with whole_folder(folder, strangers=_strangers) as draft:
+            yield draft
+    except OSError as error:
+        raise RecordError(
+            f"{folder} can not be written ({error.strerror or error})",
+            "results need a place on a disk that can be written",
+            "name another folder with --output",
+        ) from error
+
+
+def write_figures(folder: Path, prefix: str, plates: Sequence[Plate]) -> None:
+    """Each figure as SVG and PNG, in a folder that is made."""
+    folder.mkdir(exist_ok=True)
+    for plate in plates:
+        (folder / f"{prefix}{plate.name}.svg").write_text(plate.svg(), encoding="utf-8")
+        (folder / f"{prefix}{plate.name}.png").write_bytes(plate.png())
+
+
+def _fit_for_a_file(title: str) -> str:
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", title).strip("-.")[:60] or "record"

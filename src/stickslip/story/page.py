@@ -1,0 +1,173 @@
+"""One self-contained page: what was found, how sure it is, and how it came about."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
+
+from stickslip import __version__
+from stickslip.answers.comparison import Comparison
+from stickslip.answers.decay_comparison import DecayComparison
+from stickslip.answers.decays import DecayFindings
+from stickslip.answers.findings import Findings
+from stickslip.answers.frequencies import TimeFrequency
+from stickslip.answers.squeak_comparison import SqueakComparison
+from stickslip.answers.squeaks import SqueakFindings
+from stickslip.estimate import Estimate
+from stickslip.files.write import whole
+from stickslip.plot import style
+from stickslip.plot.figures import figures
+from stickslip.plot.plate import Plate, drawable
+from stickslip.printing import printable
+from stickslip.record.record import Record
+from stickslip.squeak.listening import Clip, burst_clips
+from stickslip.story.summary import Summary, summary
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+TEMPLATE = "page.html.jinja"
+MOST_SOUND = 1 << 20  # bytes of sound of one record in a page; the folder holds all
+_COLOURS = {
+    style.INK: "currentColor", style.FAINT: "var(--faint)", style.SHADE: "var(--shade)", style.BLUE: "var(--blue)",
+    style.ORANGE: "var(--orange)", style.GREEN: "var(--green)", style.PURPLE: "var(--purple)", style.SKY: "var(--sky)",
+}  # fmt: skip
+Asked: TypeAlias = (
+    Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | SqueakFindings | SqueakComparison
+)
+Results: TypeAlias = Asked | Estimate | Sequence[Estimate]
+
+
+@dataclass(frozen=True)
+class Section:
+    """What the page says of one record, or of all of them: words, figures, and sounds."""
+
+    words: Summary
+    plates: Sequence[Plate] = ()
+    clips: Sequence[Clip] = ()
+
+
+def report(
+    results: Results,
+    record: Record | None,
+    path: str | Path,
+) -> Path:
+    """Write one HTML page that holds everything and asks nothing of a network.
+
+    Parameters
+    ----------
+    results : Findings, Comparison, TimeFrequency, DecayFindings, DecayComparison, SqueakFindings, SqueakComparison, \
+            Estimate, or a sequence of estimates
+        What was found.
+    record : Record or None
+        Where plain estimates were found: its faults, channels and history are told. Findings bring their own.
+    path : path
+        The page to write; it appears whole or not at all.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FormatError
+        The page can not be written there.
+    EstimateError
+        `results` is empty or holds something else than estimates.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> friction = Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="median of 18 half cycles")
+    >>> page = report([friction], None, Path(tempfile.mkdtemp()) / "report.html")
+    >>> "1.318" in page.read_text(encoding="utf-8")
+    True
+    """
+    text = render(sections_of(results, record))
+    with whole(Path(path)) as draft:
+        draft.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+def sections_of(results: Results, record: Record | None = None, *, png: bool = False) -> list[Section]:
+    """The sections of the page, with their figures drawn; as PNG too where these are asked for."""
+    if isinstance(results, Comparison | DecayComparison | SqueakComparison):
+        return [_section(part, png=png) for part in (results, *results.findings)]
+    if isinstance(results, Findings | DecayFindings | TimeFrequency | SqueakFindings):
+        return [_section(results, png=png)]
+    return [Section(summary(cast(Sequence[Estimate], results), record=record))]
+
+
+def section(words: Summary, plates: Iterable[Plate], clips: Sequence[Clip] = (), *, png: bool = False) -> Section:
+    """Words, and the figures that can be drawn; of the others a note."""
+    drawn, lost = drawable(plates, png=png)
+    return Section(replace(words, notes=(*words.notes, *lost)), drawn, clips)
+
+
+def _section(part: Asked, *, png: bool) -> Section:
+    clips = burst_clips(part.squeaks) if isinstance(part, SqueakFindings) else ()
+    return section(summary(part), figures(part), clips, png=png)
+
+
+def render(sections: Sequence[Section]) -> str:
+    """The page as text."""
+    return templates().get_template(TEMPLATE).render(sections=sections, version=__version__)
+
+
+def templates(*folders: Path) -> Environment:
+    """The page's template and those of other folders that extend it, with the filters that they use."""
+    from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=ChoiceLoader([PackageLoader("stickslip.story"), FileSystemLoader(folders)]), autoescape=True,
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_visible,
+    )  # fmt: skip
+    environment.filters.update(inline_svg=inline_svg, told=told, spelled=style.spelled, played=played, heard=heard)
+    return environment
+
+
+def _visible(value: Any) -> Any:
+    """What the page is given: text of others shows its hidden signs."""
+    return type(value)(printable(value)) if isinstance(value, str) else value
+
+
+def heard(clips: Sequence[Clip]) -> Sequence[Clip]:
+    """The clips that the page itself holds: as many of the loudest as keep it light."""
+    light, size = set(), 0
+    for clip in sorted(clips, key=lambda clip: -clip.level):
+        size += len(clip.wav)
+        if size > MOST_SOUND:
+            break
+        light.add(clip.name)
+    return [clip for clip in clips if clip.name in light]
+
+
+def played(clip: Clip) -> str:
+    """The sound as an address that holds it."""
+    return f"data:audio/wav;base64,{base64.b64encode(clip.wav).decode('ascii')}"
+
+
+def inline_svg(plate: Plate) -> str:
+    """The figure as an SVG element that takes the page's width, colours and type."""
+    svg = plate.svg()
+    svg = svg[svg.index("<svg") :]
+    opening, rest = svg.split(">", 1)
+    opening = re.sub(r' (width|height)="[^"]*"', "", opening).replace("<svg", '<svg role="img" aria-hidden="true"')
+    rest = re.sub(r"<metadata>.*?</metadata>", "", rest, flags=re.DOTALL)
+    rest = re.sub(r'<g id="[^"]*">', "<g>", rest)
+    for colour, variable in _COLOURS.items():
+        rest = rest.replace(colour, variable)
+    return f"{opening}>{rest}"
+
+
+def told(value: Any) -> str:
+    """An argument of a step, with its parts spelled out."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {told(item)}" for key, item in value.items())
+    if isinstance(value, (list, tuple)):
+        return "; ".join(told(item) for item in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,294 @@
+"""Squeaks in sentences, tables and sounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from stickslip.answers.squeak_comparison import Condition, SqueakComparison
+from stickslip.answers.squeaks import SqueakFindings, trend_of
+from stickslip.estimate import Estimate, decimals
+from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
+from stickslip.squeak.couplings import Coupling, Pair
+from stickslip.story.words import interval_of, number, value_of
+from stickslip.units import prefixed
+
+MOST = 40  # bursts in a table
+NONE = "–"
+
+
+def headline(found: SqueakFindings) -> Iterator[str]:
+    """What was heard, in a few sentences."""
+    squeaks, record = found.squeaks, found.record
+    heard = squeaks.of("squeak", "squeal")
+    where = "" if squeaks.channel == "sound" else f" in the channel {squeaks.channel}"
+    if not squeaks.bursts:
+        yield f"Nothing sounds{where}: no burst in {record.duration:.4g} s."
+        return
+    creaks = [f"{burst.rate:.3g}" for burst in squeaks.of("creak")]
+    if not heard and creaks:
+        yield f"It creaks{where}: stick-slip pulses, {' and '.join(creaks)} in a second."
+    elif squeaks.answer == "can not be told":
+        yield f"Whether it squeaks{where} can not be told: {_untold(squeaks)}."
+    elif not heard:
+        kinds = [(squeaks.of(kind), words) for kind, words in WORDS.items()]
+        yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {words}' for of, words in kinds if of)}."
+    elif found.frequency is not None:
+        many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"
+        tone = found.frequency.value
+        yield f"It {squeaks.answer}{where} {many}, at {number(tone, tone / 500, 'Hz')}."
+    loudest = found.loudest
+    if loudest is not None:
+        yield _of_one(loudest, squeaks)
+    if found.coupling is not None:
+        yield _of_pairs(found.coupling)
+        yield from _of_energy(found.coupling, torsion="torsion_velocity" in record)
+    if found.loops is not None:
+        slope = found.loops.slope
+        trend = trend_of(slope)
+        sure = f" {trend}" if trend in ("falls", "rises") else " can not be told to change"
+        yield (f"Friction is {value_of(found.loops.level)} and{sure} with speed: {value_of(slope)} ({_ends(slope)}).")
+
+
+def _of_pairs(joined: Coupling) -> str:
+    """What the squeak adds to how the channels move together."""
+    pairs = [pair for pair in joined.pairs if not pair.tied]
+    coupled, adding = [pair for pair in pairs if pair.coupled], [pair for pair in pairs if pair.adds]
+    if not pairs:
+        return "Of two channels of which one follows from the other no coupling can be told."
+    if all(pair.added is None for pair in pairs):
+        return (
+            f"While it squeaks, {len(coupled)} of {len(pairs)} pairs of channels move together beyond chance; there is "
+            "nothing outside to tell what of that the squeak adds."
+        )
+    if not adding:
+        many = f"{len(coupled)} of {len(pairs)} pairs of channels move together beyond chance"
+        return f"While it squeaks, {many}; that the squeak adds to any of them, against the rest, is not shown."
+    most = max(adding, key=lambda pair: 0.0 if pair.added is None else pair.added.value)
+    return (
+        f"While it squeaks, {len(adding)} of {len(pairs)} pairs of channels move together more than outside, most of "
+        f"all {spoken_name(most.first)} and {spoken_name(most.second)}: coherence {most.inside:.2f} against "
+        f"{most.outside:.2f}."
+    )
+
+
+def _of_energy(joined: Coupling, *, torsion: bool) -> Iterator[str]:
+    """Which motion friction feeds, where that is told."""
+    fed = {"tangential vibration": joined.energy_per_cycle, "torsion": joined.energy_to_torsion}
+    for motion, energy in fed.items():
+        if energy is not None and not energy.includes(0.0):
+            verb = "feeds" if energy.value > 0 else "damps"
+            yield f"Friction {verb} the {motion}: {value_of(energy)} in each cycle of the squeak."
+    if joined.energy_per_cycle is not None and joined.energy_per_cycle.includes(0.0):
+        lever = "; what it gives the torsion is told where its distance from the axis is stated, as lever= in m"
+        told = lever if torsion and joined.energy_to_torsion is None else ""
+        yield f"Whether friction feeds or damps the tangential vibration can not be told{told}."
+
+
+def spoken_name(channel: str) -> str:
+    """A channel's name as words."""
+    return {"a": "acceleration"}.get(channel, channel.replace("_", " "))
+
+
+def _untold(squeaks: Squeaks) -> str:
+    """Of how many bursts it can not be told whether friction makes them."""
+    every, asked = len(squeaks.of("tonal")), len(squeaks.untold)
+    if every == asked:
+        return (
+            "one tonal burst may be friction's, or not"
+            if every == 1
+            else (f"each of {every} tonal bursts may be friction's, or not")
+        )
+    rest = "the other one is not" if every - asked == 1 else f"the other {every - asked} are not"
+    return f"of {every} tonal bursts {asked} may be friction's, or not; {rest}"
+
+
+def _of_one(burst: Squeak, squeaks: Squeaks) -> str:
+    """The loudest burst in a sentence."""
+    where = "" if math.isnan(burst.phase) else f", at {100 * burst.phase:.0f} % of the forcing cycle"
+    speed = "" if math.isnan(burst.speed) else f" and {number(burst.speed, 1e-3, 'm/s')}"
+    told = f"The loudest is {level_of(burst, squeaks)}{where}{speed}"
+    friction = {"shown": "friction makes it", "likely": "friction likely makes it"}.get(burst.friction)
+    return f"{told}; {friction}: {burst.evidence}." if friction else f"{told}: {burst.evidence}."
+
+
+def level_of(burst: Squeak, squeaks: Squeaks) -> str:
+    """The level with its reference, and weighted where that is known."""
+    if math.isnan(burst.level):
+        return "clipped, its level unknown"
+    weighted = "" if math.isnan(burst.weighted_level) else f", {burst.weighted_level:.0f} dB(A)"
+    return f"{burst.level:.1f} dB re {squeaks.reference}{weighted}"
+
+
+def _counted(bursts: Sequence[Squeak]) -> str:
+    return f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}"
+
+
+def cautions(found: SqueakFindings) -> list[str]:
+    """What should keep the reader from trusting it."""
+    told = [note for note in found.squeaks.notes if "calibrated" in note or "alone; the record has" in note]
+    if any(fault.kind == "spike" for fault in found.faults):
+        told.append(
+            "What stands off as a spike may be a contact that sticks, lifts or lands: look before it is replaced."
+        )
+    spoilt: dict[str, list[str]] = {}
+    for place, burst in enumerate(found.squeaks.bursts):
+        for part in burst.status.split("; ") if burst.status != "ok" else ():
+            spoilt.setdefault(part, []).append(str(place + 1))
+    return told + [
+        f"Burst{'s' if len(places) > 1 else ''} {', '.join(places)}: {part}." for part, places in spoilt.items()
+    ]
+
+
+def burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each burst."""
+    squeaks = found.squeaks
+    moves, calibrated = not math.isnan(squeaks.forcing), any(not math.isnan(b.weighted_level) for b in squeaks.bursts)
+    headings = [
+        "", "begins [s]", "lasts [s]", "kind", "Hz", "dB", *(["dB(A)"] if calibrated else []), "tonal",
+        *(["phase", "m/s"] if moves else []), "friction",
+    ]  # fmt: skip
+    rows = []
+    for place, burst in enumerate(squeaks.bursts[:MOST]):
+        rate = "" if math.isnan(burst.rate) else f", {burst.rate:.3g} pulses in a second"
+        rows.append([
+            str(place + 1), f"{burst.start:.3f}", f"{burst.duration:.3f}", burst.kind + rate, f"{burst.frequency:.1f}",
+            "clipped" if math.isnan(burst.level) else f"{burst.level:.1f}",
+            *([_or_none(burst.weighted_level, ".1f")] if calibrated else []), f"{100 * burst.tonality:.0f} %",
+            *([_or_none(burst.phase, ".2f"), _or_none(burst.speed, ".3f")] if moves else []), burst.friction,
+        ])  # fmt: skip
+    return headings, rows
+
+
+def channel_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each channel that vibrates."""
+    rows = []
+    for squeaks in (found.squeaks, *found.beside):
+        heard = squeaks.of("squeak", "squeal")
+        frequency = f"{np.mean([burst.frequency for burst in heard]):.1f}" if heard else NONE
+        levels = [burst.level for burst in heard or squeaks.bursts if not math.isnan(burst.level)]
+        level = f"{max(levels):.1f} re {squeaks.reference}" if levels else NONE
+        rows.append([squeaks.channel, squeaks.kind, str(len(heard)), frequency, level])
+    return ["channel", "what it is", "squeaks", "Hz", "loudest, dB"], rows
+
+
+def hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each measure of how it is heard."""
+    rows, quality, impulses = [], found.quality, found.impulses
+    if quality is not None:
+        rows += [
+            ["loudness N5", f"{quality.loudness:.3g} sone", "exceeded 5 % of the time; Zwicker, ISO 532-1, free field"],
+            ["sharpness", f"{quality.sharpness:.3g} acum", "of the mean specific loudness; weighting of DIN 45692"],
+            ["roughness", _or_none(quality.roughness, ".3g") + " asper", "Daniel and Weber, mean of windows of 0.2 s"],
+        ]
+    if impulses is not None:
+        rows += [
+            ["crest factor", f"{impulses.crest_factor:.3g}", "largest magnitude over RMS; 1.41 of a sine"],
+            ["kurtosis", f"{impulses.kurtosis:.3g}", "3 of normal noise, 1.5 of a sine, large of pulses"],
+            [
+                "pulses",
+                _or_none(impulses.rate, ".3g") + " in a second",
+                "in windows of 2 ms, 10 dB over the valleys beside",
+            ],
+        ]
+    return ["", "value", "what it is"], rows
+
+
+def hearing_note(found: SqueakFindings) -> str:
+    """By what, and that no conformity is claimed."""
+    by = "" if found.quality is None else f"Loudness, sharpness and roughness by {found.quality.method}. "
+    return f"{by}No conformity to a standard is claimed; the pulses follow none."
+
+
+def coupling_table(joined: Coupling) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each pair of channels: first those that the squeak adds to, last what is no coupling."""
+    rest = any(pair.added is not None for pair in joined.pairs)
+    headings = [
+        "channels, the first leads", "coherence", *(["outside", "added (95 %)"] if rest else []), "phase", "later by"
+    ]  # fmt: skip
+
+    def order(pair: Pair) -> tuple[bool, bool, float]:
+        return pair.tied, not pair.adds, 0.0 if pair.added is None else -pair.added.value
+
+    return headings, [_pair(pair, rest=rest) for pair in sorted(joined.pairs, key=order)]
+
+
+def coupling_note(joined: Coupling) -> str:
+    """How to read the table of pairs."""
+    tied = (
+        " Friction and acceleration of one mass go together by its inertia, m a = ... - f: that is no coupling."
+        if any(pair.tied for pair in joined.pairs)
+        else ""
+    )
+    half = (
+        " At half a period it can not be told which leads: that is a sign, and no delay."
+        if any(pair.delay is None for pair in joined.pairs)
+        else ""
+    )
+    return (
+        f"Compared: {joined.compared}. Channels that have nothing to do with each other have a coherence below "
+        f"{joined.pairs[0].significant:.2f} in 95 of 100 cases. A tone has no beginning: which channel leads holds "
+        f"within half a period, and is no cause.{half}{tied}"
+    )
+
+
+def _pair(pair: Pair, *, rest: bool) -> list[str]:
+    sign = -1 if pair.leads == pair.second else 1
+    first, second = (pair.second, pair.first) if sign < 0 else (pair.first, pair.second)
+    told = [f"{first}{' → ' if pair.leads != 'neither' else ', '}{second}", f"{pair.inside:.2f}"]
+    if rest:
+        low, high = pair.added.interval if pair.added is not None else (math.nan, math.nan)
+        told += [f"{pair.outside:.2f}", f"{round(low, 2) + 0.0:.2f} to {round(high, 2) + 0.0:.2f}"]
+    if not pair.coupled:
+        return [*told, NONE, "by chance"]
+    phase = f"{math.degrees(sign * pair.phase.value):.0f}°"
+    if pair.delay is None:
+        return [*told, phase, "half a period"]
+    delay, half = sign * pair.delay.value, (pair.delay.interval[1] - pair.delay.interval[0]) / 2
+    factor, unit = prefixed(delay, "s")
+    digits = decimals(factor * half, factor * delay)
+    return [*told, phase, f"{factor * delay:.{digits}f} ± {factor * half:.{digits}f} {unit}"]
+
+
+def condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[list[str]]]:
+    """Headings and a row for each condition; a column that is known of none is left out."""
+    headings = ["condition", "load", "driven, stroke", "friction", "slope against speed (95 %)", "heard", "Hz", "dB"]
+    rows = [_condition(each) for each in comparison.conditions]
+    known = [place for place in range(len(headings)) if any(row[place] != NONE for row in rows)]
+    return [headings[place] for place in known], [[row[place] for place in known] for row in rows]
+
+
+def _condition(each: Condition) -> list[str]:
+    forcing = "" if math.isnan(each.forcing) else f"{each.forcing:.3g} Hz"
+    stroke = "" if math.isnan(each.stroke) else f"±{number(each.stroke, each.stroke / 100, 'm')}"
+    slope = NONE if each.slope is None else f"{value_of(each.slope)} ({_ends(each.slope)})"
+    return [
+        each.name, NONE if each.normal is None else number(each.normal, 0.0, "N"),
+        ", ".join(part for part in (forcing, stroke) if part) or NONE, _value(each.level), slope, _heard(each),
+        NONE if each.frequency is None else f"{each.frequency.value:.1f}", _or_none(each.sound, ".1f"),
+    ]  # fmt: skip
+
+
+def _heard(each: Condition) -> str:
+    """Squeaks and their number, or what is heard instead."""
+    if each.squeaks:
+        name = "squeal" if each.answer == "squeals" else "squeak"
+        return f"{each.count} {name}{'s' * (each.count > 1)} ({each.rate:.2g} in a second)"
+    if each.answer == "creaks":
+        return f"creak, {each.pulses:.3g} pulses in a second"
+    return "can not be told" if each.answer == "can not be told" else f"no squeak ({each.kind})"
+
+
+def _ends(estimate: Estimate) -> str:
+    """The interval without the unit, which stands beside the value."""
+    return interval_of(estimate).removesuffix(value_of(estimate).lstrip("-.0123456789e"))
+
+
+def _value(estimate: Estimate | None) -> str:
+    return NONE if estimate is None else value_of(estimate)
+
+
+def _or_none(value: float, form: str) -> str:
+    return NONE if math.isnan(value) else f"{value:{form}}"
