@@ -13,7 +13,7 @@ from stickslip.errors import ModelError
 from stickslip.parameters import PARTS
 from stickslip.solve.orbit import SteadyState, alike
 from stickslip.solve.periodic import steady_state
-from stickslip.solve.poincare import Table, end_of, lap, tables
+from stickslip.solve.poincare import Table, lap, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 from stickslip.solve.trajectory import Trajectory
@@ -82,7 +82,7 @@ def settled(system: System, start: Start, *, transient: int, orders: int) -> Att
         if orbit.status != "unstable":
             break
         table = tables(system)
-        start = as_start(table, *end_of(lap(system, table, *opening(table, start), transient)))
+        start = as_start(table, *lap(system, table, *opening(table, start), transient).end())
         transient *= 4
     else:
         orbit = replace(orbit, status="not periodic", order=0, period=math.nan)
@@ -90,14 +90,14 @@ def settled(system: System, start: Start, *, transient: int, orders: int) -> Att
         if orbit.status != "not periodic":
             break
         table = orbit.orbit.table
-        course = lap(system, table, *end_of(orbit.orbit), LOOKS)
+        course = lap(system, table, *orbit.orbit.end(), LOOKS)
         points = course.section()
         if _is_still(course):
             orbit = replace(orbit, status="rest", order=1, period=table.motion.period)
         elif turn == PATIENCE or not _approaches(points):
             return Attractor(orbit, points[:-1])
         else:
-            onwards = as_start(table, *end_of(course))
+            onwards = as_start(table, *course.end())
             orbit = steady_state(system, start=onwards, transient=LOOKS, orders=orders, patience=LOOKS)
     return Attractor(orbit, orbit.orbit.section()[: max(orbit.order, 1)])
 
@@ -133,7 +133,7 @@ def onward(attractor: Attractor) -> Start:
     if attractor.status == "unbounded":
         return {}
     table = attractor.orbit.orbit.table
-    state, mode = end_of(attractor.orbit.orbit)
+    state, mode = attractor.orbit.orbit.end()
     if attractor.status != "rest":
         state[0] += PUSH * attractor.orbit.amplitude
     return as_start(table, state, mode)

@@ -14,7 +14,7 @@ from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.maps.attractor import Attractor, Start, as_start, numbers, require_period, same, settled
 from stickslip.record.exchange import labelled_arrays
-from stickslip.solve.poincare import Table, end_of, extent, lap, tables
+from stickslip.solve.poincare import Table, extent, lap, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 
@@ -156,7 +156,7 @@ def _axes(grid: Mapping[str, ArrayLike]) -> tuple[tuple[str, str], tuple[Array, 
 def _number(system: System, table: Table, found: list[Attractor], start: Start, patience: tuple[int, int]) -> int:
     """Which of the attractors found so far a start leads to; a new one is added."""
     transient, orders = patience
-    state, mode = end_of(lap(system, table, *opening(table, start), transient))
+    state, mode = lap(system, table, *opening(table, start), transient).end()
     for number, each in enumerate(found):
         if _belongs(system, table, state, mode, each):
             return number
@@ -180,7 +180,7 @@ def _belongs(system: System, table: Table, state: Array, mode: int, attractor: A
     if np.min(gaps) > NEAR:
         return False
     course = lap(system, table, state, mode, attractor.orbit.order)
-    after = np.abs(end_of(course)[0][:physical] - attractor.points[int(np.argmin(gaps))]) / np.where(size > 0, size, 1)
+    after = np.abs(course.end()[0][:physical] - attractor.points[int(np.argmin(gaps))]) / np.where(size > 0, size, 1)
     if np.max(after) > max(np.min(gaps), 1e-12):
         return False
     return attractor.orbit.order > 1 or list(course.modes) == list(attractor.orbit.orbit.modes)

@@ -13,7 +13,7 @@ from stickslip.maps.measures import AT_REST, EVENTS, MOVING, ORDERS, own_name
 from stickslip.maps.plan import Plan
 from stickslip.maps.watch import repeats
 from stickslip.solve.exponents import lyapunov
-from stickslip.solve.poincare import derivative, end_of, lap, tables
+from stickslip.solve.poincare import derivative, lap, tables
 from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.trajectory import Event, Trajectory
 
@@ -150,5 +150,5 @@ def multiplier(run: Trajectory, settle: int) -> complex:
     end = run.states[0].copy()
     end[: table.physical] = run.section()[-1]
     orbit = lap(run.system, table, end, int(run.modes[-1]), steps)
-    found = np.linalg.eigvals(derivative(orbit, end_of(orbit)[1])[0])
+    found = np.linalg.eigvals(derivative(orbit, orbit.end()[1])[0])
     return complex(found[np.argmax(np.abs(found))])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.solve.poincare import Table, closes, derivative, end_of, stretch
+from stickslip.solve.poincare import Table, closes, derivative, stretch
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 from stickslip.solve.trajectory import Trajectory
@@ -59,7 +59,7 @@ def closed(
     best = np.inf
     for _ in range(ROUNDS):
         orbit = stretch(system, table, state, mode, span=(0.0, period))
-        end, after = end_of(orbit)
+        end, after = orbit.end()
         path = orbit.sample(np.linspace(0.0, period, LOOKED) * (1 - 1e-12), ("x", "v"))[0]
         size, spread = np.max(np.abs(path), axis=1), np.ptp(path, axis=1)
         gap = (end - state)[:count]

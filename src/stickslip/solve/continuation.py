@@ -12,7 +12,7 @@ from stickslip.errors import ModelError
 from stickslip.parameters import find, places
 from stickslip.solve.orbit import SteadyState, cycle_of
 from stickslip.solve.periodic import judged
-from stickslip.solve.poincare import closes, derivative, end_of, extent, lap, tables
+from stickslip.solve.poincare import closes, derivative, extent, lap, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 
@@ -222,7 +222,7 @@ def _family(orbit: SteadyState, parameter: str, first: float, way: float) -> _Ma
         state, _ = opening(table, {})
         state[: table.physical] = point[:-1] * size
         motion = lap(varied, table, state, mode, order)
-        last, after = end_of(motion)
+        last, after = motion.end()
         slope, slowest = derivative(motion, after)
         return last[: table.physical] / size, after, judged(motion, order, slope, slowest), slope
 

@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Estimate
 from stickslip.solve.curved import CurvedTrajectory
-from stickslip.solve.poincare import carried, end_of, extent, lap, tables
+from stickslip.solve.poincare import carried, extent, lap, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 from stickslip.solve.tape import Tape
@@ -80,7 +80,7 @@ def lyapunov(
     how = "differences of the map" if isinstance(table, Tape) else "exact tangent"
     for number in range(transient + cycles):
         orbit = lap(system, table, state, mode, 1)
-        state, mode = end_of(orbit)
+        state, mode = orbit.end()
         if number == 0:
             weights = _weights(system, orbit)
             difference /= weights

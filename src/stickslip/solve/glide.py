@@ -122,14 +122,14 @@ def blank_past() -> Past:
     return Past(none[0], none[1], np.zeros(HISTORY), np.ones(HISTORY, np.int64), np.zeros(3, np.int64))
 
 
-@compiled(**OPTIONS)
+@compiled(**OPTIONS, forceinline=True)
 def until(clock, limit, period):
     """Time [s] from a clock to a limit; without a period both have no laps."""
     left = (limit.laps - clock.laps) * period if limit.laps != clock.laps else 0.0
     return left + (limit.time - clock.time)
 
 
-@compiled(**OPTIONS)
+@compiled(**OPTIONS, forceinline=True)
 def later(clock, time, period):
     """The clock after a time, with what rounding takes from it, wrapped at the period."""
     step = time - clock.rest
@@ -137,11 +137,11 @@ def later(clock, time, period):
     rest = (now - clock.time) - step
     if now < period:
         return Clock(clock.laps, now, rest)
-    whole = math.floor(now / period)
+    whole = 1.0 if now < 2.0 * period else float(math.floor(now / period))  # a piece of the fast path ends in the next
     return Clock(clock.laps + whole, now - whole * period, rest)
 
 
-@compiled(**OPTIONS)
+@compiled(**OPTIONS, forceinline=True)
 def remember(past, mode, leaving, time, parts):
     """Put a piece into the ring; the guess goes on with it."""
     slot = past.places[NEXT]
@@ -150,7 +150,7 @@ def remember(past, mode, leaving, time, parts):
     past.places[GUESS] = (past.places[GUESS] + 1) & (past.modes.shape[0] - 1)
 
 
-@compiled(**OPTIONS)
+@compiled(**OPTIONS, forceinline=True)
 def new_lap(past):
     """A lap begins: its guesses are the pieces of the one that has ended."""
     past.places[GUESS] = past.places[LAP]
@@ -370,28 +370,30 @@ def _clear(nodes, drive, own, piece, exits, last, end, parts):
 
 
 @compiled(**FAST, forceinline=True)
-def _ended(model, own, drive, mode, piece, past, left):
-    """Guess and certify: how the piece ends."""
+def _tried(kind, model, own, drive, mode, piece, past, left):
+    """Guess and certify: how the piece ends, if this guess is right."""
     nodes, first = model.fast.nodes, model.linear.first[mode]
-    exits = model.linear.first[mode + 1] - first
-    none = complex(0.0, 0.0)
-    for kind in range(3):
-        t, leaving, parts = _guessed(kind, model, own, drive, mode, piece, past, left)
-        if not t > 0.0:
-            continue
-        sure, n, m = True, none, none
-        if kind == LASTS:
-            n, m = _turned(nodes, drive, t), _freely(nodes, own, t)
-        else:
-            sure, t, n, m = _polished(nodes, drive, own, piece, leaving - first, t)
-            sure = sure and t < 0.9999 * left and t < model.period
-        end = End(True, t, leaving, parts, n, m)
-        last = leaving - first if leaving >= 0 else -1
-        while sure and parts <= SPLITS and not _clear(nodes, drive, own, piece, exits, last, end, parts):
-            parts *= 2
-        if sure and parts <= SPLITS:
-            return End(True, t, leaving, parts, n, m)
-    return End(False, 0.0, -1, 1, none, none)
+    exits, none = model.linear.first[mode + 1] - first, complex(0.0, 0.0)
+    t, leaving, parts = _guessed(kind, model, own, drive, mode, piece, past, left)
+    if not t > 0.0:
+        return End(False, 0.0, -1, 1, none, none)
+    if kind == LASTS:
+        sure, n, m, last = True, _turned(nodes, drive, t), _freely(nodes, own, t), -1
+    else:
+        last = leaving - first
+        sure, t, n, m = _polished(nodes, drive, own, piece, last, t)
+        sure = sure and t < 0.9999 * left and t < model.period
+    end = End(True, t, leaving, parts, n, m)
+    while sure and parts <= SPLITS and not _clear(nodes, drive, own, piece, exits, last, end, parts):
+        parts *= 2
+    return End(sure and parts <= SPLITS, t, leaving, parts, n, m)
+
+
+@compiled(**FAST)
+def _otherwise(model, own, drive, mode, piece, past, left):
+    """As :func:`_tried` with the guesses that follow when the lap before tells nothing."""
+    end = _tried(LOOKED, model, own, drive, mode, piece, past, left)
+    return end if end.proved else _tried(LASTS, model, own, drive, mode, piece, past, left)
 
 
 @compiled(**FAST, forceinline=True)
@@ -496,7 +498,10 @@ def glide(model, clock, state, mode, limit, past, out, count, work):
             settled = count == capacity
             if settled:
                 break
-            end = _ended(model, own, drive, mode, piece, past, until(clock, limit, model.period))
+            left = until(clock, limit, model.period)
+            end = _tried(BEFORE, model, own, drive, mode, piece, past, left)
+            if not end.proved:
+                end = _otherwise(model, own, drive, mode, piece, past, left)
             if not end.proved:
                 break
             _write(out, count, clock, mode, here, state, end)

@@ -9,9 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.orbit import SteadyState, alike
-from stickslip.solve.poincare import CLOSED, Table, closes, derivative, end_of, extent, lap, tables
+from stickslip.solve.poincare import CLOSED, Table, closes, derivative, extent, lap, tables
 from stickslip.solve.self_excited import self_excited
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
@@ -143,13 +142,12 @@ def attractors(
 
 def _iterate(system: System, table: Table, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
     orbit = lap(system, table, state, mode, laps)
-    return *end_of(orbit), _size(orbit)
+    return *orbit.end(), _size(orbit)
 
 
 def _size(orbit: Trajectory) -> float:
     """Largest displacement of late."""
-    states = orbit.step_states if isinstance(orbit, CurvedTrajectory) else orbit.states
-    return float(np.max(np.abs(states[-64:, 0])))
+    return float(np.max(np.abs(orbit.corners[-64:, 0])))
 
 
 def _closed(system: System, table: Table, state: Array, mode: int, orders: int) -> SteadyState | None:
@@ -159,7 +157,7 @@ def _closed(system: System, table: Table, state: Array, mode: int, orders: int) 
         point, where = state, mode
         for _ in range(12):
             orbit = lap(system, table, point, where, order)
-            end, after = end_of(orbit)
+            end, after = orbit.end()
             size = extent(orbit)
             gap = (end - point)[: table.physical]
             relative = float(np.max(np.abs(gap) / np.maximum(size, 1e-300), initial=0.0, where=size > 0))
@@ -182,9 +180,9 @@ def _least(system: System, table: Table, orbit: Trajectory, after: int, order: i
     for fewer in range(1, order):
         if order % fewer == 0:
             part = lap(system, table, orbit.states[0], int(orbit.modes[0]), fewer)
-            gap = np.abs(end_of(part)[0] - orbit.states[0])[: table.physical]
+            gap = np.abs(part.end()[0] - orbit.states[0])[: table.physical]
             if np.all(gap <= 1e3 * CLOSED * extent(orbit)):
-                return judged(part, fewer, *derivative(part, end_of(part)[1]))
+                return judged(part, fewer, *derivative(part, part.end()[1]))
     return judged(orbit, order, *derivative(orbit, after))
 
 

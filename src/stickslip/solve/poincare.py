@@ -16,7 +16,6 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.curved import CurvedTrajectory, run_curved
-from stickslip.solve.kernel import follow
 from stickslip.solve.simulate import run, stops_of
 from stickslip.solve.tables import Array, System, Tables, table_of
 from stickslip.solve.tangent import carry_tangents
@@ -58,22 +57,6 @@ def lap(system: System, table: Table, state: Array, mode: int, laps: int) -> Tra
     return stretch(system, table, state, mode, span=(float(laps), 0.0))
 
 
-def end_of(orbit: Trajectory) -> tuple[Array, int]:
-    """State and mode at the end of whole laps, the event that falls on it included."""
-    table, mode, leaving = orbit.table, int(orbit.modes[-1]), int(orbit.exits[-1])
-    physical = table.physical
-    last = orbit.states[0].copy()
-    if isinstance(orbit, CurvedTrajectory):
-        last[:physical] = orbit.sample([orbit.duration], ("state",))[0][:, 0]
-        return last, mode if leaving < 0 else int(orbit.table.exits[1][leaving])  # type: ignore[attr-defined]
-    end = orbit.states[-1].copy()
-    follow(table.linear, mode, end, float(orbit.durations[-1]), np.empty((3, len(last))))
-    if leaving >= 0:
-        end, mode = table.reset[leaving] @ end, int(table.target[leaving])
-    last[:physical] = end[:physical]
-    return last, mode
-
-
 def closes(orbit: Trajectory, gap: float) -> bool:
     """Whether a return this close, relative to the orbit's size, is one to rounding."""
     return gap <= (10 * CLOSED if isinstance(orbit, CurvedTrajectory) else CLOSED)
@@ -81,8 +64,7 @@ def closes(orbit: Trajectory, gap: float) -> bool:
 
 def extent(orbit: Trajectory) -> Array:
     """Largest modulus of each physical entry of the state, as the pieces or steps begin."""
-    states = orbit.step_states if isinstance(orbit, CurvedTrajectory) else orbit.states
-    return np.asarray(np.max(np.abs(states[:, : orbit.table.physical]), axis=0))
+    return np.asarray(np.max(np.abs(orbit.corners[:, : orbit.table.physical]), axis=0))
 
 
 def derivative(orbit: Trajectory, after: int) -> tuple[Array, float]:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import SolveError
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
-from stickslip.solve.kernel import sample
+from stickslip.solve.kernel import follow, sample
 from stickslip.solve.tables import DEGREE, Array, System, Tables
 
 UNITS = {
@@ -96,6 +96,27 @@ class Trajectory:
             return self.kept
         angle = table.tones[0, 2] * self.offsets + table.tones[0, 3]
         return np.column_stack([self.kept, np.ones(len(self.kept)), np.cos(angle), np.sin(angle)])
+
+    @property
+    def corners(self) -> Array:
+        """State at the start of each stretch that is one closed form or one polynomial (n, N)."""
+        return self.states
+
+    def end(self) -> tuple[Array, int]:
+        """State and mode at the end of whole laps of the drive, the event that falls on it included.
+
+        Returns
+        -------
+        state : ndarray (N,)
+        mode : int
+        """
+        table, mode, leaving = self.table, int(self.modes[-1]), int(self.exits[-1])
+        first, last = self.states[0].copy(), self.states[-1].copy()
+        follow(table.linear, mode, last, float(self.durations[-1]), np.empty((3, len(last))))
+        if leaving >= 0:
+            last, mode = table.reset[leaving] @ last, int(table.target[leaving])
+        first[: table.physical] = last[: table.physical]  # the drive's signals are again what they were
+        return first, mode
 
     @property
     def pieces(self) -> tuple[Piece, ...]:

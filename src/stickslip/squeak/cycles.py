@@ -16,7 +16,7 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import finite
 from stickslip.solve.autonomous import settled_cycle
 from stickslip.solve.energies import EnergyFlow, energy_flow
-from stickslip.solve.poincare import Table, end_of, stretch, tables
+from stickslip.solve.poincare import Table, stretch, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.trajectory import Trajectory
 from stickslip.squeak.sliding import System
@@ -216,7 +216,7 @@ def _followed(
     done, count, opened = 0, FIRST, 0.0
     while True:
         motion = stretch(system, table, state, mode, span=(0.0, count * cycle))
-        end, after = end_of(motion)
+        end, after = motion.end()
         part = count / 4
         first, last = (_size(motion, sliding, begin * cycle, part, cycle) for begin in (0.0, count - part))
         if _held(motion):
