@@ -324,3 +324,38 @@ def test_a_record_that_was_written_remembers_what_its_file_lacked(tmp_path: Path
     (tmp_path / "rig.csv").write_text(text_of([*FIXED, "0.0"]))
     kept = ss.read_record(ss.write_record(ss.read_record(tmp_path / "rig.csv"), tmp_path / "kept.h5"))
     assert [fault.kind for fault in kept.check() if fault.kind == "cut"] == ["cut"]
+
+
+# ---- what twenty thousand mutated files brought up (tools/mutate_files.py)
+
+
+def test_a_heap_of_hdf5_that_leads_nowhere_is_not_followed(tmp_path: Path) -> None:
+    """The library takes a free piece of no length for the next one, for ever."""
+    path = tmp_path / "kept.h5"
+    ss.write_record(ss.Record.of({"x": np.arange(60.0)}, fs=250), path)
+    data = bytearray(path.read_bytes())
+    free = data.index(b"GCOL") + 16
+    while data[free : free + 2] != b"\0\0":  # the free piece follows those that are in use, each padded to eight bytes
+        free += 16 + -(-int.from_bytes(data[free + 8 : free + 16], "little") // 8) * 8
+    data[free + 8 : free + 16] = bytes(8)
+    path.write_bytes(bytes(data))
+    outcome = civil(limited(read_and_check, path, folder=tmp_path))
+    assert "'kept.h5' is damaged near byte" in outcome.out
+
+
+@pytest.mark.parametrize("huge", [1e200, 1.7e308])
+def test_a_clock_of_huge_numbers_is_checked_without_a_warning(huge: float) -> None:
+    stamps = np.arange(60) / 250
+    stamps[-1] = huge
+    record = ss.Record({"x": np.sin(np.arange(60) / 9)}, {"x": ss.Channel("x", "m")}, 250.0, stamps=stamps)
+    assert record.check()
+
+
+def test_a_gap_beside_a_missing_stamp_has_a_length() -> None:
+    stamps = np.arange(200) / 250
+    stamps[100:] += 0.2
+    stamps[100] = np.nan
+    record = ss.Record({"x": np.sin(np.arange(200) / 9)}, {"x": ss.Channel("x", "m")}, 250.0, stamps=stamps)
+    (gap,) = [fault for fault in record.check() if fault.kind == "gap"]
+    assert "gap of up to 208 ms" in gap.message
+    assert "about 50 samples lost" in gap.message

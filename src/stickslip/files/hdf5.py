@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import mmap
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +20,7 @@ NAME = "HDF5"
 SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5", ".nc")
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
+HEAP = b"GCOL\x01\0\0\0"  # begins a global heap: of texts whose length varies
 WIDEST = 512  # a matrix wider than this both ways is an image, not a table of channels
 COMPRESSION = 2000  # no filter of HDF5 shrinks numbers further; a larger claim was never written
 LARGEST_CHUNK = 8 * FREE  # bytes: a chunk is unpacked whole
@@ -61,6 +64,7 @@ def read(path: Path, options: Options) -> Table:
     constants: dict[str, float] = {}
     notes: list[str] = []
     record: Mapping[str, Any] = {}
+    check_heaps(path)
     with reading(path, NAME), h5py.File(path, "r") as file:
         if KEY in file.attrs:
             record = parse_metadata(file.attrs[KEY])
@@ -78,6 +82,25 @@ def read(path: Path, options: Options) -> Table:
                 columns.append(Column(column, unit, rows, fs))
                 sources[column] = source
     return table(path, columns, sources, constants, notes, record)
+
+
+def check_heaps(path: Path) -> None:
+    """Refuse a file with a heap of texts in which a free piece has no length: HDF5 would look behind it for ever."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        begin = data.find(HEAP)
+        while begin >= 0:
+            end = min(begin + int.from_bytes(data[begin + 8 : begin + 16], "little"), len(data))
+            at = begin + 16
+            while at + 16 <= end:
+                index, _, length = struct.unpack("<HH4xQ", data[at : at + 16])
+                if index == 0 and length == 0:
+                    raise FormatError(
+                        f"'{path.name}' is damaged near byte {at}",
+                        "each piece of a heap of HDF5 has a length",
+                        "copy it again from its source",
+                    )
+                at += length if index == 0 else 16 + length + -length % 8
+            begin = data.find(HEAP, begin + 1)
 
 
 def table(

@@ -163,6 +163,7 @@ def _read_v73(path: Path) -> Table:
     constants: dict[str, float] = {}
     left_out: list[str] = []
     links: list[str] = []
+    hdf5.check_heaps(path)
     with reading(path, NAME), h5py.File(path, "r") as file:
         for place, dataset in hdf5.datasets(file, links):
             if place.startswith("#"):  # MATLAB's own store of what cells and objects refer to

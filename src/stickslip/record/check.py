@@ -91,9 +91,9 @@ def find_faults(record: Record) -> list[Fault]:
     ['constant']
     """
     faults = [*_short(record), *_unstated(record), *_cut(record)]
-    if record.stamps is not None and not is_uniform(record.stamps):
-        faults += _clock_faults(record.stamps)
     with np.errstate(over="ignore", invalid="ignore"):  # a damaged file holds 1e300: its square is no news
+        if record.stamps is not None and not is_uniform(record.stamps):
+            faults += _clock_faults(record.stamps)
         for name in record:
             faults += _channel_faults(name, record.channels[name].unit, record[name])
     return sorted(_folded(record, faults), key=lambda fault: fault.severity != "error")
@@ -147,8 +147,9 @@ def _cut(record: Record) -> list[Fault]:
 def _clock_faults(stamps: Array) -> list[Fault]:
     clock, mended = inspect(stamps), "repair_clock(record)"
     usual = f"{1e3 * clock.step:.4g} ms"
-    with np.errstate(invalid="ignore"):  # between stamps that are no numbers
-        intervals = np.diff(stamps)
+    known = np.flatnonzero(np.isfinite(stamps))
+    intervals, rows = np.full(len(stamps), np.nan), np.ones(len(stamps))  # from each stamp to the next that is a number
+    intervals[known[:-1]], rows[known[:-1]] = np.diff(stamps[known]), np.diff(known)
     faults: list[Fault] = []
     if len(clock.missing):
         what = _several(len(clock.missing), "time stamp is not a number", "time stamps are not numbers")
@@ -170,10 +171,11 @@ def _clock_faults(stamps: Array) -> list[Fault]:
         faults.append(_clock_fault("rate", _pairs(clock.slower), what, filled))
     if len(clock.gaps):
         lengths = intervals[clock.gaps]
-        lost = int(np.sum(np.maximum(1, np.round(lengths / clock.step) - 1)))
+        lost = float(np.sum(np.maximum(1, np.round(lengths / clock.step) - rows[clock.gaps])))
+        many = _several(int(lost), "sample", "samples") if lost < 1e9 else f"{lost:.2g} samples"
         what = (
             f"{_several(len(clock.gaps), 'gap', 'gaps')} of up to {1e3 * np.max(lengths):.4g} ms "
-            f"where samples come every {usual}, about {_several(lost, 'sample', 'samples')} lost"
+            f"where samples come every {usual}, about {many} lost"
         )
         faults.append(_clock_fault("gap", _pairs(clock.gaps), what, "fill_gaps(record)"))
     if len(clock.uneven):
