@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 import stickslip
+from stickslip import compiled
+from stickslip.cli.progress import compiling
 
 PACKAGE = Path(stickslip.__file__).parent
 ASK = (
@@ -83,3 +85,42 @@ def test_an_install_that_may_not_be_written_keeps_them_with_the_user(copy: Path,
 
 def test_a_folder_named_by_the_user_goes_first(copy: Path, tmp_path: Path) -> None:
     assert ask(copy, NUMBA_CACHE_DIR=str(tmp_path / "named"))[2].is_relative_to(tmp_path / "named")
+
+
+SQUARE = "from stickslip.compiled import compiled\n\n@compiled()\ndef square(x):\n    return x * x\n"
+
+
+def test_who_watches_is_told_that_it_compiles_and_for_how_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
+    monkeypatch.setattr(compiled.compilation, "seconds", 0.0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with compiling():
+        assert compiled.generated(f"{SQUARE}# watched\n").square(3.0) == 9.0
+        assert compiled.compilation.seconds > 0
+        monkeypatch.setattr(compiled.compilation, "seconds", 7.0)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [
+        "stickslip: compiling for this machine, once; what is compiled is kept",
+        "stickslip: compiled in 7 s; the next run finds it",
+    ]
+
+
+def test_who_does_not_watch_reads_nothing_of_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(compiled.compilation, "seconds", 7.0)
+    with compiling():
+        pass
+    assert not capsys.readouterr().err
+
+
+def test_the_log_tells_that_it_compiles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
+    monkeypatch.setattr(compiled.compilation, "seconds", 0.0)
+    with caplog.at_level("INFO", logger="stickslip"):
+        compiled.generated(SQUARE).square(3.0)
+    assert caplog.messages == ["compiling for this machine, once; what is compiled is kept"]

@@ -13,6 +13,7 @@ from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
 from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
 from stickslip.cli.lab import lab
+from stickslip.cli.progress import compiling
 from stickslip.cli.rig import rig
 from stickslip.cli.simulate import simulate
 from stickslip.cli.squeak import squeak
@@ -37,7 +38,8 @@ class _Commands(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with compiling():
+                return super().invoke(ctx)
         except KeyboardInterrupt:
             say(SENTENCE, err=True)
             ctx.exit(INTERRUPTED)
