@@ -756,13 +756,16 @@ _known_turns: dict[bytes, tuple[Any, ...]] = {}
 def _one_by_one(core: Array) -> tuple[Any, ...]:
     """As :func:`_turned`, of flows some of which are known: the systems of a fit have most of theirs in common."""
     keys = [flow.tobytes() for flow in core]
-    new = [j for j, key in enumerate(keys) if key not in _known_turns]
+    known = {key: turned for key in keys if (turned := _known_turns.get(key)) is not None}
+    new = {key: flow for key, flow in zip(keys, core, strict=True) if key not in known}
     if new:
+        turned = _turned(np.array(list(new.values())), np.arange(len(new)))
+        made = dict(zip(new, zip(*turned, strict=True), strict=True))
         if len(_known_turns) > MOST_KNOWN:
             _known_turns.clear()
-        made = zip(*_turned(core[new], np.arange(len(new))), strict=True)
-        _known_turns.update(zip([keys[j] for j in new], made, strict=True))
-    return tuple(np.array(part) for part in zip(*(_known_turns[key] for key in keys), strict=True))
+        _known_turns.update(made)
+        known |= made
+    return tuple(np.array(part) for part in zip(*(known[key] for key in keys), strict=True))
 
 
 def _turned(core: Array, modes: Index) -> tuple[Array, Any, Any]:
