@@ -16,7 +16,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
-from stickslip.solve import tables as tables_module
+from stickslip.solve import cells
 from stickslip.solve.tables import systems_of, table_of, tables_of
 from stickslip.sweeps.block import _alone, run_block
 from stickslip.sweeps.measures import LOG, MEASURES
@@ -198,7 +198,7 @@ if __name__ == "__main__":
 
 
 def test_more_single_systems_than_are_kept_have_the_tables_of_each_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tables_module, "MOST_KNOWN", 3)
+    monkeypatch.setattr(cells, "MOST_KNOWN", 3)
     systems = [RIGID.having(mass=m) for m in (1.0, 1.5, 2.0, 2.5, 1.0)]  # which have their stick in common
     together = tables_of(systems_of(systems))
     for row, system in enumerate(systems):
