@@ -20,6 +20,7 @@ from stickslip.maps.block import _alone, run_block
 from stickslip.maps.measures import LOG, MEASURES
 from stickslip.maps.sweep import planned
 from stickslip.maps.threads import threads
+from stickslip.solve import cells
 from stickslip.solve.tables import systems_of, table_of, tables_of
 
 xarray = pytest.importorskip("xarray")
@@ -198,3 +199,11 @@ def test_the_threads_engine_is_the_default_of_this_machine() -> None:
 if __name__ == "__main__":
     for j, case in enumerate(SIMULATED):
         np.savez(Path(sys.argv[1]) / f"{j}.npz", **{k: v.values for k, v in on_gpu(case, "cuda").data_vars.items()})
+
+
+def test_more_single_systems_than_are_kept_have_the_tables_of_each_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cells, "MOST_KNOWN", 3)
+    systems = [RIGID.having(mass=m) for m in (1.0, 1.5, 2.0, 2.5, 1.0)]  # which have their stick in common
+    together = tables_of(systems_of(systems))
+    for row, system in enumerate(systems):
+        assert np.array_equal(together.hop[row], tables_of(systems_of([system])).hop[0])

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.oscillator import Oscillator
+from stickslip.solve.cells import Linear
 from stickslip.solve.glide import Clock, Model, Past, Pieces
 from stickslip.solve.kernel import CHATTER, begin, march, scratch
 from stickslip.solve.phasors import Phasors, phasors_of
 from stickslip.solve.simulate import opening
-from stickslip.solve.tables import Array, Linear, kind_of_drive, kind_of_law, opened, systems_of, tables_of
+from stickslip.solve.tables import Array, kind_of_drive, kind_of_law, opened, systems_of, tables_of
 
 TIRELESS = 2**62  # cells: a batch is not interrupted
 LAP = 64  # pieces remembered of each oscillator, a power of two; a lap of the drive with more has no fast path

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Legendre
@@ -26,29 +26,8 @@ NEWTON = 12  # most iterations
 ROUNDING = 1e-11  # most that rounding may leave of Newton's method
 
 
-class Scheme(NamedTuple):
-    """Points in (0, 1], their matrix, and the fit of values at them by powers of w = 2 u - 1."""
-
-    points: NDArray[np.float64]
-    matrix: NDArray[np.float64]
-    fit: NDArray[np.float64]
-
-
-class Stages(NamedTuple):
-    """Scratch of a leap: stages, their rates, slopes and nodes, the equations and their right side, nodes, a state."""
-
-    states: NDArray[np.float64]
-    values: NDArray[np.float64]
-    slopes: NDArray[np.float64]
-    nodes: NDArray[np.float64]
-    equations: NDArray[np.float64]
-    right: NDArray[np.float64]
-    one: NDArray[np.float64]
-    moved: NDArray[np.float64]
-
-
 @cache
-def method() -> Scheme:
+def method() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Radau's points in (0, 1], their matrix, and the fit of values at them by powers of w = 2 u - 1."""
     inner = (Legendre.basis(STAGES) - Legendre.basis(STAGES - 1)).roots()  # Radau's right points; the last is 1
     points = (np.sort(inner.real) + 1) / 2
@@ -58,13 +37,13 @@ def method() -> Scheme:
     areas = np.column_stack([part.integ(lbnd=-1)(2 * points - 1) / 2 for part in basis])
     matrix = np.ascontiguousarray(np.linalg.solve(values.T, areas.T).T)
     fit = np.linalg.inv(np.vander(2 * np.concatenate([[0.0], points]) - 1, WIDTH, increasing=True))[:, 1:]
-    return Scheme(points, matrix, np.ascontiguousarray(fit))
+    return points, matrix, np.ascontiguousarray(fit)
 
 
-def room(nodes: int, size: int, physical: int) -> Stages:
-    """Scratch for leaps."""
+def room(nodes: int, size: int, physical: int) -> tuple[NDArray[Any], ...]:
+    """Work arrays: stages, their rates, slopes and nodes, the equations and their right side, nodes, a state."""
     unknown = STAGES * physical
-    return Stages(
+    return (
         np.zeros((STAGES, size)), np.zeros((STAGES, physical)), np.zeros((STAGES, physical, physical)),
         np.zeros((STAGES, nodes)), np.zeros((unknown, unknown)), np.zeros(unknown), np.zeros(2 * nodes),
         np.zeros(size),
@@ -100,60 +79,58 @@ def solve(a, b):
 
 
 @compiled(**EXACT)
-def _slopes(rates, curve, mode, i, work):
-    """Rates at stage i, their derivatives by differences, and the values of all nodes."""
-    room, big, face, physical = work.leap, work.big, curve.exits.face, curve.physical
-    stage, value, slope, every = room.states[i], room.values[i], room.slopes[i], room.nodes[i]
-    rates(curve.numbers, mode, stage, 1.0, room.one)
+def _slopes(rates, numbers, mode, stage, physical, face, big, value, slope, every, work, moved):
+    """Rates at a stage, their derivatives by differences, and the values of all nodes."""
+    rates(numbers, mode, stage, 1.0, work)
     for j in range(physical):
-        value[j] = room.one[2 * j + 1]
+        value[j] = work[2 * j + 1]
     for j in range(len(every)):
-        every[j] = room.one[2 * j]
+        every[j] = work[2 * j]
     speed = 0.0
-    for k in range(len(stage)):
-        room.moved[k] = stage[k]
-        speed += face[k] * stage[k]
+    for i in range(len(stage)):
+        moved[i] = stage[i]
+        speed += face[i] * stage[i]
     for d in range(physical):
         # friction may follow the logarithm of the velocity against the counter-face
         step = 1e-7 * abs(stage[1] - speed) + 1e-13 * big[1] if d == 1 else 1e-7 * abs(stage[d]) + 1e-10 * big[d]
         if step == 0.0:
             step = 1e-14
-        room.moved[d] = stage[d] + step
-        step = room.moved[d] - stage[d]
-        rates(curve.numbers, mode, room.moved, 1.0, room.one)
-        room.moved[d] = stage[d]
+        moved[d] = stage[d] + step
+        step = moved[d] - stage[d]
+        rates(numbers, mode, moved, 1.0, work)
+        moved[d] = stage[d]
         for j in range(physical):
-            slope[j, d] = (room.one[2 * j + 1] - value[j]) / step
+            slope[j, d] = (work[2 * j + 1] - value[j]) / step
 
 
 @compiled(**EXACT)
-def settle(rates, curve, mode, state, h, work):
+def settle(rates, numbers, mode, state, h, scheme, physical, face, big, tolerance, work):
     """Newton's method for the stages, which hold the drive's signals and a guess: the last change, or infinity.
 
     Where rounding keeps it above the tolerance (a small velocity between large forces), the change tells by how much.
     """
-    matrix, physical, tolerance = curve.scheme.matrix, curve.physical, curve.tolerance
-    room, a, b = work.leap, work.leap.equations, work.leap.right
+    _, matrix, _ = scheme
+    stages, value, slope, every, a, b, one, moved = work
     change, before = math.inf, math.inf
     for iteration in range(NEWTON):
         for i in range(STAGES):
-            _slopes(rates, curve, mode, i, work)
+            _slopes(rates, numbers, mode, stages[i], physical, face, big, value[i], slope[i], every[i], one, moved)
         for i in range(STAGES):
             for j in range(physical):
                 row, total = i * physical + j, 0.0
                 for m in range(STAGES):
-                    total += matrix[i, m] * room.values[m, j]
+                    total += matrix[i, m] * value[m, j]
                     for d in range(physical):
-                        a[row, m * physical + d] = -h * matrix[i, m] * room.slopes[m, j, d]
+                        a[row, m * physical + d] = -h * matrix[i, m] * slope[m, j, d]
                 a[row, row] += 1.0
-                b[row] = room.states[i, j] - state[j] - h * total
+                b[row] = stages[i, j] - state[j] - h * total
         if not solve(a, b):
             return math.inf
         change = 0.0
         for i in range(STAGES):
             for j in range(physical):
-                room.states[i, j] -= b[i * physical + j]
-                change = max(change, abs(b[i * physical + j]) / max(work.big[j], 1e-300))
+                stages[i, j] -= b[i * physical + j]
+                change = max(change, abs(b[i * physical + j]) / max(big[j], 1e-300))
         if change <= max(1e-2 * tolerance, 1e-15):
             return change
         if not change < math.inf or (iteration > 3 and change > 0.5 * before):
@@ -203,54 +180,56 @@ def at(c, w):
 
 
 @compiled(**EXACT)
-def leap(rates, curve, mode, time, state, h, unit, poly, work):
+def leap(
+    rates, numbers, scheme, tones, face, mode, time, state, h, unit, s, width, physical, big, tolerance, poly, work
+):
     """A step of length h as polynomials of w, and the length of the next in units of h; 0 where it failed.
 
-    The Taylor series at the start, in `work`, is in units of `unit`: the drive's signals are polynomials, or tones.
+    `s` is the Taylor series at the start in units of `unit`: the drive's signals are polynomials, or tones.
     """
-    points, stages, size = curve.scheme.points, work.leap.states, len(state)
+    points, _, fit = scheme
+    stages, size = work[0], len(state)
     for i in range(STAGES):
-        advance(work.s, curve.order + 1, size, curve.order, points[i] * h / unit, stages[i])
-        set_tones(curve.tones, time + points[i] * h, stages[i])
-        for j in range(curve.physical):
+        advance(s, width, size, width - 1, points[i] * h / unit, stages[i])
+        set_tones(tones, time + points[i] * h, stages[i])
+        for j in range(physical):
             stages[i, j] = state[j]
-    change = settle(rates, curve, mode, state, h, work)
+    change = settle(rates, numbers, mode, state, h, scheme, physical, face, big, tolerance, work)
     if change == math.inf:
         return 0.0
     for j in range(size):
-        fitted(stages, j, state[j], curve.scheme.fit, poly[j])
-    return growth(poly, size, work.big, max(curve.tolerance, 10.0 * change))
+        fitted(stages, j, state[j], fit, poly[j])
+    return growth(poly, size, big, max(tolerance, 10.0 * change))
 
 
 @compiled(**EXACT)
-def _fitted_node(curve, node, work):
-    """Powers of w of any kept node, into `work.c`."""
-    values = work.leap.states if node < len(work.big) else work.leap.nodes
-    fitted(values, node, work.s[node * (curve.order + 1)], curve.scheme.fit, work.c)
+def _fitted_node(node, size, s, width, fit, work, c):
+    """Powers of w of any kept node."""
+    fitted(work[0] if node < size else work[3], node, s[node * width], fit, c)
 
 
 @compiled(**EXACT)
-def landing(curve, mode, asleep, work):
+def landing(mode, exits, guards, scheme, s, width, size, big, asleep, work, c, noise):
     """Where a leap ends, as w, and by which exit (-1 where by none): an exit, or a sleeping function that wakes."""
-    exits, guards, c, noise, big = curve.exits, curve.guards, work.c, work.noise, work.big
-    end, leaving = 1.0, -1
-    for g in range(guards.first[mode], guards.first[mode + 1]):
-        kind, start = guards.kind[g], work.s[guards.argument[g] * (curve.order + 1)]
-        if not awake(kind, start, asleep):
-            _fitted_node(curve, guards.argument[g], work)
-            level, sign = waking(kind, start, asleep)
+    node, _, _, _, bound, _, scale = exits
+    kind, argument, mind = guards
+    fit, end, leaving = scheme[2], 1.0, -1
+    for g in range(mind[mode], mind[mode + 1]):
+        start = s[argument[g] * width]
+        if not awake(kind[g], start, asleep):
+            _fitted_node(argument[g], size, s, width, fit, work, c)
+            level, sign = waking(kind[g], start, asleep)
             for k in range(WIDTH):
                 c[k] *= sign
             c[0] += level
             noise[0] = 0.0
             w = first_rise(c, noise, WIDTH, 0, 1.0, -1.0, 1.0)
             end = end if w == NONE else min(end, w)
-    for e in range(exits.first[mode], exits.first[mode + 1]):
-        node = exits.node[e]
-        _fitted_node(curve, node, work)
-        most = big[node] if node < len(big) else 0.0
+    for e in range(bound[mode], bound[mode + 1]):
+        _fitted_node(node[e], size, s, width, fit, work, c)
+        most = big[node[e]] if node[e] < size else 0.0
         for k in range(WIDTH):
-            c[k] *= exits.scale[e]
+            c[k] *= scale[e]
             most = max(most, abs(c[k]))
         noise[0] = NOISE * most
         if at(c, -1.0) >= -noise[0]:  # too near for a leap

@@ -24,15 +24,13 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve import collocation, march
 from stickslip.solve.interrupts import held_back
-from stickslip.solve.march import Leaps, Steps, View
 from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
 from stickslip.solve.series import expansion
 from stickslip.solve.tape import Tape
-from stickslip.solve.taylor import Curve, Exits, Guards, Sums, Work
 from stickslip.solve.trajectory import Trajectory
 
 Array = NDArray[np.float64]
-March = Callable[[Curve, Array, Array, int, tuple[float, float], Steps, Leaps, Work], tuple[int, int, int, int]]
+March = Callable[..., tuple[int, int, int, int]]  # of clock, state, mode, until, and what follows in `march.march`
 Stops = Iterable[tuple[tuple[float, float], tuple[Any, Any]]]
 
 LOW, HIGH = 14, 18  # orders: few, since each is compiled, and near the best for any tolerance
@@ -85,13 +83,6 @@ class CurvedTrajectory(Trajectory):
         return last, int(self.modes[-1]) if leaving < 0 else int(table.exits[1][leaving])
 
     @property
-    def _steps(self) -> Steps:
-        """The steps as the kernels read them, where laps, offsets and exits are not looked at."""
-        none = np.zeros(0)
-        return Steps(none, none, self.step_lengths, self.step_modes, self.step_states, np.zeros(0, np.int16),
-                     self.step_leaps)  # fmt: skip
-
-    @property
     def cells(self) -> tuple[Array, Array]:
         """Start and length [s] of the steps."""
         return self.step_starts, self.step_lengths
@@ -110,9 +101,11 @@ class CurvedTrajectory(Trajectory):
         nodes = np.column_stack([table.places[name] for name in names])
         out, step = np.empty((len(names), len(times))), np.empty(len(times), dtype=np.int64)
         count = int(np.max(np.diff(table.watched[8])))
-        work = np.empty(count * (self.order + 1)), np.empty(self.step_states.shape[1]), np.empty(count)
-        leaps = Leaps(self.leaps, self.reach)
-        march.sample(_viewed(table, self.order), self.step_starts, self._steps, leaps, times, nodes, out, step, work)
+        march.sample(
+            *_viewed(table, self.order), self.order, self.step_starts, self.step_lengths, self.step_modes,
+            self.step_states, self.step_leaps, self.leaps, self.reach, times, nodes, out, step,
+            (np.empty(count * (self.order + 1)), np.empty(self.step_states.shape[1]), np.empty(count)),
+        )  # fmt: skip
         piece = np.searchsorted(self.starts, self.step_starts[step], side="right") - 1
         return out, piece
 
@@ -134,7 +127,7 @@ class Code(NamedTuple):
     series: int
     numbers: Array
     rates: int
-    scheme: collocation.Scheme
+    scheme: tuple[Array, Array, Array]
 
 
 @lru_cache(maxsize=32)
@@ -145,19 +138,21 @@ def code(table: Tape, order: int) -> Code:
 
 
 @lru_cache(maxsize=32)
-def _viewed(table: Tape, order: int) -> View:
+def _viewed(table: Tape, order: int) -> tuple[int, Array, int, Array]:
     """The code that values between the steps need, and that of the outputs."""
-    own = code(table, order)
-    return View(own.series, own.numbers, *expansion(table.watched, table.shown, 0), order)
+    series, numbers, *_ = code(table, order)
+    return series, numbers, *expansion(table.watched, table.shown, 0)
 
 
-def _curve(table: Tape, order: int, rtol: float) -> Curve:
-    """A system as the march reads it."""
+def _march(table: Tape, order: int) -> March:
     own = code(table, order)
-    return Curve(
-        own.series, own.numbers, own.rates, own.scheme, Sums(*table.sums), Exits(*table.exits), Guards(*table.guards),
-        table.tones, table.motion.period, table.physical, order, SHARE * rtol,
-    )  # fmt: skip
+
+    def follow(clock: Array, state: Array, mode: int, at: tuple[float, float], *rest: Any) -> tuple[int, int, int, int]:
+        return march.march(  # type: ignore[no-any-return]
+            *own, table.sums, table.exits, table.guards, table.tones, clock, state, mode, at, table.motion.period, *rest
+        )  # fmt: skip
+
+    return follow
 
 
 def run_curved(
@@ -169,44 +164,45 @@ def run_curved(
     budget: int,
     rtol: float,
     tell: Callable[[float], None],
-    follow: March = march.march,
+    follow: March | None = None,
 ) -> CurvedTrajectory:
     """March from a state at time 0 to the end of the course's time (laps, offset), in chunks."""
     (laps, offset), stops = course
     order = degree(rtol)
-    curve = _curve(table, order, rtol)
+    follow = follow or _march(table, order)
     system, size, period = table.system, len(table.names), table.motion.period
     count = int(np.max(np.diff(table.nodes[8])))
+    work = (np.zeros(count * (order + 1)), np.zeros(order + 1), np.zeros(order + 1))
+    long_work = collocation.room(count, size, table.physical)
     total = offset + (laps * period if math.isfinite(period) else 0.0)
     scale = min(period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total, total)
-    clock = np.array([0.0, 0.0, 1e-6 * scale, 0.0, 0.0, march.PATIENCE])  # as march.LAPS and the others say
+    clock = np.array([0.0, 0.0, 1e-6 * scale, 0.0, 0.0, march.PATIENCE])
     state, big = state.copy(), np.abs(state)
-    leap_room = collocation.room(count, size, table.physical)
-    work = Work(np.zeros(count * (order + 1)), np.zeros(order + 1), np.zeros(order + 1), big, leap_room)
     kept: list[tuple[NDArray[Any], ...]] = []
-    leaps: list[Leaps] = []
+    leaps: list[tuple[Array, Array]] = []
     status = "complete"
     try:
         for at, (signals, values) in stops:
             state[signals] = values
-            clock[march.TAYLOR] = min(clock[march.TAYLOR], scale)  # at rest steps would grow for ever
+            clock[2] = min(clock[2], scale)  # at rest steps would grow for ever
             outcome = march.FULL
             while outcome == march.FULL:
-                room, leapt_to = room_for(CHUNK, size), _room_of_leaps(size)
+                room, (polys, reach) = room_for(CHUNK, size), _room_of_leaps(size)
                 before = clock.copy()
                 with held_back() if kept else nullcontext():  # the first call may compile for long
-                    outcome, written, leapt, mode = follow(curve, clock, state, mode, at, room, leapt_to, work)
+                    outcome, written, leapt, mode = follow(
+                        clock, state, mode, at, table.physical, SHARE * rtol, order, big, room, polys, reach, work,
+                        long_work,
+                    )  # fmt: skip
                 if written:
-                    numbers = room.leaps[:written]
-                    numbers[numbers >= 0] += sum(len(part.reach) for part in leaps)
+                    room[6][:written][room[6][:written] >= 0] += sum(len(part[1]) for part in leaps)
                     kept.append(tuple(column[:written] for column in room))
-                    leaps.append(Leaps(leapt_to.polys[:leapt].copy(), leapt_to.reach[:leapt].copy()))
-                laps_gone, passed = clock[march.LAPS] - before[march.LAPS], clock[march.OFFSET] - before[march.OFFSET]
-                passed += laps_gone * period if laps_gone else 0.0
-                ahead = total - clock[march.OFFSET] - (clock[march.LAPS] * period if clock[march.LAPS] else 0.0)
+                    leaps.append((polys[:leapt].copy(), reach[:leapt].copy()))
+                passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
+                ahead = total - clock[1] - (clock[0] * period if clock[0] else 0.0)
                 _refuse(outcome, table, state, clock, passed, ahead, CHUNK * len(kept))
                 require_budget(
-                    int(np.sum(room.ends[:written] >= 0)), passed=passed, scale=scale, budget=budget,
+                    int(np.sum(room[5][:written] >= 0)), passed=passed, scale=scale, budget=budget,
                     state=named(table.names[: table.physical], state),
                 )  # fmt: skip
                 tell(1.0 - ahead / total)
@@ -218,24 +214,25 @@ def run_curved(
         total = offset + length + (lap * period if math.isfinite(period) else 0.0)
     if status == "complete":
         tell(1.0)
-        status = "at rest" if march.rests(curve, mode, state, work.s) else status
+        own = code(table, order)
+        status = "at rest" if march.rests(own.series, own.numbers, mode, state, order, work[0]) else status
     return _assembled(table, kept, leaps, total, status, order)
 
 
-def room_for(count: int, size: int) -> Steps:
-    """Room for steps."""
-    return Steps(np.empty(count), np.empty(count), np.empty(count), np.empty(count, np.int64), np.empty((count, size)),
+def room_for(count: int, size: int) -> tuple[NDArray[Any], ...]:
+    """Columns of steps: laps, offset, length, mode, state, exit, number among the leaps."""
+    return (np.empty(count), np.empty(count), np.empty(count), np.empty(count, np.int64), np.empty((count, size)),
             np.empty(count, np.int16), np.empty(count, np.int64))  # fmt: skip
 
 
-def _room_of_leaps(size: int) -> Leaps:
-    return Leaps(np.empty((LEAPS, size, collocation.WIDTH)), np.empty(LEAPS))
+def _room_of_leaps(size: int) -> tuple[Array, Array]:
+    return np.empty((LEAPS, size, collocation.WIDTH)), np.empty(LEAPS)
 
 
 def _assembled(
     table: Tape,
     kept: list[tuple[NDArray[Any], ...]],
-    leaps: list[Leaps],
+    leaps: list[tuple[Array, Array]],
     total: float,
     status: str,
     order: int,
@@ -261,14 +258,14 @@ def _assembled(
         step_modes=modes,
         step_states=states,
         step_leaps=which,
-        leaps=np.concatenate([part.polys for part in leaps]),
-        reach=np.concatenate([part.reach for part in leaps]),
+        leaps=np.concatenate([part[0] for part in leaps]),
+        reach=np.concatenate([part[1] for part in leaps]),
         order=order,
     )
 
 
 def _refuse(outcome: int, table: Tape, state: Array, clock: Array, passed: float, ahead: float, done: int) -> None:
-    place = f"lap {clock[march.LAPS]:g}, {clock[march.OFFSET]:g} s, at {named(table.names[: table.physical], state)}"
+    place = f"lap {clock[0]:g}, {clock[1]:g} s, at {named(table.names[: table.physical], state)}"
     if outcome == march.CHATTER:
         raise chatter(place)
     if outcome == march.UNPROVED:

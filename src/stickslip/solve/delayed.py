@@ -15,7 +15,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,8 @@ from stickslip.laws.curved import CurvedMode, lifted, symbol
 from stickslip.laws.time_delay import DELAYED, TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve import march, taylor
-from stickslip.solve.curved import CHUNK, STEPS, Array, CurvedTrajectory, Stops, room_for, run_curved
-from stickslip.solve.march import Leaps, Steps
+from stickslip.solve.curved import CHUNK, STEPS, Array, CurvedTrajectory, Stops, code, degree, room_for, run_curved
 from stickslip.solve.tape import Tape, tape
-from stickslip.solve.taylor import Curve, Work
 
 PAST = 2  # where the chain of the past stands in the state: behind x and v
 REACH = 4.0  # longest look ahead of a step of the past, in lags
@@ -82,15 +80,15 @@ def run_delayed(
             f"a step is no longer than the lag, and a run takes at most {STEPS:g} steps",
             "take a longer lag=, a shorter time, or the law without its lag",
         )
-    past = _Past(table, law)
+    past = _Past(table, law, degree(rtol))
     return run_curved(table, state, past.opening(state, mode), course=course, rtol=rtol, follow=past, **rest)
 
 
 class _Past:
     """The march of a system with a time lag; remembers the steps of the last lag. Lives for one run."""
 
-    def __init__(self, table: Tape, law: TimeDelay) -> None:
-        self.lag = law.lag
+    def __init__(self, table: Tape, law: TimeDelay, order: int) -> None:
+        self.lag, self.table, self.code = law.lag, table, code(table, order)
         self.slip = table.outputs["slip"]
         self.sides = np.array([mode.side for mode in table.modes], dtype=np.float64)
         self.lows = [low for low, _ in law.law.branches()]
@@ -105,36 +103,36 @@ class _Past:
         return mode % 3 + 3 * (int(np.searchsorted(self.lows, state[PAST], side="right")) - 1)
 
     def __call__(
-        self, curve: Curve, clock: Array, state: Array, mode: int, until: tuple[float, float], room: Steps,
-        leaps: Leaps, work: Work,
+        self, clock: Array, state: Array, mode: int, at: tuple[float, float], physical: int, tolerance: float,
+        order: int, big: Array, room: tuple[NDArray[Any], ...], *work: Any,
     ) -> tuple[int, int, int, int]:  # fmt: skip
         """As :func:`march.march`; without leaps, whose polynomials are no Taylor steps."""
-        clock[march.CALL] = math.inf
-        work.big[PAST + 1 : PAST + curve.order + 1] = np.inf  # a polynomial's own chain is exact at any step
-        self._forget(len(room.laps))
+        table = self.table
+        clock[5] = math.inf
+        big[PAST + 1 : PAST + order + 1] = np.inf  # a polynomial's own chain is exact at any step
+        self._forget(len(room[0]))
         before = self.known
-        columns, aim = self.columns.part(0, before + len(room.laps)), np.array(until)
-        lag = Lag(self.lag, self.slip, self.sides, self.edge, self.cursor)
-        outcome, self.known, mode = _march(curve, clock, state, mode, aim, columns, leaps, work, lag, before)
+        outcome, self.known, mode = _march(
+            *self.code, table.sums, table.exits, table.guards, table.tones, clock, state, mode, np.array(at),
+            table.motion.period, physical, tolerance, order, big,
+            tuple(column[: before + len(room[0])] for column in self.columns), *work,
+            self.lag, self.slip, self.sides, self.edge, self.cursor, before,
+        )  # fmt: skip
         written = self.known - before
-        _copy(self.columns.part(before, self.known), room)
+        for column, own in zip(room, self.columns, strict=True):
+            column[:written] = own[before : self.known]
         return outcome, written, 0, mode
 
     def _forget(self, count: int) -> None:
         """Make room for steps: drop those before the lag, grow where the lag is longer than the room."""
-        if self.known + count <= len(self.columns.laps):
+        if self.known + count <= len(self.columns[0]):
             return
         first, kept = int(self.cursor[0]), self.known - int(self.cursor[0])
-        grown = room_for(2 * (kept + count), self.columns.states.shape[1])
-        _copy(self.columns.part(first, self.known), grown)
+        grown = room_for(2 * (kept + count), self.columns[4].shape[1])
+        for new, old in zip(grown, self.columns, strict=True):
+            new[:kept] = old[first : self.known]
         self.columns, self.known = grown, kept
         self.cursor[0] = 0
-
-
-def _copy(steps: Steps, room: Steps) -> None:
-    """Write steps at the beginning of a room."""
-    for name in Steps._fields:
-        getattr(room, name)[: len(steps.laps)] = getattr(steps, name)
 
 
 @compiled(**taylor.EXACT)
@@ -161,96 +159,86 @@ def _coefficient(row, s, width, k):
     return total
 
 
-class Lag(NamedTuple):
-    """A time lag [s]: the slip as a linear form of the state, side of each mode, where the step of the past ends (laps,
-    offset), and the step of the past that comes next with whether it is due."""
-
-    lag: float
-    slip: Array
-    sides: Array
-    edge: Array
-    cursor: NDArray[np.int64]
-
-
 @compiled(**taylor.EXACT)
-def _holds(curve, steps, j, big, lag, s):
-    """Fill `s` with the step's polynomial in units of a length that is returned, and how long it holds [s]."""
-    series = taylor.coded(curve.series)
-    h, u = steps.lengths[j], 1.0
-    for _ in range(40):
-        series(curve.numbers, steps.modes[j], steps.states[j], h, s)
-        u = taylor.length(s, curve.order + 1, curve.order, steps.states.shape[1], curve.tolerance, big)
-        if not (u >= taylor.GROWTH and h < REACH * lag):
-            break
-        h *= taylor.GROWTH
-    return h, u * h if u > 0.0 else 0.0
-
-
-@compiled(**taylor.EXACT)
-def _recall(curve, steps, count, clock, state, work, lag):
+def _recall(
+    series, numbers, steps, count, clock, state, period, tolerance, order, big, s, lag, slip, sides, edge, cursor
+):
     """Set the chain of the past to the step at the cursor, and its edge to where that step's polynomial ends to hold.
 
     The polynomial of a step that was cut short may hold over the steps that follow it.
     """
-    s, order, period, edge = work.s, curve.order, curve.period, lag.edge
-    width, j = order + 1, lag.cursor[0]
-    side = lag.sides[steps.modes[j]]
-    h, holds = _holds(curve, steps, j, work.big, lag.lag, s)
-    scale = curve.tolerance * work.big[PAST]
+    series = taylor.coded(series)
+    laps, offsets, lengths, modes, states, _, _ = steps
+    width, size = order + 1, len(state)
+    j = cursor[0]
+    mode, h, u = modes[j], lengths[j], 1.0
+    side = sides[mode]
+    for _ in range(40):
+        series(numbers, mode, states[j], h, s)
+        u = taylor.length(s, width, order, size, tolerance, big)
+        if not (u >= taylor.GROWTH and h < REACH * lag):
+            break
+        h *= taylor.GROWTH
+    holds = u * h if u > 0.0 else 0.0
+    scale = tolerance * big[PAST]
     e = j + 1
-    while e < count and lag.sides[steps.modes[e]] == side:
-        last = e + 1 == count
-        end = (clock[march.LAPS], clock[march.OFFSET]) if last else (steps.laps[e + 1], steps.offsets[e + 1])
-        over = _apart(end, (steps.laps[j], steps.offsets[j]), period)
+    while e < count and sides[modes[e]] == side:
+        end = (laps[e + 1], offsets[e + 1]) if e + 1 < count else (clock[0], clock[1])
+        over = _apart(end, (laps[j], offsets[j]), period)
         if over > holds:
             break
         total = 0.0
         for k in range(order, -1, -1):
-            total = total * (over / h) + _coefficient(lag.slip, s, width, k)
-        if not abs(total - _along(lag.slip, state if last else steps.states[e + 1])) <= scale:
+            total = total * (over / h) + _coefficient(slip, s, width, k)
+        if not abs(total - _along(slip, states[e + 1] if e + 1 < count else state)) <= scale:
             break
         e += 1
     if e < count:
-        edge[0], edge[1] = steps.laps[e], steps.offsets[e] + lag.lag
+        edge[0], edge[1] = laps[e], offsets[e] + lag
     else:
-        edge[0], edge[1] = clock[march.LAPS], clock[march.OFFSET] + lag.lag
+        edge[0], edge[1] = clock[0], clock[1] + lag
     while edge[1] >= period:
         edge[0] += 1.0
         edge[1] -= period
-    lag.cursor[0] = e
+    cursor[0] = e
     power = 1.0
     for k in range(order + 1):
-        state[PAST + k] = side * _coefficient(lag.slip, s, width, k) * power
-        power *= lag.lag / h
-    work.big[PAST] = max(work.big[PAST], abs(state[PAST]))
+        state[PAST + k] = side * _coefficient(slip, s, width, k) * power
+        power *= lag / h
+    big[PAST] = max(big[PAST], abs(state[PAST]))
 
 
 @compiled(**taylor.EXACT)
-def _march(curve, clock, state, mode, until, steps, leaps, work, lag, count):
+def _march(
+    series, numbers, rates, scheme, sums, exits, guards, tones, clock, state, mode, until, period, physical, tolerance,
+    order, big, steps, polys, reach, work, long_work, lag, slip, sides, edge, cursor, count,
+):  # fmt: skip
     """As `march.march`, from edge to edge of the past; `count` steps are known, and new ones are put behind them."""
-    exits, edge, ends, modes = curve.exits, lag.edge, steps.ends, steps.modes
+    laps, offsets, lengths, modes, states, ends, leaps = steps
+    _, target, _, _, bound, _, _ = exits
     while True:
-        if lag.cursor[1]:
-            _recall(curve, steps, count, clock, state, work, lag)
-            lag.cursor[1] = 0
-        first = _apart((edge[0], edge[1]), (until[0], until[1]), curve.period) <= 0.0
+        if cursor[1]:
+            _recall(series, numbers, steps, count, clock, state, period, tolerance, order, big, work[0], lag, slip,
+                    sides, edge, cursor)  # fmt: skip
+            cursor[1] = 0
+        first = _apart((edge[0], edge[1]), (until[0], until[1]), period) <= 0.0
         aim = (edge[0], edge[1]) if first else (until[0], until[1])
-        clock[march.TAYLOR] = min(clock[march.TAYLOR], lag.lag)  # at rest steps would grow for ever
-        free = march.Steps(
-            steps.laps[count:], steps.offsets[count:], steps.lengths[count:], modes[count:], steps.states[count:],
-            ends[count:], steps.leaps[count:],
+        clock[2] = min(clock[2], lag)  # at rest steps would grow for ever
+        free = (laps[count:], offsets[count:], lengths[count:], modes[count:], states[count:], ends[count:],
+                leaps[count:])  # fmt: skip
+        outcome, written, _, mode = march.march(
+            series, numbers, rates, scheme, sums, exits, guards, tones, clock, state, mode, aim, period, physical,
+            tolerance, order, big, free, polys, reach, work, long_work,
         )  # fmt: skip
-        outcome, written, _, mode = march.march(curve, clock, state, mode, aim, free, leaps, work)
         if count > 0 and written > 0 and modes[count] != modes[count - 1] and ends[count - 1] < 0:
-            before = modes[count - 1]
-            for e in range(exits.first[before], exits.first[before + 1]):  # an exit due at the edge itself
-                if exits.target[e] == modes[count] or ends[count - 1] < 0:
+            for e in range(bound[modes[count - 1]], bound[modes[count - 1] + 1]):  # an exit due at the edge itself
+                if target[e] == modes[count] or ends[count - 1] < 0:
                     ends[count - 1] = e
         count += written
         if outcome != march.DONE:
             return outcome, count, mode
         if first:
-            clock[march.LAPS], clock[march.OFFSET] = edge[0], edge[1]
-            lag.cursor[1] = 1
-        if not first or _apart((edge[0], edge[1]), (until[0], until[1]), curve.period) >= 0.0:
+            clock[0], clock[1] = edge[0], edge[1]
+            cursor[1] = 1
+        if not first or _apart((edge[0], edge[1]), (until[0], until[1]), period) >= 0.0:
             return outcome, count, mode

@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import FAST, OPTIONS, compiled
+from stickslip.solve.cells import Linear
 from stickslip.solve.phasors import CARRIES, STOPS, Phasors, drive_of, slide_of, way_out
 from stickslip.solve.roots import NOISE
-from stickslip.solve.tables import Array, Linear
+from stickslip.solve.tables import Array
 
 HISTORY = 4096  # pieces remembered, a power of two; the guess is one lap old
 SPLITS = 64  # intervals of a certificate at most; a piece that needs more is nearly tangent to an exit

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip.compiled import OPTIONS, compiled
+from stickslip.solve.cells import DEGREE, SPLITTER
 from stickslip.solve.glide import Clock, glide, later, new_lap, remember, until
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise, opening_order
-from stickslip.solve.tables import DEGREE, SPLITTER, Array
+from stickslip.solve.tables import Array
 
 DONE, FULL, CHATTER, LOST, UNPROVED = 0, 1, 2, 3, 4
 CHAIN = 64  # transitions without time in between before a run is given up
@@ -91,7 +92,7 @@ def multiply(matrix, state, out):
 def leap(hop, state, tail, work):
     """state + tail = exp(A cell) (state + tail), in twice the digits: a long piece has thousands of cells.
 
-    `hop` is (3, N, N), see :func:`stickslip.solve.tables.halved`; `tail` is what rounding took from the state.
+    `hop` is (3, N, N), see :func:`stickslip.solve.cells.halved`; `tail` is what rounding took from the state.
     """
     n = state.shape[0]
     for i in range(n):

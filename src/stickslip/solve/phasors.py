@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import FAST, compiled
-from stickslip.solve.tables import Array, Tables, distinct
+from stickslip.solve.cells import distinct
+from stickslip.solve.tables import Array, Tables
 
 KEEPS, STOPS, CARRIES = 0.0, 1.0, 2.0  # what an exit does to velocity and memory
 HALF_STEP = 0.09  # rad between a node and the edge of its polynomial; degree 9 leaves 1e-17

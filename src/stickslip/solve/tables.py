@@ -22,12 +22,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.compiled import OPTIONS, compiled
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law, Mode
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
+from stickslip.solve.cells import DEGREE, Linear, cells_of, derivatives, derive
 from stickslip.solve.joint import JointMode, numbered, reached
 from stickslip.structure import Structure
 
@@ -36,50 +36,7 @@ Index = NDArray[np.int64]
 Rows = NDArray[np.floating[Any]]
 System = Oscillator | Structure
 
-DEGREE = 20  # of the Taylor polynomial in a cell; with rate * cell <= 1 the remainder is 1/21! = 2e-20 of its scale
-SPLITTER = 134217729.0  # 2^27 + 1: halves a number into 26 bits and the rest
-CANCELLED = 8 * 2.220446049250313e-16  # of the terms: what rounding leaves of a difference of equals
 WHOLE = 1e3 * float(np.finfo(np.longdouble).eps)  # a part this close to a whole number is one
-PART = 4  # a cell turns one radian; its exponential is summed over a fourth of it, and squared twice
-TERMS = 40  # of that sum at most: it ends where a term changes nothing
-SETTLED = 16  # terms of an exponential after which one that changes nothing is followed by none that does
-ROOM = 2**17  # numbers of the flows whose exponentials are summed together
-MOST_KNOWN = 512  # flows of single systems whose exponentials are kept
-NEAR = 256  # different rows among which an equal one is looked for
-
-
-class Linear(NamedTuple):
-    """What the kernels read of a system; with a leading axis of many, but for what all share.
-
-    Attributes
-    ----------
-    flow : ndarray (M, N, N)
-        A of each mode.
-    cell : ndarray (M,)
-        Length [s] of a Taylor cell: the reciprocal of the mode's fastest rate; infinite where nothing turns.
-    hop : ndarray (M, 3, N, N)
-        exp(A cell), in the three parts of :func:`halved`.
-    series : ndarray (E, DEGREE + 1, N)
-        q A^k of each exit: its derivatives as linear forms of the state.
-    target, crossing : ndarray (E,)
-        Mode that follows; whether only a crossing counts. Shared.
-    reset : ndarray (E, N, N)
-        R of each exit, with the stuck velocity set where the next mode holds the mass.
-    first : ndarray (M + 1,)
-        Exits of mode j are ``first[j]`` to ``first[j + 1]``. Shared.
-    tones : ndarray (J, 4)
-        Index of cosine, index of sine, angular frequency, phase.
-    """
-
-    flow: Array
-    cell: Array
-    hop: Array
-    series: Array
-    target: Index
-    crossing: NDArray[np.bool_]
-    reset: Array
-    first: Index
-    tones: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +52,7 @@ class Tables:
     modes : tuple of Mode
         The law's table, or the joint modes of several contacts, for names, kinds and sides.
     flow, cell, hop, series, target, crossing, reset, first, tones : ndarray
-        As in :class:`Linear`.
+        As in :class:`stickslip.solve.cells.Linear`.
     friction : ndarray (B, M, m, N)
         Friction force of each contact as a linear form of the state.
     outputs : mapping of str to ndarray (B, N) or (B, m, N)
@@ -579,13 +536,13 @@ class _Builder:
             if joint.exits:
                 quantities = np.concatenate([rows[c][0] for c in dict.fromkeys(c for c, _ in joint.exits)], axis=1)
                 if self.systems.joint:
-                    series[:, part] = _derivatives(quantities, flow)
+                    series[:, part] = derivatives(quantities, flow)
                 else:
                     series[:, part, 0] = quantities
             self._resets(j, [own for _, own in rows], reset[:, part])
         if not self.systems.joint:
-            _derive(flows, first, series, np.empty((2, size**2), np.int64), np.empty(size**2))
-        cell, hop = _cells(flows, self.physical)
+            derive(flows, first, series, np.empty((2, size**2), np.int64), np.empty(size**2))
+        cell, hop = cells_of(flows, self.physical)
         return Tables(
             names=self.names, modes=self._modes(), flow=flows, cell=cell, hop=hop, series=series,
             target=np.array([target for joint in joints for target in joint.targets], dtype=np.int64),
@@ -675,45 +632,6 @@ def _solved(matrix: Rows, right: Any) -> Rows:
     return np.asarray(work[..., size:])
 
 
-def _derivatives(quantity: Rows, flow: Rows) -> Rows:
-    """q A^k of exits (B, E, N); where terms cancel but for their rounding, nothing is left."""
-    rows = [quantity]
-    sizes = np.abs(flow)
-    for _ in range(DEGREE):
-        if not np.any(rows[-1]):
-            break
-        row, size = rows[-1] @ flow, np.abs(rows[-1]) @ sizes
-        rows.append(np.where(np.abs(row) > CANCELLED * size, row, 0.0))
-    rows += [np.zeros_like(quantity)] * (DEGREE + 1 - len(rows))
-    return np.stack(rows, axis=2)
-
-
-@compiled(**OPTIONS, nogil=True)
-def _derive(flows, first, series, places, work):
-    """As :func:`_derivatives`, of every exit of many systems in doubles; `series` holds the quantities."""
-    count, modes, n, _ = flows.shape
-    for b in range(count):
-        for m in range(modes):
-            filled = 0  # entries of the flow, column by column
-            for j in range(n):
-                for i in range(n):
-                    if flows[b, m, i, j] != 0.0:
-                        places[0, filled], work[filled] = i, flows[b, m, i, j]
-                        filled += 1
-                places[1, j] = filled
-            for e in range(first[m], first[m + 1]):
-                for k in range(series.shape[2] - 1):
-                    f = 0
-                    for j in range(n):
-                        total, size = 0.0, 0.0
-                        while f < places[1, j]:
-                            term = series[b, e, k, places[0, f]] * work[f]
-                            total += term
-                            size += abs(term)
-                            f += 1
-                        series[b, e, k + 1, j] = total if abs(total) > CANCELLED * size else 0.0
-
-
 def _leaps(first: Index, targets: Index, resets: Array) -> Array:
     """The products of resets (B, E, N, N) along the shortest way from each mode to each other one (B, M, M, N, N)."""
     count, size = len(first) - 1, resets.shape[-1]
@@ -729,133 +647,6 @@ def _leaps(first: Index, targets: Index, resets: Array) -> Array:
                     queue.append(targets[e])
                     leaps[:, begin, targets[e]] = resets[:, e] @ leaps[:, begin, mode]
     return leaps
-
-
-def _cells(flow: Array, constant: int) -> tuple[Array, Array]:
-    """Length of a Taylor cell [s] of each flow (B, M, N, N), and exp(A cell) as `hop` has it.
-
-    The column of the constant stands for a force that does not change: the exponential is linear in it, and that of
-    the rest is the same for all flows that differ in that force alone.
-    """
-    count, modes, size, _ = flow.shape
-    whole = flow.reshape(-1, size, size)
-    core = whole.copy()
-    core[:, :, constant] = 0.0
-    where, which = np.empty((2, len(core)), np.int64)
-    where = where[: distinct(core.reshape(len(core), -1), where, which)]
-    cell, turned, integral = _one_by_one(core[where]) if count == 1 else _turned(core[where], where % modes)
-    hop = np.ascontiguousarray(np.moveaxis(halved(turned), 0, 1))[which]
-    pushed = np.einsum("bij,bj->bi", integral[which], whole[:, :, constant].astype(np.longdouble))
-    hop[:, :, :, constant] = np.moveaxis(halved(turned[:, :, constant][which] + pushed), 0, 1)
-    return cell[which].reshape(count, modes), hop.reshape(count, modes, 3, size, size)
-
-
-_known_turns: dict[bytes, tuple[Any, ...]] = {}
-
-
-def _one_by_one(core: Array) -> tuple[Any, ...]:
-    """As :func:`_turned`, of flows some of which are known: the systems of a fit have most of theirs in common."""
-    keys = [flow.tobytes() for flow in core]
-    new = [j for j, key in enumerate(keys) if key not in _known_turns]
-    if new:
-        if len(_known_turns) > MOST_KNOWN:
-            _known_turns.clear()
-        made = zip(*_turned(core[new], np.arange(len(new))), strict=True)
-        _known_turns.update(zip([keys[j] for j in new], made, strict=True))
-    return tuple(np.array(part) for part in zip(*(_known_turns[key] for key in keys), strict=True))
-
-
-def _turned(core: Array, modes: Index) -> tuple[Array, Any, Any]:
-    """Cells of flows without their constant column, the flows' exponentials over them and the integrals of those.
-
-    Flows of one mode have their strongly connected parts in common.
-    """
-    size = core.shape[1]
-    rate = np.zeros(len(core))
-    for mode in range(np.max(modes) + 1):
-        own = modes == mode
-        if np.any(own):
-            rate[own] = _fastest(core[own])
-    cell = np.divide(1.0, rate, out=np.full(len(core), np.inf), where=rate > 0)
-    time = np.where(rate > 0, cell, 0.0)
-    step = max(1, ROOM // size**2)
-    parts = [_exponentials(core[j : j + step], time[j : j + step]) for j in range(0, len(core), step)]
-    turned, integral = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return cell, turned, integral
-
-
-def _fastest(flow: Array) -> Array:
-    """The fastest rate of each flow [1/s]: the largest modulus of its eigenvalues.
-
-    They are found part by part of what is strongly connected in any of the flows: the eigenvalues of nilpotent parts
-    come out of a general solver as small noise instead of zero.
-    """
-    rates = np.zeros(len(flow))
-    for part in _parts(np.any(flow != 0, axis=0).tobytes(), flow.shape[1]):
-        own = flow[:, part][:, :, part]
-        values = own[:, :, 0] if len(part) == 1 else np.linalg.eigvals(own)
-        rates = np.maximum(rates, np.max(np.abs(values), axis=1))
-    return rates
-
-
-@lru_cache(maxsize=256)
-def _parts(pattern: bytes, size: int) -> list[tuple[int, ...]]:
-    """Strongly connected parts of a flow, by where it is not zero."""
-    reach = np.frombuffer(pattern, dtype=bool).reshape(size, size) | np.eye(size, dtype=bool)
-    for _ in range(max(1, size.bit_length())):
-        reach = reach @ reach
-    return sorted({tuple(np.flatnonzero(reach[j] & reach[:, j]).tolist()) for j in range(size)})
-
-
-def _exponentials(flow: Array, time: Array) -> tuple[Any, Any]:
-    """exp(A t) of each flow in extended precision, and its integral over the time, in which it turns one radian.
-
-    Each entry is summed on its own, so entries of very different units keep their digits.
-    """
-    part = time.astype(np.longdouble)[:, None, None] / PART
-    step = flow.astype(np.longdouble) * part
-    unit = np.broadcast_to(np.eye(flow.shape[1], dtype=np.longdouble), flow.shape)
-    term, turned, integral = unit, unit.copy(), unit.copy()
-    for k in range(1, TERMS):
-        term = term @ step / k
-        before = turned
-        turned = turned + term
-        integral += term / (k + 1)
-        if k >= SETTLED and np.array_equal(turned, before):
-            break
-    integral *= part
-    for _ in range(int(math.log2(PART))):
-        integral = integral + turned @ integral
-        turned = turned @ turned
-    return turned, integral
-
-
-@compiled(**OPTIONS)
-def distinct(rows, where, which):
-    """Where each different row stands first, and which of them each row is; how many there are. Rows that are far apart
-    may count as different though they are equal."""
-    count, width = 0, rows.shape[1]
-    for r in range(rows.shape[0]):
-        which[r] = -1
-        for u in range(count - 1, max(-1, count - 1 - NEAR), -1):
-            j = 0
-            while j < width and rows[where[u], j] == rows[r, j]:
-                j += 1
-            if j == width:
-                which[r] = u
-                break
-        if which[r] < 0:
-            where[count], which[r] = r, count
-            count += 1
-    return count
-
-
-def halved(matrix: Any) -> Array:
-    """A matrix as a sum of three: its first 26 bits, the rest of a double, and what a double has no room for."""
-    whole = np.asarray(matrix, dtype=np.float64)
-    spread = SPLITTER * whole
-    upper = spread - (spread - whole)
-    return np.array([upper, whole - upper, np.asarray(matrix - whole, dtype=np.float64)])
 
 
 def opened(tables: Tables, start: Mapping[str, Array]) -> tuple[Array, Index]:

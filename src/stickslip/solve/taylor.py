@@ -10,13 +10,11 @@ two crossings within one step are two.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 from stickslip.compiled import compiled
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise
@@ -27,90 +25,6 @@ EXACT = {"error_model": "numpy"}
 LINEAR, PRODUCT, SQUARE, QUOTIENT, POWER, EXP, TANH, SLOPE, LOG, ASINH = range(10)
 GROWTH = 6.0  # longest step in units of the one before
 STILL = 1e-10  # a power's base below this is zero: there the power is not analytic
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-
-
-class Sums(NamedTuple):
-    """What rounds each rate and each exit: first weight, sizes of the weights, their nodes, and of the constant."""
-
-    low: Index
-    weights: Array
-    nodes: Index
-    constant: Array
-
-
-class Exits(NamedTuple):
-    """Node, target, whether only a crossing counts, whether the mass is held then, first exit of each mode, the
-    counter-face's velocity, and the node's factor."""
-
-    node: Index
-    target: Index
-    crossing: NDArray[np.bool_]
-    held: NDArray[np.bool_]
-    first: Index
-    face: Array
-    scale: Array
-
-
-class Guards(NamedTuple):
-    """Functions that fall asleep, the nodes of their arguments, and the first of each mode."""
-
-    kind: Index
-    argument: Index
-    first: Index
-
-
-class Curve(NamedTuple):
-    """A system under a curved law, and how it is followed.
-
-    Attributes
-    ----------
-    series, rates : int
-        Code of the Taylor coefficients and of the rates alone, by address.
-    numbers : ndarray
-        The code's constants.
-    scheme : Scheme
-        The leaps' method.
-    sums, exits, guards
-        What the march looks at.
-    tones : ndarray (J, 4)
-        What turns.
-    period : float
-        Of the drive [s].
-    physical : int
-        Entries of the state that belong to the oscillator and its law.
-    order : int
-        Degree of the Taylor polynomials.
-    tolerance : float
-        Of a step, relative to the largest value of each entry.
-    """
-
-    series: int
-    numbers: Array
-    rates: int
-    scheme: Any
-    sums: Sums
-    exits: Exits
-    guards: Guards
-    tones: Array
-    period: float
-    physical: int
-    order: int
-    tolerance: float
-
-
-class Work(NamedTuple):
-    """Scratch: the series, the coefficients of an exit and their noise, the largest value of each entry of the state,
-    and what a leap needs."""
-
-    s: Array
-    c: Array
-    noise: Array
-    big: Array
-    leap: Any
-
 
 ROW = types.float64[::1]
 CODE = types.void(ROW, types.int64, ROW, types.float64, ROW)  # what fills in coefficients, see `series.expansion`
@@ -150,25 +64,25 @@ def value(kind, at, power):
 @compiled(**EXACT)
 def _rate_noise(sums, row, k, h, width, s):
     """Noise of coefficient k > 0 of a state entry: what rounds the sum that is its rate."""
-    total = sums.constant[row] if k == 1 else 0.0
-    for t in range(sums.low[row], sums.low[row + 1]):
-        total += sums.weights[t] * abs(s[sums.nodes[t] * width + k - 1])
+    low, weight, index, constant = sums
+    total = constant[row] if k == 1 else 0.0
+    for t in range(low[row], low[row + 1]):
+        total += weight[t] * abs(s[index[t] * width + k - 1])
     return NOISE * total * h / k
 
 
 @compiled(**EXACT)
-def _exit_noise(curve, mode, e, k, h, work):
-    """Noise of coefficient k of an exit."""
-    sums, s, big, size, width = curve.sums, work.s, work.big, len(work.big), curve.order + 1
-    row, rates = len(sums.constant) - len(curve.exits.node) + e, mode * size  # the sums of the rates stand first
-    total = NOISE * 1e-2 * sums.constant[row] if k == 0 else 0.0
-    for t in range(sums.low[row], sums.low[row + 1]):
-        i = sums.nodes[t]
+def _exit_noise(sums, row, rates, k, size, h, width, big, s):
+    """Noise of coefficient k of an exit; the rates' sums of its mode begin at row `rates`."""
+    low, weight, index, constant = sums
+    total = NOISE * 1e-2 * constant[row] if k == 0 else 0.0
+    for t in range(low[row], low[row + 1]):
+        i = index[t]
         if i >= size:
             noise = NOISE * abs(s[i * width + k])
         else:
             noise = NOISE * 1e-2 * big[i] if k == 0 else _rate_noise(sums, rates + i, k, h, width, s)
-        total += sums.weights[t] * noise
+        total += weight[t] * noise
     return total
 
 
@@ -268,21 +182,20 @@ def resolved(s, start, top, floor, u):
 
 
 @compiled(**EXACT)
-def rise(curve, mode, e, h, u, work):
+def rise(sums, row, rates, crossing, node, scale, size, h, u, order, width, big, s, c, noise):
     """When an exit ends the mode, in units of h, up to u; infinite where it does not, -1 where nothing is proved."""
-    s, c, noise, scale = work.s, work.c, work.noise, curve.exits.scale[e]
-    j, low = curve.exits.node[e] * (curve.order + 1), 0
-    top = curve.order if curve.exits.node[e] < len(work.big) else curve.order - 1
-    floor = _exit_noise(curve, mode, e, 0, h, work)
+    j, low = node * width, 0
+    top = order if node < size else order - 1
+    floor = _exit_noise(sums, row, rates, 0, size, h, width, big, s)
     if scale * s[j] < -floor and surely_below(s, j, top, scale, 0.0, u):
         return math.inf
     while abs(scale * s[j + low]) <= floor:
         low += 1
         if low > top:
             return math.inf
-        floor = _exit_noise(curve, mode, e, low, h, work)
+        floor = _exit_noise(sums, row, rates, low, size, h, width, big, s)
     if scale * s[j + low] > 0.0:
-        return math.inf if curve.exits.crossing[e] else 0.0
+        return math.inf if crossing else 0.0
     power = 1.0
     for k in range(top + 1):
         c[k] = scale * s[j + k] * power

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import SolveError
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
+from stickslip.solve.cells import DEGREE
 from stickslip.solve.kernel import follow, sample
-from stickslip.solve.tables import DEGREE, Array, System, Tables
+from stickslip.solve.tables import Array, System, Tables
 
 UNITS = {
     "x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N",
