@@ -12,6 +12,7 @@ from click.testing import CliRunner, Result
 
 import stickslip as ss
 from stickslip.cli.program import main
+from stickslip.cli.records import default_folder
 from stickslip.units import parse_range
 
 RIG = ["--mass", "2.42", "--stiffness", "2310"]
@@ -44,6 +45,13 @@ def test_the_law_is_written_for_other_programs(tmp_path: Path) -> None:
         assert any(ss.laws.export_law(found.law, format=form).strip() in text for text in written.values()), form
     assert all(text.endswith("\n") for text in written.values())
     assert "FRICTION_TEST" in written["friction.c"]
+
+
+def test_a_fit_leaves_the_results_of_an_analysis_alone() -> None:
+    groups = [[Path("runs/rig.csv")]]
+    assert default_folder(groups) == Path("rig-stickslip")
+    assert default_folder(groups, "fit") == Path("rig-fit")
+    assert default_folder(groups * 2, "fit") == Path("comparison-fit")
 
 
 def test_the_fitted_law_can_be_simulated_as_it_was_written(tmp_path: Path) -> None:

@@ -476,5 +476,6 @@ def test_all_is_removed_at_the_end(number: signal.Signals) -> None:
             send(client, "a.csv", b"a,b\n1,2\n")
         assert len(list((place / "files").iterdir())) == 1
         lab.process.send_signal(number)
-        lab.process.wait(30)
+        code = lab.process.wait(30)
     assert not place.exists()
+    assert number != signal.SIGINT or code == 0, "Ctrl-C is how the lab is ended, and no failure"

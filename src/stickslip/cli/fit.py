@@ -54,7 +54,7 @@ LONG = 30  # letters of a status that is not said twice
     "jenkins, iwan, maxwell over the displacement, aging, slip after a step of the speed. Friction is measured, or "
     "found from the motion, the force and --mass. The choice where a file holds friction and no displacement.",
 )
-@result_options("FILE-stickslip")
+@result_options("FILE-fit")
 @reading_options
 def fit(
     files: tuple[str, ...], output: Path | None, as_json: bool, laws: str | None, calibration: float,
@@ -77,7 +77,7 @@ def fit(
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     _require_one_question(groups, curve, asked=bool(laws or system))
-    folder = output or (None if as_json else default_folder(groups))
+    folder = output or (None if as_json else default_folder(groups, "fit"))
     names = [name for name in laws.split(",") if name.strip()] if laws else None
     words = f"{len(names) if names else 'six'} laws"
     with progress(3) as tell:

@@ -39,4 +39,7 @@ def lab(port: int, no_browser: bool) -> None:
             if not no_browser:
                 webbrowser.open(doorway(folder, address).as_uri())
 
-        serve(door, token=token, opened=opened)
+        try:
+            serve(door, token=token, opened=opened)
+        except KeyboardInterrupt:  # the server has shut down by then, and hands the signal on
+            say("The lab has ended.")

@@ -127,8 +127,9 @@ def names_of(groups: Sequence[Sequence[Path]]) -> list[list[str]]:
     return [list(told[each]) for each in paths]
 
 
-def default_folder(groups: Sequence[Sequence[Path]]) -> Path:
-    return folder_after(groups[0][0], "stickslip") if len(groups) == 1 else Path("comparison-stickslip")
+def default_folder(groups: Sequence[Sequence[Path]], ending: str = "stickslip") -> Path:
+    """Where the results of these records go; commands that answer other questions of them end it otherwise."""
+    return folder_after(groups[0][0], ending) if len(groups) == 1 else Path(f"comparison-{ending}")
 
 
 def folder_after(file: Path, ending: str) -> Path:
