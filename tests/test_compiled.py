@@ -124,3 +124,10 @@ def test_the_log_tells_that_it_compiles(
     with caplog.at_level("INFO", logger="stickslip"):
         compiled.generated(SQUARE).square(3.0)
     assert caplog.messages == ["compiling for this machine, once; what is compiled is kept"]
+
+
+def test_what_another_process_removes_meanwhile_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed = [tmp_path / "gone", tmp_path]
+    monkeypatch.setattr(Path, "iterdir", lambda self: iter(listed))
+    compiled._prune(tmp_path)
+    assert tmp_path.exists()

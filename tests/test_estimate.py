@@ -68,3 +68,10 @@ def test_an_end_that_is_none_is_told_in_words(found, words, cell):
 
 def test_a_bound_of_a_plain_number_has_no_unit():
     assert str(estimate(0.0, 0.0, 0.07, unit="1")) == "friction below 0.07 (95 %)"
+
+
+def test_what_has_no_value_keeps_its_reason_and_no_interval_is_made_up() -> None:
+    friction = Estimate.normal("friction", 5.0, sd=0.1, unit="N", method="")
+    assert friction.unknown("the sign is wrong").within(0.0).status == "the sign is wrong"
+    loose = Estimate.normal("friction", 5.0, sd=math.nan, unit="N", method="")
+    assert all(math.isnan(end) for end in loose.within(0.0).interval)

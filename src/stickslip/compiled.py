@@ -20,6 +20,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
@@ -67,6 +68,13 @@ class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
         if not self._depth:
             self.seconds += time.perf_counter() - self._began
 
+    def timed(self, compiler: Callable[[], Any]) -> Any:
+        """What a compiler makes that tells numba's listeners nothing; what it found on disk does not count."""
+        began = time.perf_counter()
+        made = compiler()
+        self.seconds += 0.0 if made.cache_hits else time.perf_counter() - began
+        return made
+
 
 def _say(words: str) -> None:
     """To who sits before a prompt of Python; else to who listens to the log of the package."""
@@ -85,7 +93,11 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 def pointer(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """As :func:`compiled`, at once and for one signature: a function that compiled code takes as an argument."""
-    return _keeping(lambda **more: cfunc(signature, **more), options)
+
+    def compiler(**more: Any) -> Callable[[Callable[..., Any]], Any]:
+        return lambda function: compilation.timed(lambda: cfunc(signature, **more)(function))
+
+    return _keeping(compiler, options)
 
 
 def _keeping(compiler: Callable[..., Any], options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
@@ -185,14 +197,21 @@ def _kept(name: str) -> Path | None:
     place = root / name
     if not place.exists():
         _prune(root)
-    place.mkdir(exist_ok=True)
-    os.utime(place)
-    return place
+    while True:
+        place.mkdir(exist_ok=True)
+        try:
+            os.utime(place)
+        except FileNotFoundError:  # pruned by another process between the two
+            continue
+        return place
 
 
 def _prune(root: Path) -> None:
     """Remove what nothing has loaded for long: kernels of earlier sources, generated code beyond the latest used."""
-    now, used = time.time(), {place: place.stat().st_mtime for place in root.iterdir()}
+    now, used = time.time(), {}
+    for place in root.iterdir():
+        with suppress(FileNotFoundError):  # removed by another process meanwhile
+            used[place] = place.stat().st_mtime
     latest = sorted((place for place in used if place.name.startswith("generated_")), key=lambda place: -used[place])
     crowded = {place for place in latest[KEPT:] if used[place] < now - IN_USE}
     for place in used:

@@ -31,7 +31,7 @@ _POWER = r"-?(?:[1-9](?:\.5)?|0?\.5)|\([1-9]/2\)"
 _TERM = rf"[{_LETTER}][{_LETTER}0-9]*(?:\^(?:{_POWER}))?"
 _CHAIN = rf"{_TERM}(?:[ /]{_TERM})*"
 _UNIT = re.compile(rf"(1/)?({_CHAIN})(?:/\(({_CHAIN})\))?")  # of all that pint would evaluate, only this reaches it
-_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 
 
 @dataclass(frozen=True)
@@ -110,15 +110,7 @@ _SIGNS = str.maketrans({"μ": "u", "µ": "u", "²": "^2", "³": "^3", "·": " "}
 
 
 def _normal(text: str) -> str:
-    text = (
-        text.strip()
-        .replace("μ", "u")
-        .replace("µ", "u")
-        .replace("²", "^2")
-        .replace("³", "^3")
-        .replace("·", " ")
-        .replace("**", "^")
-    )
+    text = text.strip().translate(_SIGNS).replace("**", "^")
     text = re.sub(r"\s+per\s+", "/", re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z]|$)", " ", text)).strip()  # N.m, in.
     text = re.sub(r"(?<=[A-Za-z])2\b", "^2", text)  # m/s2
     text = re.sub(r"\bsec(s|onds?)?\b", "s", text)

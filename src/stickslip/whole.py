@@ -193,9 +193,12 @@ def _recover(path: Path, strangers: Strangers | None) -> None:
         place = path.with_name(name)
         if not left.fullmatch(name) or place.is_symlink() or not place.is_dir():
             continue
-        if not {*os.listdir(place)} <= {NEW, WHOLE, EARLIER}:  # not made here
+        try:
+            if not {*os.listdir(place)} <= {NEW, WHOLE, EARLIER}:  # not made here
+                continue
+            lock = locked(place)
+        except (PermissionError, FileNotFoundError):  # another user's, or just cleared by another process
             continue
-        lock = locked(place)
         if lock is None:
             continue
         with lock:

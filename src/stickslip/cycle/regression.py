@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -307,8 +307,11 @@ def _answer(
 
 
 def _mean_of_both(forward: Estimate, back: Estimate, name: str) -> Estimate:
+    doubtful = forward if forward.status != "ok" else back
+    if not (forward.known and back.known):
+        return replace(forward if not forward.known else back, name=name)
     low, high = ((a + b) / 2 for a, b in zip(forward.interval, back.interval, strict=True))
     return Estimate(
         name, (forward.value + back.value) / 2, (low, high), (forward.sd + back.sd) / 2, forward.unit,
-        f"mean of both directions, {forward.method}", forward.status, forward.checks,
+        f"mean of both directions, {forward.method}", doubtful.status, forward.checks,
     )  # fmt: skip
