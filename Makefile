@@ -1,4 +1,4 @@
-# make demo | lab | test | lint | docs | bench | smoke | package | clean
+# make demo | lab | test | soak | lint | docs | bench | smoke | package | clean
 # Set-up is part of every target: the environment lives in .venv and is made when it is missing or out of date.
 PYTHON ?= python3
 VENV := .venv
@@ -9,7 +9,7 @@ ifneq ($(wildcard ../shared/data),)
 export STICKSLIP_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: demo lab test lint docs bench smoke package clean
+.PHONY: demo lab test soak lint docs bench smoke package clean
 
 demo: $(VENV)/.user
 	$(BIN)/stickslip demo --output stickslip-demo
@@ -18,7 +18,10 @@ lab: $(VENV)/.lab
 	$(BIN)/stickslip lab
 
 test: $(VENV)/.dev
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
+
+soak: $(VENV)/.dev
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m soak
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""A call in a process of its own, with a limit of time and of memory: what hostile input is tried in.
+"""A call in a process of its own, with a limit of processor time and of memory: what hostile input is tried in.
 
 The processes are forked from one that has imported the package already, so that a case costs what it does and not what
 it takes to start Python.
@@ -20,7 +20,8 @@ from typing import Any
 
 import pytest
 
-SECONDS = 20.0
+SECONDS = 20  # of processor time
+PATIENCE = 600.0  # s by the clock, for one that waits for ever: another program's load must not be taken for it
 BYTES = 1_000_000_000
 ADDRESSES = 4 * BYTES  # what may be reserved: thread stacks and arenas are, and are never touched
 
@@ -30,7 +31,10 @@ _FORKS.set_forkserver_preload(["stickslip.cli.program", "numpy", "pandas", "pint
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a call ended: exit code (None where it was stopped), what it printed, its largest memory in bytes."""
+    """How a call ended: its exit code, what it printed, its largest memory in bytes.
+
+    The code is below zero where it took too much processor time, and None where it waited for ever.
+    """
 
     code: int | None
     out: str
@@ -53,7 +57,7 @@ def limited(call: Callable[..., object], *arguments: Any, folder: Path) -> Outco
     with tempfile.TemporaryDirectory() as place:
         process = _FORKS.Process(target=_within_limits, args=(call, arguments, str(folder), place))
         process.start()
-        process.join(SECONDS)
+        process.join(PATIENCE)
         stopped = process.is_alive()
         if stopped:
             process.kill()
@@ -82,6 +86,7 @@ def _program(words: list[str]) -> None:
 
 def _within_limits(call: Callable[..., object], arguments: tuple[Any, ...], folder: str, place: str) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     os.chdir(folder)
     code = 0

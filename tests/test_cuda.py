@@ -65,7 +65,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, n
     folder = tmp_path_factory.mktemp("cuda")
     environment = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-W", "error", __file__, str(folder)]
-    run = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=200)
+    run = subprocess.run(command, capture_output=True, text=True, env=environment)
     assert run.returncode == 0, run.stderr[-3000:]
     return {name: dict(np.load(folder / f"{j}.npz")) for j, name in enumerate(CASES)}
 

@@ -62,7 +62,7 @@ def read_or_refuse(path: Path) -> ss.Record | None:
 
     What could be read is also checked up.
     """
-    began = time.perf_counter()
+    began = time.process_time()
     record, sentence = None, ""
     try:
         record = ss.read_record(path, fs=250 if path.name in CLOCKLESS else None)
@@ -71,7 +71,7 @@ def read_or_refuse(path: Path) -> ss.Record | None:
         sentence = str(error)
     assert "\n" not in sentence
     assert len(sentence) < 1500
-    assert time.perf_counter() - began < 20
+    assert time.process_time() - began < 20
     return record
 
 

@@ -236,6 +236,6 @@ def test_ctrl_c_while_something_is_imported(tmp_path: Path, name: str) -> None:
     )
     write(tmp_path, "run")
     command = [sys.executable, "-c", code, "convert", "run.csv", "out.parquet"]
-    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert (run.returncode, run.stderr) == (130, "stickslip: interrupted; nothing was written.\n")
     assert not (tmp_path / "out.parquet").exists()

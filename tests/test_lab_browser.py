@@ -24,7 +24,7 @@ from labs import Lab, running_lab
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PICTURES = Path(__file__).parent / "pictures"
-PATIENCE = 60_000.0  # ms, for an analysis on a busy machine
+PATIENCE = 600_000.0  # ms: that an analysis on a busy machine ends, not how soon
 KINETIC = 'input[type=range][aria-label="kinetic friction, slider"]'
 SHOWN = """(rows) => JSON.stringify(rows) === JSON.stringify(
   [...document.querySelectorAll("#rows tr")].map((row) => [...row.cells].map((cell) => cell.textContent)))"""
@@ -35,10 +35,7 @@ STATE = {
     "run": {"cycles": 8},
 }
 
-pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine (apt-get install chromium)"),
-    pytest.mark.timeout(240),
-]
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine (apt-get install chromium)")
 
 
 @pytest.fixture(scope="module")

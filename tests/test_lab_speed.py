@@ -66,9 +66,9 @@ def test_the_command_prints_an_address_that_answers_on_this_machine_alone(starte
     assert address.startswith("http://127.0.0.1:")
     home, _, token = address.partition("/?token=")
     request = urllib.request.Request(f"{home}/alive", headers={"Authorization": f"Bearer {token}"})
-    assert urllib.request.urlopen(request, timeout=10).status == 200
+    assert urllib.request.urlopen(request, timeout=600).status == 200
     with pytest.raises(urllib.error.HTTPError):
-        urllib.request.urlopen(f"{home}/alive", timeout=10)
+        urllib.request.urlopen(f"{home}/alive", timeout=600)
     assert spent < 2
     port = int(home.rpartition(":")[2])
     listening = Path("/proc/net/tcp").read_text().splitlines()[1:] if sys.platform == "linux" else []
@@ -81,7 +81,7 @@ def test_the_command_prints_an_address_that_answers_on_this_machine_alone(starte
 def test_a_port_that_is_taken_is_told(started: tuple[str, float]) -> None:
     port = started[0].partition("/?")[0].rpartition(":")[2]
     command = [sys.executable, "-m", "stickslip", "lab", "--port", port, "--no-browser"]
-    found = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    found = subprocess.run(command, capture_output=True, text=True)
     assert found.returncode == 2
     assert f"port {port} is taken" in found.stderr
     assert "Traceback" not in found.stderr

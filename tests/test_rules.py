@@ -25,6 +25,8 @@ PACKAGE = Path(stickslip.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 ROOMS = sorted(stub.parent for stub in PACKAGE.glob("*/__init__.pyi"))
 MODULES = sorted(module.name for module in pkgutil.walk_packages([str(PACKAGE)], "stickslip."))
+TREES = {str(file.relative_to(PACKAGE)): ast.parse(file.read_text("utf-8")) for file in FILES}
+WITH_EXAMPLES = [name for name in TREES if ">>>" in (PACKAGE / name).read_text("utf-8")]
 HEAVY = {"scipy", "pandas", "matplotlib", "pint", "h5py", "pyarrow", "xarray", "jinja2", "pooch", "nptdms", "soundfile"}
 EMPTY_NAMES = {"utils", "util", "core", "common", "helpers", "misc", "tools"}
 
@@ -84,28 +86,26 @@ def documented(text: str) -> list[str]:
     return [name.strip().lstrip("*") for head in heads for name in head.split(",")]
 
 
-@pytest.mark.parametrize("name", stickslip.__all__)
-def test_every_public_name_exists(name: str) -> None:
-    assert getattr(stickslip, name) is not None
+def test_every_public_name_exists() -> None:
+    assert not [name for name in stickslip.__all__ if getattr(stickslip, name) is None]
 
 
 def test_few_names_stand_at_the_top() -> None:
     assert len(stickslip.__all__) <= 60
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_no_file_of_a_room_hides_one_of_its_names(room: Path) -> None:
+def test_no_file_of_a_room_hides_one_of_its_names() -> None:
     """Once imported, ``signals/x.py`` is what ``signals.x`` means."""
-    names = named(room / "__init__.pyi")
-    assert not set(names) & {file.stem for file in room.glob("*.py")}
+    names = {room.name: set(named(room / "__init__.pyi")) & {file.stem for file in room.glob("*.py")} for room in ROOMS}
+    assert not {room: hidden for room, hidden in names.items() if hidden}
 
 
-@pytest.mark.parametrize("name", PUBLIC)
-def test_every_public_name_stands_in_the_reference(name: str) -> None:
-    page = PACKAGE.parents[1] / "docs" / "api" / "index.md"
-    room = name.partition(".")[0]
-    listed = room if (PACKAGE / f"{room}.py").exists() else name  # a module of its own is listed as a whole
-    assert re.search(rf"^   {re.escape(listed)}$", page.read_text("utf-8"), flags=re.MULTILINE)
+def test_every_public_name_stands_in_the_reference() -> None:
+    page = (PACKAGE.parents[1] / "docs" / "api" / "index.md").read_text("utf-8")
+    # a module of its own is listed as a whole
+    rooms = {name: name.partition(".")[0] for name in PUBLIC}
+    listed = {room if (PACKAGE / f"{room}.py").exists() else name for name, room in rooms.items()}
+    assert not listed - set(re.findall(r"^   (\S+)$", page, flags=re.MULTILINE))
 
 
 def test_the_map_of_the_house_names_files_that_stand() -> None:
@@ -118,72 +118,82 @@ def test_the_map_of_the_house_names_files_that_stand() -> None:
     assert set(folders) == {file.parent.name for file in FILES} - {PACKAGE.name}
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_a_public_function_is_documented(name: str) -> None:
-    function = FUNCTIONS[name]
-    found = sections(function)
-    parameters = list(inspect.signature(function).parameters)
-    assert found[""].strip(), "the first line says what it answers"
-    assert ">>>" in found.get("Examples", ""), "a runnable example"
-    assert "Returns" in found or "Yields" in found or inspect.signature(function).return_annotation in ("None", None)
-    if parameters:
-        assert documented(found.get("Parameters", "")) == parameters, "every parameter, in order"
+def undocumented(function: types.FunctionType) -> Iterator[str]:
+    """What the docstring of a public function lacks."""
+    texts = sections(function)
+    signature = inspect.signature(function)
+    if not texts[""].strip():
+        yield "a first line that says what it answers"
+    if ">>>" not in texts.get("Examples", ""):
+        yield "a runnable example"
+    if not {"Returns", "Yields"} & set(texts) and signature.return_annotation not in ("None", None):
+        yield "what it returns"
+    if signature.parameters and documented(texts.get("Parameters", "")) != list(signature.parameters):
+        yield "every parameter, in order"
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_a_public_function_takes_few_arguments_by_name(name: str) -> None:
-    parameters = list(inspect.signature(FUNCTIONS[name]).parameters.values())
-    assert len(parameters) <= 8
+def test_a_public_function_is_documented() -> None:
+    assert not {name: lacking for name, function in FUNCTIONS.items() if (lacking := [*undocumented(function)])}
+
+
+def test_a_public_function_takes_few_arguments_by_name() -> None:
+    parameters = {name: [*inspect.signature(function).parameters.values()] for name, function in FUNCTIONS.items()}
+    assert not [name for name, taken in parameters.items() if len(taken) > 8]
     by_name = (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
-    assert all(p.kind in by_name or p.name in BY_PLACE for p in parameters[1:]), "keyword-only after the first"
+    by_place = {
+        name: [p.name for p in taken[1:] if p.kind not in by_name and p.name not in BY_PLACE]
+        for name, taken in parameters.items()
+    }
+    assert not {name: taken for name, taken in by_place.items() if taken}, "keyword-only after the first"
 
 
-@pytest.mark.parametrize("name", CLASSES)
-def test_a_public_class_is_documented(name: str) -> None:
-    found = sections(CLASSES[name])
-    assert found[""].strip()
-    if dataclasses.is_dataclass(CLASSES[name]):
-        fields = [field.name for field in dataclasses.fields(CLASSES[name])]
-        text = found.get("Attributes", "") + "\n" + found.get("Parameters", "")
-        assert set(fields) <= set(documented(text)), "every field"
+def test_a_public_class_is_documented() -> None:
+    texts = {name: sections(thing) for name, thing in CLASSES.items()}
+    assert not [name for name, text in texts.items() if not text[""].strip()]
+    fields = {name: dataclasses.fields(thing) for name, thing in CLASSES.items() if dataclasses.is_dataclass(thing)}
+    lacking = {
+        name: {field.name for field in of_class}
+        - {*documented(texts[name].get("Attributes", "") + "\n" + texts[name].get("Parameters", ""))}
+        for name, of_class in fields.items()
+    }
+    assert not {name: missing for name, missing in lacking.items() if missing}
 
 
-@pytest.mark.parametrize("name", DATACLASSES)
-def test_results_are_frozen_and_draw_nothing(name: str) -> None:
-    thing = DATACLASSES[name]
-    assert thing.__dataclass_params__.frozen
-    assert not hasattr(thing, "plot")
+def test_results_are_frozen_and_draw_nothing() -> None:
+    assert not [name for name, thing in DATACLASSES.items() if not thing.__dataclass_params__.frozen]
+    assert not [name for name, thing in DATACLASSES.items() if hasattr(thing, "plot")]
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
-def test_a_file_is_short_and_named_for_what_it_holds(file: Path) -> None:
-    assert len(file.read_text("utf-8").splitlines()) <= 700
-    assert not {*file.relative_to(PACKAGE).with_suffix("").parts} & EMPTY_NAMES
-    assert len(file.relative_to(PACKAGE).parts) <= 2, "two levels at most"
+def test_a_file_is_short_and_named_for_what_it_holds() -> None:
+    places = {file.relative_to(PACKAGE).with_suffix(""): file for file in FILES}
+    assert not [str(place) for place, file in places.items() if len(file.read_text("utf-8").splitlines()) > 700]
+    assert not [place for place in places if {*place.parts} & EMPTY_NAMES]
+    assert not [place for place in places if len(place.parts) > 2], "two levels at most"
 
 
-@pytest.mark.parametrize("file", [f for f in FILES if f.name == "__init__.py" and f.parent != PACKAGE], ids=str)
-def test_a_room_names_what_is_public_in_its_stub_alone(file: Path) -> None:
-    docstring, *rest = ast.parse(file.read_text("utf-8")).body
-    assert isinstance(docstring, ast.Expr)
-    if file.with_suffix(".pyi").exists():
-        assert [ast.unparse(line) for line in rest] == [
-            "from stickslip.lazy import attached", "__getattr__, __dir__, __all__ = attached(__name__)",
-        ]  # fmt: skip
-    else:
-        assert not rest, "a docstring alone: import from the module"
+def test_a_room_names_what_is_public_in_its_stub_alone() -> None:
+    attached = ["from stickslip.lazy import attached", "__getattr__, __dir__, __all__ = attached(__name__)"]
+    for name, tree in TREES.items():
+        if not name.endswith("/__init__.py"):
+            continue
+        docstring, *rest = tree.body
+        assert isinstance(docstring, ast.Expr), name
+        # without a stub, a docstring alone: import from the module
+        wanted = attached if (PACKAGE / name).with_suffix(".pyi").exists() else []
+        assert [ast.unparse(line) for line in rest] == wanted, name
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
-def test_nothing_is_unpickled_or_evaluated(file: Path) -> None:
-    tree = ast.parse(file.read_text("utf-8"))
-    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
-    called = {func.id for func in calls if isinstance(func, ast.Name)}
-    imported = {
-        alias.name for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom) for alias in node.names
-    } | {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert not called & {"eval", "exec"}
-    assert not imported & {"pickle", "dill", "joblib", "marshal", "shelve"}
+def unsafe(tree: ast.Module) -> set[str]:
+    """The names by which a file would evaluate or unpickle what it reads."""
+    nodes = [*ast.walk(tree)]
+    called = {node.func.id for node in nodes if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+    imported = {alias.name for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) for alias in node.names}
+    imported |= {str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)}
+    return called & {"eval", "exec"} | imported & {"pickle", "dill", "joblib", "marshal", "shelve"}
+
+
+def test_nothing_is_unpickled_or_evaluated() -> None:
+    assert not {name: names for name, tree in TREES.items() if (names := unsafe(tree))}
 
 
 @pytest.mark.parametrize("room", ["cli", "lab"])
@@ -212,18 +222,20 @@ def test_the_command_line_and_the_page_use_public_names_alone(room: str) -> None
 )
 def test_the_start_is_light(start: str) -> None:
     code = f"import sys; {start}; print('LOADED', *{{name.partition('.')[0] for name in sys.modules}})"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(run.stdout.rpartition("LOADED")[2].split())
     assert not loaded & HEAVY
 
 
-@pytest.mark.parametrize("module", ["stickslip", *MODULES])
-def test_the_examples_run(module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", WITH_EXAMPLES)
+def test_the_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(os.environ, "MPLBACKEND", "agg")
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-    results = doctest.testmod(importlib.import_module(module), optionflags=flags)
-    assert results.failed == 0, f"{results.failed} of {results.attempted} examples of {module} failed; see above"
+    parts = Path(name).with_suffix("").parts
+    module = importlib.import_module(".".join(["stickslip", *parts]).removesuffix(".__init__"))
+    results = doctest.testmod(module, optionflags=flags)
+    assert results.failed == 0, f"{results.failed} of {results.attempted} examples of {name} failed; see above"
 
 
 def test_the_files_that_contributing_names_are_there() -> None:

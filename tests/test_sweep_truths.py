@@ -188,7 +188,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, A
     environment = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
     run = subprocess.run(
         [sys.executable, "-W", "error", __file__, str(folder)],
-        capture_output=True, text=True, env=environment, timeout=250,
+        capture_output=True, text=True, env=environment,
     )  # fmt: skip
     assert run.returncode == 0, run.stderr[-3000:]
     return {name: dict(np.load(folder / f"{name}.npz")) for name in CASES}
