@@ -65,7 +65,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options:
         )
     groups = [group for argument in files for group in groups_of(argument)]
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
-    asked |= {key: asked[key] or getattr(rig, key) for key in ("mass", "stiffness")}
+    asked |= {key: getattr(rig, key) for key in ("mass", "stiffness") if asked[key] is None}
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
         tell("drawing and writing", 2 * len(groups))
