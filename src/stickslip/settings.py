@@ -12,6 +12,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from stickslip.errors import ModelError, RecordError
+from stickslip.printing import printable
 from stickslip.units import parse_value
 
 STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -29,26 +30,26 @@ def quantity(unit: str) -> BeforeValidator:
         try:
             return parse_value(value, unit)
         except RecordError as error:
-            raise ValueError(f"{error.value}; {error.rule}") from error
+            raise ValueError(printable(f"{error.value}; {error.rule}")) from error
 
     return BeforeValidator(read)
 
 
 def read_toml(path: Path, *, what: str) -> tuple[dict[str, Any], list[str]]:
     """The values of a TOML file, and its lines, so that a message can name one; `what` it holds is for the message."""
-    rule = f"{what} a TOML file"
+    rule, name = f"{what} a TOML file", path.name or str(path)
     try:
         if path.exists() and not path.is_file():  # a pipe would be waited for
-            raise ModelError(f"{path.name} is no file of its own", rule, "write the settings into a file")
+            raise ModelError(f"{name} is no file of its own", rule, "write the settings into a file")
         with path.open("rb") as file:
             data = file.read(LARGEST + 1)
         text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise ModelError(f"{path.name} can not be read ({reason})", rule, "check the path") from error
+        raise ModelError(f"{name} can not be read ({reason})", rule, "check the path") from error
     if len(data) > LARGEST:
-        raise ModelError(f"{path.name} is larger than {LARGEST / 1e6:g} MB", rule, "name a file of settings")
-    return _parsed(text, source=path.name), text.splitlines()
+        raise ModelError(f"{name} is larger than {LARGEST / 1e6:g} MB", rule, "name a file of settings")
+    return _parsed(text, source=name), text.splitlines()
 
 
 def _parsed(text: str, *, source: str) -> dict[str, Any]:
@@ -166,7 +167,9 @@ def _shown(value: object) -> str:
 def _said(message: str) -> str:
     """What a model says of a value, in the words of a settings file."""
     said = message.removeprefix("Value error, ").replace("Input should", "it should")
-    said = said.replace("Tuple should", "it should").replace(" after validation", "")
+    said = (
+        said.replace("Tuple should", "it should").replace("String should", "it should").replace(" after validation", "")
+    )
     return said.replace("a valid dictionary", "a table").replace("a valid ", "a ")
 
 

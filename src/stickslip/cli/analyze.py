@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.options import reading_options, result_options, usable
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -76,6 +76,7 @@ def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: 
 @click.option(
     "--output",
     type=click.Path(path_type=Path),
+    callback=usable,
     default=Path("stickslip-demo"),
     show_default=True,
     metavar="DIR",

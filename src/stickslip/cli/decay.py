@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.options import quantity, reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -23,8 +23,18 @@ from stickslip.cli.show import show
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.")
-@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, for the friction force; of an angle in N m/rad.")
+@click.option(
+    "--mass",
+    callback=quantity("kg", "kg m^2"),
+    metavar="VALUE",
+    help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.",
+)
+@click.option(
+    "--stiffness",
+    callback=quantity("N/m", "N m/rad"),
+    metavar="VALUE",
+    help="Spring in N/m, for the friction force; of an angle in N m/rad.",
+)
 @click.option(
     "--method",
     type=click.Choice(["all", "waveform", "thesis"]),
@@ -65,7 +75,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options:
         )
     groups = [group for argument in files for group in groups_of(argument)]
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
-    asked |= {key: asked[key] or getattr(rig, key) for key in ("mass", "stiffness")}
+    asked |= {key: getattr(rig, key) for key in ("mass", "stiffness") if asked[key] is None}
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
         tell("drawing and writing", 2 * len(groups))

@@ -76,9 +76,9 @@ def fit(
     """
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
-    _require_one_question(groups, curve, asked=bool(laws or system))
+    _require_one_question(groups, curve, asked=laws is not None or system is not None)
     folder = output or (None if as_json else default_folder(groups, "fit"))
-    names = [name for name in laws.split(",") if name.strip()] if laws else None
+    names = laws.split(",") if laws is not None else None
     words = f"{len(names) if names else 'six'} laws"
     with progress(3) as tell:
         tell("reading", 0)

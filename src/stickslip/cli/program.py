@@ -44,10 +44,15 @@ class _Commands(click.Group):
             say(SENTENCE, err=True)
             ctx.exit(INTERRUPTED)
         except click.UsageError as error:
-            ctx.exit(_misused(error, ctx.command_path))
+            ctx.exit(_misused(error, " ".join(filter(None, (ctx.command_path, ctx.invoked_subcommand)))))
         except ss.StickslipError as error:
             complain(spoken(error))
             ctx.exit(error.exit_code)
+        except OSError as error:  # a name that the system does not take, a disk that is full
+            if error.filename is None:
+                raise
+            complain(f"'{error.filename}' can not be used; {error.strerror}; name another file or folder.")
+            ctx.exit(1)
 
 
 def _misused(error: click.UsageError, command: str) -> int:

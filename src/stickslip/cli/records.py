@@ -52,7 +52,7 @@ def rig_of(
         if pairs:
             given[key] = {**base.get(key, {}), **dict(pair(text, f"--{key}") for text in pairs)}
     if repair is not None:
-        given["repair"] = [word.strip() for word in repair.split(",") if word.strip()]
+        given["repair"] = [word.strip() for word in repair.split(",")]
     if normal:  # the first pattern that fits decides
         loads = dict(pair(load, "--normal") if "=" in load else ("*", load) for load in normal)
         for load in loads.values():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.options import quantity, reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -39,7 +39,12 @@ if TYPE_CHECKING:
     metavar='LOAD or "PATTERN=LOAD"',
     help="Normal load in N, for all files or for those whose name fits. Repeatable.",
 )
-@click.option("--lever", metavar="VALUE", help="Distance of the friction from the axis of torsion in m, for its work.")
+@click.option(
+    "--lever",
+    callback=quantity("m"),
+    metavar="VALUE",
+    help="Distance of the friction from the axis of torsion in m, for its work.",
+)
 @result_options("FILE-squeak")
 @reading_options
 def squeak(

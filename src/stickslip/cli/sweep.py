@@ -8,6 +8,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.interrupted import INTERRUPTED
+from stickslip.cli.options import usable
 from stickslip.cli.terminal import paragraph, print_table, say, say_json
 
 
@@ -17,7 +18,7 @@ from stickslip.cli.terminal import paragraph, print_table, say, say_json
               help="Where it runs: serial, threads, dask, dask://HOST:PORT or cuda.")  # fmt: skip
 @click.option("--store", type=click.Path(path_type=Path), metavar="MAP.ZARR",
               help="Where what is done is kept, and goes on after an end; FILE.zarr unless given.")  # fmt: skip
-@click.option("--output", type=click.Path(path_type=Path), metavar="DIR",
+@click.option("--output", type=click.Path(path_type=Path), callback=usable, metavar="DIR",
               help="Folder for the report and its figures; none unless given.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
 def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_json: bool) -> None:

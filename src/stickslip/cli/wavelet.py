@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.options import quantity, reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import folder_after, groups_of, name_of, read_parts, rig_of
 from stickslip.cli.show import show
@@ -24,8 +24,15 @@ if TYPE_CHECKING:
 @click.option("--frequencies", metavar="LOW:HIGH", help="Range of the map in Hz; what the record allows unless given.")
 @click.option("--wavelet-frequency", type=float, default=4.5, show_default=True, help="How long a wavelet is.")
 @click.option("--normalisation", type=click.Choice(["energy", "amplitude"]), default="energy", show_default=True)
-@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, or with its unit, for the contact's stiffness.")
-@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit, for the same.")
+@click.option(
+    "--mass",
+    callback=quantity("kg"),
+    metavar="VALUE",
+    help="Oscillating mass in kg, or with its unit, for the contact's stiffness.",
+)
+@click.option(
+    "--stiffness", callback=quantity("N/m"), metavar="VALUE", help="Spring in N/m, or with its unit, for the same."
+)
 @result_options("FILE-wavelet")
 @reading_options
 def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | None, **options: Any) -> None:

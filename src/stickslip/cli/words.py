@@ -9,6 +9,7 @@ _REPAIRS = {
     "restore_clipped": "clipping", "remove_drift": "drift",
 }  # fmt: skip
 _SPOKEN = (
+    (r"\b(the command line|the run) sets (\w+)", r"\1 sets --\2"),
     (r"\brecord\.check\(\)", "stickslip check"),
     (r"\brecord\.rows\(\)", "--rows"),
     (r"\brecord\.between\([^)]*\)", "--rows"),
@@ -24,7 +25,7 @@ _SPOKEN = (
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
     (r'\bfriction_force\(record, \.\.\., method="(\w+)"\)', r"--method \1"),
     (
-        r"\b(channels|channel|frequencies|normal|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness|lever)=(?=\W|$)",
+        r"\b(channels|channel|frequencies|normal|rows|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness|lever|calibration)=(?=\W|$)",
         r"--\1",
     ),
 )

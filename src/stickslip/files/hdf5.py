@@ -67,7 +67,7 @@ def read(path: Path, options: Options) -> Table:
     check_heaps(path)
     with reading(path, NAME), h5py.File(path, "r") as file:
         if KEY in file.attrs:
-            record = parse_metadata(file.attrs[KEY])
+            record = parse_metadata(_value(file.attrs, KEY) or "")
         constants |= _numbers(file.attrs)
         for name, dataset in datasets(file, notes):
             reason = refusal(dataset)
@@ -204,25 +204,28 @@ def _real(dtype: np.dtype[Any]) -> bool:
     return dtype.kind in "fiub" and dtype.shape == ()
 
 
+def _value(attributes: Any, name: str) -> float | str | None:
+    """A number or a text; None of an attribute of any other type.
+
+    HDF5 is not asked to read those: by a list of a damaged type it reads outside its memory, and the process dies.
+    """
+    h5t = optional("h5py").h5t
+    attribute = attributes.get_id(name)
+    known = (h5t.INTEGER, h5t.FLOAT, h5t.STRING)
+    if attribute.shape not in ((), (1,)) or attribute.get_type().get_class() not in known:
+        return None
+    value = np.asarray(attributes[name]).item()
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+
+
 def _numbers(attributes: Any) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for name in attributes:
-        shape = attributes.get_id(name).shape
-        value = attributes[name] if shape in ((), (1,)) else None
-        if isinstance(value, (np.generic, np.ndarray)) and value.dtype.kind in "fiub":
-            found[name] = float(value.item())
-    return found
+    values = {name: _value(attributes, name) for name in attributes}
+    return {name: float(value) for name, value in values.items() if isinstance(value, (int, float, np.floating))}
 
 
 def _unit(attributes: Any) -> str | None:
-    for word in UNIT_WORDS:
-        if word in attributes:
-            value = attributes[word]
-            value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
-            text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-            if isinstance(text, str) and text.strip():
-                return text.strip()
-    return None
+    texts = (_value(attributes, word) for word in UNIT_WORDS if word in attributes)
+    return next((text.strip() for text in texts if isinstance(text, str) and text.strip()), None)
 
 
 def _rate(dataset: Any) -> float | None:

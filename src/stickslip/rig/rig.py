@@ -19,6 +19,8 @@ from stickslip.rig.sensor import Digitiser, Mount, Noise, Sensor
 from stickslip.signals.response import respond
 from stickslip.solve.trajectory import Trajectory
 
+MOST_ROWS = 10_000_000  # of a record: with its sensors' convolutions some hundred bytes each
+
 Array = NDArray[np.float64]
 
 POUND, GRAVITY = 4.4482216152605, 9.80665  # force [N], acceleration [m/s^2]
@@ -215,11 +217,17 @@ class Rig:
             A rate that is not positive, or a start outside the run.
         """
         finite("fs", fs, unit="Hz", positive=True)
-        begin = start + self.offset
+        begin = finite("start", start, unit="s", signed=True) + self.offset
         count = math.floor((run.duration - begin) * fs * (1 + self.rate) * (1 + 1e-12)) + 1
         if not 0 <= begin < run.duration or count < 2:
             raise ModelError(
                 f"a record from {begin:g} s on", f"the run lasts from 0 to {run.duration:g} s", "start within it"
+            )
+        if count > MOST_ROWS:
+            raise ModelError(
+                f"fs = {fs:g} Hz over {run.duration - begin:g} s",
+                f"a rig writes at most {MOST_ROWS:g} rows",
+                "give a lower fs= or a shorter run",
             )
         chance = np.random.default_rng(rng)
         times = begin + np.arange(count) / (fs * (1 + self.rate))

@@ -111,8 +111,8 @@ class RigSettings(BaseModel):
         default_factory=dict
     )
     repair: tuple[Annotated[str, BeforeValidator(_repair)], ...] = ()
-    time: str | None = None
-    delimiter: str | None = None
+    time: Annotated[str, Field(min_length=1)] | None = None
+    delimiter: Annotated[str, Field(min_length=1)] | None = None
     decimal: Literal[".", ","] | None = None
     rows: Annotated[str, BeforeValidator(_row_range)] | None = None
 

@@ -96,6 +96,8 @@ def results_folder(folder: Path, results: Mapping[str, Any]) -> Iterator[Path]:
 def check_folder(folder: Path) -> None:
     """Refuse a folder that holds anything that an earlier run did not write."""
     if not folder.exists():
+        if any(parent.is_file() for parent in folder.absolute().parents):
+            raise ModelError(f"{folder} lies in a file", "results go into a folder", "name another with --output")
         return
     strangers = ["it is a file"] if not folder.is_dir() else _strangers(folder)
     if strangers:

@@ -1,0 +1,132 @@
+"""Every option of every command with a wrong value: one sentence that names it, and nothing is ignored."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import math
+import re
+import traceback
+from pathlib import Path
+
+import click
+import pytest
+
+from limits import civil, limited, program
+from stickslip.cli.program import main
+from stickslip.printing import printable
+from test_sweep_cli import GRID, SLIDER
+
+RECORD = "t [s],x [m],friction [N]\n" + "".join(
+    f"{n / 1000},{math.sin(n / 5)},{(-1) ** (n // 9)}\n" for n in range(300)
+)
+NUMBERS = ["", "-1", "nan", "inf", "-inf", "1e400", "1,5", "0x10", "none", "½", "5 lux", "9**9**9", "9" * 5000]
+TEXTS = ["../", "folder", "nowhere", "a\x1b[31mb", "two\nlines", "\u202e\x07", "\udcff", "a=b=c", "=", "a" * 5000]
+CALLS: dict[str, list[str]] = {
+    "analyze": ["x.csv"],
+    "check": ["x.csv"],
+    "convert": ["x.csv", "out.csv", "--force"],
+    "decay": ["x.csv", "--json"],
+    "demo": ["--json"],
+    "fit": ["x.csv", "--json", "--mass=1", "--stiffness=100"],
+    "lab": ["--no-browser"],
+    "rig": ["slider.toml", "--json"],
+    "simulate": ["slider.toml", "--json"],
+    "squeak": ["x.csv", "--json"],
+    "sweep": ["grid.toml", "--json"],
+    "thesis": ["6"],
+    "wavelet": ["x.csv", "--json"],
+}
+FOLDERS = ("--output", "--store")  # any name is right that the system takes
+OF_FOLDERS = ["x.csv", "x.csv/within", "a" * 5000]
+END = tuple[str, str, int, str]  # option, value, exit code, what was said
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    (tmp_path / "folder").mkdir()
+    for name, text in {"x.csv": RECORD, "slider.toml": SLIDER, "grid.toml": GRID}.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def wrong_values(option: click.Parameter) -> list[str]:
+    """Values of every kind, none of which the option can mean."""
+    return OF_FOLDERS if option.opts[0] in FOLDERS else [*NUMBERS, *TEXTS]
+
+
+def ask_wrongly(command: str) -> None:
+    """Each option of a command with each of its wrong values; how each ends is printed as JSON."""
+    ends: list[END] = []
+    for option in main.commands[command].params:
+        if isinstance(option, click.Argument) or getattr(option, "is_flag", False):
+            continue
+        for value in wrong_values(option):
+            with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+                try:
+                    main([command, *CALLS[command], f"{option.opts[0]}={value}"], prog_name="stickslip")
+                except SystemExit as end:
+                    code = end.code if isinstance(end.code, int) else 1
+                except Exception:  # noqa: BLE001  (whatever gets out is what the test looks for)
+                    code = 70
+                    traceback.print_exc()
+            ends.append((option.opts[0], value, code, err.getvalue() or out.getvalue()[:200]))
+    print(json.dumps(ends))
+
+
+@pytest.mark.parametrize("command", CALLS)
+def test_a_wrong_value_is_refused_in_a_sentence_that_names_it(place: Path, command: str) -> None:
+    ends: list[END] = json.loads(civil(limited(ask_wrongly, command, folder=place)).out)
+    assert ends
+    assert not [(option, value[:40], code, said[:400]) for option, value, code, said in ends if not refused(code, said)]
+    assert not [(option, value[:40], said[:400]) for option, value, _, said in ends if not names(said, option, value)]
+
+
+def refused(code: int, said: str) -> bool:
+    return code in (1, 2) and said.startswith("stickslip: ") and said.count("\n") == 1
+
+
+def names(said: str, option: str, value: str) -> bool:
+    """Whether the option is named, or its value, or a part of one of several parts."""
+    shown = [
+        " ".join(printable(part[:40]).split()) for part in (*re.split("[=,/]", value, maxsplit=1), str(Path(value)))
+    ]
+    return option in said or option[2:].replace("-", "_") in said or any(part and part in said for part in shown)
+
+
+def test_every_command_is_asked() -> None:
+    assert CALLS.keys() | {"datasets"} == main.commands.keys(), "datasets has no option"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["check", "x.csv", "--time", ""],
+        ["check", "x.csv", "--delimiter", ""],
+        ["check", "x.csv", "--repair", ","],
+        ["fit", "x.csv", "--mass=1", "--stiffness=100", "--laws", ""],
+        ["decay", "x.csv", "--mass", ""],
+        ["rig", "slider.toml", "--json", "--fs", "1e12"],
+    ],
+    ids=" ".join,
+)
+def test_nothing_is_ignored_and_nothing_is_too_much(place: Path, words: list[str]) -> None:
+    ended = civil(program(*words, folder=place))
+    assert ended.code == 2
+    assert words[-2] in ended.err or words[-2][2:] in ended.err
+
+
+def test_a_damaged_list_among_the_attributes_of_hdf5_is_not_read(place: Path) -> None:
+    """A text's type is turned into a list's: HDF5 would read outside its memory."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(place / "a.h5", "w") as file:
+        file["x"] = [float(n) for n in range(90)]
+        file["x"].attrs["units"] = "mm"
+        file.attrs["fs"] = 100.0
+    whole = (place / "a.h5").read_bytes()
+    kind = whole.index(b"units\0\0\0\x19\x01") + 9
+    assert program("check", "a.h5", folder=place).out.startswith("Record(x [m]; 90 samples, 100 Hz")
+    for damage in (0x00, 0x09, 0x5B, 0xFF):
+        (place / "a.h5").write_bytes(whole[:kind] + bytes([damage]) + whole[kind + 1 :])
+        assert civil(program("check", "a.h5", folder=place)).code in (0, 1)
