@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,9 @@ import numpy as np
 
 from stickslip.plot.maps import plates_of
 from stickslip.solve.tables import System
-from stickslip.story import page
 from stickslip.story.folder import check_folder, results_folder, write_figures
-from stickslip.story.summary import Summary
+from stickslip.story.page import render
+from stickslip.story.story import Story
 
 LOST = ("not run", "failed")  # outcomes that leave holes in a map
 
@@ -89,15 +90,15 @@ def publish_map(atlas: Any, *, folder: str | Path, system: System | None = None)
     changing = sum(size > 1 for size in atlas.sizes.values())
     flat = atlas.squeeze() if 1 <= changing < len(atlas.dims) else atlas
     plates = plates_of(flat, system) if 1 <= len(flat.dims) <= 2 else ()
-    section = page.section(_words(atlas), plates, png=True)
+    story = replace(_words(atlas), draw=lambda: plates).drawn(png=True)
     with results_folder(folder, map_numbers(atlas)) as draft:
-        (draft / "report.html").write_text(page.render([section]), encoding="utf-8")
+        (draft / "report.html").write_text(render([story]), encoding="utf-8")
         (draft / "figures").mkdir()
-        write_figures(draft / "figures", "", section.plates)
+        write_figures(draft / "figures", "", story.plates)
     return folder
 
 
-def _words(atlas: Any) -> Summary:
+def _words(atlas: Any) -> Story:
     """How many motions over what, and what became of them."""
     status = atlas["status"]
     codes, words = status.attrs.get("flag_values", ()), status.attrs.get("flag_meanings", "").split()
@@ -117,7 +118,7 @@ def _words(atlas: Any) -> Summary:
     if counts.get("at rest") == status.size:
         cautions.append("Nothing moves anywhere: friction holds the mass at every point. Drive it harder, or near its "
                         "own frequency.")  # fmt: skip
-    return Summary("Map", (f"{status.size} motions over {over}: {became}.",), cautions, settings=_settings(atlas.attrs))
+    return Story("Map", (f"{status.size} motions over {over}: {became}.",), cautions, settings=_settings(atlas.attrs))
 
 
 def _over(atlas: Any, dim: str) -> str:

@@ -16,7 +16,6 @@ from stickslip.errors import ModelError
 from stickslip.files.write import WRITERS, write_record
 from stickslip.laws.formula import Formula
 from stickslip.parameters import PARTS
-from stickslip.plot.figures import figures
 from stickslip.plot.plate import drawable
 from stickslip.plot.trajectory import (
     contacts_of,
@@ -25,6 +24,7 @@ from stickslip.plot.trajectory import (
     last_cycles,
     numbered_words,
     period_of,
+    plates_of,
     pressed,
     sampled,
 )  # fmt: skip
@@ -36,6 +36,7 @@ from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.squeak.listening import write_sound
 from stickslip.squeak.sound import sound_pressure, squeak_record
 from stickslip.story.folder import check_folder, results_folder, write_figures
+from stickslip.story.story import Story
 from stickslip.structure import Structure
 from stickslip.systems.file import Case
 from stickslip.units import prefixed
@@ -100,6 +101,11 @@ class Outcome:
             "event_count": counts.total(),
             "events": [_told(event) for event in itertools.islice(self.run.each_event(), MOST_TOLD)],
         }
+
+
+def of_run(run: Trajectory) -> Story:
+    """A run by itself: its figures."""
+    return Story("Run", draw=lambda: plates_of(run))
 
 
 def outcome(case: Case, *, progress: Callable[[float], object] | None = None) -> Outcome:
@@ -210,7 +216,7 @@ def publish_run(
         write_record(run.record(fs=rate), draft / f"record.{form}")
         _write_events(run, draft / "events.csv")
         tell("drawing the figures", 2)
-        plates, lost = drawable(figures(run), png=True)
+        plates, lost = drawable(plates_of(run), png=True)
         numbers |= {"notes": lost} if lost else {}
         write_figures(draft / "figures", "", plates)
         if animation is not None:
