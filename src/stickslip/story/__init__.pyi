@@ -1,5 +1,3 @@
-from stickslip.story.maps import map_numbers as map_numbers
-from stickslip.story.maps import publish_map as publish_map
 from stickslip.story.rig import publish_rig as publish_rig
 from stickslip.story.simulation import Outcome as Outcome
 from stickslip.story.simulation import outcome as outcome

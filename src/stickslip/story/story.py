@@ -28,7 +28,7 @@ TELLERS = {
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
     "Trajectory": "simulation.of_run",
     "Bifurcation": "regimes.of_bifurcation", "Basins": "regimes.of_basins", "Boundary": "regimes.of_boundary",
-    "Dither": "regimes.of_dither",
+    "Dither": "regimes.of_dither", "Dataset": "maps.of_map",
     "Estimate": "estimates.of_one", "list": "estimates.of_several", "tuple": "estimates.of_several",
 }  # fmt: skip
 
@@ -193,7 +193,7 @@ def summary(result: Any, **context: Any) -> Story:
         :func:`simulate` or another question returned; or a sequence of estimates.
     **context
         What the result does not hold itself: as ``record`` the one that plain estimates, a law or a curve was found
-        in; of a law fitted to several all of them.
+        in; of a law fitted to several all of them. As ``system`` what moved on a map that :func:`sweep` made.
 
     Returns
     -------
