@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,10 +11,9 @@ from stickslip.cli.terminal import paragraph, print_table, say, say_json
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip.story import Outcome, Story
+    from stickslip.story import Story
 
 LONG = 30  # letters of a status that is not said twice
-SHOWN_EVENTS = 12
 
 
 def print_json(told: Mapping[str, Any]) -> None:
@@ -64,31 +62,3 @@ def _print_lines(story: Story) -> None:
         rows.append([line.name, line.value, line.interval, *([line.true or "-"] if truth else []), status])
     if rows:
         print_table(headings, rows)
-
-
-def show_run(result: Outcome, written: Path | None, *, as_json: bool) -> None:
-    if as_json:
-        print_json(result.to_dict())
-        return
-    paragraph((f"\n{result.case.name}", "bold"), f"  {result.case.about}")
-    for sentence in result.sentences:
-        paragraph(sentence)
-    print_table(("quantity", "value"), result.rows)
-    if result.known:
-        answers = [(name, str(pair["known"]), str(pair["found"])) for name, pair in result.known.items()]
-        paragraph("\nKnown of this scenario, and what the engine finds:")
-        print_table(("answer", "known", "found"), answers)
-    count, events = result.run.event_counts().total(), list(itertools.islice(result.run.each_event(), SHOWN_EVENTS))
-    if events:
-        several = any(event.contact for event in events)
-        rows = [
-            (f"{event.time:.9g}", event.kind, *([str(event.contact + 1)] if several else []), event.mode)
-            for event in events
-        ]
-        headings = ("time [s]", "event", *(["contact"] if several else []), "mode that begins")
-        say()
-        print_table(headings, rows)
-        if count > len(rows):
-            say(f"... and {count - len(rows)} more{', in events.csv' if written is not None else ''}")
-    if written is not None:
-        say(f"Results: {written}")

@@ -1,7 +1,5 @@
-from stickslip.story.rig import publish_rig as publish_rig
 from stickslip.story.simulation import Outcome as Outcome
 from stickslip.story.simulation import outcome as outcome
-from stickslip.story.simulation import publish_run as publish_run
 from stickslip.story.simulation import require_output as require_output
 from stickslip.story.story import Line as Line
 from stickslip.story.story import Story as Story

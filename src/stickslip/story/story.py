@@ -26,7 +26,8 @@ TELLERS = {
     "DecayFindings": "decay.of_findings", "DecayComparison": "decay.of_comparison",
     "SqueakFindings": "squeak.of_findings", "SqueakComparison": "squeak.of_comparison",
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
-    "Trajectory": "simulation.of_run",
+    "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
+    "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
     "Bifurcation": "regimes.of_bifurcation", "Basins": "regimes.of_basins", "Boundary": "regimes.of_boundary",
     "Dither": "regimes.of_dither", "Dataset": "maps.of_map",
     "Estimate": "estimates.of_one", "list": "estimates.of_several", "tuple": "estimates.of_several",
@@ -193,7 +194,8 @@ def summary(result: Any, **context: Any) -> Story:
         :func:`simulate` or another question returned; or a sequence of estimates.
     **context
         What the result does not hold itself: as ``record`` the one that plain estimates, a law or a curve was found
-        in; of a law fitted to several all of them. As ``system`` what moved on a map that :func:`sweep` made.
+        in; of a law fitted to several all of them. As ``system`` what moved on a map that :func:`sweep` made. Of a run
+        and of a record ``form`` names the format of the file that is written: csv, h5 or parquet.
 
     Returns
     -------
