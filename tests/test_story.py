@@ -32,7 +32,7 @@ def test_figures_are_drawn_when_they_are_looked_at() -> None:
 def test_results_json_of_a_record_keeps_its_keys() -> None:
     findings = ss.answers.Findings("run", ss.datasets.demo())
     assert set(ss.summary(findings).data()) == {
-        "name", "faults", "contradiction", "settings", "normal_load", "estimates", "regression_residual", "truth", "notes",
-        "history",
+        "name", "faults", "contradiction", "settings", "normal_load", "estimates", "regression_residual", "truth",
+        "notes", "history",
     }  # fmt: skip
     assert set(ss.summary([LEVEL]).data()) == {"estimates"}
