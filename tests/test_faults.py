@@ -233,12 +233,14 @@ class Answers:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages that cost nothing: what is tried is how they are written."""
 
-    def sections(results: Any) -> list[Any]:
+    def told(results: Any) -> Any:
         clips = [SimpleNamespace(name="burst", wav=b"RIFF")]
-        return [SimpleNamespace(words=SimpleNamespace(title=results.name), plates=[Drawn()], clips=clips)]
+        part = SimpleNamespace(title=results.name, plates=[Drawn()], clips=clips)
+        return SimpleNamespace(part=part, data=results.to_dict, write=lambda draft: None)
 
-    monkeypatch.setattr(folder_module, "sections_of", sections)
-    monkeypatch.setattr(folder_module, "render", lambda parts: f"<title>{parts[0].words.title}</title>")
+    monkeypatch.setattr(folder_module, "summary", told)
+    monkeypatch.setattr(folder_module, "sections", lambda story, png: [story.part])
+    monkeypatch.setattr(folder_module, "render", lambda stories: f"<title>{stories[0].title}</title>")
 
 
 def results_in(folder: Path) -> str | None:

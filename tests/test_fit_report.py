@@ -38,7 +38,7 @@ def test_the_law_is_written_for_other_programs(tmp_path: Path) -> None:
     record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
     found = ss.fit_curve(record, curve="coulomb")
     assert found.law is not None
-    folder = ss.story.publish_fit(found, folder=tmp_path / "fit", records=[record])
+    folder = ss.publish(found, folder=tmp_path / "fit", record=record)
     written = {file.name: file.read_text(encoding="utf-8") for file in (folder / "law").iterdir()}
     forms = ("toml", "python", "c", "mujoco", "modelica", "simulink")
     for form in forms:
@@ -57,7 +57,7 @@ def test_a_fit_leaves_the_results_of_an_analysis_alone() -> None:
 def test_the_fitted_law_can_be_simulated_as_it_was_written(tmp_path: Path) -> None:
     record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
     found = ss.fit_curve(record, curve="coulomb")
-    folder = ss.story.publish_fit(found, folder=tmp_path / "fit", records=[record])
+    folder = ss.publish(found, folder=tmp_path / "fit", record=record)
     case = ss.systems.read_system(folder / "law" / "law.toml")
     assert case.system.law == found.law
     assert (case.system.mass, case.system.stiffness, case.duration) == (2.42, 2310.0, record.duration)
@@ -75,7 +75,7 @@ def test_a_law_fitted_to_a_pull_is_written_with_the_pull(tmp_path: Path) -> None
     made = {"x": np.cumsum(v) / 1000, "v": v, "z": z, "friction": 1.1 + rng.normal(0, 0.01, t.size)}
     step = ss.record.Step("friction_force", {"mass": 2.42, "stiffness": 2310.0, "contact": "ground"}, "")
     record = dataclasses.replace(ss.Record.of(made, fs=1000), history=(step,))
-    folder = ss.story.publish_fit(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", records=[record])
+    folder = ss.publish(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", record=record)
     drive = ss.systems.read_system(folder / "law" / "law.toml").system.drive
     assert isinstance(drive, ss.drives.Ramp)
     assert drive.speed == pytest.approx(2e-3, rel=1e-3)
@@ -104,22 +104,22 @@ def test_a_single_fitted_law_is_shown_and_written_too(tmp_path: Path) -> None:
     record = rig.measure(ss.simulate(slider, duration=1.6), fs=2000, rng=1, start=0.8)
     found = ss.fit_law(record, slider.having(kinetic=1.0))
     assert [plate.name for plate in ss.figures(found)] == ["fit-1"]
-    folder = ss.story.publish_fit(found, folder=tmp_path / "fit", records=[record])
+    folder = ss.publish(found, folder=tmp_path / "fit", record=record)
     told = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     assert (told["law"], told["estimates"][0]["value"]) == ("Coulomb", found.law.kinetic)
     assert ss.systems.read_system(folder / "law" / "law.toml").system.law == found.law
-    assert ss.story.fit_summary(found, records=[record], name="run").headline[0] == (
+    assert ss.summary(found, record=record).headline[0] == (
         f"The law Coulomb, fitted to x: kinetic {found.law.kinetic:.3f} N."
     )
     ahead = ss.fit_law(record, found.oscillator, free=(), intervals=False)
-    assert "as it was given, predicts x" in ss.story.fit_summary(ahead, records=[record], name="run").headline[0]
+    assert "as it was given, predicts x" in ss.summary(ahead, record=record).headline[0]
 
 
 def test_a_law_without_a_mass_says_what_it_lacks(tmp_path: Path) -> None:
     t = np.arange(8000) / 1000
     v = 0.1 * np.sin(2 * np.pi * t)
     record = ss.Record.of({"v": v, "friction": np.sign(v)}, fs=1000)
-    folder = ss.story.publish_fit(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", records=[record])
+    folder = ss.publish(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", record=record)
     file = folder / "law" / "law.toml"
     assert file.read_text(encoding="utf-8").startswith("# a law alone: to simulate it, add [system]")
     with pytest.raises(ss.errors.ModelError, match=r"law.toml holds a law alone; .* add \[system\]"):
@@ -129,7 +129,7 @@ def test_a_law_without_a_mass_says_what_it_lacks(tmp_path: Path) -> None:
 def test_a_curve_without_a_law_has_none(tmp_path: Path) -> None:
     record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
     found = ss.fit_curve(record, curve="asymmetric")
-    folder = ss.story.publish_fit(found, folder=tmp_path / "fit", records=[record])
+    folder = ss.publish(found, folder=tmp_path / "fit", record=record)
     assert found.law is None
     assert not (folder / "law").exists()
 

@@ -132,7 +132,7 @@ def test_a_folder_of_results_is_clean_of_the_name(tmp_path: Path) -> None:
 def test_the_page_shows_what_it_is_told(tmp_path: Path) -> None:
     estimate = ss.Estimate.normal(f"friction {EVIL}<b>", 1.0, sd=0.1, unit=f"N{EVIL}", method=f"by {EVIL}{BYTES}")
     record = ss.Record.of({"x": np.arange(9.0)}, fs=10).with_channel("q", np.arange(9.0), unit=f"q{EVIL}")
-    page = ss.report([estimate], record, tmp_path / "page.html").read_text("utf-8")
+    page = ss.report([estimate], tmp_path / "page.html", record=record).read_text("utf-8")
     assert not hidden(page)
     assert "\\u001b[31m" in page
     assert "&lt;b&gt;" in page

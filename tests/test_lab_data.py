@@ -452,7 +452,7 @@ def test_a_record_of_velocity_and_friction_is_fitted_without_mass_and_spring(cli
     answer = answered(client, "fit", key)
     assert 'the curve "stribeck"' in answer["headline"][0]
     record = ss.read_record(path)
-    told = ss.story.fit_summary(ss.fit_curve(record, curve="stribeck"), records=[record], name="").lines[0]
+    told = ss.summary(ss.fit_curve(record, curve="stribeck"), record=record).lines[0]
     assert answer["lines"][0][:2] == [told.name, told.value]
 
 

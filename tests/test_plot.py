@@ -17,10 +17,10 @@ from stickslip.answers.findings import Findings
 from stickslip.answers.questions import analyze
 from stickslip.plot.comparison import plot_load_dependence
 from stickslip.plot.contact import plot_velocity_loop
-from stickslip.plot.figures import figures
 from stickslip.plot.plate import Plate
 from stickslip.plot.style import COLUMNS, STYLE, envelope, prefixed, thinned
 from stickslip.plot.traces import close_up, plot_force_balance, plot_traces
+from stickslip.story.story import figures
 
 FS = 500.0
 
@@ -230,7 +230,7 @@ def test_units_are_chosen_to_be_read(peak: float, unit: str, shown: str) -> None
 def test_a_result_without_figures_is_refused_in_a_sentence() -> None:
     wave = np.sin(2 * np.pi * 500 * np.arange(4000) / 8000)
     heard = ss.find_squeaks(ss.Record.of({"sound": wave}, fs=8000))
-    with pytest.raises(ss.errors.ModelError, match=r"figures of a Squeaks; .* analyze_squeaks, "):
+    with pytest.raises(ss.errors.ModelError, match=r"a Squeaks; .* analyze_squeaks, "):
         ss.figures(heard)
 
 

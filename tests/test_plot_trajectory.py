@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 import stickslip as ss
 from stickslip.plot.animation import frames
-from stickslip.plot.figures import figures
 from stickslip.plot.style import BLUE, SKY
 from stickslip.plot.trajectory import (
     curve,
@@ -24,6 +23,7 @@ from stickslip.plot.trajectory import (
 )
 from stickslip.solve.energies import energy
 from stickslip.solve.trajectory import Trajectory
+from stickslip.story.story import figures
 
 
 def motion(name: str, **run: float) -> Trajectory:

@@ -23,8 +23,8 @@ from stickslip.estimate import Estimate
 from stickslip.story import folder as folder_module
 from stickslip.story.folder import publish
 from stickslip.story.page import report
-from stickslip.story.summary import summary
-from stickslip.story.words import doubts, headline, interval_of, value_of
+from stickslip.story.story import summary
+from stickslip.story.words import doubts, interval_of, value_of
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
 
@@ -83,7 +83,7 @@ def everything(folder: Path) -> set[str]:
 
 
 def test_the_page_asks_nothing_of_a_network(demo: Findings, tmp_path: Path) -> None:
-    text = report(demo, None, tmp_path / "report.html").read_text(encoding="utf-8")
+    text = report(demo, tmp_path / "report.html").read_text(encoding="utf-8")
     page = Page(text)
     assert page.open == []
     loading = {("img", "src"), ("script", "src"), ("link", "href"), ("iframe", "src"), ("object", "data")}
@@ -94,7 +94,7 @@ def test_the_page_asks_nothing_of_a_network(demo: Findings, tmp_path: Path) -> N
 
 
 def test_the_page_tells_a_person_first_and_everything_after(demo: Findings, tmp_path: Path) -> None:
-    text = Page(report(demo, None, tmp_path / "report.html").read_text(encoding="utf-8")).text
+    text = Page(report(demo, tmp_path / "report.html").read_text(encoding="utf-8")).text
     places = [text.index(part) for part in (
         "The contact slides against 1.1", "Friction against velocity", "Numbers", "True value",
         "What was wrong with the record", "Settings", "What was done, in order", "Made by stickslip",
@@ -110,7 +110,7 @@ def test_the_page_holds_the_checksum_of_what_was_read(tmp_path: Path) -> None:
     record = slid(1.0, 2.0).record
     path = ss.write_record(ss.Record.of(dict(record.samples), fs=500.0), tmp_path / "slide.parquet")
     findings = analyze(ss.read_record(path, channels={name: name for name in record}))
-    text = report(findings, None, tmp_path / "report.html").read_text(encoding="utf-8")
+    text = report(findings, tmp_path / "report.html").read_text(encoding="utf-8")
     assert hashlib.sha256(path.read_bytes()).hexdigest() in text
     assert findings.name == "slide.parquet"
 
@@ -121,8 +121,8 @@ def test_what_a_file_says_is_text_and_never_markup(demo: Findings, tmp_path: Pat
     step = ss.record.Step(evil, {evil: [{"name": evil}]}, evil)
     record = replace(demo.record, history=(step,))
     findings = replace(demo, name=evil, notes=(evil,), settings={**demo.settings, "damper": evil}, record=record)
-    for results, of in ((findings, None), ([estimate], record)):
-        page = Page(report(results, of, tmp_path / "report.html").read_text(encoding="utf-8"))
+    for results, of in ((findings, {}), ([estimate], {"record": record})):
+        page = Page(report(results, tmp_path / "report.html", **of).read_text(encoding="utf-8"))
         assert not [tag for tag, *_ in page.attributes if tag == "script"]
         assert "<script>" not in (tmp_path / "report.html").read_text(encoding="utf-8")
         assert evil in page.text
@@ -130,13 +130,13 @@ def test_what_a_file_says_is_text_and_never_markup(demo: Findings, tmp_path: Pat
 
 def test_plain_estimates_have_a_page_with_their_record(demo: Findings, tmp_path: Path) -> None:
     friction = Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="by hand")
-    text = Page(report([friction], demo.record, tmp_path / "report.html").read_text(encoding="utf-8")).text
+    text = Page(report([friction], tmp_path / "report.html", record=demo.record).read_text(encoding="utf-8")).text
     assert "1.318 N" in text
     assert "1.310 to 1.326 N" in text
     assert "The check-up found nothing wrong" in text
     for nothing in ([], ["1.3 N"]):
         with pytest.raises(EstimateError, match="a report of"):
-            report(nothing, None, tmp_path / "none.html")  # type: ignore[arg-type]
+            report(nothing, tmp_path / "none.html")  # type: ignore[arg-type]
     assert everything(tmp_path) == {"report.html"}
 
 
@@ -149,13 +149,13 @@ def test_faults_and_doubts_are_told(tmp_path: Path) -> None:
     told = summary(doubtful)
     assert told.faults == [str(fault) for fault in faults]
     assert any("1 fault" in caution for caution in told.cautions)
-    text = Page(report(doubtful, None, tmp_path / "r.html").read_text(encoding="utf-8")).text
+    text = Page(report(doubtful, tmp_path / "r.html").read_text(encoding="utf-8")).text
     assert str(faults[0]) in text
 
 
 def test_a_comparison_leads_to_each_record(tmp_path: Path) -> None:
     comparison = compare([slid(0.3 * n, n, f"load {n:g}.csv") for n in (1.0, 2.0, 4.0)])
-    page = Page(report(comparison, None, tmp_path / "r.html").read_text(encoding="utf-8"))
+    page = Page(report(comparison, tmp_path / "r.html").read_text(encoding="utf-8"))
     links = [str(value)[1:] for tag, name, value in page.attributes if (tag, name) == ("a", "href")]
     targets = {value for _, name, value in page.attributes if name == "id"}
     assert len(links) == 3
@@ -183,10 +183,10 @@ def test_numbers_carry_the_digits_that_they_are_sure_of(estimate: Estimate, valu
 def test_the_headline_names_the_direction_of_a_slope(demo: Findings) -> None:
     assert demo.loops is not None
     falling = Estimate.normal("slope", -3.0, sd=0.1, unit="N s/m", method="")
-    sentences = " ".join(headline(replace(demo, loops=replace(demo.loops, slope=falling))))
+    sentences = " ".join(summary(replace(demo, loops=replace(demo.loops, slope=falling))).headline)
     assert "falls with speed" in sentences
     doubted = replace(falling, status="the sliding speed hardly varies")
-    assert "with speed" not in " ".join(headline(replace(demo, loops=replace(demo.loops, slope=doubted))))
+    assert "with speed" not in " ".join(summary(replace(demo, loops=replace(demo.loops, slope=doubted))).headline)
     assert "2 stops in each cycle" in sentences
 
 
@@ -194,7 +194,7 @@ def test_the_share_that_sticks_is_told_as_its_interval(demo: Findings) -> None:
     """Its value is the upper end: creep below the threshold counts as sticking."""
     assert demo.sticks is not None
     share = Estimate("stuck share of the time", 0.332, (0.26, 0.334), 0.02, "1", "")
-    told = " ".join(headline(replace(demo, sticks=replace(demo.sticks, share=share))))
+    told = " ".join(summary(replace(demo, sticks=replace(demo.sticks, share=share))).headline)
     assert "It sticks 26 to 33 % of the time" in told
 
 
@@ -205,7 +205,7 @@ def test_directions_that_differ_are_told_of_a_regression_too() -> None:
     noise = np.random.default_rng(0).normal(0, 0.05, time.size)
     for back in (2.0, 3.0):
         force = 3.0 * a + np.where(v > 0, 5.0, 3.0 + back) * v + np.where(v > 0, 2.0, -back) + noise
-        told = " ".join(headline(analyze(ss.Record.of({"x": x, "force": force}, fs=1000))))
+        told = " ".join(summary(analyze(ss.Record.of({"x": x, "force": force}, fs=1000))).headline)
         differ = re.search(r"The two directions differ: ([\d.]+) N forward and ([\d.]+) N back", told)
         assert (differ is not None) == (back == 3.0), told
         if differ is not None:

@@ -18,6 +18,7 @@ from PIL import Image
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.files.write import WRITERS
+from stickslip.story import folder as folder_module
 from stickslip.story import simulation
 
 SLIDER = """
@@ -80,7 +81,7 @@ def test_a_scenario_is_shown_with_its_known_answers() -> None:
     assert result.exit_code == 0, result.output
     assert "comes to rest after 3.142 s, at a displacement of 250 mm" in result.stdout
     assert "3.14159265  stick" in result.stdout
-    assert result.stdout.rstrip().endswith("Results: FD-4-stickslip")
+    assert result.stdout.rstrip().endswith("Report: FD-4-stickslip/report.html")
     for answer in told("FD-4")["known_answers"].values():
         assert answer["found"] == pytest.approx(answer["known"], rel=1e-12)
 
@@ -89,7 +90,8 @@ def test_a_file_gives_a_folder_that_holds_the_motion() -> None:
     result = run("slider.toml")
     assert result.exit_code == 0, result.output
     folder = Path("slider-stickslip")
-    assert {path.name for path in folder.iterdir()} == {"results.json", "events.csv", "record.csv", "figures"}
+    held = {"report.html", "results.json", "events.csv", "record.csv", "figures"}
+    assert {path.name for path in folder.iterdir()} == held
     assert {path.stem for path in (folder / "figures").iterdir()} == FIGURES
     record = ss.read_record(folder / "record.csv")
     motion = ss.simulate(ss.systems.read_system("slider.toml").system, cycles=30)
@@ -263,7 +265,7 @@ def test_an_error_while_writing_leaves_nothing(monkeypatch: pytest.MonkeyPatch) 
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(simulation, "write_figures", full)
+    monkeypatch.setattr(folder_module, "write_figures", full)
     result = run("slider.toml")
     assert result.exit_code == 1
     assert "No space left on device" in result.stderr

@@ -140,12 +140,12 @@ def test_a_map_that_can_not_be_drawn_says_why(tmp_path: Path) -> None:
     slider = forced(0.8, 0.5)
     cube = {"frequency": [0.1, 0.13], "kinetic": [2.0, 3.0], ("mass", "stiffness"): [(1, 1), (2, 2)]}
     atlas = ss.sweep(slider, cube, measures=["stops"], settle=2, cycles=2)
-    page = (ss.story.publish_map(atlas, folder=tmp_path / "cube", system=slider) / "report.html").read_text("utf-8")
+    page = (ss.publish(atlas, folder=tmp_path / "cube", system=slider) / "report.html").read_text("utf-8")
     assert "over frequency and kinetic and mass with stiffness: 8 at rest" in page
     assert "There is no figure: the map is over 3 parameters" in page
     assert "Nothing moves anywhere" in page
     thin = ss.sweep(slider, {**cube, "kinetic": [0.5]}, measures=["stops"], settle=2, cycles=2)
-    folder = ss.story.publish_map(thin.isel(mass_stiffness=[0]), folder=tmp_path / "thin", system=slider)
+    folder = ss.publish(thin.isel(mass_stiffness=[0]), folder=tmp_path / "thin", system=slider)
     assert "no figure" not in (folder / "report.html").read_text("utf-8")
     assert (folder / "figures" / "stops.png").is_file()
 

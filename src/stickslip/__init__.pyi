@@ -51,7 +51,6 @@ from stickslip.maps.sweep import sweep as sweep
 from stickslip.oscillator import Oscillator as Oscillator
 
 # telling
-from stickslip.plot.figures import figures as figures
 from stickslip.record.record import Record as Record
 from stickslip.rig.rig import Rig as Rig
 from stickslip.signals.wavelet import wavelet_map as wavelet_map
@@ -61,7 +60,8 @@ from stickslip.squeak.bursts import find_squeaks as find_squeaks
 from stickslip.squeak.stability import stability as stability
 from stickslip.story.folder import publish as publish
 from stickslip.story.page import report as report
-from stickslip.story.summary import summary as summary
+from stickslip.story.story import figures as figures
+from stickslip.story.story import summary as summary
 from stickslip.structure import Contact as Contact
 from stickslip.structure import Structure as Structure
 

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
-from stickslip.cli.records import default_folder, groups_of, name_of, read, rig_of
-from stickslip.cli.terminal import paragraph, print_table, say, say_json
-from stickslip.cli.words import spoken
-
-if TYPE_CHECKING:
-    from stickslip import Record
-    from stickslip.law import CurveFit, LawComparison
-
+from stickslip.cli.records import default_folder, groups_of, read, rig_of
+from stickslip.cli.show import show
 
 CURVES = (
     "coulomb", "viscous", "stribeck", "asymmetric", "tabulated", "dahl", "jenkins", "iwan", "maxwell", "aging", "slip",
 )  # fmt: skip
-LONG = 30  # letters of a status that is not said twice
 
 
 @click.command()
@@ -89,9 +82,8 @@ def fit(
             progress=lambda share: tell(f"fitting and comparing {words}, {share:.0%}", 1 + share),
         )  # fmt: skip
         tell("drawing and writing", 2)
-        name = name_of(groups[0]) if len(groups) == 1 else f"{len(groups)} records"
-        written = ss.story.publish_fit(result, folder=folder, records=records, name=name) if folder else None
-    _show(result, records, name, written, as_json=as_json)
+        written = ss.publish(result, folder=folder, record=records) if folder else None
+    show(result, written, as_json=as_json, record=records)
 
 
 def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked: bool) -> None:
@@ -106,27 +98,3 @@ def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked:
 def _oscillator(file: Path | None) -> object:
     """The system of a file; whether it is of one mass is for the fit to say."""
     return None if file is None else ss.systems.read_system(file).system
-
-
-def _show(
-    result: LawComparison | CurveFit, records: list[Record], name: str, written: Path | None, *, as_json: bool
-) -> None:
-    if as_json:
-        say_json(ss.story.fit_numbers(result))
-        return
-    summary = ss.story.fit_summary(result, records=records, name=name)
-    paragraph((f"\n{summary.title}", "bold"))
-    for sentence in (*summary.headline, *summary.cautions):
-        paragraph(spoken(sentence))
-    told = " ".join((*summary.headline, *summary.cautions))
-    rows = [[line.name, line.value, line.interval, _brief(line.status, told)] for line in summary.lines]
-    print_table(("quantity", "value", "95 % interval", "how sure"), rows)
-    if summary.verdicts:
-        print_table(("law tried", "verdict"), summary.verdicts)
-    if written is not None:
-        say(f"Report: {written / 'report.html'}")
-
-
-def _brief(status: str, told: str) -> str:
-    """A status in its column; a long one that stands above the table is not said once more in each row."""
-    return "as said above" if len(status) > LONG and status in told else status

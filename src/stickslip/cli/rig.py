@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +12,7 @@ import stickslip as ss
 from stickslip.cli.cases import case_options, folder_name, wanted_case
 from stickslip.cli.options import pair, result_options
 from stickslip.cli.progress import progress
-from stickslip.cli.show import print_json
-from stickslip.cli.terminal import print_table, say
-from stickslip.cli.words import spoken
+from stickslip.cli.show import show
 
 if TYPE_CHECKING:
     from stickslip import Record, Rig
@@ -99,16 +97,9 @@ def rig(case: str, output: Path | None, as_json: bool, plan: bool, **options: An
         tell("simulating", 0)
         run = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", 0)).run
         results = _planned(run, bench, tell, options) if plan else _measured(run, bench, tell, options)
-        written = ss.story.publish_rig(results, folder=folder, form=form) if folder else None
-    if as_json:
-        print_json(_told(results))
-        return
-    if isinstance(results, ss.answers.ExperimentPlan):
-        _show_plan(results, needs)
-    else:
-        _show_record(results)
-    if written is not None:
-        say(f"Results: {written}")
+        context = {"needs": needs} if plan else {"form": form}
+        written = ss.publish(results, folder=folder, **context) if folder else None
+    show(results, written, as_json=as_json, **context)
 
 
 def _bench(preset: str, changes: tuple[str, ...]) -> Rig:
@@ -142,32 +133,3 @@ def _planned(
     """Many."""
     chosen = {name: options[name] for name in ("draws", "seed", "start")}
     return ss.answers.plan_experiment(run, rig=bench, rates=options["rates"] or RATES, progress=tell, **chosen)
-
-
-def _told(results: Record | ExperimentPlan) -> dict[str, Any]:
-    if isinstance(results, ss.answers.ExperimentPlan):
-        return results.to_dict()
-    return {"fs": results.fs, "truth": dict(results.truth), "faults": [str(fault) for fault in results.check()]}
-
-
-def _show_record(record: Record) -> None:
-    say(repr(record))
-    rows = [(name, f"{value:.6g}") for name, value in record.truth.items() if name != "events"]
-    print_table(("what is true", "SI"), rows)
-    for fault in record.check():
-        say(f"- {spoken(fault)}")
-
-
-def _show_plan(plan: ExperimentPlan, needs: Sequence[tuple[str, str]]) -> None:
-    rows = [
-        [f"{setup.fs:g}", ", ".join(setup.sensors), *(str(setup.accuracy[each]) for each in plan.questions)]
-        for setup in plan.setups
-    ]
-    print_table(("fs [Hz]", "sensors", *plan.questions), rows)
-    say(f"Root-mean-square errors of {plan.draws} record{'s' * (plan.draws > 1)} at each rate.")
-    for reason in plan.refusals:
-        say(f"- {spoken(reason)}")
-    for question, error in needs:
-        setup = plan.enough(question, error)
-        found = f"{', '.join(setup.sensors)} at {setup.fs:g} Hz" if setup else "none of these"
-        say(f"{question} within {error}: {found}")

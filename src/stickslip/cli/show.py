@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,25 +11,9 @@ from stickslip.cli.terminal import paragraph, print_table, say, say_json
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from typing import TypeAlias
+    from stickslip.story import Story
 
-    from stickslip.answers import (
-        Comparison,
-        DecayComparison,
-        DecayFindings,
-        Findings,
-        SqueakComparison,
-        SqueakFindings,
-        TimeFrequency,
-    )
-    from stickslip.story import Outcome
-
-    Asked: TypeAlias = (
-        Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | SqueakFindings | SqueakComparison
-    )
-
-
-SHOWN_EVENTS = 12
+LONG = 30  # letters of a status that is not said twice
 
 
 def print_json(told: Mapping[str, Any]) -> None:
@@ -38,79 +21,44 @@ def print_json(told: Mapping[str, Any]) -> None:
     say_json({"program": "stickslip", "version": ss.__version__, **told})
 
 
-def show(
-    results: Asked,
-    written: Path | None,
-    *,
-    as_json: bool,
-) -> None:
+def show(result: Any, written: Path | None, *, as_json: bool, **context: Any) -> None:
+    """A result as its story tells it; `context` as in ``publish``."""
+    story = ss.summary(result, **context)
     if as_json:
-        print_json(results.to_dict())
+        print_json(story.data())
         return
-    parts = getattr(results, "findings", ())
-    if isinstance(results, ss.answers.SqueakComparison):  # a line each: the page has the rest
-        _print_lines(parts)
-        parts = ()
-    for part in (*parts, results):
-        _print_table(part)
+    for part in story.parts:
+        if story.brief:
+            paragraph((part.title, "bold"), f": {spoken(part.headline[0])}")
+        else:
+            _print_story(part)
+    _print_story(story)
     if written is not None:
         say(f"Report: {written / 'report.html'}")
 
 
-def _print_lines(parts: Sequence[Asked]) -> None:
-    for part in parts:
-        told = ss.summary(part)
-        paragraph((told.title, "bold"), f": {spoken(told.headline[0])}")
-
-
-def _print_table(results: Asked) -> None:
-    summary = ss.summary(results)
-    paragraph((f"\n{summary.title}", "bold"))
-    faults = [f"- {fault}" for fault in summary.faults or () if fault not in summary.headline]
-    for sentence in (*summary.headline, *summary.cautions, *faults):
+def _print_story(story: Story) -> None:
+    paragraph((f"\n{story.title}", "bold"))
+    faults = [f"- {fault}" for fault in story.faults or () if fault not in story.headline]
+    for sentence in (*story.headline, *story.cautions, *faults):
         paragraph(spoken(sentence))
-    truth = summary.has_truth
-    headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")
-    rows = [
-        [line.name, line.value, line.interval, *([line.true or "-"] if truth else []), line.status]
-        for line in summary.lines
-    ]
-    if rows:
-        print_table(headings, rows)
-    for each in summary.tables:
-        paragraph(f"\n{each.title}")
-        print_table(each.headings, each.rows)
-        if each.note:
-            paragraph((each.note, "dim"))
-    if summary.verdicts:
-        print_table(("motion tried", "verdict"), summary.verdicts)
-    for note in summary.notes:
+    _print_lines(story)
+    for table in story.tables:
+        paragraph(f"\n{table.title}")
+        print_table(table.headings, table.rows)
+        if table.note:
+            paragraph((table.note, "dim"))
+    for note in story.notes:
         paragraph((f"Note: {spoken(note)}", "dim"))
 
 
-def show_run(result: Outcome, written: Path | None, *, as_json: bool) -> None:
-    if as_json:
-        print_json(result.to_dict())
-        return
-    paragraph((f"\n{result.case.name}", "bold"), f"  {result.case.about}")
-    for sentence in result.sentences:
-        paragraph(sentence)
-    print_table(("quantity", "value"), result.rows)
-    if result.known:
-        answers = [(name, str(pair["known"]), str(pair["found"])) for name, pair in result.known.items()]
-        paragraph("\nKnown of this scenario, and what the engine finds:")
-        print_table(("answer", "known", "found"), answers)
-    count, events = result.run.event_counts().total(), list(itertools.islice(result.run.each_event(), SHOWN_EVENTS))
-    if events:
-        several = any(event.contact for event in events)
-        rows = [
-            (f"{event.time:.9g}", event.kind, *([str(event.contact + 1)] if several else []), event.mode)
-            for event in events
-        ]
-        headings = ("time [s]", "event", *(["contact"] if several else []), "mode that begins")
-        say()
+def _print_lines(story: Story) -> None:
+    """The numbers. A long status that stands above the table is not said once more in each row."""
+    truth, said = story.has_truth, " ".join((*story.headline, *story.cautions))
+    headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")
+    rows = []
+    for line in story.lines:
+        status = "as said above" if len(line.status) > LONG and line.status in said else line.status
+        rows.append([line.name, line.value, line.interval, *([line.true or "-"] if truth else []), status])
+    if rows:
         print_table(headings, rows)
-        if count > len(rows):
-            say(f"... and {count - len(rows)} more{', in events.csv' if written is not None else ''}")
-    if written is not None:
-        say(f"Results: {written}")

@@ -13,7 +13,7 @@ from stickslip.cli.cases import case_options, folder_name, wanted_case
 from stickslip.cli.interrupted import INTERRUPTED
 from stickslip.cli.options import result_options
 from stickslip.cli.progress import progress
-from stickslip.cli.show import show_run
+from stickslip.cli.show import show
 from stickslip.cli.terminal import say, say_json
 
 LIST_WIDTH = 100
@@ -60,8 +60,8 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
     with progress(4 if options["animation"] else 3) as tell:
         tell("simulating", 0)
         result = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", share))
-        written = ss.story.publish_run(result, folder=folder, tell=tell, **options) if folder else None
-    show_run(result, written, as_json=as_json)
+        written = ss.publish(result, folder=folder, tell=tell, **options) if folder else None
+    show(result, written, as_json=as_json, **options)
     if result.run.status == "interrupted":
         raise SystemExit(INTERRUPTED)
 

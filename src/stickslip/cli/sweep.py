@@ -9,7 +9,8 @@ import click
 import stickslip as ss
 from stickslip.cli.interrupted import INTERRUPTED
 from stickslip.cli.options import usable
-from stickslip.cli.terminal import paragraph, print_table, say, say_json
+from stickslip.cli.show import print_json, show
+from stickslip.cli.terminal import say
 
 
 @click.command()
@@ -34,19 +35,13 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     place = store if store is not None else file.with_suffix(".zarr")
     found = ss.sweep(asked.case.system, asked.grid, measures=asked.measures, cycles=asked.cycles, settle=asked.settle,
                      start=asked.case.start, engine=engine, store=place)  # fmt: skip
-    if output is not None:
-        ss.story.publish_map(found, folder=output, system=asked.case.system)
-    told, whole = ss.story.map_numbers(found), found.attrs["status"] == "complete"
+    story, whole = ss.summary(found), found.attrs["status"] == "complete"
+    written = ss.publish(found, folder=output, system=asked.case.system) if output is not None else None
     if as_json:
-        say_json({**told, "store": str(place)})
+        print_json({**story.data(), "store": str(place)})
         raise SystemExit(0 if whole else INTERRUPTED)
-    paragraph((f"\n{' x '.join(map(str, found.sizes.values()))} points, {found.attrs['status']}", "bold"))
-    rows = [[name, *(f"{part[key]:.6g}" if part[key] is not None else "-" for key in ("least", "most")),
-             str(part["known"]), part["unit"]] for name, part in told["variables"].items()]  # fmt: skip
-    print_table(("measure", "least", "most", "points", "unit"), rows)
+    show(found, written, as_json=False)
     say(f"Map: {place}")
-    if output is not None:
-        say(f"Report: {output / 'report.html'}")
     if not whole:
         say("Call again to go on.")
         raise SystemExit(INTERRUPTED)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import FormatError
+from stickslip.errors import FormatError, ModelError
 from stickslip.files.table import optional
 from stickslip.record.metadata import KEY, record_to_metadata, time_column
 from stickslip.record.record import Record
@@ -140,3 +140,9 @@ WRITERS: dict[str, Callable[[Path, Columns, str], None]] = {
     ".hdf5": _write_hdf5,
     ".parquet": _write_parquet,
 }
+
+
+def require_form(form: str) -> None:
+    """Refuse a format of records, as "csv", that is not written."""
+    if f".{form}" not in WRITERS:
+        raise ModelError(f"a record as '{form}'", f"it is written as {', '.join(w[1:] for w in WRITERS)}", "choose one")

@@ -15,6 +15,7 @@ from stickslip.lab.describe import curve, describe
 
 if TYPE_CHECKING:
     from stickslip import Record
+    from stickslip.story import Story
 
 FOLDER = "results"
 
@@ -46,15 +47,15 @@ def published(
     return _told(ss.summary(results))
 
 
-def _told(summary: Any) -> dict[str, Any]:
+def _told(story: Story) -> dict[str, Any]:
     """What the lab shows: the same words as the report and the command line. Also packs the folder."""
     shutil.make_archive(FOLDER, "zip", FOLDER)
     return {
-        "title": summary.title,
-        "headline": [on_the_page(each) for each in summary.headline],
-        "cautions": [on_the_page(each) for each in summary.cautions],
-        "lines": [[line.name, line.value, line.interval, line.status] for line in summary.lines],
-        "notes": [on_the_page(each) for each in summary.notes],
+        "title": story.title,
+        "headline": [on_the_page(each) for each in story.headline],
+        "cautions": [on_the_page(each) for each in story.cautions],
+        "lines": [[line.name, line.value, line.interval, line.status] for line in story.lines],
+        "notes": [on_the_page(each) for each in story.notes],
         "overlay": [],
     }
 
@@ -124,9 +125,8 @@ def fit(asked: Asked) -> dict[str, Any]:
         calibration=asked.options.get("calibration") or 0.01,
         progress=lambda share: asked.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
     )  # fmt: skip
-    name = asked.name(0) if len(records) == 1 else f"{len(records)} records"
-    ss.story.publish_fit(found, folder=FOLDER, records=records, name=name)
-    told = _told(ss.story.fit_summary(found, records=records, name=name))
+    ss.publish(found, folder=FOLDER, record=records)
+    told = _told(ss.summary(found, record=records))
     curves = [*_law_curves(asked, records, found)]
     return {**told, "overlay": curves, "state": fitted_system(Path(FOLDER, "law", "law.toml"))}
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +15,6 @@ from stickslip.maps.boundaries import Boundary
 from stickslip.maps.dither import Dither, dithered_friction
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import UNITS
-from stickslip.plot.plate import Plate, plate
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -345,28 +342,3 @@ def plot_dither(found: Dither) -> Figure:
     legend_above(bottom, columns=3)
     figure.align_ylabels([top, bottom])
     return figure
-
-
-def plates_of(result: Bifurcation | Basins | Boundary | Dither) -> tuple[Plate, ...]:
-    """The figure of one result, with its words."""
-    draw: Callable[[], Any]
-    if isinstance(result, Bifurcation):
-        draw, name, title = partial(plot_bifurcation, result), "bifurcation", "Motion along a parameter"
-        words = (
-            "Where the mass is once in each period of the drive: blue followed upwards, orange downwards; lines mark "
-            "where the kind of motion changes. Below, the largest multiplier: at 1 the motion ceases to attract."
-        )
-    elif isinstance(result, Basins):
-        draw, name, title = partial(plot_basins, result), "basins", "Which start leads where"
-        words = "Each start in the colour of the motion it leads to; crosses: where that motion is at phase zero."
-    elif isinstance(result, Dither):
-        draw, name, title = partial(plot_dither, result), "dither", "What dither does"
-        words = (
-            "Top: the longest stick left; below the line none outlasts a period of the dither. Bottom: the friction "
-            "left on average, and what the averaged law says; where they part, friction moves the mass in a period, "
-            "or the contact gives way."
-        )
-    else:
-        draw, name, title = partial(plot_boundary, result), "boundary", "Where the kind of motion changes"
-        words = "Points: found by bisection of exact runs. Line: the closed form."
-    return (plate(name, draw, title, words),)

@@ -35,7 +35,6 @@ WORDS = {
     "x": ("displacement", "m"), "v": ("velocity", "m/s"), "a": ("acceleration", "m/s^2"), "load": ("load cell", "N"),
     "friction": ("friction", "N"),
 }  # fmt: skip
-FITS = (LawComparison, LawFit, CurveFit)  # what has figures of its fit
 ALONG = {"v": ("velocity", "m/s"), "x": ("displacement", "m"), "t": ("time", "s")}
 COLOURS = (BLUE, GREEN, PURPLE, SKY, ORANGE)
 SHOWN = 0.4  # s of a record that are drawn: more can not be told apart on a page

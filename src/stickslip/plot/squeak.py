@@ -341,7 +341,7 @@ def plot_condition_loops(comparison: SqueakComparison) -> Figure:
     return figure
 
 
-def plates_of_squeaks(found: SqueakFindings) -> list[Plate]:
+def plates_of(found: SqueakFindings) -> list[Plate]:
     """The figures of one record."""
     squeaks = found.squeaks
     plates = [
@@ -388,7 +388,7 @@ def plates_of_squeaks(found: SqueakFindings) -> list[Plate]:
     return plates
 
 
-def plates_of_conditions(comparison: SqueakComparison) -> list[Plate]:
+def plates_together(comparison: SqueakComparison) -> list[Plate]:
     """The figures of several records side by side."""
     if all(each.loops is None for each in comparison.findings):
         return []

@@ -1,12 +1,8 @@
-from stickslip.story.fit import fit_numbers as fit_numbers
-from stickslip.story.fit import fit_summary as fit_summary
-from stickslip.story.fit import publish_fit as publish_fit
-from stickslip.story.maps import map_numbers as map_numbers
-from stickslip.story.maps import publish_map as publish_map
-from stickslip.story.rig import publish_rig as publish_rig
 from stickslip.story.simulation import Outcome as Outcome
 from stickslip.story.simulation import outcome as outcome
-from stickslip.story.simulation import publish_run as publish_run
 from stickslip.story.simulation import require_output as require_output
+from stickslip.story.story import Line as Line
+from stickslip.story.story import Story as Story
+from stickslip.story.story import Table as Table
 
 __all__: list[str]

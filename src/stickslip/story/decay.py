@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from stickslip.decay.answer import beginning, rig_units
 from stickslip.decay.choice import SIZE
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate
-from stickslip.story.words import WITHIN_DIGIT, interval_of, number, value_of
+from stickslip.plot.decay import plates_of, plates_together
+from stickslip.story.story import Line, Story, tried
+from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, leading, number, value_of
 
 MOST = 0.5  # of the power of what is left over
 OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
@@ -23,12 +26,36 @@ FAR = 0.2  # rad: a pendulum's swing that a straight spring does not follow
 METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
 
 
-def headline(result: DecayFindings | DecayComparison) -> list[str]:
-    """What was found, in a few sentences."""
-    return list(_together(result) if isinstance(result, DecayComparison) else _sentences(result))
+def of_findings(findings: DecayFindings) -> Story:
+    """One record."""
+    beside = [replace(each, status="for comparison") for each in findings.comparisons]
+    motions = () if findings.motion is None else [told[1:] for told in findings.motion.candidates]
+    return Story.of_record(
+        findings.name, findings.record, headline=[*leading(findings.faults), *headline(findings)],
+        cautions=cautions(findings),
+        lines=[Line.of(each, findings.true_value(each)) for each in (*findings.estimates, *beside)],
+        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
+        tables=[tried("motion", motions)] if motions else [],
+        draw=lambda: plates_of(findings), data=findings.to_dict,
+    )  # fmt: skip
 
 
-def settings(findings: DecayFindings) -> dict[str, str]:
+def of_comparison(comparison: DecayComparison) -> Story:
+    """Several records together."""
+    own = [
+        Line.of(number, each.true_value(number), name=f"{number.name}, {each.name}")
+        for each in comparison.findings
+        for number in (each.best.damping_ratio, each.best.dry_displacement, each.best.frequency)
+    ]
+    return Story(
+        f"{len(comparison.findings)} records together", list(_together(comparison)), doubts(comparison.estimates),
+        lines=[*map(Line.of, comparison.estimates), *own], notes=comparison.notes,
+        parts=[of_findings(each) for each in comparison.findings],
+        draw=lambda: plates_together(comparison), data=comparison.to_dict,
+    )  # fmt: skip
+
+
+def _settings(findings: DecayFindings) -> dict[str, str]:
     """Choices and constants, as text."""
     units = rig_units(findings.settings["channel"])
     told = {key: number(value, 0.0, units[key]) for key, value in findings.settings.items() if key in units}
@@ -43,7 +70,8 @@ def settings(findings: DecayFindings) -> dict[str, str]:
     }
 
 
-def _sentences(findings: DecayFindings) -> Iterator[str]:
+def headline(findings: DecayFindings) -> Iterator[str]:
+    """What was found, in a few sentences."""
     yield from _frictions(findings)
     yield from _left_over(findings)
     for note in findings.notes:
@@ -137,11 +165,6 @@ def _reach(estimate: Estimate) -> str:
         return value_of(estimate)
     two_sided = -math.inf < low < high < math.inf and not estimate.is_bound
     return f"within {words}" if two_sided else words
-
-
-def verdicts(findings: DecayFindings) -> list[tuple[str, str]]:
-    """The motions that were tried, in words, and what the record says of each."""
-    return [] if findings.motion is None else [(words, verdict) for _, words, verdict in findings.motion.candidates]
 
 
 def _both(ratio: Estimate, dry: Estimate) -> str:

@@ -14,31 +14,29 @@ from stickslip.errors import ModelError, RecordError
 from stickslip.plot.plate import Plate
 from stickslip.printing import printable
 from stickslip.squeak.listening import Clip
-from stickslip.story.page import Asked, render, sections_of
+from stickslip.story.page import render, sections
+from stickslip.story.story import summary
 from stickslip.whole import whole_folder
 
 PROGRAM = "stickslip"
 NUMBERS = "results.json"
 
 
-def publish(
-    results: Asked,
-    *,
-    folder: str | Path,
-) -> Path:
-    """Write ``report.html``, ``results.json``, the figures as SVG and PNG, and the bursts as WAV into a folder.
+def publish(result: Any, *, folder: str | Path, **context: Any) -> Path:
+    """Write ``report.html``, ``results.json``, the figures as SVG and PNG, and what else a result has into a folder.
 
-    The folder appears when all is written, and is on the disk itself then. An earlier one of ours is replaced in one
-    step where the system can do that (Linux, macOS); a folder that holds anything else is left alone. A file that
-    somebody puts there meanwhile stays.
+    That is each burst as WAV, and a fitted law for other programs. The folder appears when all is written, and is on
+    the disk itself then. An earlier one of ours is replaced in one step where the system can do that (Linux, macOS); a
+    folder that holds anything else is left alone. A file that somebody puts there meanwhile stays.
 
     Parameters
     ----------
-    results : Findings, Comparison, TimeFrequency, DecayFindings, DecayComparison, SqueakFindings or SqueakComparison
-        What :func:`analyze`, :func:`compare`, :func:`time_frequency`, :func:`analyze_decay`, :func:`compare_decays`,
-        :func:`analyze_squeaks` or :func:`compare_squeaks` returned.
+    result : Findings, Comparison or any other result
+        As in :func:`summary`.
     folder : path
         The folder to make.
+    **context
+        As in :func:`summary`: of a fit ``record`` tells what it was fitted to, and how the law's system moved.
 
     Returns
     -------
@@ -47,7 +45,7 @@ def publish(
     Raises
     ------
     ModelError
-        The folder holds something that is not ours.
+        The folder holds something that is not ours, or the result is of a kind that is not told.
     RecordError
         The folder can not be written.
 
@@ -63,13 +61,15 @@ def publish(
     """
     folder = Path(folder)
     check_folder(folder)
-    sections = sections_of(results, png=True)
-    with results_folder(folder, results.to_dict()) as draft:
-        (draft / "report.html").write_text(render(sections), encoding="utf-8")
-        for number, section in enumerate(sections):
-            prefix = f"{number}-{_fit_for_a_file(section.words.title)}-" if len(sections) > 1 else ""
-            write_figures(draft / "figures", prefix, section.plates)
-            _write_sounds(draft / "sounds", prefix, section.clips)
+    story = summary(result, **context)
+    stories = sections(story, png=True)
+    with results_folder(folder, story.data()) as draft:
+        (draft / "report.html").write_text(render(stories), encoding="utf-8")
+        for number, part in enumerate(stories):
+            prefix = f"{number}-{_fit_for_a_file(part.title)}-" if len(stories) > 1 else ""
+            write_figures(draft / "figures", prefix, part.plates)
+            _write_sounds(draft / "sounds", prefix, part.clips)
+        story.write(draft)
     return folder
 
 

@@ -38,7 +38,7 @@ def write_law(draft: Path, result: LawComparison | LawFit | CurveFit, records: S
         except ModelError:  # this law has no such form
             continue
         if form == "toml":
-            text = _whole(text, result, records[0])
+            text = _whole(text, result, records[0]) if records else f"{ALONE}\n{text}"
         (draft / "law" / file).write_text(text.rstrip("\n") + "\n", encoding="utf-8")
 
 

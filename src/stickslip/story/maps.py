@@ -1,112 +1,71 @@
-"""What is told of a map: its numbers, a page, and the folder that holds them with its figures."""
+"""A map over the parameters of a system, told."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from stickslip.plot.maps import plates_of
+from stickslip.plot.plate import Plate
 from stickslip.solve.tables import System
-from stickslip.story import page
-from stickslip.story.folder import check_folder, results_folder, write_figures
-from stickslip.story.summary import Summary
+from stickslip.story.story import Story, Table
 
 LOST = ("not run", "failed")  # outcomes that leave holes in a map
 
 
-def map_numbers(atlas: Any) -> dict[str, Any]:
-    """What a map holds, in plain data.
+def of_map(atlas: Any, *, system: System | None = None) -> Story:
+    """A map, with Den Hartog's boundary where the `system` that moved is given.
 
-    Parameters
-    ----------
-    atlas : xarray.Dataset
-        What :func:`sweep` returned.
-
-    Returns
-    -------
-    dict
-        The settings, and for each variable its least and most value, at how many points it is known, and its unit.
-
-    Examples
-    --------
-    >>> import stickslip as ss
-    >>> slider = ss.scenarios.forced(0.8, 0.5)
-    >>> atlas = ss.sweep(slider, {"kinetic": [0.5, 0.9]}, measures=["stops"], settle=40, cycles=10)
-    >>> map_numbers(atlas)["variables"]["normal_stops"]
-    {'least': 0.0, 'most': 2.0, 'known': 2, 'unit': '1'}
+    A map over more than two parameters that change has no figures, and its page says so.
     """
-    told = {}
+    measures = _measures(atlas)
+    title = f"{' x '.join(map(str, atlas.sizes.values()))} points, {atlas.attrs.get('status', 'complete')}"
+    rows = [
+        [name, *("-" if part[key] is None else f"{part[key]:.6g}" for key in ("least", "most")),
+         str(part["known"]), part["unit"]] for name, part in measures.items()
+    ]  # fmt: skip
+    return Story(
+        "Map", _headline(atlas), _cautions(atlas), settings=_settings(atlas.attrs),
+        tables=[Table(title, ("measure", "least", "most", "points", "unit"), rows)],
+        draw=lambda: _plates(atlas, system), data=lambda: {**atlas.attrs, "variables": measures},
+    )  # fmt: skip
+
+
+def _measures(atlas: Any) -> dict[str, dict[str, Any]]:
+    """Of each variable its least and most value, at how many points it is known, and its unit."""
+    found = {}
     for name, column in atlas.data_vars.items():
         values = abs(column) if column.dtype.kind == "c" else column
         known = int(values.notnull().sum())
         least, most = (float(values.min()), float(values.max())) if known else (None, None)
-        told[str(name)] = {"least": least, "most": most, "known": known, "unit": column.attrs.get("units", "1")}
-    return {**atlas.attrs, "variables": told}
+        found[str(name)] = {"least": least, "most": most, "known": known, "unit": column.attrs.get("units", "1")}
+    return found
 
 
-def publish_map(atlas: Any, *, folder: str | Path, system: System | None = None) -> Path:
-    """Write ``report.html``, ``results.json`` and the figures of a map as SVG and PNG into a folder.
-
-    The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
-    is left alone. A map over more than two parameters that change has no figures, and the page says so.
-
-    Parameters
-    ----------
-    atlas : xarray.Dataset
-        What :func:`sweep` returned.
-    folder : path
-        The folder to make.
-    system : Oscillator or Structure, optional
-        What moved, for Den Hartog's boundary, as in :func:`plot_map`.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ModelError
-        The folder holds something that is not ours.
-    RecordError
-        The folder can not be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> import stickslip as ss
-    >>> slider = ss.scenarios.forced(0.8, 0.5)
-    >>> grid = {"frequency": [0.1, 0.13, 0.16], "kinetic": [0.3, 0.6, 0.9]}
-    >>> atlas = ss.sweep(slider, grid, measures=["stops"], settle=40, cycles=10)
-    >>> folder = publish_map(atlas, folder=Path(tempfile.mkdtemp()) / "map", system=slider)
-    >>> sorted(path.name for path in folder.iterdir())
-    ['figures', 'report.html', 'results.json']
-    """
-    folder = Path(folder)
-    check_folder(folder)
+def _plates(atlas: Any, system: System | None) -> tuple[Plate, ...]:
     changing = sum(size > 1 for size in atlas.sizes.values())
     flat = atlas.squeeze() if 1 <= changing < len(atlas.dims) else atlas
-    plates = plates_of(flat, system) if 1 <= len(flat.dims) <= 2 else ()
-    section = page.section(_words(atlas), plates, png=True)
-    with results_folder(folder, map_numbers(atlas)) as draft:
-        (draft / "report.html").write_text(page.render([section]), encoding="utf-8")
-        (draft / "figures").mkdir()
-        write_figures(draft / "figures", "", section.plates)
-    return folder
+    return plates_of(flat, system) if 1 <= len(flat.dims) <= 2 else ()
 
 
-def _words(atlas: Any) -> Summary:
-    """How many motions over what, and what became of them."""
+def _counts(atlas: Any) -> dict[str, int]:
+    """How many motions ended in what."""
     status = atlas["status"]
     codes, words = status.attrs.get("flag_values", ()), status.attrs.get("flag_meanings", "").split()
-    counts = {
-        word.replace("_", " "): int(np.sum(status.values == code)) for code, word in zip(codes, words, strict=True)
-    }
-    became = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    return {word.replace("_", " "): int(np.sum(status.values == code)) for code, word in zip(codes, words, strict=True)}
+
+
+def _headline(atlas: Any) -> list[str]:
+    """How many motions over what, and what became of them."""
+    became = ", ".join(f"{count} {word}" for word, count in _counts(atlas).items() if count)
     over = " and ".join(_over(atlas, str(dim)) for dim in atlas.dims)
-    whole = atlas.attrs.get("status", "complete")
+    return [f"{atlas['status'].size} motions over {over}: {became}."]
+
+
+def _cautions(atlas: Any) -> list[str]:
+    counts, whole = _counts(atlas), atlas.attrs.get("status", "complete")
     cautions = [] if whole == "complete" else [f"The map is not whole: {whole}."]
     cautions += [f"{counts[word]} points have no answer: {word}." for word in LOST if counts.get(word)]
     if sum(size > 1 for size in atlas.sizes.values()) > 2:
@@ -114,10 +73,10 @@ def _words(atlas: Any) -> Summary:
             f"There is no figure: the map is over {len(atlas.dims)} parameters, and two can be drawn. Choose with "
             "sel() and draw that with plot_map(), or sweep over fewer."
         )
-    if counts.get("at rest") == status.size:
+    if counts.get("at rest") == atlas["status"].size:
         cautions.append("Nothing moves anywhere: friction holds the mass at every point. Drive it harder, or near its "
                         "own frequency.")  # fmt: skip
-    return Summary("Map", (f"{status.size} motions over {over}: {became}.",), cautions, settings=_settings(atlas.attrs))
+    return cautions
 
 
 def _over(atlas: Any, dim: str) -> str:

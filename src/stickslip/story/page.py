@@ -4,28 +4,17 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any
 
 from stickslip import __version__
-from stickslip.answers.comparison import Comparison
-from stickslip.answers.decay_comparison import DecayComparison
-from stickslip.answers.decays import DecayFindings
-from stickslip.answers.findings import Findings
-from stickslip.answers.frequencies import TimeFrequency
-from stickslip.answers.squeak_comparison import SqueakComparison
-from stickslip.answers.squeaks import SqueakFindings
-from stickslip.estimate import Estimate
 from stickslip.files.write import whole
 from stickslip.plot import style
-from stickslip.plot.figures import figures
-from stickslip.plot.plate import Plate, drawable
+from stickslip.plot.plate import Plate
 from stickslip.printing import printable
-from stickslip.record.record import Record
-from stickslip.squeak.listening import Clip, burst_clips
-from stickslip.story.summary import Summary, summary
+from stickslip.squeak.listening import Clip
+from stickslip.story.story import Story, summary
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -36,37 +25,19 @@ _COLOURS = {
     style.INK: "currentColor", style.FAINT: "var(--faint)", style.SHADE: "var(--shade)", style.BLUE: "var(--blue)",
     style.ORANGE: "var(--orange)", style.GREEN: "var(--green)", style.PURPLE: "var(--purple)", style.SKY: "var(--sky)",
 }  # fmt: skip
-Asked: TypeAlias = (
-    Findings | Comparison | TimeFrequency | DecayFindings | DecayComparison | SqueakFindings | SqueakComparison
-)
-Results: TypeAlias = Asked | Estimate | Sequence[Estimate]
 
 
-@dataclass(frozen=True)
-class Section:
-    """What the page says of one record, or of all of them: words, figures, and sounds."""
-
-    words: Summary
-    plates: Sequence[Plate] = ()
-    clips: Sequence[Clip] = ()
-
-
-def report(
-    results: Results,
-    record: Record | None,
-    path: str | Path,
-) -> Path:
+def report(result: Any, path: str | Path, **context: Any) -> Path:
     """Write one HTML page that holds everything and asks nothing of a network.
 
     Parameters
     ----------
-    results : Findings, Comparison, TimeFrequency, DecayFindings, DecayComparison, SqueakFindings, SqueakComparison, \
-            Estimate, or a sequence of estimates
-        What was found.
-    record : Record or None
-        Where plain estimates were found: its faults, channels and history are told. Findings bring their own.
+    result : Findings, Comparison, Estimate or any other result
+        As in :func:`summary`.
     path : path
         The page to write; it appears whole or not at all.
+    **context
+        As in :func:`summary`: ``record`` tells where plain estimates were found, with its faults and history.
 
     Returns
     -------
@@ -76,46 +47,34 @@ def report(
     ------
     FormatError
         The page can not be written there.
+    ModelError
+        A result of a kind that is not told.
     EstimateError
-        `results` is empty or holds something else than estimates.
+        A sequence that is empty or holds something else than estimates.
 
     Examples
     --------
     >>> import tempfile
+    >>> from stickslip import Estimate
     >>> friction = Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="median of 18 half cycles")
-    >>> page = report([friction], None, Path(tempfile.mkdtemp()) / "report.html")
+    >>> page = report([friction], Path(tempfile.mkdtemp()) / "report.html")
     >>> "1.318" in page.read_text(encoding="utf-8")
     True
     """
-    text = render(sections_of(results, record))
+    text = render(sections(summary(result, **context)))
     with whole(Path(path)) as draft:
         draft.write_text(text, encoding="utf-8")
     return Path(path)
 
 
-def sections_of(results: Results, record: Record | None = None, *, png: bool = False) -> list[Section]:
+def sections(story: Story, *, png: bool = False) -> list[Story]:
     """The sections of the page, with their figures drawn; as PNG too where these are asked for."""
-    if isinstance(results, Comparison | DecayComparison | SqueakComparison):
-        return [_section(part, png=png) for part in (results, *results.findings)]
-    if isinstance(results, Findings | DecayFindings | TimeFrequency | SqueakFindings):
-        return [_section(results, png=png)]
-    return [Section(summary(cast(Sequence[Estimate], results), record=record))]
+    return [part.drawn(png=png) for part in (story, *story.parts)]
 
 
-def section(words: Summary, plates: Iterable[Plate], clips: Sequence[Clip] = (), *, png: bool = False) -> Section:
-    """Words, and the figures that can be drawn; of the others a note."""
-    drawn, lost = drawable(plates, png=png)
-    return Section(replace(words, notes=(*words.notes, *lost)), drawn, clips)
-
-
-def _section(part: Asked, *, png: bool) -> Section:
-    clips = burst_clips(part.squeaks) if isinstance(part, SqueakFindings) else ()
-    return section(summary(part), figures(part), clips, png=png)
-
-
-def render(sections: Sequence[Section]) -> str:
+def render(stories: Sequence[Story]) -> str:
     """The page as text."""
-    return templates().get_template(TEMPLATE).render(sections=sections, version=__version__)
+    return templates().get_template(TEMPLATE).render(stories=stories, version=__version__)
 
 
 def templates(*folders: Path) -> Environment:

@@ -1,65 +1,53 @@
-"""What the virtual rig gives, in a folder: a record with its truth, or the plan of an experiment."""
+"""What the virtual rig gives, told: a record with its truth, or the plan of an experiment."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from stickslip.answers.experiment import ExperimentPlan
-from stickslip.errors import ModelError
-from stickslip.files.write import WRITERS, write_record
+from stickslip.answers.findings import record_name
+from stickslip.files.write import require_form, write_record
 from stickslip.plot.experiment import plot_plan
 from stickslip.plot.plate import plate
 from stickslip.record.record import Record
-from stickslip.story.folder import results_folder, write_figures
+from stickslip.story.story import Story, Table
+
+CAPTION = "Root-mean-square error against the sampling rate, for each choice of sensors."
 
 
-def publish_rig(results: Record | ExperimentPlan, *, folder: str | Path, form: str = "csv") -> Path:
-    """Write a virtual record, or the plan of an experiment, into a folder.
+def of_record(record: Record, *, form: str = "csv") -> Story:
+    """A record, with what is true of it and what is wrong with it; its folder holds it too, in `form`."""
+    require_form(form)
+    faults = [str(fault) for fault in record.check()]
+    true = [(name, f"{value:.6g}") for name, value in record.truth.items() if name != "events"]
 
-    Of a record: the file, and ``results.json`` with the truth and what is wrong with the record. Of a plan:
-    ``results.json`` with every setup and its accuracy, and the figure. The folder appears when all is written. An
-    earlier one of ours is replaced; a folder that holds anything else is left alone.
+    def write(folder: Path) -> None:
+        write_record(record, folder / f"record.{form}")
 
-    Parameters
-    ----------
-    results : Record or ExperimentPlan
-        From :meth:`Rig.measure`, or from :func:`plan_experiment`.
-    folder : path
-        The folder to make.
-    form : {"csv", "h5", "parquet"}
-        Format of the record.
+    return Story.of_record(
+        record_name(record), record, headline=[repr(record)], faults=faults,
+        tables=[Table("What is true", ("what is true", "SI"), true)] if true else [],
+        data=lambda: {"fs": record.fs, "truth": dict(record.truth), "faults": faults}, write=write,
+    )  # fmt: skip
 
-    Returns
-    -------
-    Path
 
-    Raises
-    ------
-    ModelError
-        A format is not known, or the folder holds something that is not ours.
-    RecordError
-        The folder can not be written.
+def of_plan(plan: ExperimentPlan, *, needs: Sequence[tuple[str, str]] = ()) -> Story:
+    """Every setup with its accuracy, and the least that is enough for what is needed."""
+    rows = [
+        [f"{setup.fs:g}", ", ".join(setup.sensors), *(str(setup.accuracy[each]) for each in plan.questions)]
+        for setup in plan.setups
+    ]
+    errors = f"Root-mean-square errors of {plan.draws} record{'s' * (plan.draws > 1)} at each rate."
+    return Story(
+        "Plan of an experiment", [_enough(plan, *each) for each in needs], notes=plan.refusals,
+        tables=[Table("What each setup tells", ("fs [Hz]", "sensors", *plan.questions), rows, errors)],
+        draw=lambda: [plate("plan", partial(plot_plan, plan), "What each setup tells", CAPTION)], data=plan.to_dict,
+    )  # fmt: skip
 
-    Examples
-    --------
-    >>> import tempfile
-    >>> import stickslip as ss
-    >>> slider = ss.Oscillator(mass=1, stiffness=100, law=ss.laws.Coulomb(0.2))
-    >>> run = ss.simulate(slider, start={"x": 0.05}, duration=2.0)
-    >>> folder = publish_rig(ss.Rig().measure(run, fs=500, rng=1), folder=Path(tempfile.mkdtemp()) / "rig")
-    >>> sorted(path.name for path in folder.iterdir())
-    ['record.csv', 'results.json']
-    """
-    if f".{form}" not in WRITERS:
-        raise ModelError(f"a record as '{form}'", f"it is written as {', '.join(w[1:] for w in WRITERS)}", "choose one")
-    if isinstance(results, Record):
-        told = {"fs": results.fs, "truth": dict(results.truth), "faults": [str(fault) for fault in results.check()]}
-        with results_folder(Path(folder), told) as draft:
-            write_record(results, draft / f"record.{form}")
-        return Path(folder)
-    with results_folder(Path(folder), results.to_dict()) as draft:
-        caption = "Root-mean-square error against the sampling rate, for each choice of sensors."
-        plan = plate("plan", partial(plot_plan, results), "What each setup tells", caption)
-        write_figures(draft / "figures", "", [plan])
-    return Path(folder)
+
+def _enough(plan: ExperimentPlan, question: str, error: str) -> str:
+    setup = plan.enough(question, error)
+    found = f"{', '.join(setup.sensors)} at {setup.fs:g} Hz" if setup else "none of these"
+    return f"{question} within {error}: {found}"

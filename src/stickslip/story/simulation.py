@@ -1,11 +1,11 @@
-"""What is told of a simulated run: sentences, a table, the events; and the folder that holds it all."""
+"""A simulated run, told: sentences, quantities, the events; and what its folder holds beside."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,10 @@ import numpy as np
 
 from stickslip import scenarios
 from stickslip.errors import ModelError
-from stickslip.files.write import WRITERS, write_record
+from stickslip.files.write import require_form, write_record
 from stickslip.laws.formula import Formula
 from stickslip.parameters import PARTS
-from stickslip.plot.figures import figures
-from stickslip.plot.plate import drawable
+from stickslip.plot.plate import Plate
 from stickslip.plot.trajectory import (
     contacts_of,
     cycle_of,
@@ -25,6 +24,7 @@ from stickslip.plot.trajectory import (
     last_cycles,
     numbered_words,
     period_of,
+    plates_of,
     pressed,
     sampled,
 )  # fmt: skip
@@ -35,7 +35,8 @@ from stickslip.solve.tables import Tables
 from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.squeak.listening import write_sound
 from stickslip.squeak.sound import sound_pressure, squeak_record
-from stickslip.story.folder import check_folder, results_folder, write_figures
+from stickslip.story.folder import check_folder
+from stickslip.story.story import Story, Table
 from stickslip.structure import Structure
 from stickslip.systems.file import Case
 from stickslip.units import prefixed
@@ -45,6 +46,7 @@ MOST_ROWS = 200_000  # of a record whose rate was not asked for
 REFUSED_ROWS = 100_000_000
 MOST_PIECES = 200_000  # of a run whose energy is integrated: beyond, it takes longer than the run
 MOST_TOLD = 10_000  # events in JSON; events.csv has them all
+SHOWN_EVENTS = 12
 MOST_NAMED = 4  # masses in a sentence
 KINDS = ("slip", "microstick", "stick", "flight")
 TANGENTIAL_NORMAL_TORSIONAL = 3  # displacements of a squeak rig
@@ -102,6 +104,69 @@ class Outcome:
         }
 
 
+def of_run(run: Trajectory) -> Story:
+    """A run by itself: its figures."""
+    return Story("Run", draw=lambda: plates_of(run))
+
+
+def of_outcome(
+    result: Outcome,
+    *,
+    fs: float | None = None,
+    form: str = "csv",
+    animation: str | None = None,
+    sound: bool = False,
+    tell: Callable[[str, float], None] = lambda words, done: None,
+) -> Story:
+    """A run and what happened; its folder holds the events and the sampled record too.
+
+    The record is sampled at `fs` [Hz], that of the case, or one fine enough for the motion, and written in `form`. A
+    moving picture ("gif", "mp4") and the sound, of a squeak rig with the record of its sensors, come on top. `tell` is
+    called before each part of the work with a few words and how many parts are done; the run counts as one.
+    """
+    run, case = result.run, result.case
+    _require_record(case, fs, form, animation)
+    rate = fs or case.fs or default_rate(run)
+
+    def draw() -> tuple[Plate, ...]:
+        tell("drawing the figures", 1)
+        return plates_of(run)
+
+    def write(folder: Path) -> None:
+        tell("writing the record", 2)
+        write_record(run.record(fs=rate), folder / f"record.{form}")
+        _write_events(run, folder / "events.csv")
+        if animation is not None:
+            from stickslip.plot.animation import animate
+
+            animate(run, folder / f"animation.{animation}", tell=lambda n, of: tell("animating", 3 + n / of))
+        if sound:
+            _write_sound(run, folder, fs or case.fs or HEARD, form)
+
+    return Story(
+        f"{case.name}  {case.about}".rstrip(), result.sentences, tables=list(_tables(result)),
+        draw=draw, data=lambda: {**result.to_dict(), "fs": rate}, write=write,
+    )  # fmt: skip
+
+
+def _tables(result: Outcome) -> Iterator[Table]:
+    """The quantities, the known answers and the first events."""
+    yield Table("Quantities", ("quantity", "value"), result.rows)
+    if result.known:
+        answers = [(name, str(pair["known"]), str(pair["found"])) for name, pair in result.known.items()]
+        yield Table("Known of this scenario, and what the engine finds:", ("answer", "known", "found"), answers)
+    count, events = result.run.event_counts().total(), list(itertools.islice(result.run.each_event(), SHOWN_EVENTS))
+    if events:
+        several = any(event.contact for event in events)
+        rows = [
+            (f"{event.time:.9g}", event.kind, *([str(event.contact + 1)] if several else []), event.mode)
+            for event in events
+        ]
+        headings = ("time [s]", "event", *(["contact"] if several else []), "mode that begins")
+        more = f"... and {count - len(rows)} more: events.csv, in a folder of results, has all." * (count > len(rows))
+        yield Table("Events", headings, rows, more)
+
+
 def outcome(case: Case, *, progress: Callable[[float], object] | None = None) -> Outcome:
     """Run a case, and say what happened.
 
@@ -150,78 +215,6 @@ def default_rate(run: Trajectory) -> float:
     return min(rate, MOST_ROWS / run.duration)
 
 
-def publish_run(
-    result: Outcome,
-    *,
-    folder: str | Path,
-    fs: float | None = None,
-    form: str = "csv",
-    animation: str | None = None,
-    sound: bool = False,
-    tell: Callable[[str, float], None] = lambda words, done: None,
-) -> Path:
-    """Write a run into a folder: results.json, events.csv, the sampled record, figures, a moving picture, the sound.
-
-    The folder appears when all is written. An earlier one of ours is replaced; a folder that holds anything else
-    is left alone.
-
-    Parameters
-    ----------
-    result : Outcome
-        The run.
-    folder : path
-        The folder to make.
-    fs : float, optional
-        Sampling rate of the record [Hz]; that of the case, or one fine enough for the motion.
-    form : {"csv", "h5", "parquet"}
-        Format of the record.
-    animation : {"gif", "mp4"}, optional
-        A moving picture beside the figures.
-    sound : bool
-        Add sound.wav, what :func:`sound_pressure` says of it, and of a squeak rig the record of its sensors.
-    tell : callable
-        Called before each part of the work with a few words and how many parts are done; the run counts as one.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ModelError
-        A format is not known, the record would be too long, or the folder holds something that is not ours.
-    RecordError
-        The folder can not be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from stickslip.systems.file import scenario_case
-    >>> folder = publish_run(outcome(scenario_case("FD-4")), folder=Path(tempfile.mkdtemp()) / "decay")
-    >>> sorted(path.name for path in folder.iterdir())
-    ['events.csv', 'figures', 'record.csv', 'results.json']
-    """
-    run = result.run
-    require_output(result.case, folder=folder, fs=fs, form=form, animation=animation)
-    rate = fs or result.case.fs or default_rate(run)
-    numbers = {**result.to_dict(), "fs": rate}
-    with results_folder(Path(folder), numbers) as draft:
-        tell("writing the record", 1)
-        write_record(run.record(fs=rate), draft / f"record.{form}")
-        _write_events(run, draft / "events.csv")
-        tell("drawing the figures", 2)
-        plates, lost = drawable(figures(run), png=True)
-        numbers |= {"notes": lost} if lost else {}
-        write_figures(draft / "figures", "", plates)
-        if animation is not None:
-            from stickslip.plot.animation import animate
-
-            animate(run, draft / f"animation.{animation}", tell=lambda n, of: tell("animating", 3 + n / of))
-        if sound:
-            _write_sound(run, draft, fs or result.case.fs or HEARD, form)
-    return Path(folder)
-
-
 def _write_sound(run: Trajectory, folder: Path, fs: float, form: str) -> None:
     """The sound as a WAV; of a squeak rig, as its sensors would have written it, with their record."""
     if isinstance(run.system, Structure) and run.system.size == TANGENTIAL_NORMAL_TORSIONAL and run.table.motion.base:
@@ -246,14 +239,14 @@ def _told(event: Event) -> dict[str, Any]:
 def require_output(
     case: Case, *, folder: str | Path, fs: float | None = None, form: str = "csv", animation: str | None = None
 ) -> None:
-    """Refuse, before a case is run, what :func:`publish_run` could not write after it.
+    """Refuse, before a case is run, what :func:`publish` could not write after it.
 
     Parameters
     ----------
     case : Case
         What is to be run.
     folder, fs, form, animation
-        As in :func:`publish_run`.
+        Where it goes, the record's sampling rate [Hz] and format, and the moving picture's.
 
     Raises
     ------
@@ -265,8 +258,12 @@ def require_output(
     >>> from stickslip.systems.file import scenario_case
     >>> require_output(scenario_case("FD-4"), folder="decay", form="h5")
     """
-    if f".{form}" not in WRITERS:
-        raise ModelError(f"a record as '{form}'", f"it is written as {', '.join(w[1:] for w in WRITERS)}", "choose one")
+    _require_record(case, fs, form, animation)
+    check_folder(Path(folder))
+
+
+def _require_record(case: Case, fs: float | None, form: str, animation: str | None) -> None:
+    require_form(form)
     if animation is not None:
         from stickslip.plot.animation import require_writer
 
@@ -278,7 +275,6 @@ def require_output(
             f"a record has at most {REFUSED_ROWS:g} rows, at a positive rate",
             "give a lower --fs or a shorter run",
         )
-    check_folder(Path(folder))
 
 
 def _values(run: Trajectory) -> dict[str, tuple[float, str]]:

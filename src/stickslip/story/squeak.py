@@ -10,16 +10,45 @@ import numpy as np
 from stickslip.answers.squeak_comparison import Condition, SqueakComparison
 from stickslip.answers.squeaks import SqueakFindings, trend_of
 from stickslip.estimate import Estimate, decimals
+from stickslip.plot.squeak import plates_of, plates_together
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
 from stickslip.squeak.couplings import Coupling, Pair
-from stickslip.story.words import interval_of, number, value_of
+from stickslip.squeak.listening import burst_clips
+from stickslip.story.story import Line, Story, Table
+from stickslip.story.words import doubts, interval_of, leading, number, value_of
 from stickslip.units import prefixed
 
 MOST = 40  # bursts in a table
 NONE = "–"
 
 
-def headline(found: SqueakFindings) -> Iterator[str]:
+def of_findings(found: SqueakFindings) -> Story:
+    """One record."""
+    record, (low, high) = found.record, found.squeaks.band
+    return Story.of_record(
+        found.name, record, headline=[*leading(found.faults), *_headline(found)],
+        cautions=[*_cautions(found), *doubts(found.estimates)], lines=list(map(Line.of, found.estimates)),
+        faults=[str(fault) for fault in found.faults], notes=found.notes, tables=list(_tables(found)),
+        settings={
+            "heard in": found.squeaks.channel, "between": f"{low:g} and {high:g} Hz",
+            **({} if found.normal is None else {"normal load": number(found.normal, 0.0, "N")}),
+            "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s",
+        },
+        draw=lambda: plates_of(found), listen=lambda: burst_clips(found.squeaks), data=found.to_dict,
+    )  # fmt: skip
+
+
+def of_comparison(comparison: SqueakComparison) -> Story:
+    """Several conditions; each by itself on the page, and in a line of the terminal."""
+    return Story(
+        f"{len(comparison.conditions)} conditions compared", comparison.verdicts, notes=comparison.notes,
+        tables=[Table("Conditions", *_condition_table(comparison))],
+        parts=[of_findings(each) for each in comparison.findings], brief=True,
+        draw=lambda: plates_together(comparison), data=comparison.to_dict,
+    )  # fmt: skip
+
+
+def _headline(found: SqueakFindings) -> Iterator[str]:
     """What was heard, in a few sentences."""
     squeaks, record = found.squeaks, found.record
     heard = squeaks.of("squeak", "squeal")
@@ -69,7 +98,7 @@ def _of_pairs(joined: Coupling) -> str:
     most = max(adding, key=lambda pair: 0.0 if pair.added is None else pair.added.value)
     return (
         f"While it squeaks, {len(adding)} of {len(pairs)} pairs of channels move together more than outside, most of "
-        f"all {spoken_name(most.first)} and {spoken_name(most.second)}: coherence {most.inside:.2f} against "
+        f"all {_spoken_name(most.first)} and {_spoken_name(most.second)}: coherence {most.inside:.2f} against "
         f"{most.outside:.2f}."
     )
 
@@ -87,7 +116,7 @@ def _of_energy(joined: Coupling, *, torsion: bool) -> Iterator[str]:
         yield f"Whether friction feeds or damps the tangential vibration can not be told{told}."
 
 
-def spoken_name(channel: str) -> str:
+def _spoken_name(channel: str) -> str:
     """A channel's name as words."""
     return {"a": "acceleration"}.get(channel, channel.replace("_", " "))
 
@@ -109,12 +138,12 @@ def _of_one(burst: Squeak, squeaks: Squeaks) -> str:
     """The loudest burst in a sentence."""
     where = "" if math.isnan(burst.phase) else f", at {100 * burst.phase:.0f} % of the forcing cycle"
     speed = "" if math.isnan(burst.speed) else f" and {number(burst.speed, 1e-3, 'm/s')}"
-    told = f"The loudest is {level_of(burst, squeaks)}{where}{speed}"
+    told = f"The loudest is {_level_of(burst, squeaks)}{where}{speed}"
     friction = {"shown": "friction makes it", "likely": "friction likely makes it"}.get(burst.friction)
     return f"{told}; {friction}: {burst.evidence}." if friction else f"{told}: {burst.evidence}."
 
 
-def level_of(burst: Squeak, squeaks: Squeaks) -> str:
+def _level_of(burst: Squeak, squeaks: Squeaks) -> str:
     """The level with its reference, and weighted where that is known."""
     if math.isnan(burst.level):
         return "clipped, its level unknown"
@@ -126,7 +155,7 @@ def _counted(bursts: Sequence[Squeak]) -> str:
     return f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}"
 
 
-def cautions(found: SqueakFindings) -> list[str]:
+def _cautions(found: SqueakFindings) -> list[str]:
     """What should keep the reader from trusting it."""
     told = [note for note in found.squeaks.notes if "calibrated" in note or "alone; the record has" in note]
     if any(fault.kind == "spike" for fault in found.faults):
@@ -142,7 +171,23 @@ def cautions(found: SqueakFindings) -> list[str]:
     ]
 
 
-def burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+def _tables(found: SqueakFindings) -> Iterator[Table]:
+    """The bursts, the channels, how it is heard, and what moves together."""
+    bursts, joined = found.squeaks.bursts, found.coupling
+    if bursts:
+        more = f", the first {MOST}" if len(bursts) > MOST else ""
+        title = f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}{more}, levels re {found.squeaks.reference}"
+        yield Table(title, *_burst_table(found))
+    if found.beside:
+        yield Table("In every channel that vibrates", *_channel_table(found))
+    if found.quality is not None or found.impulses is not None:
+        yield Table("How it is heard", *_hearing_table(found), _hearing_note(found))
+    if joined is not None:
+        title = f"What moves together at {number(joined.frequency, 0.5, 'Hz')}"
+        yield Table(title, *_coupling_table(joined), _coupling_note(joined))
+
+
+def _burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each burst."""
     squeaks = found.squeaks
     moves, calibrated = not math.isnan(squeaks.forcing), any(not math.isnan(b.weighted_level) for b in squeaks.bursts)
@@ -162,7 +207,7 @@ def burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
     return headings, rows
 
 
-def channel_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+def _channel_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each channel that vibrates."""
     rows = []
     for squeaks in (found.squeaks, *found.beside):
@@ -174,7 +219,7 @@ def channel_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]
     return ["channel", "what it is", "squeaks", "Hz", "loudest, dB"], rows
 
 
-def hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+def _hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each measure of how it is heard."""
     rows, quality, impulses = [], found.quality, found.impulses
     if quality is not None:
@@ -196,13 +241,13 @@ def hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]
     return ["", "value", "what it is"], rows
 
 
-def hearing_note(found: SqueakFindings) -> str:
+def _hearing_note(found: SqueakFindings) -> str:
     """By what, and that no conformity is claimed."""
     by = "" if found.quality is None else f"Loudness, sharpness and roughness by {found.quality.method}. "
     return f"{by}No conformity to a standard is claimed; the pulses follow none."
 
 
-def coupling_table(joined: Coupling) -> tuple[Sequence[str], list[list[str]]]:
+def _coupling_table(joined: Coupling) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each pair of channels: first those that the squeak adds to, last what is no coupling."""
     rest = any(pair.added is not None for pair in joined.pairs)
     headings = [
@@ -215,7 +260,7 @@ def coupling_table(joined: Coupling) -> tuple[Sequence[str], list[list[str]]]:
     return headings, [_pair(pair, rest=rest) for pair in sorted(joined.pairs, key=order)]
 
 
-def coupling_note(joined: Coupling) -> str:
+def _coupling_note(joined: Coupling) -> str:
     """How to read the table of pairs."""
     tied = (
         " Friction and acceleration of one mass go together by its inertia, m a = ... - f: that is no coupling."
@@ -252,7 +297,7 @@ def _pair(pair: Pair, *, rest: bool) -> list[str]:
     return [*told, phase, f"{factor * delay:.{digits}f} ± {factor * half:.{digits}f} {unit}"]
 
 
-def condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[list[str]]]:
+def _condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each condition; a column that is known of none is left out."""
     headings = ["condition", "load", "driven, stroke", "friction", "slope against speed (95 %)", "heard", "Hz", "dB"]
     rows = [_condition(each) for each in comparison.conditions]

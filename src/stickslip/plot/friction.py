@@ -1,20 +1,13 @@
-"""Which figures a result is worth, each with a title and a caption in plain words."""
+"""Which figures a record's friction is worth, each with a title and a caption in plain words."""
 
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 from stickslip.answers.comparison import Comparison
-from stickslip.answers.decay_comparison import DecayComparison
-from stickslip.answers.decays import DecayFindings
 from stickslip.answers.findings import Findings
-from stickslip.answers.frequencies import TimeFrequency
-from stickslip.answers.squeak_comparison import SqueakComparison
-from stickslip.answers.squeaks import SqueakFindings
 from stickslip.balance.felt_and_computed import UNLIKE
 from stickslip.balance.force import FUSIONS
-from stickslip.errors import ModelError
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.consistency import plot_consistency
 from stickslip.plot.contact import (
@@ -25,117 +18,16 @@ from stickslip.plot.contact import (
     plot_transition_speed,
     plot_velocity_loop,
 )
-from stickslip.plot.decay import plates_of as decay_plates
-from stickslip.plot.decay import plates_together as together_plates
 from stickslip.plot.force import plot_force_comparison
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
-from stickslip.plot.squeak import plates_of_conditions, plates_of_squeaks
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
 
 UNSURE = "not stated"  # in the status of what sensors that are not known may have made
 
-if TYPE_CHECKING:
-    from stickslip.law.fit_curve import CurveFit
-    from stickslip.law.law import LawFit
-    from stickslip.law.which_law import LawComparison
-    from stickslip.maps.basins import Basins
-    from stickslip.maps.bifurcation import Bifurcation
-    from stickslip.maps.boundaries import Boundary
-    from stickslip.maps.dither import Dither
-    from stickslip.solve.trajectory import Trajectory
 
-
-def figures(
-    result: Findings
-    | Comparison
-    | DecayFindings
-    | DecayComparison
-    | TimeFrequency
-    | SqueakFindings
-    | SqueakComparison
-    | Trajectory
-    | Bifurcation
-    | Basins
-    | Boundary
-    | Dither
-    | LawComparison
-    | LawFit
-    | CurveFit,
-) -> tuple[Plate, ...]:
-    """The figures that show a result, in reading order.
-
-    Parameters
-    ----------
-    result : Findings, Comparison, DecayFindings, DecayComparison, TimeFrequency, SqueakFindings, SqueakComparison, \
-            Trajectory, Bifurcation, Basins, Boundary, Dither, LawComparison, LawFit or CurveFit
-        What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`compare_decays`, :func:`time_frequency`,
-        :func:`analyze_squeaks`, :func:`compare_squeaks`, :func:`simulate`, :func:`bifurcation`, :func:`basins`,
-        :func:`boundary`, :func:`dither`, :func:`compare_laws`, :func:`fit_law` or :func:`fit_curve` returned.
-
-    Returns
-    -------
-    tuple of Plate
-        Each with ``.figure`` (matplotlib), ``.title``, ``.caption``, ``.svg()`` and ``.png()``.
-
-    Raises
-    ------
-    ModelError
-        A result of another kind.
-
-    Examples
-    --------
-    >>> import stickslip as ss
-    >>> record = ss.datasets.demo()
-    >>> plates = figures(ss.analyze(record, mass=2.42, stiffness=2310, damping=0.12))
-    >>> [plate.name for plate in plates][:2]
-    ['friction-velocity', 'friction-displacement']
-    """
-    if isinstance(result, Comparison):
-        return tuple(_of_comparison(result))
-    if isinstance(result, Findings):
-        return tuple(_of_findings(result))
-    if isinstance(result, DecayFindings):
-        return tuple(decay_plates(result))
-    if isinstance(result, DecayComparison):
-        return tuple(together_plates(result))
-    if isinstance(result, SqueakFindings):
-        return tuple(plates_of_squeaks(result))
-    if isinstance(result, SqueakComparison):
-        return tuple(plates_of_conditions(result))
-    if isinstance(result, TimeFrequency):
-        from stickslip.plot.wavelet import plates_of as plates_of_map
-
-        return tuple(plates_of_map(result))
-    from stickslip.solve.trajectory import Trajectory
-
-    if isinstance(result, Trajectory):
-        from stickslip.plot.trajectory import plates_of
-
-        return plates_of(result)
-    from stickslip.plot.law import FITS, law_plates
-
-    return tuple(law_plates(result)) if isinstance(result, FITS) else _of_regimes(result)
-
-
-def _of_regimes(result: Bifurcation | Basins | Boundary | Dither) -> tuple[Plate, ...]:
-    from stickslip.maps.basins import Basins
-    from stickslip.maps.bifurcation import Bifurcation
-    from stickslip.maps.boundaries import Boundary
-    from stickslip.maps.dither import Dither
-    from stickslip.plot.bifurcation import plates_of
-
-    if isinstance(result, Bifurcation | Basins | Boundary | Dither):
-        return plates_of(result)
-    raise ModelError(
-        f"figures of a {type(result).__name__}",
-        "figures are of what analyze, compare, analyze_decay, compare_decays, time_frequency, analyze_squeaks, "
-        "compare_squeaks, simulate, bifurcation, basins, boundary, dither, compare_laws, fit_law or fit_curve returned",
-        "ask one of these, or a plot_ function of the result",
-    )
-
-
-def _of_findings(findings: Findings) -> list[Plate]:
+def plates_of(findings: Findings) -> list[Plate]:
+    """The figures of one record, in reading order."""
     events = findings.sticks.events if findings.sticks is not None else ()
     sticks = [event for event in events if event.kind == "stick"]
     plates = [*_of_friction(findings), *_over_time(findings, sticks=len(sticks)), *_of_contact(findings)]
@@ -252,7 +144,8 @@ def _how_it_adds_up(findings: Findings) -> str:
     return "At every moment the other terms add up to the friction."
 
 
-def _of_comparison(comparison: Comparison) -> list[Plate]:
+def plates_together(comparison: Comparison) -> list[Plate]:
+    """The figures of several records."""
     plates = []
     if comparison.coefficient is not None:
         plates.append(

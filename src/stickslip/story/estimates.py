@@ -1,0 +1,40 @@
+"""Plain estimates, told with the record that they were found in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from stickslip.answers.findings import record_name
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
+from stickslip.record.record import Record
+from stickslip.story.story import Line, Story
+from stickslip.story.words import leading
+
+
+def of_one(estimate: Estimate, *, record: Record | None = None) -> Story:
+    """An estimate by itself."""
+    return of_several([estimate], record=record)
+
+
+def of_several(estimates: Sequence[Estimate], *, record: Record | None = None) -> Story:
+    """Estimates, and the faults of their record."""
+    strangers = [type(item).__name__ for item in estimates if not isinstance(item, Estimate)]
+    if strangers or not estimates:
+        raise EstimateError(
+            f"a report of {', '.join(strangers) or 'nothing'}",
+            "a report is made of Findings, a Comparison, or Estimates",
+            "pass analyze(record), compare(findings) or a list of estimates",
+        )
+    lines = [Line.of(estimate) for estimate in estimates]
+
+    def data() -> dict[str, object]:
+        return {"estimates": [estimate.to_dict() for estimate in estimates]}
+
+    if record is None:
+        return Story("Estimates", lines=lines, data=data)
+    faults = record.check()
+    return Story.of_record(
+        record_name(record), record, headline=leading(faults), lines=lines, faults=[str(fault) for fault in faults],
+        data=data,
+    )  # fmt: skip

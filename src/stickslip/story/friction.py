@@ -1,0 +1,226 @@
+"""A record's friction, and that of several records, told."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+
+from stickslip.answers.comparison import Comparison
+from stickslip.answers.findings import Findings
+from stickslip.answers.preparation import LEFT_OUT
+from stickslip.balance.pull import Pull
+from stickslip.cycle.before_slip import Presliding
+from stickslip.cycle.onset import Breakaway
+from stickslip.estimate import Estimate
+from stickslip.plot.friction import plates_of, plates_together
+from stickslip.story.story import Line, Story
+from stickslip.story.words import FEW, cautions, interval_of, leading, number, sentence, value_of
+
+NEVER = "The contact never sticks."
+RARELY = 0.005  # of the time
+SAME = 0.05  # forward and back differ noticeably beyond this part of the level
+ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
+TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
+UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
+
+
+def of_findings(findings: Findings) -> Story:
+    """One record."""
+    return Story.of_record(
+        findings.name, findings.record, headline=[*leading(findings.faults), *_headline(findings)],
+        cautions=cautions(findings), lines=[Line.of(each, findings.true_value(each)) for each in findings.estimates],
+        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
+        draw=lambda: plates_of(findings), data=findings.to_dict,
+    )  # fmt: skip
+
+
+def of_comparison(comparison: Comparison) -> Story:
+    """Several records side by side."""
+    levels = [(each, each.level) for each in comparison.findings if each.level is not None]
+    return Story(
+        f"{len(comparison.findings)} records compared", list(_together(comparison)),
+        lines=[
+            *map(Line.of, comparison.estimates),
+            *(Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels),
+        ],
+        notes=comparison.notes, parts=[of_findings(each) for each in comparison.findings],
+        draw=lambda: plates_together(comparison), data=comparison.to_dict,
+    )  # fmt: skip
+
+
+def _settings(findings: Findings) -> dict[str, str]:
+    told = {
+        key: number(value, 0.0, UNITS[key]) if key in UNITS else str(value) for key, value in findings.settings.items()
+    }
+    if findings.normal is not None:
+        told["normal load"] = number(findings.normal, 0.0, "N")
+    record = findings.record
+    return {**told, "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}
+
+
+def _headline(findings: Findings) -> Iterator[str]:
+    if findings.contradiction:
+        yield (
+            f"The channels contradict each other: perhaps {findings.contradiction}. Until that is mended no force is "
+            "told here; the table has what they give as they are."
+        )
+        if findings.sticks is not None:
+            yield from _of_sticks(findings)
+        return
+    if findings.loops is not None:
+        yield from _of_loops(findings)
+    found = findings.regression
+    if found is not None and found.viscous is not None and found.coulomb is not None:
+        share = f"; {100 * found.residual:.1f} % of it is left unexplained" if math.isfinite(found.residual) else ""
+        yield (
+            f"An inertia of {value_of(found.inertia)}, viscous friction of {value_of(found.viscous)} and dry friction "
+            f"of {value_of(found.coulomb)} explain the measured force{share}."
+        )
+    apart = findings.asymmetric
+    if apart is not None and findings.loops is None:
+        yield from _of_directions(apart.coulomb_forward, apart.coulomb_back)
+        yield from _of_directions(apart.viscous_forward, apart.viscous_back, "in viscous friction")
+    if findings.sticks is not None:
+        yield from _of_sticks(findings)
+    if findings.breakaway is not None:
+        yield from _of_breakaway(findings.breakaway)
+    if findings.stiffness is not None:
+        yield _of_contact(findings.stiffness, findings.contact_damping)
+    if findings.cause is not None:
+        yield sentence(f"{findings.cause.cause}: {findings.cause.reason.rstrip('.')}.")
+    if findings.presliding is not None:
+        yield from _of_presliding(findings.presliding)
+    if findings.pull is not None:
+        yield from _of_pull(findings.pull)
+
+
+def _of_directions(forward: Estimate | None, back: Estimate | None, what: str = "") -> Iterator[str]:
+    if forward is None or back is None:
+        return
+    apart = abs(forward.value - back.value)
+    if apart > SAME * abs(forward.value + back.value) / 2 and apart > 2 * forward.sd + 2 * back.sd:
+        alike = "" if what else "; a zero offset of a sensor or a sloping rig looks the same"
+        yield (
+            f"The two directions differ{what and ' ' + what}: {value_of(forward)} forward and {value_of(back)} "
+            f"back{alike}."
+        )
+
+
+def _of_loops(findings: Findings) -> Iterator[str]:
+    loops = findings.loops
+    assert loops is not None
+    if not loops.level.known:
+        yield f"How large the friction is can not be told: {loops.level.status}."
+        return
+    if loops.level.interval[0] == 0:
+        highest = value_of(loops.level, loops.level.interval[1])
+        yield f"No sliding friction can be told from none: it is {highest} at most (95 % sure)."
+    else:
+        yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
+    lesser = re.fullmatch(FEW, loops.level.status) or loops.level.status.endswith(LEFT_OUT)  # said among the cautions
+    if loops.level.status != "ok" and not lesser:
+        yield f"That is not to be trusted: {loops.level.status}."
+    if findings.coefficient is not None and findings.normal is not None:
+        yield (
+            f"Under a normal load of {number(findings.normal, 0.0, 'N')} that is a friction coefficient of "
+            f"{value_of(findings.coefficient)}."
+        )
+    yield from _of_directions(loops.forward, loops.back)
+    low, high = loops.slope.interval
+    if loops.slope.status != "ok":
+        return
+    if low > 0 or high < 0:
+        yield f"Friction {'rises' if low > 0 else 'falls'} with speed, by {value_of(loops.slope)}."
+    elif math.isfinite(low + high):
+        yield "No change of friction with speed can be told from zero."
+
+
+def _of_sticks(findings: Findings) -> Iterator[str]:
+    sticks = findings.sticks
+    assert sticks is not None
+    if not any(event.kind == "stick" for event in sticks.events):
+        brief = sticks.share.value >= RARELY
+        share = value_of(sticks.share)
+        yield f"The contact rests only briefly as it turns round, {share} of the time in all." if brief else NEVER
+        return
+    if sticks.share.value < RARELY:
+        yield "The contact hardly ever sticks."
+        return
+    beat = f" of {value_of(findings.loops.frequency)}" if findings.loops is not None else ""
+    often = sticks.per_cycle.value
+    stops = f", with {often:.2g} stops in each cycle{beat}" if math.isfinite(often) and often > 0 else ""
+    low, high = sticks.share.interval
+    share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
+    yield f"It sticks {share} of the time{stops}."
+
+
+def _of_breakaway(found: Breakaway) -> Iterator[str]:
+    ratio = found.ratio
+    low, high = ratio.interval
+    if not math.isfinite(low + high):
+        yield f"What it bears just before it slips can not be told: {ratio.status}."
+        return
+    more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
+    sides = " and ".join(f"{value_of(each)} {each.name.split()[-1]}" for each in (found.forward, found.back) if each)
+    yield (
+        f"Just before it slips it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 % sure: "
+        f"{interval_of(ratio)})."
+    )
+    rings = [each for each in (found.ringing_forward, found.ringing_back) if each is not None]
+    if rings:
+        yield f"After slip begins it rings at {' and '.join(f'{value_of(e)} {e.name.split()[-1]}' for e in rings)}."
+    apart = found.ringing_difference
+    if apart is not None and not apart.interval[0] <= 0 <= apart.interval[1]:
+        yield f"The two directions ring apart by {value_of(apart)} (95 % sure: {interval_of(apart)})."
+
+
+def _of_contact(stiffness: Estimate, damping: Estimate | None) -> str:
+    damped = f" and a damping of {value_of(damping)}" if damping is not None else ""
+    return (
+        f"While it holds the contact has a stiffness of {value_of(stiffness)} (95 % sure: {interval_of(stiffness)})"
+        f"{damped}."
+    )
+
+
+def _of_presliding(found: Presliding) -> Iterator[str]:
+    if found.verdict == "gives way" and found.stiffness is not None:
+        gap = found.backlash
+        play = f", with {value_of(gap)} of play" if gap is not None and gap.interval[0] > 0 else ""
+        yield (
+            f"Before it slips the contact gives way, with a stiffness of {value_of(found.stiffness)} "
+            f"(95 % sure: {interval_of(found.stiffness)}){play}."
+        )
+    elif found.verdict == "rigid":
+        yield f"Before it slips the contact is rigid as far as the record can tell: {found.evidence}."
+    else:
+        yield f"Whether the contact gives way before it slips can not be told: {found.evidence}."
+
+
+def _of_pull(found: Pull) -> Iterator[str]:
+    if found.regime == "stick-slip":
+        yield (
+            f"The slider sticks and slips at {value_of(found.frequency)}: while it sticks the force rises by "
+            f"{value_of(found.loading_rate)} (95 % sure: {interval_of(found.loading_rate)}), to "
+            f"{value_of(found.breakaway)}, and falls by {value_of(found.drop)} in a slip."
+        )
+    else:
+        yield (
+            f"The slider does not stick: it swings about its steady sliding at {value_of(found.frequency)}, as its own "
+            f"inertia lets it (the force rises for {value_of(found.rise_over_fall)} times as long as it falls)."
+        )
+
+
+def _together(comparison: Comparison) -> Iterator[str]:
+    levels = [findings.level for findings in comparison.findings if findings.level is not None]
+    if levels:
+        least, most = min(levels, key=lambda e: e.value), max(levels, key=lambda e: e.value)
+        yield (
+            f"Over {len(comparison.findings)} records the sliding friction runs from {value_of(least)} to "
+            f"{value_of(most)}."
+        )
+    if comparison.coefficient is not None:
+        mu = comparison.coefficient
+        yield f"Against the normal load the friction coefficient is {value_of(mu)} (95 % sure: {interval_of(mu)})."
+        if mu.interval[1] - mu.interval[0] > TOO_WIDE * abs(mu.value):
+            yield "The interval is wide because few records fix it; more loads would narrow it."

@@ -1,0 +1,260 @@
+"""A result as it is told, sentences first: page, terminal and lab read nothing else."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stickslip.errors import ModelError
+from stickslip.story.words import interval_of, value_of
+
+if TYPE_CHECKING:
+    from stickslip.estimate import Estimate
+    from stickslip.plot.plate import Plate
+    from stickslip.record.channels import Channel
+    from stickslip.record.record import Record, Step
+    from stickslip.squeak.listening import Clip
+
+# Of each kind of result the function that tells it, in a file of this room, which is imported when it is needed.
+TELLERS = {
+    "Findings": "friction.of_findings", "Comparison": "friction.of_comparison",
+    "TimeFrequency": "frequencies.of_map",
+    "DecayFindings": "decay.of_findings", "DecayComparison": "decay.of_comparison",
+    "SqueakFindings": "squeak.of_findings", "SqueakComparison": "squeak.of_comparison",
+    "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
+    "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
+    "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
+    "Bifurcation": "regimes.of_bifurcation", "Basins": "regimes.of_basins", "Boundary": "regimes.of_boundary",
+    "Dither": "regimes.of_dither", "Dataset": "maps.of_map",
+    "Estimate": "estimates.of_one", "list": "estimates.of_several", "tuple": "estimates.of_several",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of the table of results, as text.
+
+    Attributes
+    ----------
+    name, value, interval : str
+        The quantity, its value and its 95 % interval.
+    true : str or None
+        The true value, where the record is simulated and knows it.
+    method, status : str
+        How it was found; "ok", or why not to trust it.
+    checks : tuple of str
+        What was checked.
+    """
+
+    name: str
+    value: str
+    interval: str
+    true: str | None
+    method: str
+    status: str
+    checks: tuple[str, ...]
+
+    @classmethod
+    def of(cls, estimate: Estimate, true: float | None = None, *, name: str = "") -> Line:
+        """The row of an estimate, under another name where one is given."""
+        return cls(
+            name or estimate.name, value_of(estimate), interval_of(estimate),
+            None if true is None else value_of(estimate, true), estimate.method, estimate.status, estimate.checks,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text.
+
+    Attributes
+    ----------
+    title : str
+        What it shows.
+    headings : sequence of str
+        Of its columns.
+    rows : sequence of sequence of str
+        Its cells.
+    note : str
+        How to read it.
+    """
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+
+
+def tried(what: str, verdicts: Sequence[Sequence[str]]) -> Table:
+    """What was tried, and what the records say of each."""
+    return Table("What was tried", (f"{what} tried", "verdict"), verdicts)
+
+
+def _nothing_more(folder: Path) -> None:
+    """Of most results page, numbers and figures are all."""
+
+
+@dataclass(frozen=True)
+class Story:
+    """A result as it is told.
+
+    Attributes
+    ----------
+    title : str
+        The record's name.
+    headline, cautions : sequence of str
+        What was found; what should keep the reader from trusting it.
+    lines : sequence of Line
+        The table.
+    faults : sequence of str or None
+        What the check-up found; None where there was none.
+    notes : sequence of str
+        What was assumed, and what could not be asked.
+    settings : mapping of str to str
+        Constants and choices.
+    tables : sequence of Table
+        What is told in rows of its own: bursts, pairs of channels, motions that were tried.
+    channels : sequence of Channel
+        The record's channels.
+    history : sequence of Step
+        What was done to the record.
+    parts : sequence of Story
+        Of several records, each by itself.
+    draw, listen : callable
+        The figures, and the sounds; called when they are first looked at, as :attr:`plates` and :attr:`clips`.
+    data : callable
+        What ``results.json`` holds.
+    write : callable
+        Writes the files that this kind of result has beside page, numbers, figures and sounds into a folder.
+    brief : bool
+        Whether a terminal tells the parts in a line each; the page has the rest.
+    """
+
+    title: str
+    headline: Sequence[str] = ()
+    cautions: Sequence[str] = ()
+    lines: Sequence[Line] = ()
+    faults: Sequence[str] | None = None
+    notes: Sequence[str] = ()
+    settings: Mapping[str, str] | None = None
+    tables: Sequence[Table] = ()
+    channels: Sequence[Channel] = ()
+    history: Sequence[Step] = ()
+    parts: Sequence[Story] = ()
+    draw: Callable[[], Iterable[Plate]] = tuple
+    listen: Callable[[], Sequence[Clip]] = tuple
+    data: Callable[[], Mapping[str, Any]] = dict
+    write: Callable[[Path], object] = _nothing_more
+    brief: bool = False
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether a true value is known for any row."""
+        return any(line.true is not None for line in self.lines)
+
+    @property
+    def has_checks(self) -> bool:
+        """Whether anything was checked for any row."""
+        return any(line.checks for line in self.lines)
+
+    @functools.cached_property
+    def plates(self) -> tuple[Plate, ...]:
+        """The figures, in reading order."""
+        return tuple(self.draw())
+
+    @functools.cached_property
+    def clips(self) -> Sequence[Clip]:
+        """The sounds."""
+        return self.listen()
+
+    def drawn(self, *, png: bool = False) -> Story:
+        """With the figures that can be drawn, as PNG too where these are asked for, and of the others a note."""
+        from stickslip.plot.plate import drawable
+
+        plates, lost = drawable(self.plates, png=png)
+        return replace(self, notes=(*self.notes, *lost), draw=lambda: plates)
+
+    @classmethod
+    def of_record(cls, title: str, record: Record, **told: Any) -> Story:
+        """What is told of something that was found in a record."""
+        return cls(title, channels=list(record.channels.values()), history=record.history, **told)
+
+
+def summary(result: Any, **context: Any) -> Story:
+    """What is told of a result: sentences for a person, tables, cautions, settings, history; figures on demand.
+
+    Parameters
+    ----------
+    result : Findings, Comparison, Estimate or any other result
+        What :func:`analyze`, :func:`compare`, :func:`analyze_decay`, :func:`analyze_squeaks`, :func:`fit_law`,
+        :func:`simulate` or another question returned; or a sequence of estimates.
+    **context
+        What the result does not hold itself: as ``record`` the one that plain estimates, a law or a curve was found
+        in; of a law fitted to several all of them. As ``system`` what moved on a map that :func:`sweep` made. Of a run
+        and of a record ``form`` names the format of the file that is written: csv, h5 or parquet.
+
+    Returns
+    -------
+    Story
+
+    Raises
+    ------
+    ModelError
+        A result of a kind that is not told.
+    EstimateError
+        A sequence that is empty or holds something else than estimates.
+
+    Examples
+    --------
+    >>> from stickslip import Estimate
+    >>> friction = Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="median of 18 half cycles")
+    >>> summary([friction]).lines[0].interval
+    '1.310 to 1.326 N'
+    """
+    place = next((TELLERS[kind.__name__] for kind in type(result).__mro__ if kind.__name__ in TELLERS), None)
+    if place is None:
+        raise ModelError(
+            f"a {type(result).__name__}",
+            "figures, summary, report and publish tell what analyze, compare, analyze_decay, compare_decays, "
+            "time_frequency, analyze_squeaks, compare_squeaks, simulate, bifurcation, basins, boundary, dither, "
+            "compare_laws, fit_law or fit_curve returned, and estimates",
+            "give what one of these returned, or draw with a plot_ function of the result",
+        )
+    file, name = place.split(".")
+    story: Story = getattr(importlib.import_module(f"stickslip.story.{file}"), name)(result, **context)
+    return story
+
+
+def figures(result: Any, **context: Any) -> tuple[Plate, ...]:
+    """The figures that show a result, in reading order.
+
+    Parameters
+    ----------
+    result : Findings, Comparison, Trajectory, Bifurcation or any other result
+        As in :func:`summary`.
+    **context
+        As in :func:`summary`.
+
+    Returns
+    -------
+    tuple of Plate
+        Each with ``.figure`` (matplotlib), ``.title``, ``.caption``, ``.svg()`` and ``.png()``.
+
+    Raises
+    ------
+    ModelError
+        A result of a kind that is not told.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> record = ss.datasets.demo()
+    >>> plates = figures(ss.analyze(record, mass=2.42, stiffness=2310, damping=0.12))
+    >>> [plate.name for plate in plates][:2]
+    ['friction-velocity', 'friction-displacement']
+    """
+    return summary(result, **context).plates

@@ -1,0 +1,38 @@
+"""Who tells of which result, and what a story leaves to its reader."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+
+import pytest
+
+import stickslip as ss
+from stickslip.story.story import TELLERS, Story
+
+LEVEL = ss.Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="by hand")
+
+
+@pytest.mark.parametrize("kind", sorted(TELLERS.keys() - {"Dataset", "list", "tuple"}))
+def test_the_register_names_the_function_that_tells(kind: str) -> None:
+    file, name = TELLERS[kind].split(".")
+    teller = getattr(importlib.import_module(f"stickslip.story.{file}"), name)
+    first = next(iter(inspect.signature(teller).parameters.values()))
+    assert first.annotation == kind
+
+
+def test_figures_are_drawn_when_they_are_looked_at() -> None:
+    drawn: list[str] = []
+    story = Story("slow", draw=lambda: drawn.append("once") or ())  # type: ignore[func-returns-value]
+    assert not drawn
+    assert story.plates == story.plates == ()
+    assert drawn == ["once"]
+
+
+def test_results_json_of_a_record_keeps_its_keys() -> None:
+    findings = ss.answers.Findings("run", ss.datasets.demo())
+    assert set(ss.summary(findings).data()) == {
+        "name", "faults", "contradiction", "settings", "normal_load", "estimates", "regression_residual", "truth",
+        "notes", "history",
+    }  # fmt: skip
+    assert set(ss.summary([LEVEL]).data()) == {"estimates"}
