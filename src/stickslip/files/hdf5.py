@@ -67,7 +67,8 @@ def read(path: Path, options: Options) -> Table:
     check_heaps(path)
     with reading(path, NAME), h5py.File(path, "r") as file:
         if KEY in file.attrs:
-            record = parse_metadata(_value(file.attrs, KEY) or "")
+            kept = _value(file.attrs, KEY)
+            record = parse_metadata(kept if isinstance(kept, str) else "")
         constants |= _numbers(file.attrs)
         for name, dataset in datasets(file, notes):
             reason = refusal(dataset)
