@@ -67,7 +67,7 @@ def read(path: Path, options: Options) -> Table:
     check_heaps(path)
     with reading(path, NAME), h5py.File(path, "r") as file:
         if KEY in file.attrs:
-            record = parse_metadata(_value(file.attrs, KEY) or "")
+            record = parse_metadata(str(_value(file.attrs, KEY) or ""))
         constants |= _numbers(file.attrs)
         for name, dataset in datasets(file, notes):
             reason = refusal(dataset)

@@ -1,6 +1,7 @@
 from stickslip.story.fit import fit_numbers as fit_numbers
 from stickslip.story.fit import fit_summary as fit_summary
 from stickslip.story.fit import publish_fit as publish_fit
+from stickslip.story.folder import check_folder as check_folder
 from stickslip.story.maps import map_numbers as map_numbers
 from stickslip.story.maps import publish_map as publish_map
 from stickslip.story.rig import publish_rig as publish_rig
