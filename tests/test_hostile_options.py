@@ -19,7 +19,7 @@ from stickslip.printing import printable
 from test_sweep_cli import GRID, SLIDER
 
 RECORD = "t [s],x [m],friction [N]\n" + "".join(
-    f"{n / 1000},{math.sin(n / 5)},{(-1) ** (n // 9)}\n" for n in range(300)
+    f"{n / 1000},{math.exp(-n / 150) * math.sin(n / 5)},{(-1) ** (n // 9)}\n" for n in range(300)
 )
 NUMBERS = ["", "-1", "nan", "inf", "-inf", "1e400", "1,5", "0x10", "none", "½", "5 lux", "9**9**9", "9" * 5000]
 TEXTS = ["../", "folder", "nowhere", "a\x1b[31mb", "two\nlines", "\u202e\x07", "\udcff", "a=b=c", "=", "a" * 5000]

@@ -202,6 +202,23 @@ def parse_value(text: str | float, expect: str) -> float:
     return value
 
 
+def parse_constant(name: str, text: str | float, expect: str) -> float:
+    """:func:`parse_value` of a constant of a rig; a mistake is told with the constant's name.
+
+    Examples
+    --------
+    >>> parse_constant("lever", "6 cm", "m")
+    0.06
+    """
+    try:
+        value = parse_value(text, expect)
+    except RecordError as error:
+        raise ModelError(f"{name} = {text!r}", f"{error.value}; {error.rule}", f"correct the {name}") from error
+    if not value > 0:
+        raise ModelError(f"{name} = {text!r}", f"a {name} is positive", f"correct the {name}")
+    return value
+
+
 def parse_range(text: str, expect: str) -> tuple[float, float]:
     """LOW:HIGH as two numbers in SI, each as :func:`parse_value` reads it.
 

@@ -20,10 +20,10 @@ from stickslip.decay.motions import Restoring
 from stickslip.decay.release import Releases, find_releases
 from stickslip.decay.swings import SEEN
 from stickslip.decay.which_motion import DecayMotion, choose_motion
-from stickslip.errors import EstimateError, ModelError
+from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record
-from stickslip.units import parse_value
+from stickslip.units import parse_constant
 
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
@@ -323,11 +323,7 @@ def analyze_decay(
 def _constants(channel: str, **stated: float | str | None) -> dict[str, Any]:
     """Mass and stiffness where stated, in SI."""
     units = rig_units(channel)
-    constants = {name: parse_value(value, units[name]) for name, value in stated.items() if value is not None}
-    for name, value in constants.items():
-        if not value > 0:
-            raise ModelError(f"{name} = {value:g}", f"a {name} is positive", f"correct the {name}")
-    return constants
+    return {name: parse_constant(name, value, units[name]) for name, value in stated.items() if value is not None}
 
 
 def _by_waveform(

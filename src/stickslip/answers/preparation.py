@@ -13,7 +13,6 @@ from stickslip.balance.force import friction_force
 from stickslip.balance.lag import SensorDelay, sensor_delay
 from stickslip.balance.mass import mass_and_stiffness
 from stickslip.balance.motion import is_measured
-from stickslip.errors import StickslipError
 from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
@@ -30,9 +29,6 @@ REPEATS = "the motion repeats itself"  # so that other delays would do as well, 
 STRANGE = "differ by more than noise"
 LEFT_OUT = "it may be wrong by some per cent, which the interval leaves out"
 FOUND = " (found in this record)"
-QUIETER = 3.0  # times less noise for which sensors of unknown mounts are taken: what they add is not in it
-EXPLAINED = 1.25  # of the noise of the motion's friction, that the two may be apart; a ringing mount leaves them at 2.3
-AS_LARGE = 0.05  # of the friction, by which the two may differ in size: a load cell in the wrong unit differs by more
 SURE = 3.0  # standard deviations from which a delay is taken out
 
 
@@ -254,42 +250,12 @@ def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
     known = [name for name in helps if described(record.channels[name])]
     if known and rig.contact == "ground":
         return "fusion", f"{' and '.join(helps)} beside x: all sensors together by a Kalman smoother"
-    if "load" in helps and rig.contact == "ground" and (quieter := _quieter(record, rig)):
-        return "fusion", quieter
     why = "there is neither an accelerometer nor a load cell"
     if helps:
         why = f"of {' and '.join(helps)} no mount is stated: state it to have all sensors put together"
     if helps and rig.contact == "base":
         why = "the contact is on the moving base"
     return "smoother", f"{why}: the displacement differentiated by a smoother"
-
-
-def _quieter(record: Record, rig: RigSettings) -> str:
-    """Why all sensors together find the friction better than the motion alone, though no mount is stated; else empty.
-
-    Their friction must be much less noisy by their own measure, and no further from that of the motion than this one's
-    noise is, be it for a mount that rings, and as large.
-    """
-    part = middle(record, STRETCH)
-    try:
-        alone, together = (
-            friction_force(part, contact=rig.contact, method=method, **_constants(rig))
-            for method in ("smoother", "fusion")
-        )
-    except StickslipError:
-        return ""  # the method that is taken then says what it lacks
-    noise, least = (float(np.sqrt(np.mean(each["friction_sd"] ** 2))) for each in (alone, together))
-    power = float(together["friction"] @ together["friction"])
-    if not (0 < least < noise / QUIETER and power > 0):
-        return ""
-    apart = float(np.sqrt(np.mean((alone["friction"] - together["friction"]) ** 2)))
-    gain = float(together["friction"] @ alone["friction"]) / power
-    if apart > EXPLAINED * noise or abs(gain - 1) > AS_LARGE:
-        return ""
-    return (
-        f"all sensors together leave {noise / least:.3g} times less noise in the friction than the motion alone, whose "
-        "noise explains all between them, though no mount is stated"
-    )
 
 
 def _balanced(record: Record, rig: RigSettings, method: str, asked: Asked) -> Record:

@@ -21,7 +21,7 @@ from stickslip.squeak.couplings import Coupling, coupling
 from stickslip.squeak.quality import Impulsiveness, SoundQuality, impulsiveness, sound_quality
 from stickslip.squeak.spectra import BurstSpectra, burst_spectra
 from stickslip.statistics import mean_of_cycles
-from stickslip.units import parse_range, parse_value
+from stickslip.units import parse_constant, parse_range, parse_value
 
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
@@ -196,6 +196,7 @@ def analyze_squeaks(
     ('squeak', True, True)
     """
     band = parse_range(frequencies, "Hz") if isinstance(frequencies, str) else frequencies
+    lever = None if lever is None else parse_constant("lever", lever, "m")
     faults = tuple(record.check())
     squeaks = find_squeaks(record, channel=channel, frequencies=band)
     asked = Asked(list(squeaks.notes))

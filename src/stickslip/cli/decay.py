@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import quantity, reading_options, result_options
+from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -25,13 +25,11 @@ from stickslip.cli.show import show
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
 @click.option(
     "--mass",
-    callback=quantity("kg", "kg m^2"),
     metavar="VALUE",
     help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.",
 )
 @click.option(
     "--stiffness",
-    callback=quantity("N/m", "N m/rad"),
     metavar="VALUE",
     help="Spring in N/m, for the friction force; of an angle in N m/rad.",
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from stickslip.errors import RecordError
+import stickslip as ss
 
 
 def pair(text: str, option: str) -> tuple[str, str]:
@@ -55,32 +55,10 @@ def reading_options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-def quantity(*units: str) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
-    """Refuse before the work what is no number in one of these units, or is negative."""
-
-    def read(context: click.Context, option: click.Parameter, text: str | None) -> str | None:
-        if text is None or any(_measures(text, unit) for unit in units):
-            return text
-        raise click.BadParameter(f"'{text}' is no positive number in {' or '.join(units)}")
-
-    return read
-
-
-def _measures(text: str, unit: str) -> bool:
-    from stickslip.units import parse_value
-
-    try:
-        return parse_value(text, unit) >= 0
-    except RecordError:
-        return False
-
-
 def usable(context: click.Context, option: click.Parameter, folder: Path | None) -> Path | None:
     """A folder for results, refused before the work where it may not be written; none may be asked for."""
     if folder is not None:
-        from stickslip.story.folder import check_folder
-
-        check_folder(folder)
+        ss.story.check_folder(folder)
     return folder
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import quantity, reading_options, result_options
+from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--lever",
-    callback=quantity("m"),
     metavar="VALUE",
     help="Distance of the friction from the axis of torsion in m, for its work.",
 )

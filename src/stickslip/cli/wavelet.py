@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import quantity, reading_options, result_options
+from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import folder_after, groups_of, name_of, read_parts, rig_of
 from stickslip.cli.show import show
@@ -26,13 +26,10 @@ if TYPE_CHECKING:
 @click.option("--normalisation", type=click.Choice(["energy", "amplitude"]), default="energy", show_default=True)
 @click.option(
     "--mass",
-    callback=quantity("kg"),
     metavar="VALUE",
     help="Oscillating mass in kg, or with its unit, for the contact's stiffness.",
 )
-@click.option(
-    "--stiffness", callback=quantity("N/m"), metavar="VALUE", help="Spring in N/m, or with its unit, for the same."
-)
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit, for the same.")
 @result_options("FILE-wavelet")
 @reading_options
 def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | None, **options: Any) -> None:
@@ -48,14 +45,13 @@ def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | No
     groups = groups_of(file)
     if len(groups) != 1:
         raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is mapped at a time", param_hint="FILE")
-    asked = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation", "mass", "stiffness")}
+    asked = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation")}
     rig = rig_of(**options)
     folder = output or (None if as_json else folder_after(groups[0][0], "wavelet"))
     with progress(3) as tell:
         tell(f"reading {name_of(groups[0])}", 0)
         parts = _told_of(read_parts(groups[0], rig), tell)
-        for name in ("mass", "stiffness"):
-            asked[name] = asked[name] if asked[name] is not None else getattr(rig, name)
+        asked |= {"mass": rig.mass, "stiffness": rig.stiffness}
         found = ss.answers.time_frequency(parts, frequencies=frequencies, **asked)
         tell("drawing and writing", 2)
         written = ss.publish(found, folder=folder) if folder else None

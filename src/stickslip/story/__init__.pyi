@@ -1,3 +1,4 @@
+from stickslip.story.folder import check_folder as check_folder
 from stickslip.story.simulation import Outcome as Outcome
 from stickslip.story.simulation import outcome as outcome
 from stickslip.story.simulation import require_output as require_output

@@ -94,7 +94,25 @@ def results_folder(folder: Path, results: Mapping[str, Any]) -> Iterator[Path]:
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse a folder that holds anything that an earlier run did not write."""
+    """Refuse, before any work, a folder that results may not go into.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they are to go; it need not be there.
+
+    Raises
+    ------
+    ModelError
+        It lies in a file, or holds anything that an earlier run did not write.
+    OSError
+        Its name is none that the system takes.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> check_folder(Path(tempfile.mkdtemp()) / "results")
+    """
     if not folder.exists():
         if any(parent.is_file() for parent in folder.absolute().parents):
             raise ModelError(f"{folder} lies in a file", "results go into a folder", "name another with --output")
