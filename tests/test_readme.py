@@ -95,13 +95,13 @@ def test_the_commands_run(folder: Path, line: str) -> None:
         elif command[1:] == ["simulate", "--list"]:
             assert "FD-4" in run.stdout
         elif command[1] == "simulate":
-            assert (folder / run.stdout.split()[-1] / "results.json").is_file(), "the folder that it names is there"
+            assert (folder / run.stdout.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
         elif command[1] in ("decay", "squeak"):
             assert {"decay": "damping ratio", "squeak": "It squeaks"}[command[1]] in run.stdout
             assert (folder / run.stdout.split()[-1]).stat().st_size > 10_000, "the report that it names is there"
         elif command[1] == "rig":
             assert ("Root-mean-square errors" if "--plan" in command else "what is true") in run.stdout
-            assert (folder / run.stdout.split()[-1] / "results.json").is_file(), "the folder that it names is there"
+            assert (folder / run.stdout.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
         elif command[1] == "wavelet":
             assert "jumps or kinks" in run.stdout
         else:
