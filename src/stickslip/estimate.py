@@ -131,7 +131,7 @@ class Estimate:
         >>> friction.scaled(10, "N").within(0.0, high=5.0).includes(-0.1), friction.within(0.2).known
         (False, False)
         """
-        if not self.known or math.isnan(sum(self.interval)):  # nothing to cut; the status says why
+        if not self.known or any(map(math.isnan, self.interval)):  # nothing to cut; the status says why
             return self
         ends = max(low, self.interval[0]), min(high, self.interval[1])
         outside = not low <= self.value <= high
