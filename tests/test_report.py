@@ -237,7 +237,7 @@ def test_an_earlier_result_is_replaced_and_a_stranger_left_alone(light: Findings
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(ModelError, match="it is a file"):
         publish(light, folder=tmp_path / "file")
-    with pytest.raises(StickslipError, match="can not be written"):
+    with pytest.raises(StickslipError, match="lies in a file"):
         publish(light, folder=tmp_path / "file" / "below")
 
 

@@ -72,7 +72,7 @@ def fit_records(
     >>> rig = ss.rig.rig_settings({"mass": "2.42 kg", "stiffness": 2310})
     >>> found, _ = fit_records([ss.datasets.demo()], rig=rig, curve="coulomb")
     >>> print(found.parameters["kinetic"])
-    sliding friction 1.1022 N (95 %: 1.1002 to 1.1042)
+    sliding friction 1.102 N (95 %: 1.100 to 1.104)
     """
     curve = curve or _only_curve(records[0], asked=bool(laws or system))
     if curve is not None and len(records) > 1:
