@@ -225,7 +225,7 @@ def test_viscous_damping_alone_leaves_ten_times_the_residual_of_a_real_pendulum(
     assert found.viscous_residual > 10
     told = ss.summary(found)
     assert f"alone leaves {found.viscous_residual:.3g} times the residual" in " ".join(told.headline)
-    assert [words for words, _ in told.verdicts] == [words for _, words, _ in found.motion.candidates]
+    assert [row[0] for row in told.tables[0].rows] == [words for _, words, _ in found.motion.candidates]
     low, high = found.as_force(found.motion.dry_displacement_any, "").interval
     assert low < 3.6e-3 < 4.8e-3 < high
 

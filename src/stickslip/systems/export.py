@@ -157,7 +157,8 @@ def _system(held: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _call(part: Mapping[str, Any]) -> str:
-    return f"ss.{part['name']}({_arguments(part, without=('name',))})"
+    room = "laws" if part["name"] in LAWS else "drives"
+    return f"ss.{room}.{part['name']}({_arguments(part, without=('name',))})"
 
 
 def _arguments(values: Mapping[str, Any], without: tuple[str, ...] = ()) -> str:
