@@ -66,7 +66,7 @@ def test_a_decay_without_a_finite_worst_case_is_drawn_and_written(tmp_path):
     assert (folder / "figures" / "bounds.svg").exists()
 
 
-ROOMS = ("identify", "decay", "curves", "squeak", "signals")
+ROOMS = ("balance", "cycle", "contact", "consistent", "decay", "law", "squeak", "signals")
 # what searches for seconds in any record of this length, and is asked by others of the list or in its own tests
 LONG = {"transition", "find_microslips", "mechanism", "lag_or_compliance", "synchronise", "sound_quality", "resample",
         "wavelet_map", "wavelet_blocks", "wavelet_overview"}  # fmt: skip
@@ -74,18 +74,20 @@ CHANNELS = ("x", "v", "a", "z", "friction", "load", "sound")
 STATED = {"channel": "x", "channels": "x", "fs": 500.0}
 
 
-def questions() -> list[str]:
+def questions() -> dict[str, Callable[..., object]]:
     """Public functions of a record alone, by their signatures."""
-    names = []
-    for name in ss.__all__:
-        function = getattr(ss, name)
+    offered = {
+        name: getattr(place, name) for place in (ss, *(getattr(ss, room) for room in ROOMS)) for name in place.__all__
+    }
+    chosen = {}
+    for name, function in offered.items():
         if not inspect.isfunction(function) or function.__module__.split(".")[1] not in ROOMS or name in LONG:
             continue
         first, *others = inspect.signature(function).parameters.values()
         needed = {each.name for each in others if each.default is each.empty and each.kind is not each.VAR_POSITIONAL}
         if "Record" in str(first.annotation) and needed <= STATED.keys():
-            names.append(name)
-    return names
+            chosen[name] = function
+    return chosen
 
 
 TIME = np.arange(1000) / 1000
@@ -98,10 +100,17 @@ DEGENERATE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", questions())
+QUESTIONS = questions()
+
+
+def test_the_battery_is_asked_of_many() -> None:
+    assert len(QUESTIONS) > 25
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
 def test_a_degenerate_record_has_an_answer_or_a_sentence(name):
     """Nothing but StickslipError comes out, and no warning: they are errors here."""
-    question: Callable[..., object] = getattr(ss, name)
+    question = QUESTIONS[name]
     asked = inspect.signature(question).parameters.values()
     needed = {each.name: STATED[each.name] for each in asked if each.default is each.empty and each.name in STATED}
     by_name = {key: value for key, value in needed.items() if key != "channels"}

@@ -347,7 +347,7 @@ def test_a_heap_of_hdf5_that_leads_nowhere_is_not_followed(tmp_path: Path) -> No
 def test_a_clock_of_huge_numbers_is_checked_without_a_warning(huge: float) -> None:
     stamps = np.arange(60) / 250
     stamps[-1] = huge
-    record = ss.Record({"x": np.sin(np.arange(60) / 9)}, {"x": ss.Channel("x", "m")}, 250.0, stamps=stamps)
+    record = ss.Record({"x": np.sin(np.arange(60) / 9)}, {"x": ss.record.Channel("x", "m")}, 250.0, stamps=stamps)
     assert record.check()
 
 
@@ -355,7 +355,7 @@ def test_a_gap_beside_a_missing_stamp_has_a_length() -> None:
     stamps = np.arange(200) / 250
     stamps[100:] += 0.2
     stamps[100] = np.nan
-    record = ss.Record({"x": np.sin(np.arange(200) / 9)}, {"x": ss.Channel("x", "m")}, 250.0, stamps=stamps)
+    record = ss.Record({"x": np.sin(np.arange(200) / 9)}, {"x": ss.record.Channel("x", "m")}, 250.0, stamps=stamps)
     (gap,) = [fault for fault in record.check() if fault.kind == "gap"]
     assert "gap of up to 208 ms" in gap.message
     assert "about 50 samples lost" in gap.message

@@ -123,7 +123,7 @@ def test_a_folder_of_results_is_clean_of_the_name(tmp_path: Path) -> None:
     write(tmp_path, name, text)
     ended = quiet(program("fit", f"{name}.csv", "--curve", "coulomb", folder=tmp_path))
     assert ended.code == 0, ended.err
-    (folder,) = tmp_path.glob("*-stickslip")
+    (folder,) = tmp_path.glob("*-fit")
     assert folder.name.isprintable()
     assert not hidden((folder / "report.html").read_text("utf-8"))
     assert json.loads((folder / "results.json").read_text("utf-8"))["program"] == "stickslip"
