@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 from collections.abc import Callable
@@ -13,11 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from rich.console import Console
 
 import stickslip as ss
 from stickslip.cli.program import main
-from stickslip.cli.show import table
+from stickslip.cli.terminal import print_table
 from stickslip.cli.words import spoken
 
 CONDITIONS = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
@@ -196,11 +194,12 @@ def test_a_record_of_silence_between_clicks_has_no_spectra() -> None:
     assert not squeaks.squeaking
 
 
-def test_names_of_a_usual_length_are_not_broken_in_the_terminal() -> None:
-    shown = table(["condition", *"abcdef"], [["sq_wet_6.13/sensors.csv", *["a cell of a table that is long"] * 6]] * 2)
-    console = Console(width=80, file=io.StringIO())
-    console.print(shown)
-    assert console.file.getvalue().count("sq_wet_6.13/sensors.csv") == 2  # type: ignore[attr-defined]
+def test_names_of_a_usual_length_are_not_broken_in_the_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    print_table(["condition", *"abcdef"], [["sq_wet_6.13/sensors.csv", *["a cell of a table that is long"] * 6]] * 2)
+    assert capsys.readouterr().out.count("sq_wet_6.13/sensors.csv") == 2
 
 
 # ---- coupling in words
