@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
+from stickslip.solve.interrupts import held_back
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
 from stickslip.solve.tables import Array, System, Tables, table_of
@@ -222,10 +224,13 @@ def run(
             _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
             outcome = kernel.FULL
             while outcome == kernel.FULL:
-                before = clock
-                outcome, count, mode, clock = kernel.march(
-                    model, before, state, mode, Clock(float(at[0]), float(at[1]), 0.0), past, pieces.room(), work, CELLS
-                )
+                before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
+                # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just then;
+                # the first call may compile for long, and is left to it
+                with held_back() if getattr(kernel.march, "signatures", True) else nullcontext():
+                    outcome, count, mode, clock = kernel.march(
+                        model, before, state, mode, goal, past, pieces.room(), work, CELLS
+                    )
                 passed = until(before, clock, period)
                 pieces.keep(count, passed, total)
                 _refuse(outcome, table, state, clock)
