@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from stickslip.answers.asked import Asked
@@ -73,9 +73,9 @@ def analyze(
         What the damper ends on, and what the mass slides on; the ground unless stated.
     method : str
         How the friction is found: one of :func:`friction_force`'s, or "auto": all sensors together where there is an
-        accelerometer or a load cell beside x whose mount is stated or shows, or where a load cell leaves far less noise
-        in the friction and else what the motion alone leaves; else the displacement differentiated by a smoother. The
-        notes say which, and why.
+        accelerometer or a load cell beside x whose mount is stated or shows; else the displacement differentiated by a
+        smoother, whose interval holds: a mount's gain that nobody stated is in no interval. The notes say which, and
+        why.
 
     Returns
     -------
@@ -106,10 +106,11 @@ def analyze(
     whole = made.record
     slid = slid_on(whole, rig.contact if "contact" in rig.model_fields_set else None)
     answers: dict[str, Any] = {}
-    for each in QUESTIONS:
-        led = not each.follows or answers.get(each.follows) is not None
-        if led and answers.get(each.unless) is None and each.fits(whole):
-            answers[each.key] = asked.ask(each.name, partial(each.ask, whole, slid))
+    fused = cache(partial(_fused, whole))  # one record for all questions: the contact is fitted to it once
+    for question in QUESTIONS:
+        led = not question.follows or answers.get(question.follows) is not None
+        if led and answers.get(question.unless) is None and question.fits(whole):
+            answers[question.key] = asked.ask(question.name, partial(_answer, question, whole, fused, slid))
     answers = doubted(answers, whole, unknown=made.doubt, refusals=asked.refusals)
     answers["loops"] = _late(answers.get("loops"), record, rig)
     if all(answer is None for answer in answers.values()):
@@ -167,29 +168,32 @@ class Question:
         )
 
 
+def _answer(question: Question, whole: Record, fused: Callable[[], Record], slid: str) -> Any:
+    return question.ask(fused() if question.fused else whole, slid)
+
+
 FORCE = ("load", "force", "friction")
 QUESTIONS = (
     Question("loops", "Friction loops", (("friction",), MOTION), lambda r, on: friction_loops(r, contact=on)),
     Question("sticks", "Sticks and slips", (MOTION,), lambda r, on: find_sticks(r, contact=on)),
     Question("breakaway", "Breakaway", (("friction",), MOTION), lambda r, on: breakaway(r, contact=on)),
     Question(
-        "stiffness", "Contact stiffness", (("friction",), ("x",)), lambda r, on: contact_stiffness(_fused(r)),
-        fused=True,
+        "stiffness", "Contact stiffness", (("friction",), ("x",)), lambda r, on: contact_stiffness(r), fused=True,
     ),
     Question(
-        "contact_damping", "Contact damping", (("friction",), ("x",)), lambda r, on: contact_damping(_fused(r)),
+        "contact_damping", "Contact damping", (("friction",), ("x",)), lambda r, on: contact_damping(r),
         follows="stiffness", fused=True,
     ),
     Question(
-        "transition", "Transition speed", (("friction",), ("x",)), lambda r, on: transition_speed(_fused(r)),
+        "transition", "Transition speed", (("friction",), ("x",)), lambda r, on: transition_speed(r),
         follows="stiffness", fused=True,
     ),
     Question(
-        "coupled", "Coupled frequency", (("friction",), ("x",)), lambda r, on: coupled_frequency(_fused(r)),
+        "coupled", "Coupled frequency", (("friction",), ("x",)), lambda r, on: coupled_frequency(r),
         follows="stiffness", fused=True,
     ),
     Question(
-        "cause", "Sensor lag or compliance", (("friction",), ("x",)), lambda r, on: lag_or_compliance(_fused(r)),
+        "cause", "Sensor lag or compliance", (("friction",), ("x",)), lambda r, on: lag_or_compliance(r),
         follows="stiffness", fused=True,
     ),
     Question(
