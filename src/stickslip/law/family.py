@@ -131,6 +131,8 @@ def _least_squares(family: Family, samples: Samples) -> Member:
     lengths = np.sqrt(np.diag(covariance))
     alone = lengths * float(np.sqrt(np.mean(residual**2)))
     sd, freedom = scatter((jacobian * residual[:, None]) @ bread, alone, residual, compared)
+    if family.along == "x":
+        _require_hold(values, sd, freedom)
     correlations = covariance / np.outer(lengths, lengths)
     return Member(values, sd, freedom, correlations, compared, friction - residual)
 
@@ -175,17 +177,28 @@ def _require_separable(jacobian: Array, family: Family) -> None:
     lengths = np.linalg.norm(jacobian, axis=0)
     condition = np.linalg.cond(jacobian / np.where(lengths > 0, lengths, 1.0)) if np.all(lengths > 0) else np.inf
     if condition > INSEPARABLE and family.along == "x":
-        raise EstimateError(
-            "the contact's stiffness does not show in this record: its friction is that of sliding alone",
-            "a stiffness is told by readings in which the contact holds, next to the reversals",
-            "measure smaller strokes, or sample faster and x more finely, or fit a curve over the speed",
-        )
+        raise _sliding_alone()
     if condition > INSEPARABLE:
         raise EstimateError(
             f"this record can not tell the parameters of {family.formula.partition(',')[0]} from each other",
             "other values of them would leave as little",
             "choose a curve with fewer parameters, or give a record of slower and faster motion",
         )
+
+
+def _require_hold(values: dict[str, float], sd: Array, freedom: Array) -> None:
+    """Refuse a stiffness that might as well be none: the friction is the same whatever it is, but for rounding."""
+    which = list(values).index("stiffness")
+    if not student(freedom[which]) * sd[which] < abs(values["stiffness"]):
+        raise _sliding_alone()
+
+
+def _sliding_alone() -> EstimateError:
+    return EstimateError(
+        "the contact's stiffness does not show in this record: its friction is that of sliding alone",
+        "a stiffness is told by readings in which the contact holds, next to the reversals",
+        "measure smaller strokes, or sample faster and x more finely, or fit a curve over the speed",
+    )
 
 
 def scatter(influence: Array, alone: Array, residual: Array, samples: Samples) -> tuple[Array, Array]:
