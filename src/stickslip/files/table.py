@@ -21,7 +21,7 @@ Block = dict[str, Array]
 
 FREE = 1 << 24  # cells, 134 MB as numbers: what a file of any size may become
 PER_BYTE = 8  # cells that each byte of a larger file may become; speech in OGG, the tightest of honest files, has 4
-A_COLUMN = 1 << 14  # cells that a column counts as at least: what its name, unit and check-up cost
+A_COLUMN = 1 << 12  # cells that a column counts as at least: what its name, unit and check-up cost
 
 
 @dataclass(frozen=True)
