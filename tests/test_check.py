@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -102,13 +103,26 @@ def test_a_million_samples_are_checked_within_seconds():
     assert time.process_time() - began < 5.0
 
 
+def test_a_clock_without_a_unit_is_told_with_the_rate_that_it_gives(tmp_path):
+    rows = "".join(f"{i},{math.sin(i * 0.05):.5f}\n" for i in range(500))
+    path = tmp_path / "run.csv"
+    path.write_text(f"time,x [mm]\n{rows}", "utf-8")
+    (fault,) = read_record(path).check()
+    assert (fault.kind, fault.channel) == ("unit", None)
+    assert "1 samples a second" in fault.message
+    assert read_record(path, time="time [ms]").check() == read_record(path, fs=1000).check() == []
+    path.write_text(f"time [ms],x [mm]\n{rows}", "utf-8")
+    assert read_record(path).check() == []
+
+
 def test_real_records_without_fault(dataset):
-    emps = read_record(dataset("emps") / "DATA_EMPS.mat", channels={"x": "qm [m]", "force": "gtau * vir [N]"})
+    channels = {"x": "qm [m]", "force": "gtau * vir [N]"}
+    emps = read_record(dataset("emps") / "DATA_EMPS.mat", channels=channels, time="t [s]")
     assert emps.check() == []
     folder = dataset("frame_base_excited")
     for weight in ("250g", "450g"):
         files = [folder / f"s_b_{weight}_{letter}.mat" for letter in "xy"]
-        assert read_record(files, channels={"x": "x [mm]", "z": "y [mm]"}).check() == []
+        assert read_record(files, channels={"x": "x [mm]", "z": "y [mm]"}, units={"t": "s"}).check() == []
 
 
 def test_real_record_with_host_stamps(dataset):

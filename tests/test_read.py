@@ -288,7 +288,7 @@ def test_two_time_columns_of_one_title_must_agree(csv: Callable[..., Path]) -> N
 
 
 def test_the_history_names_the_source(csv: Callable[..., Path]) -> None:
-    path = csv("t,x [mm]\n0,1\n1,2\n")
+    path = csv("t [s],x [mm]\n0,1\n1,2\n")
     step = ss.read_record(path, channels={"x": "x"}, rows=(0, None)).history[0]
     assert step.action == "read_record"
     assert step.arguments["channels"] == {"x": "x"}

@@ -23,6 +23,7 @@ _SPOKEN = (
     (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
     (r'\bchannel="(\w+)"', r"--channel \1"),
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
+    (r'\btime="([^"]*)"', r'--time "\1"'),
     (r'\bfriction_force\(record, \.\.\., method="(\w+)"\)', r"--method \1"),
     (
         r"\b(channels|channel|frequencies|normal|rows|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness|lever|calibration)=(?=\W|$)",

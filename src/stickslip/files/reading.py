@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from stickslip.errors import FormatError, RecordError
 from stickslip.files.select import Source, TimeColumn, Wanted
 from stickslip.files.table import FREE, Block, Budget, supplied
+from stickslip.printing import printable
 from stickslip.record.channels import Channel
 from stickslip.record.clock import Clock, fit_clock, resolution
 from stickslip.record.metadata import (
@@ -207,7 +208,11 @@ class Reading:
         self, data: Mapping[tuple[int, str], Array], clock: Clock, action: str, extra: Mapping[str, Any] | None = None
     ) -> Record:
         samples = {wanted.channel.name: _combined(wanted, data) for wanted in self.wanted}
-        arguments = {**self.arguments, **(extra or {}), "files": [source.to_dict() for source in self.sources]}
+        files = [source.to_dict() for source in self.sources]
+        for number, time in self.times.items():
+            if time.assumed and self.fs is None:
+                files[number]["seconds"] = printable(time.key[1])
+        arguments = {**self.arguments, **(extra or {}), "files": files}
         length = len(next(iter(samples.values())))
         outcome = f"{length} samples at {clock.fs:g} Hz"
         outcome += "" if clock.stamps is None else ", the time stamps not uniform and kept"

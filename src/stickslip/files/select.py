@@ -65,11 +65,15 @@ class Wanted:
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """The time column of a file, the seconds in its unit, and columns of the same title that must agree with it."""
+    """The time column of a file, the seconds in its unit, and columns of the same title that must agree with it.
+
+    Where nobody stated its unit it is `assumed` to be in seconds.
+    """
 
     key: Key
     scale: float
     twins: tuple[Key, ...] = ()
+    assumed: bool = False
 
 
 class Columns:
@@ -241,8 +245,9 @@ class Columns:
 
     def _time_column(self, number: int, best: Column, named: Sequence[Column]) -> TimeColumn:
         twins = [column.name for column in named if re.fullmatch(re.escape(best.name) + r"_\d+", column.name)]
-        scale = parse_unit(self.unit_of((number, best.name)) or "s", expect="s").scale
-        return TimeColumn((number, best.name), scale, tuple((number, name) for name in twins))
+        stated = self.unit_of((number, best.name))
+        scale = parse_unit(stated or "s", expect="s").scale
+        return TimeColumn((number, best.name), scale, tuple((number, name) for name in twins), stated is None)
 
     def _asked_time(self, number: int, asked: str) -> TimeColumn | None:
         spec = split_spec(asked)
@@ -253,8 +258,8 @@ class Columns:
         column = by_name.get(spec.arithmetic.strip("`"))
         if column is None:
             return None
-        stated = spec.unit or self.unit_of((number, column.name)) or "s"
-        return TimeColumn((number, column.name), parse_unit(stated, expect="s").scale)
+        stated = spec.unit or self.unit_of((number, column.name))
+        return TimeColumn((number, column.name), parse_unit(stated or "s", expect="s").scale, assumed=stated is None)
 
     def check_units(self, channels: Iterable[str]) -> None:
         """Refuse a unit for something that is neither a channel nor a column."""

@@ -216,8 +216,8 @@ def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
 
 
 def _unstated(record: Record) -> list[Fault]:
-    """Channels whose unit nobody stated, with what they span in the one that was taken."""
-    faults = []
+    """The clock and the channels whose unit nobody stated, with what they span in the one that was taken."""
+    faults = _clock_unstated(record)
     for name, channel in record.channels.items():
         finite = record[name][np.isfinite(record[name])]
         if channel.assumed and len(finite):
@@ -228,6 +228,19 @@ def _unstated(record: Record) -> list[Fault]:
             )
             faults.append(Fault("unit", name, ((0, len(record) - 1),), message))
     return faults
+
+
+def _clock_unstated(record: Record) -> list[Fault]:
+    """The time column whose unit nobody stated: the same for milliseconds and seconds."""
+    files = [file for step in record.history for file in step.arguments.get("files", ()) if file.get("seconds")]
+    if not files:
+        return []
+    name = files[0]["seconds"]
+    message = (
+        f"{name} states no unit: read as s it gives {record.fs:.4g} samples a second for {record.duration:.4g} s; "
+        f'if it is in another, say which, as in time="{name} [ms]".'
+    )
+    return [Fault("unit", None, ((0, len(record) - 1),), message)]
 
 
 def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
