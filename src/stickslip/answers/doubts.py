@@ -83,8 +83,8 @@ def _contradiction(told: Consistency | None) -> str:
 
 def _base_unseen(record: Record) -> bool:
     """Whether the friction is that of a spring whose other end was not measured, while the motion goes on."""
-    told = [step.arguments.get("method") for step in record.history if step.action == "friction_force"]
-    if not told or told[-1] == ALONE or "x" not in record or not {"z", "force", "load"}.isdisjoint(record):
+    rig = record.rig
+    if rig is None or rig.method == ALONE or "x" not in record or not {"z", "force", "load"}.isdisjoint(record):
         return False
     first, last = (float(np.std(part)) for part in np.array_split(record["x"], 2))
     return last > GOES_ON * first

@@ -216,11 +216,10 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     ]
     if aligned:
         unknown.append(f"the delay of x{FOUND}")
-    told = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
     unknown += [
         f"the {name}{FOUND}"
         for name in ("mass", "stiffness")
-        if getattr(rig, name) is None and told and told[0].get(name) is not None
+        if getattr(rig, name) is None and getattr(record.rig, name, None) is not None
     ]
     if not unknown:
         return ""
@@ -272,12 +271,12 @@ def _balanced(record: Record, rig: RigSettings, method: str, asked: Asked) -> Re
     )
     if found is None:
         return record
-    lost = [part for part in found.history[-1].outcome.split("; ") if part.endswith("left to the others")]
+    lost = () if found.rig is None else found.rig.lost
     asked.notes.append(f"Friction force: {'; '.join([f'by the method {method}', why, *lost])}.")
-    made = found.history[-1].arguments
     for name, unit in (("mass", "kg"), ("stiffness", "N/m")):
         if getattr(rig, name) is None:
-            asked.notes.append(f"No {name} was stated: {made[name]:.4g} {unit} is found from how the mass slides.")
+            value = f"{getattr(found.rig, name):.4g} {unit}"
+            asked.notes.append(f"No {name} was stated: {value} is found from how the mass slides.")
     if "z" not in record:
         asked.notes.append("There is no channel z: the spring's other end is taken to be at rest.")
     if rig.damping is None:

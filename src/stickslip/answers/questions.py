@@ -20,6 +20,7 @@ from stickslip.answers.preparation import (
     ready,
     unmoved,
 )
+from stickslip.balance.balance import Balance
 from stickslip.balance.force import FUSIONS, friction_force
 from stickslip.balance.motion import is_measured, slid_on
 from stickslip.balance.pull import pulled_slider
@@ -249,22 +250,18 @@ def _late(loops: Loops | None, record: Record, rig: RigSettings) -> Loops | None
 def _fused(record: Record) -> Record:
     """The middle of a record, enough to fit a contact by its likelihood, with all sensors put together."""
     cut = middle(record, STRETCH)
-    told = [step.arguments for step in record.history if step.action == "friction_force"][-1]
-    return cut if told["method"] in FUSIONS else friction_force(
-        cut, method="fusion", **{key: told[key] for key in CONSTANTS}
-    )  # fmt: skip
+    if cut.rig is None or cut.rig.method in FUSIONS:
+        return cut
+    return friction_force(cut, method="fusion", **{key: getattr(cut.rig, key) for key in CONSTANTS})
 
 
 def _told(record: Record) -> dict[str, Any]:
     """The constants and the method behind the friction force, where it comes from a balance of forces."""
     if "friction" not in record or is_measured(record, "friction"):
         return {}
-    told = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
-    return {
-        key.replace("method", "differentiation"): made[key]
-        for made in told if made["mass"] is not None
-        for key in (*CONSTANTS, "method")
-    }  # fmt: skip
+    if Balance.of(record.rig) is None:
+        return {}
+    return {key.replace("method", "differentiation"): getattr(record.rig, key) for key in (*CONSTANTS, "method")}
 
 
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:

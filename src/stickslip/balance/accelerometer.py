@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.balance.balance import Balance, told_rig
+from stickslip.balance.balance import Balance, known_constants
 from stickslip.balance.fusion import fuse
 from stickslip.balance.lag import SensorDelay, sensor_delay
 from stickslip.balance.motion import is_measured
@@ -51,7 +51,7 @@ def acceleration_of_mass(
     """
     mount, noise = record.channels[channel].mount, _noise_share(record, channel)
     swings = mount is not None and mount[0] < record.fs / 2
-    rig = told_rig(record, mass=mass, stiffness=stiffness)
+    rig = known_constants(record, mass=mass, stiffness=stiffness)
     known = {"mass", "stiffness"} <= set(rig) and {"x", "z"} <= set(record) and channel == "a"
     if known and (swings or noise > LOUD):
         return _fused(record, rig, question)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.balance.motion import is_measured
 from stickslip.errors import ModelError
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, StatedRig, Step
 from stickslip.signals.derivatives import Filter, differentiate, noise_along
 from stickslip.units import parse_value
 
@@ -32,9 +32,11 @@ class Balance:
     damper: str
 
     @classmethod
-    def told(cls, rig: Mapping[str, Any]) -> Balance:
-        """As the arguments of friction_force say."""
-        return cls(rig["mass"], rig["stiffness"], rig["damping"], rig["damper"])
+    def of(cls, rig: StatedRig | None) -> Balance | None:
+        """The one by which the friction was found; None where mass or stiffness was not known."""
+        if rig is None or rig.mass is None or rig.stiffness is None:
+            return None
+        return cls(rig.mass, rig.stiffness, rig.damping, rig.damper)
 
     def pull(self, record: Record) -> Array:
         """What spring, applied force and a damper to the base do to the mass [N]; not what its own velocity does."""
@@ -104,13 +106,10 @@ class Rig(Balance):
         return said
 
 
-def told_rig(record: Record, **given: Any) -> dict[str, Any]:
-    """The rig's constants for :func:`friction_force`: as given, or as the record's last balance was told."""
-    last = [step.arguments for step in record.history if step.action == "friction_force"][-1:]
-    names = ("mass", "stiffness", "damping", "damper", "contact")
-    told = {name: step.get(name) for step in last for name in names}
-    known = {**told, **{name: value for name, value in given.items() if value is not None}}
-    return {name: value for name, value in known.items() if value is not None}
+def known_constants(record: Record, **given: Any) -> dict[str, Any]:
+    """The rig's constants for :func:`friction_force`: as given, or as the friction was found with."""
+    stated = {} if record.rig is None else record.rig.constants
+    return {**stated, **{name: value for name, value in given.items() if value is not None}}
 
 
 def paths(
@@ -154,11 +153,14 @@ def with_motion(record: Record, derive: Filter) -> Record:
     return made
 
 
-def with_friction(record: Record, force: Array, sd: Array, step: Step) -> Record:
+def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, words: Sequence[str]) -> Record:
     """The record with the friction, its standard deviation at each sample, and how it was found."""
+    arguments = {name: value for name, value in asdict(rig).items() if name != "lost"}
+    step = Step("friction_force", arguments, "; ".join(words))
     made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
     noise = float(np.median(sd))
-    return made.with_channel("friction", force, unit="N", source="friction_force", noise=noise, step=step)
+    made = made.with_channel("friction", force, unit="N", source="friction_force", noise=noise, step=step)
+    return replace(made, rig=rig)
 
 
 def stretch(record: Record) -> Array:

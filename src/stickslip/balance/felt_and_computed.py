@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.balance import told_rig
+from stickslip.balance.balance import Balance, known_constants
 from stickslip.balance.force import friction_force
 from stickslip.balance.lines import Complex, Lines, find_lines
 from stickslip.balance.mounts import Resonance, find_mounts
@@ -176,7 +176,7 @@ def compare_force(
     if not 0 < tolerance < 1:
         raise EstimateError(f"tolerance = {tolerance}", "a share between 0 and 1", "leave it at 0.1")
     record.require_clean("load", "x", question=QUESTION)
-    rig = told_rig(record, mass=mass, stiffness=stiffness, damping=damping, damper=damper)
+    rig = known_constants(record, mass=mass, stiffness=stiffness, damping=damping, damper=damper)
     if not {"mass", "stiffness"} & set(rig):
         raise EstimateError(
             "neither mass nor stiffness is known",
@@ -185,17 +185,18 @@ def compare_force(
         )
     record = without_delays(record, *(name for name in USED if name in record), question=QUESTION)
     balanced = friction_force(record, method="F", **rig)
-    told = balanced.history[-1].arguments
-    share = record.channels["load"].inertia / told["mass"]
+    balance = Balance.of(balanced.rig)
+    assert balance is not None  # a mass or a stiffness is known
+    share = record.channels["load"].inertia / balance.mass
     indirect = balanced["friction"]
     # m a = pull - f puts the flange's inertia in terms of the pull: the accelerometer's noise would be in both forces
-    direct = (balanced["load"] - share * (indirect + told["mass"] * balanced["a"])) / (1 - share)
+    direct = (balanced["load"] - share * (indirect + balance.mass * balanced["a"])) / (1 - share)
     made = balanced.with_channel("direct", direct, unit="N").with_channel("indirect", indirect, unit="N")
     names = ["direct", "indirect", *(name for name in ("x", "z", "a", "load", "force") if name in made)]
     lines = find_lines(made, names, contact=rig.get("contact"), question=QUESTION)
     cut = _cut(record)
     bands = tuple(_bands(lines, tolerance))
-    mounts = find_mounts(lines, balanced, told) if "a" in record and bands[0].verdict != "differ" else ()
+    mounts = find_mounts(lines, balanced, balance) if "a" in record and bands[0].verdict != "differ" else ()
     return ForceComparison(
         difference=_flagged(_difference(lines, direct - indirect), cut),
         agree_up_to=_flagged(_agree_up_to(bands, tolerance, lines, record.fs / 2), cut),

@@ -26,7 +26,7 @@ from stickslip.balance.mass import mass_and_stiffness, stiffness_per_mass
 from stickslip.balance.motion import require_change, require_fit
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Estimate
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, StatedRig, Step
 from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import (
     LEAST,
@@ -151,7 +151,7 @@ def friction_force(
     constants = {"mass": mass, "stiffness": stiffness, "damping": damping, **dict.fromkeys(unknown, 1.0)}
     rig = Rig.stated(constants, damper, contact)
     if method == "F2" or (method == "load" and len(unknown) == 2):
-        return felt(record, {**asdict(rig), **dict.fromkeys(unknown)}, method)
+        return felt(record, StatedRig(method, **{**asdict(rig), **dict.fromkeys(unknown)}))
     if method == "fusion" and len(unknown) == 2 and {"z", "load"} <= set(record):
         return _weighed(record, rig)
     if unknown:
@@ -183,12 +183,9 @@ def _smoothed(record: Record, rig: Rig, method: str, bandwidth: float | str | No
     ratio = math.sqrt(change / np.mean(variance)) if variance.any() else 0.0
     sd = total_sd(force, np.sqrt(variance), derive if one_filter else None, ratio)
 
-    step = Step(
-        "friction_force",
-        {**asdict(rig), "method": method, "bandwidth": width if method == "smoother" else None},
-        "; ".join(rig.words(record, method, width, one_filter=one_filter)),
-    )
-    return with_friction(with_motion(record, derive), force, sd, step)
+    stated = StatedRig(method, bandwidth=width if method == "smoother" else None, **asdict(rig))
+    words = rig.words(record, method, width, one_filter=one_filter)
+    return with_friction(with_motion(record, derive), force, sd, stated, words)
 
 
 def _punctual(record: Record) -> Record:
@@ -214,8 +211,7 @@ def _balanced(record: Record, rig: Rig, method: str, asked: str) -> Record:
         *rig.words(record, "five-point", 0.0, one_filter=False),
         "averaged over five points" if method == "F1" else "as read",
     ]
-    step = Step("friction_force", {**asdict(rig), "method": method}, "; ".join(words))
-    return with_friction(with_motion(record, derive), force, np.sqrt(variance), step)
+    return with_friction(with_motion(record, derive), force, np.sqrt(variance), StatedRig(method, **asdict(rig)), words)
 
 
 def _lacking(record: Record, asked: str, wanted: Sequence[str]) -> list[str]:
@@ -232,8 +228,17 @@ def _weighed(record: Record, rig: Rig) -> Record:
     )
     sd = np.sqrt(made["friction_sd"] ** 2 + (mass.sd * made["a"]) ** 2 + (stiffness.sd * stretch(made)) ** 2)
     words = f"m = {mass.value:.5g} kg and k = {stiffness.value:.5g} N/m from what the load cell feels"
-    step = replace(made.history[-1], outcome=f"{words}; {made.history[-1].outcome}")
-    return replace(with_friction(made, made["friction"], sd, step), history=(*made.history[:-1], step))
+    return _less_sure(made, sd, words)
+
+
+def _less_sure(record: Record, sd: Array, words: str) -> Record:
+    """A friction found with constants that are themselves found: its standard deviation, and what to say first."""
+    last = record.history[-1]
+    history = (*record.history[:-1], replace(last, outcome=f"{words}; {last.outcome}"))
+    made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
+    noise = float(np.median(sd))
+    made = made.with_channel("friction", record["friction"], unit="N", source="friction_force", noise=noise)
+    return replace(made, history=history)
 
 
 def _completed(record: Record, rig: Rig, unknown: Sequence[str], method: str, bandwidth: float | str | None) -> Record:
@@ -273,8 +278,7 @@ def _completed(record: Record, rig: Rig, unknown: Sequence[str], method: str, ba
     )  # fmt: skip
     unsure = made["a"] if "mass" in unknown else found.value * stretch(made)
     sd = np.hypot(made["friction_sd"], moving * found.sd / found.value * np.abs(unsure))
-    step = replace(made.history[-1], outcome=f"{_ratio(found)}; {made.history[-1].outcome}")
-    return replace(with_friction(made, made["friction"], sd, step), history=(*made.history[:-1], step))
+    return _less_sure(made, sd, _ratio(found))
 
 
 def _per_mass(record: Record, found: Estimate, *, method: str, **rig: Any) -> Record:
@@ -292,7 +296,8 @@ def _per_mass(record: Record, found: Estimate, *, method: str, **rig: Any) -> Re
     kept = {name: made[name] for name in made if name not in ("friction", "friction_sd")}
     bare = replace(made, samples=kept, channels={name: made.channels[name] for name in kept}, history=made.history[:-1])
     bare = bare.with_channel("friction_per_mass_sd", sd, unit="m/s^2", source="friction_force")
-    return bare.with_channel("friction_per_mass", made["friction"], unit="m/s^2", source="friction_force", step=step)
+    bare = bare.with_channel("friction_per_mass", made["friction"], unit="m/s^2", source="friction_force", step=step)
+    return bare if made.rig is None else replace(bare, rig=replace(made.rig, mass=None, stiffness=None))
 
 
 def _ratio(found: Estimate) -> str:
@@ -317,7 +322,6 @@ def _fused(record: Record, rig: Rig, method: str, asked: str) -> Record:
         *found.lost,
         f"contact against the {rig.contact}",
     ]
-    step = Step("friction_force", {**asdict(rig), "method": method}, "; ".join(words))
     made = record
     if "v" not in record:
         noise = float(np.median(found.velocity_sd))
@@ -325,4 +329,5 @@ def _fused(record: Record, rig: Rig, method: str, asked: str) -> Record:
         made = made.with_channel("v", found.velocity, unit="m/s", source="friction_force", noise=noise)
     if "a" not in record:
         made = made.with_channel("a", found.acceleration, unit="m/s^2", source="friction_force")
-    return with_friction(made, found.friction, found.friction_sd, step)
+    stated = StatedRig(method, lost=found.lost, **asdict(rig))
+    return with_friction(made, found.friction, found.friction_sd, stated, words)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.balance import told_rig
+from stickslip.balance.balance import known_constants
 from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
@@ -116,7 +116,7 @@ def impact_test(record: Record, *, mass: float | str | None = None) -> ImpactTes
     channels = [name for name in SENSED if name in record]
     record.require_clean(*(channels or SENSED), question=QUESTION, samples=2 * LEAST)
     record = without_delays(record, *channels, question=QUESTION)
-    known = told_rig(record, mass=mass).get("mass")
+    known = known_constants(record, mass=mass).get("mass")
     ringing = _ringing(record, channels)
     modes, residual = _modes(ringing)
     named = _named(modes, channels, parse_value(known, "kg") if known is not None else None)

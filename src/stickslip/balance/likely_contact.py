@@ -75,7 +75,7 @@ def likely_contact(record: Record) -> LikelyContact:
 
 
 def _likeliest(record: Record) -> LikelyContact:
-    balance, sensors, fused = _told(record)
+    balance, sensors, fused = _balanced(record)
     seen = _looked_through(record, balance, sensors, fused=fused)
     sticks, search = seen.sticks, _Search.of(seen.parts, balance, record.fs)
     best, covariance = search.peak(max(balance.stiffness, seen.slope))
@@ -206,26 +206,24 @@ def held_steps(friction: Array, velocity: Array, level: float) -> tuple[NDArray[
     return holds, found
 
 
-def _told(record: Record) -> tuple[Balance, list[str], bool]:
-    """The rig as the record's history tells it, the sensors that speak of it, and whether they were put together."""
+def _balanced(record: Record) -> tuple[Balance, list[str], bool]:
+    """By which the friction was found, the sensors that speak of it, and whether they were put together."""
     record.require_clean("x", "friction", question=STIFFNESS)
-    told = [step for step in record.history if step.action == "friction_force"]
-    if not told or told[-1].arguments.get("contact") == "base":
+    rig, balance = record.rig, Balance.of(record.rig)
+    if rig is None or rig.contact == "base":
         raise EstimateError(
-            "no friction_force in the record's history" if not told else "a contact on the moving base",
+            "a friction force that friction_force did not find" if rig is None else "a contact on the moving base",
             "the likeliest contact is found from a mass that rubs on the ground, by its balance of forces",
             'call friction_force(record, ..., method="fusion") first, or take method="slope"',
         )
-    rig = told[-1].arguments
-    if rig["mass"] is None:
+    if balance is None:
         raise EstimateError(
             "friction without mass and stiffness of the oscillator",
             "the likeliest contact is found by the balance of forces on the mass",
             'give friction_force mass= or stiffness=, or take method="slope"',
         )
-    named = FUSIONS.get(rig["method"], FUSIONS["fusion"])
-    balance = Balance.told(rig)
-    fused = rig["method"] in FUSIONS and not is_measured(record, "v")
+    named = FUSIONS.get(rig.method, FUSIONS["fusion"])
+    fused = rig.method in FUSIONS and not is_measured(record, "v")
     return balance, [name for name in named if is_measured(record, name)], fused
 
 

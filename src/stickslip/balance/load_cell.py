@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from stickslip.balance.balance import FRICTION, averaged_gain, with_friction
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, StatedRig
 from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import (
     LEAST,
@@ -24,9 +23,9 @@ ALONE = "load cell alone"
 BEYOND = 2.0  # times its mount's frequency up to which a load cell's reading is followed
 
 
-def felt(record: Record, arguments: Mapping[str, Any], method: str) -> Record:
+def felt(record: Record, rig: StatedRig) -> Record:
     """What the load cell feels, less the inertia of its flange: the thesis's F2, or through its mount's inverse."""
-    cell = record.channels["load"]
+    method, cell = rig.method, record.channels["load"]
     source = next((name for name in ("a", "v", "x") if name in record), "") if cell.inertia else ""
     used = ["load", *([source] if source else [])]
     record.require_clean(*used, question=FRICTION, samples=LEAST)
@@ -54,8 +53,7 @@ def felt(record: Record, arguments: Mapping[str, Any], method: str) -> Record:
     if cell.discharge is not None:
         words.append(f"its discharge of {cell.discharge:g} s is left in")
     name = ALONE if method == "load" else method  # no balance of forces stands behind it
-    step = Step("friction_force", {**arguments, "method": name}, "; ".join(words))
-    return with_friction(record, force, np.sqrt(variance), step)
+    return with_friction(record, force, np.sqrt(variance), replace(rig, method=name), words)
 
 
 def _unmounted(record: Record, terms: dict[str, dict[int, float]]) -> tuple[dict[str, Filter], list[str]]:

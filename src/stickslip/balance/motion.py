@@ -110,8 +110,7 @@ _CYCLES: WeakKeyDictionary[Motion, Cycles] = WeakKeyDictionary()
 def slid_on(record: Record, contact: str | None) -> str:
     """What the mass slides on: as said, or as :func:`friction_force` was told, or the ground."""
     if contact is None:
-        told = [step.arguments.get("contact") for step in record.history if step.action == "friction_force"]
-        contact = str(told[-1]) if told else "ground"
+        contact = "ground" if record.rig is None else record.rig.contact
     if contact not in ("ground", "base"):
         raise EstimateError(f"contact = '{contact}'", "the mass slides on the ground or the base", "choose one of them")
     return contact

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.balance.balance import Balance
 from stickslip.balance.lines import Complex, Lines
 from stickslip.estimate import Estimate
 from stickslip.record.record import Record
@@ -87,7 +87,7 @@ class _MeanLines:
         return np.concatenate([rest.real / sd, rest.imag / sd])
 
 
-def find_mounts(lines: Lines, record: Record, rig: Mapping[str, Any]) -> tuple[Resonance, ...]:
+def find_mounts(lines: Lines, record: Record, balance: Balance) -> tuple[Resonance, ...]:
     r"""Which mounts swing, if the accelerometer and the load cell are to tell one motion?
 
     With the pull :math:`p = k(z - x) - c\dot x + P` and :math:`\mu` the flange's mass over m, the friction is
@@ -95,38 +95,38 @@ def find_mounts(lines: Lines, record: Record, rig: Mapping[str, Any]) -> tuple[R
     :math:`H_a (p - f)/m`. Frequency and damping of both mounts are those that bring every line of the two readings
     together, by least squares. A mount is named only where the lines can not do without it.
     """
-    balance = _balance(lines, record, rig)
-    if len(balance.frequency) < 8:
+    means = _mean_lines(lines, record, balance)
+    if len(means.frequency) < 8:
         return ()
-    fits = {kinds: _fitted(balance, kinds) for kinds in ("", "a", "l", "al")}
+    fits = {kinds: _fitted(means, kinds) for kinds in ("", "a", "l", "al")}
     best = fits["al"]
-    scale = max(1.0, best.cost / max(1, 2 * len(balance.frequency) - 4))
+    scale = max(1.0, best.cost / max(1, 2 * len(means.frequency) - 4))
     shown = [k for k, other in (("a", "l"), ("l", "a")) if (fits[other].cost - best.cost) / scale > TOLD]
     kept = fits["".join(shown)]
-    return tuple(resonance for kind in shown for resonance in _named(kept, kind, balance))
+    return tuple(resonance for kind in shown for resonance in _named(kept, kind, means))
 
 
-def _balance(lines: Lines, record: Record, rig: Mapping[str, Any]) -> _MeanLines:
+def _mean_lines(lines: Lines, record: Record, balance: Balance) -> _MeanLines:
     """The mean lines, those that stand out of the noise in both readings."""
     s = 2j * np.pi * lines.frequency
     mean = {name: values.mean(axis=0) for name, values in lines.amplitudes.items()}
     nothing = np.zeros(len(s), dtype=complex)
     base = mean.get("z", nothing)
-    driven = rig["damping"] * s * (mean["x"] - (base if rig["damper"] == "base" else 0.0))
-    pull = rig["stiffness"] * (base - mean["x"]) - driven + mean.get("force", nothing)
+    driven = balance.damping * s * (mean["x"] - (base if balance.damper == "base" else 0.0))
+    pull = balance.stiffness * (base - mean["x"]) - driven + mean.get("force", nothing)
     points = 2.0 * (len(lines.frequency) + 1) * lines.count * lines.worth
     level = {}
     for name in ("x", "z", "a", "load"):
         noise = noise_along(record[name], record.fs, record.channels[name].noise) if name in mean else np.zeros(1)
         level[name] = math.sqrt(2 * float(np.mean(noise**2)) / points)  # of the real part of a mean line
-    pulled = rig["stiffness"] * math.hypot(level["x"], level["z"])
+    pulled = balance.stiffness * math.hypot(level["x"], level["z"])
     heard = (np.abs(mean["a"]) > HEARD * level["a"]) & (np.abs(mean["load"]) > HEARD * level["load"])
     heard &= lines.frequency < 0.4 * record.fs
     size = int(heard.sum())
     return _MeanLines(
         lines.frequency[heard], mean["a"][heard], mean["load"][heard], pull[heard],
-        np.full(size, math.hypot(level["a"], pulled / rig["mass"])), np.full(size, level["load"]),
-        rig["mass"], record.channels["load"].inertia,
+        np.full(size, math.hypot(level["a"], pulled / balance.mass)), np.full(size, level["load"]),
+        balance.mass, record.channels["load"].inertia,
     )  # fmt: skip
 
 

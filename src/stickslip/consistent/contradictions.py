@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from stickslip.balance.balance import told_rig
+from stickslip.balance.balance import known_constants
 from stickslip.balance.motion import is_measured, require_change
 from stickslip.consistent.checks import FAILS, Check
 from stickslip.consistent.forced_checks import (
@@ -135,7 +135,7 @@ def consistency(
     if isinstance(record, Mapping):
         checks = tuple(stated_checks(record, tolerance))
         return Consistency(checks, what_fails(checks))
-    rig = told_rig(record, mass=mass, stiffness=stiffness, damping=damping, damper=damper)
+    rig = known_constants(record, mass=mass, stiffness=stiffness, damping=damping, damper=damper)
     record.require_clean("x", question=QUESTION)
     require_change(record, "x", question=QUESTION)
     measured = [name for name in USED if name in record and is_measured(record, name)]

@@ -255,8 +255,7 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
             f"what the contact bears before it slips takes {FEW} at least",
             "sample faster",
         )
-    told = [step.arguments for step in record.history if step.action == "friction_force"]
-    method = told[-1]["method"] if told else ""
+    method = "" if record.rig is None else record.rig.method
     unknown = _unstated(record, method)
     strays = [_stray(each, wide=bool(unknown)) for each in chosen]
     stray = (RINGS if unknown else 1.0) * float(np.median(strays))
@@ -321,11 +320,10 @@ def _widened(estimate: Estimate, below: float, above: float) -> Estimate:
 
 def _balance(record: Record) -> Balance | None:
     """By which friction was found, where no sensor did better than that and the mass rests on the ground."""
-    told = [step.arguments for step in record.history if step.action == "friction_force"]
-    made = record.channels["friction"].source == "friction_force"
-    if not (made and told and told[-1].get("mass") and told[-1].get("contact") == "ground"):
+    rig = record.rig
+    if is_measured(record, "friction") or rig is None or rig.contact == "base" or rig.method in FUSIONS:
         return None
-    return None if told[-1]["method"] in FUSIONS else Balance.told(told[-1])
+    return Balance.of(rig)
 
 
 def _begun(stroke: Stroke, pull: Array, mass: float, fs: float) -> tuple[float, float] | None:

@@ -349,9 +349,9 @@ def _events(stuck: NDArray[np.bool_], certain: NDArray[np.bool_], motion: Motion
 
 def _fused_holds(record: Record, contact: str | None) -> tuple[tuple[Hold, ...], tuple[str, ...]]:
     """The holds of a contact whose friction was found by all sensors together; and what is lost where it was not."""
-    told = [step for step in record.history if step.action == "friction_force"]
+    rig = record.rig
     unseen = "onsets are told to the threshold only and micro-slips not at all"
-    if "friction" not in record or not told or told[-1].arguments.get("method") not in FUSIONS:
+    if "friction" not in record or rig is None or rig.method not in FUSIONS:
         return (), (f'{unseen}: for them call friction_force(record, ..., method="fusion") first',)
     if slid_on(record, contact) == "base":
         return (), (
@@ -362,13 +362,12 @@ def _fused_holds(record: Record, contact: str | None) -> tuple[tuple[Hold, ...],
         return (), (
             f"{unseen}: the contact's holds are shorter than four samples at {record.fs:g} Hz, or there are none",
         )
-    cell = "load" in record and told[-1].arguments["method"] != "motion"
+    cell = "load" in record and rig.method != "motion"
     lost = [] if cell else ["without a load cell onsets are three to ten times less sure"]
     shortest = record.fs * min(hold.end - hold.begin for hold in holds)
     if shortest < SHORT:
         lost.append(f"holds last {shortest:.0f} samples at {record.fs:g} Hz, and shorter ones are missed")
-    lost += [said for said in told[-1].outcome.split("; ") if "left to the others" in said]
-    return holds, tuple(lost)
+    return holds, (*lost, *rig.lost)
 
 
 def _events_of(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from stickslip.balance.motion import is_measured
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -110,20 +111,20 @@ def force_balance(record: Record) -> dict[str, Array] | None:
     """The terms of the balance that gave the friction, in the order of drawing; None where it was not computed.
 
     ``f = k (z - x) - m a - c v + P``, with ``c (v - dz/dt)`` for a damper on the base; the constants are those in the
-    history of the record, not those at hand.
+    record, not those at hand.
     """
-    told = [step.arguments for step in record.history if step.action == "friction_force"]
-    if not told or told[-1].get("mass") is None or record.channels["friction"].source != "friction_force":
+    rig = record.rig
+    if rig is None or rig.mass is None or rig.stiffness is None or is_measured(record, "friction"):
         return None
-    rig = told[-1]
     stretch = record["z"] - record["x"] if "z" in record else -record["x"]
-    terms = {"spring": rig["stiffness"] * stretch, "inertia": -rig["mass"] * record["a"]}
-    if rig["damping"]:
+    terms = {"spring": rig.stiffness * stretch, "inertia": -rig.mass * record["a"]}
+    if rig.damping:
         across = record["v"]
-        if rig["damper"] == "base" and "z" in record:
-            moved = differentiate(record["z"], record.fs, method=rig["method"], bandwidth=rig["bandwidth"])
+        if rig.damper == "base" and "z" in record:
+            derive: Literal["smoother", "five-point"] = "five-point" if rig.method == "five-point" else "smoother"
+            moved = differentiate(record["z"], record.fs, method=derive, bandwidth=rig.bandwidth)
             across = across - moved.values
-        terms["damper"] = -rig["damping"] * across
+        terms["damper"] = -rig.damping * across
     if "force" in record:
         terms["applied force"] = record["force"]
     return {**terms, "friction": record["friction"]}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
 from stickslip.record.channels import Channel
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, StatedRig, Step
 
 Array = NDArray[np.float64]
 
@@ -33,6 +33,7 @@ def record_to_metadata(record: Record) -> dict[str, Any]:
         "channels": [_plain(vars(channel)) for channel in record.channels.values()],
         "history": [_plain(step.to_dict()) for step in record.history],
         "truth": _plain(record.truth),
+        "rig": None if record.rig is None else _plain(vars(record.rig)),
         "sha256": Digests({time_column(record): record.time, **record.samples}).told(),
     }
 
@@ -97,6 +98,7 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
             history_of(metadata),
             stamps,
             _restored(metadata["truth"]),
+            StatedRig(**_restored(rig)) if (rig := metadata.get("rig")) else None,
         )
 
 

@@ -74,6 +74,44 @@ class Step:
         return f"{self.action}({arguments})" + (f": {self.outcome}" if self.outcome else "")
 
 
+@dataclass(frozen=True)
+class StatedRig:
+    """What the friction force of a record was found with.
+
+    Attributes
+    ----------
+    method : str
+        Of :func:`~stickslip.friction_force`.
+    contact : {"ground", "base"}
+        What the mass slides on.
+    mass, stiffness : float or None
+        Of the oscillator [kg, N/m]; None where the friction was found without.
+    damping : float
+        Viscous, of the suspension [N s/m].
+    damper : {"ground", "base"}
+        What the damper ends on.
+    bandwidth : float or None
+        Of the smoother [Hz].
+    lost : tuple of str
+        What a sensor could not tell, in words.
+    """
+
+    method: str
+    contact: str = "ground"
+    mass: float | None = None
+    stiffness: float | None = None
+    damping: float = 0.0
+    damper: str = "ground"
+    bandwidth: float | None = None
+    lost: tuple[str, ...] = ()
+
+    @property
+    def constants(self) -> dict[str, Any]:
+        """The arguments of the balance of forces that are known, by name."""
+        names = ("mass", "stiffness", "damping", "damper", "contact")
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Record:
     """Measured or simulated channels on one clock.
@@ -96,6 +134,8 @@ class Record:
         The time stamps [s] as read, kept only where they are not uniform; see :meth:`check` and ``repair_clock``.
     truth : mapping
         True values behind a simulated record, by name; empty for a measured one.
+    rig : StatedRig or None
+        What the friction force was found with; None where no balance of forces was drawn up.
 
     Examples
     --------
@@ -111,6 +151,7 @@ class Record:
     history: tuple[Step, ...] = ()
     stamps: Array | None = None
     truth: Mapping[str, Any] = field(default_factory=dict)
+    rig: StatedRig | None = None
 
     def __post_init__(self) -> None:
         if not self.samples:
@@ -303,7 +344,7 @@ class Record:
         """
         fs, start = self.fs if fs is None else fs, self.start if start is None else start
         channels = {n: replace(c, noise=None) for n, c in self.channels.items()} if filtered else self.channels
-        return Record(samples, channels, fs, start, (*self.history, step), stamps, self.truth)
+        return Record(samples, channels, fs, start, (*self.history, step), stamps, self.truth, self.rig)
 
     def rows(self, first: int = 0, last: int | None = None) -> Record:
         """Rows ``first`` up to, not including, ``last`` (negative from the end, as in a slice)."""
@@ -361,7 +402,7 @@ class Record:
         return to_sep005(self)
 
     def equals(self, other: object) -> bool:
-        """Whether another record holds exactly the same samples, channels, clock, history and truth."""
+        """Whether another record holds exactly the same samples, channels, clock, history, truth and rig."""
         if not isinstance(other, Record) or list(self.samples) != list(other.samples):
             return False
         pairs = [(self.samples[name], other.samples[name]) for name in self.samples]
@@ -371,7 +412,8 @@ class Record:
             pairs.append((self.stamps, other.stamps))
         same = all(np.array_equal(mine, theirs, equal_nan=True) for mine, theirs in pairs)
         details = [
-            (dict(r.channels), r.fs, r.start, [s.to_dict() for s in r.history], dict(r.truth)) for r in (self, other)
+            (dict(r.channels), r.fs, r.start, [s.to_dict() for s in r.history], dict(r.truth), r.rig)
+            for r in (self, other)
         ]
         return same and details[0] == details[1]
 

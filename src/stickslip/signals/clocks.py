@@ -166,7 +166,9 @@ def synchronise(
         outcome += f"; {found.status}"
     step = Step("synchronise", {"on": names, "offset": seconds, "offset_interval": interval, "rate": ratio}, outcome)
     theirs = tuple(Step(s.action, {**s.arguments, "record": "b"}, s.outcome) for s in b.history)
-    return Record(samples, channels, a.fs, part.start, (*part.history, *theirs, step), None, {**b.truth, **a.truth})
+    return Record(
+        samples, channels, a.fs, part.start, (*part.history, *theirs, step), None, {**b.truth, **a.truth}, part.rig
+    )
 
 
 @dataclass(frozen=True)

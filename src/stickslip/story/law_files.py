@@ -45,7 +45,7 @@ def write_law(draft: Path, result: LawComparison | LawFit | CurveFit, records: S
 def _whole(law: str, result: LawComparison | LawFit | CurveFit, record: Record) -> str:
     """The law's table within a system, moved as the first record was; alone where the mass is not known."""
     if isinstance(result, CurveFit):
-        told = next((step.arguments for step in record.history if step.action == "friction_force"), {})
+        told: dict[str, Any] = {} if record.rig is None else record.rig.constants
         contact = str(told.get("contact", "ground"))
         given: Drive = HarmonicBase(0.0, frequency=1.0, contact=contact)
     else:
@@ -56,7 +56,7 @@ def _whole(law: str, result: LawComparison | LawFit | CurveFit, record: Record) 
         return f"{ALONE}\n{law}"
     drive = _drive(record, given)
     start = {"x": float(record["x"][0])} if isinstance(drive, Release) and "x" in record else {}
-    system = {name: told[name] for name in ("mass", "stiffness", "damping", "damper") if name in told}
+    system: dict[str, Any] = {name: told[name] for name in ("mass", "stiffness", "damping", "damper") if name in told}
     tables = [law, _plain("system", system), toml_table("drive", drive)]
     return "\n".join(
         [*tables, *([_plain("start", start)] if start else []), _plain("run", {"duration": record.duration})]
