@@ -12,6 +12,7 @@ import stickslip as ss
 from rigs import RIG, measured, told
 from stickslip.cycle.parts import join_sticks, overlapping
 from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import Doubt, Status
 
 
 def pieces(record: ss.Record, *rows: int) -> list[ss.Record]:
@@ -87,7 +88,7 @@ def test_what_keeps_a_stretch_from_being_sure_is_said_of_the_whole() -> None:
     joined = join_sticks([*found[:2], (stretch, doubted), *found[3:]])
     assert joined.share.status == "a doubt (in 1 of 4 stretches)"
     assert joined.per_cycle.status == "ok"
-    crude = replace(sticks, share=replace(sticks.share, status="only 3 cycles: the interval is crude"))
+    crude = replace(sticks, share=replace(sticks.share, status=Status(Doubt.few(3, "cycle"))))
     assert join_sticks([*found[:2], (stretch, crude), *found[3:]]).share.status == "ok"
 
 

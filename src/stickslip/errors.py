@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+NO_RATE = "no sampling rate"  # the kind of error where nothing states one
+
 
 class StickslipError(Exception):
     """Base of every error that stickslip raises on purpose.
@@ -14,6 +16,8 @@ class StickslipError(Exception):
         What is needed instead ("friction loops need one full cycle").
     next_step : str
         What the user can do now ("give a longer record").
+    kind : str
+        What code asks for, where it goes on differently.
 
     Examples
     --------
@@ -23,9 +27,9 @@ class StickslipError(Exception):
 
     exit_code = 1
 
-    def __init__(self, value: str, rule: str, next_step: str) -> None:
+    def __init__(self, value: str, rule: str, next_step: str, *, kind: str = "") -> None:
         super().__init__(value, rule, next_step)
-        self.value, self.rule, self.next_step = value, rule, next_step
+        self.value, self.rule, self.next_step, self.kind = value, rule, next_step, kind
 
     def __str__(self) -> str:
         sentence = "; ".join(part.strip().rstrip(".;") for part in self.args)

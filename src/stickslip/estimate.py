@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -14,8 +14,81 @@ from stickslip.units import prefixed
 
 NORMAL_95 = 1.959963984540054  # two-sided 95 % quantile of the normal distribution
 MOST_DECIMALS = 6  # printed in the plain unit
-UNKNOWN = "unknown"
+UNKNOWN, FEW = "unknown", "few"
+UNSTATED = "unstated"  # the kind of doubt where nobody said what a sensor makes of the motion
 ROUNDING = 1e-12  # of the largest number, by which arithmetic alone may put a value beside its interval
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Why an answer should not be trusted, or not to its last digit.
+
+    Attributes
+    ----------
+    words : str
+        What people read.
+    kind : str
+        What code asks for.
+    lesser : bool
+        Whether the number stands all the same.
+    count, of : int, str
+        How many of what the answer rests on, where that is few ("only 5 cycles").
+    """
+
+    words: str
+    kind: str = ""
+    lesser: bool = False
+    count: int = 0
+    of: str = ""
+
+    @classmethod
+    def few(cls, count: int, of: str) -> Doubt:
+        """An interval that rests on few of anything."""
+        return cls(f"only {count} {of}{'s' * (count > 1)}: the interval is crude", FEW, True, count, of)
+
+
+class Status(str):
+    """ "ok", or in words why an answer should not be trusted; behind the words stand the doubts, for code to ask.
+
+    Examples
+    --------
+    >>> status = Status(Doubt.few(5, "cycle"), "the base moves")
+    >>> status
+    'only 5 cycles: the interval is crude; the base moves'
+    >>> sorted(kinds(status)), stands(status), stands(Status())
+    (['', 'few'], False, True)
+    """
+
+    doubts: tuple[Doubt, ...]
+
+    def __new__(cls, *reasons: Doubt | str) -> Self:
+        """All doubts, each once; "ok" without any."""
+        doubts = tuple(dict.fromkeys(doubt for reason in reasons for doubt in doubts_of(reason)))
+        status = super().__new__(cls, "; ".join(doubt.words for doubt in doubts) or "ok")
+        status.doubts = doubts
+        return status
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Status, self.doubts
+
+
+def doubts_of(reason: Doubt | str) -> tuple[Doubt, ...]:
+    """The doubts behind a status, or behind words that are one doubt."""
+    if isinstance(reason, Doubt):
+        return (reason,)
+    if isinstance(reason, Status):
+        return reason.doubts
+    return () if reason in ("", "ok") else (Doubt(reason),)
+
+
+def kinds(status: str) -> frozenset[str]:
+    """The kinds of doubt behind a status."""
+    return frozenset(doubt.kind for doubt in doubts_of(status))
+
+
+def stands(status: str) -> bool:
+    """Whether the number stands: there is no doubt, or lesser ones only."""
+    return all(doubt.lesser for doubt in doubts_of(status))
 
 
 @dataclass(frozen=True)

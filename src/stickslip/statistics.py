@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
 
 Array = NDArray[np.float64]
 
@@ -183,9 +183,9 @@ def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, chec
         )
     sd, freedom = mean_uncertainty(present)
     if count == 1:
-        status, check = "only 1 cycle: how sure it is can not be told", "1 cycle"
+        status, check = Status("only 1 cycle: how sure it is can not be told"), "1 cycle"
     else:
-        status = "ok" if count >= FEW_CYCLES else f"only {count} cycles: the interval is crude"
+        status = Status(*([Doubt.few(count, "cycle")] if count < FEW_CYCLES else []))
         scatter = f"{present.std(ddof=1):.3g}{'' if unit == '1' else ' ' + unit}"
         check = f"{count} cycles, scatter between them {scatter}"
     return Estimate.normal(

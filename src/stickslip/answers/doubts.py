@@ -12,24 +12,23 @@ from stickslip.balance.likely_contact import STRAYING
 from stickslip.balance.load_cell import ALONE
 from stickslip.consistent.contradictions import Consistency
 from stickslip.errors import StickslipError
-from stickslip.estimate import Estimate
+from stickslip.estimate import Doubt, Estimate, Status, stands
 from stickslip.record.record import Record
 
 BY_FORCE = (
     "loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding",
 )  # fmt: skip
 ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
-CRUDE = "the interval is crude"  # a lesser doubt than any here
 BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
 GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
 NO_BASE = "there is no channel z: the base is taken to be at rest, but something keeps the motion up"
 
 
 def doubted(
-    answers: dict[str, Any], record: Record, *, unknown: str, refusals: Sequence[StickslipError]
+    answers: dict[str, Any], record: Record, *, unknown: Doubt | None, refusals: Sequence[StickslipError]
 ) -> dict[str, Any]:
     """The answers, flagged by the gravest doubt that concerns each; `unknown` is what is not stated of the rig."""
-    told, gravest = dict(answers), dict[str, str]()
+    told, gravest = dict(answers), dict[str, Doubt | str]()
     for reason, keys in _reasons(told.get("consistency"), record, unknown, refusals):
         for key in keys:
             if gravest.setdefault(key, reason) == reason:
@@ -38,8 +37,8 @@ def doubted(
 
 
 def _reasons(
-    consistent: Consistency | None, record: Record, unknown: str, refusals: Sequence[StickslipError]
-) -> Iterator[tuple[str, Iterable[str]]]:
+    consistent: Consistency | None, record: Record, unknown: Doubt | None, refusals: Sequence[StickslipError]
+) -> Iterator[tuple[Doubt | str, Iterable[str]]]:
     """Each doubt with the questions that it concerns, the gravest first."""
     if words := _contradiction(consistent):
         yield words, (*BY_FORCE, "sticks")
@@ -49,17 +48,17 @@ def _reasons(
         yield unknown, BY_FORCE
     if unstated := [f"{name} is read as {each.unit}" for name, each in record.channels.items() if each.assumed]:
         yield f"nobody stated a unit: {' and '.join(unstated)}", (*BY_FORCE, "regression", "asymmetric", "pull")
-    if strays := [error.value for error in refusals if STRAYING in error.value]:
+    if strays := [error.value for error in refusals if error.kind == STRAYING]:
         yield f"{strays[0]}: a mass, a spring or a sensor is not as stated, or the contact no spring", ONSETS
 
 
-def flagged(found: Any, reason: str) -> Any:
+def flagged(found: Any, reason: Doubt | str) -> Any:
     """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
     if isinstance(found, Estimate):
-        lesser = found.status == "ok" or found.status.endswith(CRUDE)
+        lesser = stands(found.status)
         if found.name == "forcing frequency" or not (lesser or not found.known):
             return found
-        return replace(found, status=reason if lesser else f"{reason}; {found.status}")
+        return replace(found, status=Status(reason) if lesser else Status(reason, found.status))
     if found is None:
         return None
     numbers = {each.name: getattr(found, each.name) for each in fields(found)}

@@ -117,8 +117,8 @@ class Findings(Result):
         return tuple(first.values())
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """What the answers as wholes say that keeps them from being sure."""
+    def doubts(self) -> tuple[tuple[str, str], ...]:
+        """The answers that are not sure as wholes, and what each says of it."""
         names = {
             "delay": "sensor delay",
             "comparison": "comparison of the forces",
@@ -126,7 +126,7 @@ class Findings(Result):
             "consistency": "consistency",
         }
         told = ((names.get(name, name), getattr(value, "status", "ok")) for name, value in vars(self).items())
-        return tuple(f"{name}: {status}." for name, status in told if status != "ok" and name in names.values())
+        return tuple((name, status) for name, status in told if status != "ok" and name in names.values())
 
     @property
     def contradiction(self) -> str:

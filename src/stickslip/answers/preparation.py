@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.asked import Asked
-from stickslip.balance.felt_and_computed import UNLIKE, ForceComparison, compare_force
+from stickslip.balance.felt_and_computed import ForceComparison, compare_force
 from stickslip.balance.force import friction_force
-from stickslip.balance.lag import SensorDelay, sensor_delay
+from stickslip.balance.lag import HIDDEN, REPEATS, SensorDelay, sensor_delay
 from stickslip.balance.mass import mass_and_stiffness
 from stickslip.balance.motion import is_measured
+from stickslip.estimate import UNSTATED, Doubt, kinds
 from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
@@ -25,9 +26,6 @@ SENSED = ("x", "v", "theta", "a", "load")  # what no rig holds still while its m
 CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
 STRETCH = 1 << 14  # samples from the middle in which a delay is looked for, and the forces are compared
 AT_ONCE = 1 << 18  # samples of which all sensors are put together unasked
-REPEATS = "the motion repeats itself"  # so that other delays would do as well, the shortest being taken
-STRANGE = "differ by more than noise"
-LEFT_OUT = "it may be wrong by some per cent, which the interval leaves out"
 FOUND = " (found in this record)"
 SURE = 3.0  # standard deviations from which a delay is taken out
 
@@ -44,14 +42,14 @@ class Ready:
         Of the accelerometer behind the displacement, where it was looked for.
     comparison : ForceComparison or None
         The friction felt against the friction computed, where there are both.
-    doubt : str
+    doubt : Doubt or None
         What is not known of the sensors that a contact's stiffness hangs on.
     """
 
     record: Record
     delay: SensorDelay | None
     comparison: ForceComparison | None
-    doubt: str = ""
+    doubt: Doubt | None = None
 
 
 def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
@@ -149,7 +147,7 @@ def _base_seen(record: Record) -> bool:
 
 def _base_moves(record: Record, comparison: ForceComparison | None, asked: Asked) -> bool:
     """Whether a base that is not measured can not have been at rest, by the load cell."""
-    moves = not _base_seen(record) and comparison is not None and UNLIKE in comparison.status
+    moves = not _base_seen(record) and comparison is not None and comparison.unlike
     if moves:
         asked.notes.append(
             f"{'z does not change' if 'z' in record else 'There is no channel z'}, and with the spring's other end at "
@@ -178,7 +176,7 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
         )
         return record, found
     late = -found.delay.value
-    if found.status != "ok" and (not found.status.startswith(REPEATS) or STRANGE in found.status):
+    if found.status != "ok" and not (REPEATS in kinds(found.status) and kinds(found.status) <= {REPEATS, HIDDEN}):
         asked.notes.append(f"The delay of x against a, {1e3 * late:.3g} ms, is not taken out: {found.status}.")
         return record, found
     if abs(late) < SURE * found.delay.sd:
@@ -196,7 +194,7 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
 
 def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Asked) -> Record:
     """The record with the mounts stated that the comparison of forces shows, where they were not."""
-    differ = comparison is not None and any(word in comparison.status for word in ("opposite", "differ"))
+    differ = comparison is not None and (comparison.opposite or comparison.unlike)
     for each in () if comparison is None or differ else comparison.resonances:
         name = "a" if "accelerometer" in each.name else "load"
         if "mount" in each.name and record.channels[name].mount is None:
@@ -205,10 +203,10 @@ def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Aske
     return record
 
 
-def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) -> str:
+def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) -> Doubt | None:
     """What is not known of the rig and its sensors behind a friction force that was not measured."""
     if "friction" in record and record.channels["friction"].source not in ("friction_force", "load"):
-        return ""
+        return None
     unknown = [
         f"the mount of {name}{FOUND if record.channels[name].mount is not None else ''}"
         for name in ("a", "load")
@@ -222,8 +220,9 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
         if getattr(rig, name) is None and getattr(record.rig, name, None) is not None
     ]
     if not unknown:
-        return ""
-    return f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated: {LEFT_OUT}"
+        return None
+    words = f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated"
+    return Doubt(f"{words}: it may be wrong by some per cent, which the interval leaves out", UNSTATED, lesser=True)
 
 
 def _tell_unused(rig: RigSettings, asked: Asked) -> None:

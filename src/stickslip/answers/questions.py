@@ -34,6 +34,7 @@ from stickslip.cycle.onset import breakaway
 from stickslip.cycle.regression import regress_friction
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import EstimateError, StickslipError
+from stickslip.estimate import Status
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record
 from stickslip.rig.settings import RigSettings
@@ -244,7 +245,7 @@ def _late(loops: Loops | None, record: Record, rig: RigSettings) -> Loops | None
         f"{' and '.join(far)} {'is' if len(far) == 1 else 'are'} stated to come {delays[far[0]]:.4g} s late, "
         f"{cycles[far[0]]:.2g} cycles of the motion (milliseconds taken for seconds, perhaps)"
     )
-    return replace(loops, status=words if loops.status == "ok" else f"{words}; {loops.status}")
+    return replace(loops, status=Status(words, loops.status))
 
 
 def _fused(record: Record) -> Record:

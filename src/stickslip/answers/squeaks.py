@@ -12,9 +12,9 @@ import numpy as np
 
 from stickslip.answers.asked import Asked
 from stickslip.answers.findings import plain, record_name
-from stickslip.cycle.loops import Loops, friction_loops
+from stickslip.cycle.loops import NO_SLOPE, Loops, friction_loops
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Estimate, Result, kinds
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import HEARD, Squeak, Squeaks, find_squeaks
 from stickslip.squeak.couplings import Coupling, coupling
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from stickslip.record.check import Fault
 
 
-UNTOLD = "no slope can be told"  # in the status of a slope that the motion does not tell
 HEARD_AT_ONCE = 5.0  # s
 VIBRATING = (*HEARD, "torsion_velocity", "load")
 
@@ -251,7 +250,7 @@ def _quality(record: Record, squeaks: Squeaks, asked: Asked) -> SoundQuality | N
 
 def trend_of(slope: Estimate | None) -> str:
     """Whether friction "falls" or "rises" with speed; "flat or not told" where the slope's interval holds zero."""
-    if slope is None or UNTOLD in slope.status or slope.includes(0.0):
+    if slope is None or NO_SLOPE in kinds(slope.status) or slope.includes(0.0):
         return "flat or not told"
     return "falls" if slope.value < 0 else "rises"
 

@@ -14,7 +14,7 @@ from stickslip.balance.force import friction_force
 from stickslip.balance.lines import Complex, Lines, find_lines
 from stickslip.balance.mounts import Resonance, find_mounts
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.estimate import NORMAL_95, Estimate, Result, Status
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 QUESTION = "the comparison of forces"
 RATIO = 1.25  # of a band's upper edge to its lower one
 CHANCE = 0.01  # probability with which bands that have nothing in common pass for coherent
-UNLIKE = "the forces differ where they are largest"
 USED = ("x", "z", "v", "a", "force", "load")
 
 
@@ -97,6 +96,16 @@ class ForceComparison(Result):
     indirect: Array
     tolerance: float
     status: str
+
+    @property
+    def opposite(self) -> bool:
+        """Whether the forces have opposite signs where they are largest."""
+        return _opposite(self.bands)
+
+    @property
+    def unlike(self) -> bool:
+        """Whether the forces are two where they are largest, and not one with the wrong sign."""
+        return not self.opposite and self.bands[0].verdict != "agree"
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -299,14 +308,17 @@ def _flagged(estimate: Estimate, cut: str) -> Estimate:
     return replace(estimate, status=cut) if cut else estimate
 
 
+def _opposite(bands: tuple[ForceBand, ...]) -> bool:
+    return bands[0].verdict == "differ" and abs(abs(bands[0].phase) - math.pi) < 0.5
+
+
 def _status(bands: tuple[ForceBand, ...], record: Record, cut: str) -> str:
     words = [cut] if cut else []
-    first = bands[0]
-    if first.verdict == "differ" and abs(abs(first.phase) - math.pi) < 0.5:
+    if _opposite(bands):
         words.append("the forces have opposite signs: one sensor is wired the wrong way round, or the sign convention")
-    elif first.verdict != "agree":
-        words.append(f"{UNLIKE}: ask consistency(record) which channel it is")
+    elif bands[0].verdict != "agree":
+        words.append("the forces differ where they are largest: ask consistency(record) which channel it is")
     stated = any(record.channels[name].delay for name in ("x", "a") if name in record)
     if not stated and "delays" not in str(record.history):
         words.append("no delay is stated of any sensor")
-    return "; ".join(words) or "ok"
+    return Status(*words)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.alignment import Alignment, Pair, align, likely_delays
 from stickslip.signals.noise import noise_level
@@ -25,9 +25,10 @@ LEAST = 256  # samples
 FINEST = 1e-9  # of a channel's range: noise that it has at least, or nothing could be weighed
 SHIFTED = 0.05  # s: how far the second channel is shifted to find the least residual
 NEEDED = 30.0  # by which a mount betters the misfit, if it is there; noise alone reaches 19 on a single line
+REPEATS, HIDDEN = "the motion repeats itself", "a mount may hide in it"  # kinds of doubt
 FIRM = 0.1  # relative standard deviation up to which a mount counts as found
 CHANCE, FAINT = 3.0, 10.0  # deviations below zero that a damping may have, and above that a gain has
-HIDDEN = 3.0  # times a delay's deviation that a free mount would add to it where a run does not tell the two apart
+MASKED = 3.0  # times a delay's deviation that a free mount would add to it where a run does not tell the two apart
 ALIKE = 2.0  # factor up to which two sensors may differ in size without being asked why
 UNEXPLAINED = 2.0  # power at the lines, over that of the noise, from which the model is doubted
 
@@ -233,7 +234,7 @@ def _answer(
     (first, second), method, fitted = channels, "phase of all lines that both channels show", found is free
     gain = found.theta[1]
     alike = [other.delay for other in others if gain < 0 or other.theta[1] > 0]
-    hidden = second == "a" and not fitted and mount is None and free.sd([1, 0, 0, 0]) > HIDDEN * found.sd([1, 0, 0, 0])
+    hidden = second == "a" and not fitted and mount is None and free.sd([1, 0, 0, 0]) > MASKED * found.sd([1, 0, 0, 0])
     status = _status(found, alike, channels, hidden=hidden)
     low, high = found.lines.turn.min() / (2 * math.pi), found.lines.turn.max() / (2 * math.pi)
     stated = f"held at {mount[0]:g} Hz and {mount[1]:g}, as stated" if mount else "taken to be rigid"
@@ -262,25 +263,28 @@ def _answer(
 
 
 def _status(found: Alignment, others: Sequence[float], channels: tuple[str, str], *, hidden: bool) -> str:
-    (first, second), gain, said = channels, found.theta[1], []
+    (first, second), gain = channels, found.theta[1]
+    said: list[Doubt | str] = []
     if gain < 0:
         said.append(f"{first} or {second} has the wrong sign: the gain is {gain:.3g}")
     if not _alike(found):
         said.append(f"{second} is {abs(gain):.3g} times what {first} makes of it: see the units and the sensitivities")
     if others:
         delays = " or ".join(f"{delay:.4g}" for delay in others[:2])
-        said.append(f"the motion repeats itself: a delay of {delays} s would explain it as well; the shortest is taken")
+        words = f"the motion repeats itself: a delay of {delays} s would explain it as well; the shortest is taken"
+        said.append(Doubt(words, REPEATS))
     if hidden:
-        said.append(
+        words = (
             f"what a mount of {second} delays (2 zeta/w_m) is in it: this motion does not tell them apart; state the "
             "mount, or give runs at other frequencies too"
         )
+        said.append(Doubt(words, HIDDEN))
     if found.unexplained > UNEXPLAINED:
         said.append(
             f"{first} and {second} differ by more than noise, a delay and a mount ({found.unexplained:.3g} times the "
             "power of the noise); the intervals are widened"
         )
-    return "; ".join(said) or "ok"
+    return Status(*said)
 
 
 def _by_residual(record: Record, channels: tuple[str, str]) -> SensorDelay:

@@ -16,7 +16,7 @@ from stickslip.balance.force import FUSIONS
 from stickslip.balance.fusion import Held, fuse
 from stickslip.balance.motion import is_measured, stretches
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
 from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
@@ -32,10 +32,10 @@ UNSURE = 0.1  # relative deviation above which the likelihood is no parabola, an
 SLIGHT, ALMOST = 0.015, 0.95  # of the critical damping: where the search starts, and from where there is no ringing
 SOFTEST = 1e-3  # of the spring's stiffness
 STRAYS = 1.5  # mean square surprise of a sensor over its noise, from which it is told, and
-STRAYING = "strays from the likeliest contact by"  # said of a sensor
+STRAYING = "a sensor strays"
 ABSURD = 1e3  # from which no answer is given
 CYCLE, SHORT = 8.0, 5.0  # samples of a ring's cycle, and of a stick, below which the answer hangs on what is between
-NEGATIVE = "its damping comes out negative: a sensor's lag or mount is not accounted for"
+NEGATIVE = "negative damping"
 ROUNDS = 4
 NEAR = 0.03  # of the log likelihood: how near its peak a simplex goes before a parabola takes over
 METHOD = "likeliest contact while it holds, by a Kalman filter"
@@ -82,7 +82,7 @@ def _likeliest(record: Record) -> LikelyContact:
     misfit = np.mean([part.misfit(math.exp(best[0]), best[1]) for part in seen.parts], axis=0)
     stray, scale = _stray(misfit, sensors), max(1.0, float(misfit.max()))
     _require_spring(best, balance)
-    words = []
+    words: list[Doubt | str] = []
     if scale > STRAYS:  # what a sensor misreads it misreads alike all through a stick
         words.append(stray)
         scale *= float(np.median(sticks))
@@ -90,13 +90,14 @@ def _likeliest(record: Record) -> LikelyContact:
     # a damping below zero shows how far off the sensors put the contact
     below = max(1.0, -best[1] / (NORMAL_95 * math.sqrt(scale * covariance[1, 1])))
     if below > 1 or (best[1] < 0 and scale > STRAYS):
-        words.append(f"{NEGATIVE} ({best[1]:.3g} N s/m)")
+        sentence = "its damping comes out negative: a sensor's lag or mount is not accounted for"
+        words.append(Doubt(f"{sentence} ({best[1]:.3g} N s/m)", NEGATIVE))
         scale *= below**2
     if sensors == ["x"]:
         words.append("from the displacement alone, which blurs where sticks begin and end")
     told: dict[str, Any] = {
         "method": METHOD,
-        "status": "; ".join(words) or "ok",
+        "status": Status(*words),
         "checks": (
             f"{len(sticks)} sticks, in which the friction is below {HELD:g} of {seen.level:.3g} N",
             f"from {', '.join(sensors)}; a common error of gains, lags or mounts is not in the interval",
@@ -143,12 +144,13 @@ def _looked_through(record: Record, balance: Balance, sensors: Sequence[str], *,
 def _stray(misfit: Array, sensors: Sequence[str]) -> str:
     """How far the worst sensor is from what it should read, in words, if it is not absurd."""
     worst = int(np.argmax(misfit))
-    words = f"{sensors[worst]} {STRAYING} {math.sqrt(misfit[worst]):.3g} times its noise"
+    words = f"{sensors[worst]} strays from the likeliest contact by {math.sqrt(misfit[worst]):.3g} times its noise"
     if misfit[worst] > ABSURD:
         raise EstimateError(
             words,
             "a contact that holds is a spring and a damper, and every sensor reads it as stated",
             "check signs, and state gains, delays and mounts, by with_details or under [sensors] in the rig file",
+            kind=STRAYING,
         )
     return words
 

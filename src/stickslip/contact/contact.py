@@ -9,7 +9,7 @@ from stickslip.balance.likely_contact import HELD, LEAST, NEGATIVE, STIFFNESS, l
 from stickslip.balance.motion import stretches
 from stickslip.cycle.loops import Loops
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate
+from stickslip.estimate import Estimate, kinds
 from stickslip.record.record import Record
 from stickslip.statistics import mean_of_cycles
 
@@ -106,7 +106,7 @@ def contact_damping(record: Record) -> Estimate:
     True
     """
     found = likely_contact(record).damping
-    if NEGATIVE in found.status:
+    if NEGATIVE in kinds(found.status):
         raise EstimateError(
             f"a contact damping of {found.value:.3g} N s/m",
             "a contact takes energy from the motion, so that its damping is not below zero",

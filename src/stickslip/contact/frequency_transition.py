@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stickslip.contact.mechanisms import not_one_mode
 from stickslip.contact.ringing import Ringing, Window, checked_mass, find_ringing
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.morlet import ridge_centre
 from stickslip.signals.wavelet import wavelet_map
@@ -397,8 +397,8 @@ def _loop_stiffness(record: Record, ringing: Ringing, mode: Mode) -> Estimate | 
 
 
 def _status(ringing: Ringing, pooled: Mode, doubt: str) -> str:
-    words = [each for each in (doubt, ringing.sticks.status) if each not in ("", "ok")]
+    words = [doubt, ringing.sticks.status]
     silent = len(ringing.windows) - len(pooled.windows)
     if silent:
         words.append(f"{silent} of {len(ringing.windows)} sticks hold no ringing long enough")
-    return "; ".join(words) or "ok"
+    return Status(*words)

@@ -13,7 +13,7 @@ from stickslip.contact.frequency_transition import heard_mode
 from stickslip.contact.mechanisms import UNTOLD, not_one_mode, too_fast
 from stickslip.contact.ringing import Ringing, Window, find_ringing
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.pieces import Piece
 from stickslip.statistics import mean_of_cycles
@@ -141,7 +141,7 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
         method="cuts between rings of one mode, by dynamic programming",
     ).within(0.0)  # fmt: skip
     blurred = "without a load cell whose mount is stated, one may be missed or seen twice" if ringing.blurred else ""
-    status = "; ".join(word for word in (ringing.status, astray, blurred) if word not in ("", "ok")) or "ok"
+    status = Status(ringing.status, astray, blurred)
     low, high = per_stick.interval
     per_stick = replace(
         per_stick, interval=(max(low, 0.0), high), status=per_stick.status if status == "ok" else status

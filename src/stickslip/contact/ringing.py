@@ -13,6 +13,7 @@ from stickslip.balance.accelerometer import acceleration_of_mass
 from stickslip.balance.motion import forcing_frequency
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import EstimateError
+from stickslip.estimate import Status
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
 from stickslip.signals.pieces import GLIDE, RING, Piece, Splitter
@@ -112,9 +113,7 @@ class Ringing:
     @property
     def status(self) -> str:
         """ "ok", or what to beware of."""
-        return (
-            "; ".join(filter(None, [self.doubt, *([] if self.sticks.status == "ok" else [self.sticks.status])])) or "ok"
-        )
+        return Status(self.doubt, self.sticks.status)
 
     @property
     def loudness(self) -> float:

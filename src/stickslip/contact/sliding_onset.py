@@ -17,7 +17,7 @@ from stickslip.contact.contact import contact_stiffness
 from stickslip.contact.frequency_transition import transition
 from stickslip.cycle.loops import Loops, friction_loops
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.statistics import mean_uncertainty, student
 
@@ -180,10 +180,9 @@ def coupled_frequency(record: Record) -> Estimate:
     )
     sd = fitted.stiffness.sd / (8 * math.pi**2 * mass * value)
     said, status = _ringing(record, fitted, value, sd)
-    words = [each for each in (fitted.stiffness.status, status) if each != "ok"]
     return Estimate(
         FREQUENCY, value, (low, high), sd, "Hz", "sqrt((k + K) / m) / 2 pi, from the likeliest contact",
-        "; ".join(words) or "ok", (said, *fitted.stiffness.checks),
+        Status(fitted.stiffness.status, status), (said, *fitted.stiffness.checks),
     )  # fmt: skip
 
 
@@ -275,7 +274,7 @@ def _answer(
     )  # fmt: skip
     curve = _read(branches, level.value, lagging, off)
     told = [exact, replace(equation, status=stops) if stops != "ok" else equation]
-    words = [each for each in (lost, stiffness.status, stops, curve.status) if each != "ok"]
+    words = (lost, stiffness.status, stops, curve.status)
     told = told if not math.isinf(stiffness.interval[1]) else [each and _at_most(each) for each in told]
     return TransitionSpeed(
         method=method,
@@ -285,7 +284,7 @@ def _answer(
         friction=friction,
         velocity=velocity,
         level=level,
-        status="; ".join(dict.fromkeys(words)) or "ok",
+        status=Status(*words),
     )
 
 
@@ -401,7 +400,7 @@ def _read(branches: Sequence[Branch], level: float, lagging: str, off: float) ->
     found = Estimate.normal(
         f"{SPEED} by the curve", float(np.mean(speeds)), sd=sd, unit="m/s", quantile=student(freedom),
         method="curve of friction against velocity, where it reaches the sliding friction",
-        status="ok" if len(speeds) >= FEW else f"only {len(speeds)} turns: the interval is crude",
+        status=Status(*([Doubt.few(len(speeds), "turn")] if len(speeds) < FEW else [])),
         checks=(
             f"{len(speeds)} turns, scatter between them {1e3 * scatter:.2g} mm/s",
             lagging,

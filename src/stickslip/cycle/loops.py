@@ -21,13 +21,14 @@ from stickslip.balance.motion import (
     require_fit,
 )
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import least_squares, mean_of_cycles, mean_uncertainty, student
 
 Array = NDArray[np.float64]
 
+NO_SLOPE = "no slope"  # the kind of doubt where the motion does not tell how friction changes with speed
 LEAST_SPREAD = 0.1  # of the sliding speed about its mean, below which no slope against speed can be told
 DRIVES = "friction drives the motion: the sign of the force or of the displacement is wrong, or a drive is not read"
 BRANCHES = ("back, slowing down", "forward, slowing down", "back, speeding up", "forward, speeding up")
@@ -257,7 +258,8 @@ def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: N
         checks=(f"sliding speed varies by {100 * spread:.0f} % about its mean",),
     )  # fmt: skip
     if spread < LEAST_SPREAD:
-        return replace(found, status="the sliding speed hardly varies: no slope can be told")
+        steady = Doubt("the sliding speed hardly varies: no slope can be told", NO_SLOPE)
+        return replace(found, status=Status(steady))
     ahead = np.minimum(np.arange(len(sliding)) + motion.blur, len(sliding) - 1)
     behind = np.maximum(np.arange(len(sliding)) - motion.blur, 0)
     faster = np.sign(motion.velocity) * (motion.velocity[ahead] - motion.velocity[behind]) > 0
@@ -298,7 +300,8 @@ def _widened(slope: Estimate, branches: list[Estimate]) -> Estimate:
         return replace(slope, checks=(*slope.checks, told))
     wide = (slope.value - half, slope.value + half)
     lost = wide[0] <= 0 <= wide[1] and not slope.includes(0.0)
-    status = "friction changes along the way as much as with speed: no slope can be told" if lost else slope.status
+    words = "friction changes along the way as much as with speed: no slope can be told"
+    status = Status(Doubt(words, NO_SLOPE)) if lost else slope.status
     return replace(slope, interval=wide, sd=half / NORMAL_95, status=status, checks=(*slope.checks, told))
 
 
@@ -329,4 +332,4 @@ def _status(cycles: Cycles, found: dict[str, Estimate], energy: Estimate) -> str
         words.append(cycles.status)
     if not (found["level"].known and energy.known):
         words.append(DRIVES)
-    return "; ".join(words) or "ok"
+    return Status(*words)

@@ -15,7 +15,7 @@ from stickslip.balance.motion import is_measured
 from stickslip.cycle.slips import ringing_of
 from stickslip.cycle.strokes import FAST, Stroke, Strokes, find_strokes
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.estimate import NORMAL_95, UNSTATED, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.derivatives import noise_along
 from stickslip.signals.noise import noise_level
@@ -193,7 +193,7 @@ def _borne(record: Record, strokes: Strokes) -> _Borne:
     peak = _by_peak(record, strokes)
     if not mostly:
         words = "the mass moves before the friction has come near its level: the first peak holds the ring that follows"
-        return replace(peak, status=_and(words, peak.status))
+        return replace(peak, status=Status(words, peak.status))
     if pulled is None:
         return peak
     words = (
@@ -203,13 +203,8 @@ def _borne(record: Record, strokes: Strokes) -> _Borne:
     apart = float(np.median(peak.friction)) - float(np.median(pulled.friction))
     return replace(
         peak, below=max(peak.below, apart + pulled.below), above=max(peak.above, pulled.above - apart),
-        status=_and(words, peak.status),
+        status=Status(words, peak.status),
     )  # fmt: skip
-
-
-def _and(words: str, status: str) -> str:
-    """Words, and a status where there is one."""
-    return words if status == "ok" else f"{words}; {status}"
 
 
 def _strays(rested: Sequence[Stroke], strokes: Strokes, fs: float) -> float:
@@ -269,7 +264,8 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     best = next(iter(_used(record, method)), "x")
     fall = float(np.median(friction)) - level
     corner = max(BLUNT[best] * float(np.median([_steepest(each) for each in chosen])), ROUNDED[best] * fall)
-    status = unknown or ("told from the displacement alone, which blurs a peak" if best == "x" else "ok")
+    blurred = "told from the displacement alone, which blurs a peak" if best == "x" else "ok"
+    status = Status(Doubt(unknown, UNSTATED) if unknown else blurred)
     return _Borne(chosen, friction, PEAK, max(noise, corner / 4) + stray, corner + stray, status)
 
 

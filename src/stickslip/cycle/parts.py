@@ -11,10 +11,9 @@ import numpy as np
 
 from stickslip.cycle.sticks import StickEvent, Sticks
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import FEW, NORMAL_95, Estimate, Status, kinds
 from stickslip.record.record import Record, Step
 
-CRUDE = "the interval is crude"  # in the status of a mean of few cycles
 TOGETHER = 0.5  # of a stretch: a rest that is shorter goes with the one before
 
 
@@ -177,7 +176,7 @@ def _extend(events: list[StickEvent], more: Sequence[StickEvent], stretch: Stret
 def _together(statuses: Sequence[str], all_: int) -> str:
     """Every status that is not ok, with how many stretches say so."""
     bad = Counter(said for said in statuses if said != "ok")
-    return "; ".join(_often(said, count, all_) for said, count in bad.items()) or "ok"
+    return Status(*(_often(said, count, all_) for said, count in bad.items()))
 
 
 def _often(said: str, count: int, all_: int) -> str:
@@ -195,8 +194,8 @@ def _pooled(parts: list[Estimate], spans: list[float], *, shared: bool = False) 
     scatter = math.sqrt(float(weights @ (values - value) ** 2) / max(1, len(parts) - 1))
     sd = max(float(np.sqrt(weights**2 @ sds**2)), scatter)
     # that few cycles carry one stretch is healed by the others, unless there are few in all
-    few = len(parts) > 1 and not all(CRUDE in each.status for each in parts)
-    status = _together([each.status for each in parts if not (few and CRUDE in each.status)], len(parts))
+    few = len(parts) > 1 and not all(FEW in kinds(each.status) for each in parts)
+    status = _together([each.status for each in parts if not (few and FEW in kinds(each.status))], len(parts))
     name, unit, method = parts[0].name, parts[0].unit, f"{parts[0].method}; mean of {len(parts)} stretches"
     if shared:
         low, high = (float(weights @ ends) for ends in np.transpose([each.interval for each in parts]))

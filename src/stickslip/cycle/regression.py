@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stickslip.balance.motion import is_measured, require_fit
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import Derivative, Filter, differentiate, smooth
@@ -286,7 +286,7 @@ def _answer(
         worries.append(f"only {fit.independent:.0f} independent samples for {len(terms)} coefficients")
     if noisy > BIASED:
         worries.append(f"noise in the acceleration lowers the inertia by about {100 * noisy:.2g} %")
-    status = "; ".join(worries) or "ok"
+    status = Status(*worries)
     found: dict[str, Estimate] = {}
     for index, term in enumerate(terms):
         word, _, side = term.partition("_")

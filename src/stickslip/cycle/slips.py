@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stickslip.balance.motion import is_measured
 from stickslip.cycle.strokes import Stroke, find_strokes
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import FEW, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.statistics import FEW_CYCLES, mean_of_cycles, student
 
@@ -206,12 +206,12 @@ def _told_surely(degrees: Array, without: Array, count: int, side: str) -> list[
     sd = np.sqrt((parts - 1) / parts * ((without - without.mean(axis=0)) ** 2).sum(axis=0)) if parts else [math.inf] * 2
     told, spread = degrees.mean(axis=0), degrees.std(axis=0, ddof=1)
     quantile = student(max(parts - 1, 1))
-    status = (
-        "ok" if count >= FEW_CYCLES else f"only {count} stroke{'s' * (count > 1)} a direction: the interval is crude"
-    )
+    crude = f"only {count} stroke{'s' * (count > 1)} a direction: the interval is crude"
+    status = Status(*([Doubt(crude, FEW, lesser=True)] if count < FEW_CYCLES else []))
     low, high = degrees[:, 0].min(), degrees[:, 0].max()
     if spread[0] > max(sd[0], MIXED * told[0]):
-        status = f"the friction's own course takes part of the ring: {low:.4g} to {high:.4g} Hz by what is taken for it"
+        ends = f"{low:.4g} to {high:.4g} Hz by what is taken for it"
+        status = Status(f"the friction's own course takes part of the ring: {ends}")
     checks = (f"{count} strokes", f"{low:.4g} to {high:.4g} Hz beside polynomials of degree {SLOW} to {STIFF}")
     found = []
     for row, (what, unit) in enumerate((("ringing after slip begins", "Hz"), ("damping ratio of that ringing", "1"))):

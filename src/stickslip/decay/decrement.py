@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stickslip.decay import extremes as ex
 from stickslip.decay.release import RingDown, find_releases
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.statistics import student, weighted_mean
 
@@ -224,7 +224,7 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
     last = _surest_dry(upright, sd, i, m, form)
     frequency, notes = _frequency(times, values, ring_down)
     motion = (ring_down.order, frequency.value)
-    status = "; ".join((*ring_down.notes, *cut, *notes, *_few(len(values)))) or "ok"
+    status = Status(*ring_down.notes, *cut, *notes, *_few(len(values)))
 
     def answer(points: Array) -> Array:
         beta = ex.rate(points, i=i, m=m, form=form)
@@ -444,7 +444,7 @@ def _together(parts: Sequence[Decrement], notes: tuple[str, ...], refused: Seque
     """One answer of several releases: their weighted means, widened where they disagree."""
     notes = (*notes, *(f"a release is left out: {error.value}" for error in refused))
     surest = min(parts, key=lambda part: part.damping_ratio.sd)
-    status = "; ".join(notes) or "ok"
+    status = Status(*notes)
     ratio, dry, frequency, bias = (
         weighted_mean([getattr(part, name) for part in parts], of="releases", status=status)
         for name in ("damping_ratio", "dry_displacement", "frequency", "bias")

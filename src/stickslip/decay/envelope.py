@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from stickslip.decay.extremes import damping_ratio, frictions_seen
 from stickslip.decay.release import RingDown, find_releases
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.statistics import least_squares, student
 
@@ -204,7 +204,7 @@ def extreme_decay(
     return EnvelopeDecay(
         damping, displacement, _frequency(ring_down, damping.value, told["method"]), told["method"],
         "noise lengthens every extreme, and a sample seldom falls on one: some times less sure than the whole waveform",
-        "ok" if len(sizes) >= 8 else f"only {len(sizes)} extremes: the interval is crude",
+        Status(*([Doubt.few(len(sizes), "extreme")] if len(sizes) < 8 else [])),
     )  # fmt: skip
 
 

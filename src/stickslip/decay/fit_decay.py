@@ -14,7 +14,7 @@ from stickslip.decay.answer import DecayFit, beginning, constants, spring_of
 from stickslip.decay.release import CLIPPED, LOST, Releases, RingDown, find_releases
 from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate
+from stickslip.estimate import Doubt, Estimate, Status
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+LEFT_OVER = "residual"  # the kind of doubt where the model leaves more than noise
 UNLIKE = 2.0  # times the noise that the residual may be before the model is doubted
 APART = 1e-3  # p-value of sharing friction and frequency, below which releases are not one experiment
 SHORT = 0.15  # of a half cycle: a hold so short can not be told from the turn of a swing
@@ -282,8 +283,8 @@ def _answer(
     fitted = [_fitted(each.blocks, n, p) for each, n, p in zip(releases, half_cycles, motion.motions[0], strict=True)]
     choices = [each.choice for each in motions]
     unlike = f"the releases do not share one friction and frequency (p = {motion.alike:.1g}): fit each alone"
-    doubts = (unlike,) if motion.alike < APART else _misfit(releases, fitted)
-    status = "; ".join([*_left_out(ring_downs), *doubts, *_seen_beside(choices)]) or "ok"
+    doubts = (Doubt(unlike),) if motion.alike < APART else _misfit(releases, fitted)
+    status = Status(*_left_out(ring_downs), *doubts, *_seen_beside(choices))
     many = ", ".join(map(str, half_cycles))
     checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)
     noise = "; ".join(dict.fromkeys(each.noise.words for each in releases))
@@ -330,8 +331,8 @@ def _answer(
 
 def _left_out(ring_downs: list[RingDown]) -> list[str]:
     """What of the releases is not fitted, in words."""
-    cut = any(CLIPPED in each.notes or not each.sound.all() for each in ring_downs)
-    lost = any(LOST in each.notes for each in ring_downs)
+    cut = any(CLIPPED in each.marks or not each.sound.all() for each in ring_downs)
+    lost = any(LOST in each.marks for each in ring_downs)
     return [words for words, told in ((CLIPPED, cut), (LOST, lost)) if told]
 
 
@@ -348,7 +349,7 @@ def _fitted(blocks: Blocks, n: int, p: Array) -> Array:
     return values
 
 
-def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[str, ...]:
+def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
     """Doubt where the residual is much more than the record's own noise from block to block."""
     from stickslip.decay.start import roughness
 
@@ -361,7 +362,8 @@ def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[str, ...]:
             worst = max(worst, math.sqrt(float(left @ left) / release.blocks.freedom) / floor)
     if worst <= UNLIKE:
         return ()
-    return (f"the residual is {worst:.2g} times the noise: drift, or another motion (see choose_motion)",)
+    words = f"the residual is {worst:.2g} times the noise: drift, or another motion (see choose_motion)"
+    return (Doubt(words, LEFT_OVER),)
 
 
 def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.decay.swings import SEEN, Run, Swings, bounds_of, free_decays
 from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import Status
 from stickslip.record.check import in_words
 from stickslip.record.flaws import clipped, spikes
 from stickslip.record.record import Record
@@ -100,9 +101,14 @@ class RingDown:
     notes: tuple[str, ...] = ()
 
     @property
+    def marks(self) -> frozenset[str]:
+        """Which of `CAUGHT`, `CLIPPED` and `LOST` its notes hold."""
+        return frozenset({CAUGHT, CLIPPED, LOST}.intersection(self.notes))
+
+    @property
     def status(self) -> str:
         """ "ok", or what to beware of."""
-        return "; ".join(self.notes) or "ok"
+        return Status(*self.notes)
 
     @property
     def unevenness(self) -> float:
@@ -163,7 +169,7 @@ class Releases:
     @property
     def status(self) -> str:
         """ "ok", or what to beware of."""
-        return "; ".join(self.notes) or "ok"
+        return Status(*self.notes)
 
     def __repr__(self) -> str:
         told = [

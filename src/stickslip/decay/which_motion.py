@@ -13,7 +13,7 @@ from stickslip.decay.choice import Candidate, Choice, choose, interval_of, kept_
 from stickslip.decay.motions import MOTIONS, RESTORING, Restoring
 from stickslip.decay.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.estimate import NORMAL_95, Estimate, Result, Status
 from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
@@ -235,8 +235,8 @@ def _unclipped(ring_down: RingDown) -> int:
 def told(ring_down: RingDown, worry: str) -> str:
     """What was left out of the record and what to beware of, or "ok"."""
     left_out = [CLIPPED] if _unclipped(ring_down) else []
-    left_out += [LOST] if LOST in ring_down.notes else []
-    return "; ".join([*left_out, *([worry] if worry else [])]) or "ok"
+    left_out += [LOST] if LOST in ring_down.marks else []
+    return Status(*left_out, worry)
 
 
 def whichever(choices: Sequence[Choice], estimate: Estimate, parameter: str) -> Estimate:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import FormatError, RecordError
+from stickslip.errors import NO_RATE, FormatError, RecordError
 from stickslip.files.select import Source, TimeColumn, Wanted
 from stickslip.files.table import FREE, Block, Budget, supplied
 from stickslip.printing import printable
@@ -184,6 +184,7 @@ class Reading:
                 f"{self.names} tells neither time nor sampling rate",
                 "a record has a clock",
                 f"pass fs= in Hz, or the time column in time= (columns: {', '.join(names[:20])})",
+                kind=NO_RATE,
             )
         clock, rounding = found[0]
         for other, its_rounding in found[1:]:

@@ -72,7 +72,7 @@ def _one(asked: Asked, number: int) -> tuple[dict[str, Any], list[str]]:
     try:
         return shown(asked.name(number), asked.parts(number)), []
     except ss.errors.RecordError as error:
-        if asked.reading.get("fs") or "sampling rate" not in error.value:
+        if asked.reading.get("fs") or error.kind != ss.errors.NO_RATE:
             raise
         guess = Asked(asked.records, asked.names, {**asked.reading, "fs": 1.0}, asked.options, asked.say)
         told = shown(asked.name(number), guess.parts(number))

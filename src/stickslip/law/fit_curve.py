@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from stickslip.cycle.loops import LEAST_SPREAD, Loops
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Estimate, Result, Status
 from stickslip.law import presliding as presliding_curves
 from stickslip.law import speed as speed_curves
 from stickslip.law.data import Samples, require_resisting, require_reversals, require_speeds, samples_of
@@ -303,7 +303,7 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
         unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)), model_error=missed,
         correlations=member.correlations, along=family.along,
         at={"v": samples.velocity, "x": samples.displacement, "t": samples.time}[family.along],
-        measured=samples.friction, fitted=member.fitted, status="; ".join(worries) or "ok",
+        measured=samples.friction, fitted=member.fitted, status=Status(*worries),
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Estimate, Result, Status
 from stickslip.law.search import TRUSTED, Knob, Point, Problem, descend
 from stickslip.law.start import (
     Shown,
@@ -301,7 +301,7 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
     return LawFit(
         replace(system, drive=problem.oscillator.drive), parameters, _between(problem, sure), noise, residual,
         point.chi2, sum(counts.values()), len(problem.knobs), tuple(traces), "rough" if problem.profile else "even",
-        "; ".join(filter(None, worries)) or "ok", checks,
+        Status(*worries), checks,
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.estimate import NORMAL_95, Estimate, Result, Status
 from stickslip.laws.base import finite
 from stickslip.statistics import student
 from stickslip.units import parse_value
@@ -153,5 +153,5 @@ def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | st
         for level, load in zip(levels, weights, strict=True)
     )
     doubtful = [level.status for level in levels if level.status != "ok"]
-    status = "; ".join(dict.fromkeys(doubtful)) or "ok"
+    status = Status(*doubtful)
     return LoadLine(coefficient, adhesion, each, weights, line, covariance, quantile, status)

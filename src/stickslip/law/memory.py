@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.balance.motion import CREEP
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.estimate import NORMAL_95, Estimate, Result, Status
 from stickslip.law.data import Samples, samples_of
 from stickslip.law.nonlinear import minimise
 from stickslip.law.presliding import deflections
@@ -327,4 +327,4 @@ def _status(loops: list[_Loop], memory: str) -> str:
             )
     if memory == "undecided" and len(loops) > 1 and _reach(loops) >= FURTHEST:
         words.append("give records of higher frequencies, where the memories part")
-    return "; ".join(words) or "ok"
+    return Status(*words)

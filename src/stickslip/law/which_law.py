@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.estimate import NORMAL_95, Estimate, Result, Status
 from stickslip.law.choice import CALIBRATIONS, Misfit, Standing, standings, times, undescribed
 from stickslip.law.guess import GUESSES, Seen
 from stickslip.law.law import LawFit, answered
@@ -481,7 +481,7 @@ def _answer(
         tuple(each.name for each in kept), confidence,
         f"None of the laws tried describes these records: {doubt}." if doubt
         else " ".join(_sentences(told, families, excess_, calibration, confidence)),
-        fit, excess_, doubt or "; ".join(worries) or "ok", checks,
+        fit, excess_, Status(doubt) if doubt else Status(*worries), checks,
         (*records[0].history, step),
     )  # fmt: skip
 

@@ -6,8 +6,8 @@ from functools import partial
 
 from stickslip.answers.comparison import Comparison
 from stickslip.answers.findings import Findings
-from stickslip.balance.felt_and_computed import UNLIKE
 from stickslip.balance.force import FUSIONS
+from stickslip.estimate import UNSTATED, kinds
 from stickslip.plot.comparison import plot_levels, plot_load_dependence
 from stickslip.plot.consistency import plot_consistency
 from stickslip.plot.contact import (
@@ -22,8 +22,6 @@ from stickslip.plot.force import plot_force_comparison
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
-
-UNSURE = "not stated"  # in the status of what sensors that are not known may have made
 
 
 def plates_of(findings: Findings) -> list[Plate]:
@@ -95,7 +93,7 @@ def _over_time(findings: Findings, *, sticks: int) -> list[Plate]:
 def _of_contact(findings: Findings) -> list[Plate]:
     """What the contact does at a turn and before it slips, and what the sensors say of each other."""
     plates, found = [], findings.breakaway
-    if found is not None and findings.loops is not None and UNSURE not in found.ratio.status:
+    if found is not None and findings.loops is not None and UNSTATED not in kinds(found.ratio.status):
         plates.append(
             plate("breakaway", partial(plot_breakaway, findings), "Before it slips, and while it slides",
                    "Where the contact bears more before it slips than while it slides, its friction falls as slip "
@@ -115,7 +113,7 @@ def _of_contact(findings: Findings) -> list[Plate]:
                    "more than the contact bears.")
         )  # fmt: skip
     compared = findings.comparison
-    if compared is not None and (_is_fused(findings) or UNLIKE in compared.status):
+    if compared is not None and (_is_fused(findings) or compared.unlike):
         plates.append(
             plate("force-comparison", partial(plot_force_comparison, compared), "The force felt and the force computed",
                    "Both forces over time, their size in each band, and their ratio: above the frequency up to which "

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Estimate
+from stickslip.estimate import Estimate, Status
 from stickslip.record.record import Record, Step
 from stickslip.signals.interpolate import band_limited
 from stickslip.statistics import least_squares, student
@@ -334,4 +334,4 @@ def _judged(
         f"gain {gain:.4f}",
         f"rate ratio {rate.value:.6f} (95 %: {rate.interval[0]:.6f} to {rate.interval[1]:.6f})",
     )
-    return replace(offset, status="; ".join(words) or "ok", checks=checks)
+    return replace(offset, status=Status(*words), checks=checks)

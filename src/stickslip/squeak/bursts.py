@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import Status
 from stickslip.record.record import Record
 from stickslip.squeak.hearing import Hearing, Span, clipped_rows, filtered, pulse_train
 from stickslip.squeak.sound import REFERENCES, level
@@ -452,7 +453,7 @@ class _Listener:
         ends = self._cut(part)
         told = [f"cut by the {' and '.join(ends)} of the record: it may last longer"] if ends else []
         told += ["clipped: its level and harmonics can not be told"] if spoilt else []
-        return "; ".join(told) or "ok"
+        return Status(*told)
 
     def notes(self, unit: str) -> list[str]:
         told = []

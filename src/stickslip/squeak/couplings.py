@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
 from stickslip.laws.base import finite
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
@@ -358,7 +358,7 @@ class _Work:
 
 def _mean(name: str, values: list[float]) -> Estimate:
     count = len(values)
-    status = "ok" if count > 2 else f"only {count} burst{'s' * (count > 1)}: the interval is crude"
+    status = Status(*([Doubt.few(count, "burst")] if count <= 2 else []))
     sd = float(np.std(values, ddof=1) / math.sqrt(count)) if count > 1 else math.inf
     found = Estimate.normal(
         name, float(np.mean(values)), sd=sd, unit="J", method=f"mean of {count} bursts",

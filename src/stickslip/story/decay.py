@@ -12,8 +12,9 @@ from stickslip.answers.decay_comparison import DecayComparison
 from stickslip.answers.decays import CLEAR, DecayFindings
 from stickslip.decay.answer import beginning, rig_units
 from stickslip.decay.choice import SIZE
+from stickslip.decay.fit_decay import LEFT_OVER
 from stickslip.decay.release import CAUGHT
-from stickslip.estimate import Estimate
+from stickslip.estimate import Estimate, kinds
 from stickslip.plot.decay import plates_of, plates_together
 from stickslip.story.story import Line, Story, tried
 from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, leading, number, value_of
@@ -183,7 +184,7 @@ def _hidden(estimate: Estimate, words: str) -> str:
 def _left_over(findings: DecayFindings) -> Iterator[str]:
     """Where the fit leaves more than noise: whether that drifts, or swings at a frequency of its own."""
     fit = findings.waveform
-    if fit is None or "residual" not in fit.status:
+    if fit is None or LEFT_OVER not in kinds(fit.status):
         return
     time, left = max(zip(fit.time, fit.residual, strict=True), key=lambda each: float(np.std(each[1])))
     power = np.abs(np.fft.rfft((left - left.mean()) * np.hanning(len(left)))) ** 2
@@ -206,7 +207,7 @@ def _motion(findings: DecayFindings) -> Iterator[str]:
     many = f"{len(rings)} releases were found; the first" if len(rings) > 1 else "The motion"
     first = rings[0]
     end = f"comes to rest at {first.stop:.4g} s" if first.stopped else "is still going on at the end"
-    end = f"is caught at {first.stop:.4g} s" if CAUGHT in first.notes else end
+    end = f"is caught at {first.stop:.4g} s" if CAUGHT in first.marks else end
     begin, far = _begin(findings)
     yield (
         f"{many} {begin}, swings at {value_of(findings.best.frequency)} through {len(first.turns)} extremes from "

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from stickslip.answers.findings import record_name
+from stickslip.estimate import doubts_of
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
 from stickslip.law.which_law import LawComparison
@@ -49,7 +50,8 @@ def _story(found: Fit, record: Records, headline: list[str], cautions: list[str]
     """What all fits tell of their parameters and of the records that they were made to."""
     records = [record] if isinstance(record, Record) else list(record)
     units = list(dict.fromkeys(words for each in records for words in leading(each.check())))
-    cautions += doubts([each for each in found.estimates if each.status not in found.status])
+    said = set(doubts_of(found.status))
+    cautions += doubts([estimate for estimate in found.estimates if not said.issuperset(doubts_of(estimate.status))])
     if records:
         first = records[0]
         told = {"channels": list(first.channels.values()), "history": first.history, **told}

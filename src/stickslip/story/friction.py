@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
 
 from stickslip.answers.comparison import Comparison
 from stickslip.answers.findings import Findings
-from stickslip.answers.preparation import LEFT_OUT
 from stickslip.balance.pull import Pull
 from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
-from stickslip.estimate import Estimate
+from stickslip.estimate import Estimate, stands
 from stickslip.plot.friction import plates_of, plates_together
 from stickslip.story.story import Line, Story
-from stickslip.story.words import FEW, cautions, interval_of, leading, number, sentence, value_of
+from stickslip.story.words import cautions, interval_of, leading, number, sentence, value_of
 
 NEVER = "The contact never sticks."
 RARELY = 0.005  # of the time
@@ -118,8 +116,7 @@ def _of_loops(findings: Findings) -> Iterator[str]:
         yield f"No sliding friction can be told from none: it is {highest} at most (95 % sure)."
     else:
         yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
-    lesser = re.fullmatch(FEW, loops.level.status) or loops.level.status.endswith(LEFT_OUT)  # said among the cautions
-    if loops.level.status != "ok" and not lesser:
+    if not stands(loops.level.status):  # lesser doubts are said among the cautions
         yield f"That is not to be trusted: {loops.level.status}."
     if findings.coefficient is not None and findings.normal is not None:
         yield (

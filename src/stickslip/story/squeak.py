@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip.answers.squeak_comparison import Condition, SqueakComparison
 from stickslip.answers.squeaks import SqueakFindings, trend_of
-from stickslip.estimate import Estimate, decimals
+from stickslip.estimate import Estimate, decimals, doubts_of
 from stickslip.plot.squeak import plates_of, plates_together
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
 from stickslip.squeak.couplings import Coupling, Pair
@@ -164,8 +164,8 @@ def _cautions(found: SqueakFindings) -> list[str]:
         )
     spoilt: dict[str, list[str]] = {}
     for place, burst in enumerate(found.squeaks.bursts):
-        for part in burst.status.split("; ") if burst.status != "ok" else ():
-            spoilt.setdefault(part, []).append(str(place + 1))
+        for doubt in doubts_of(burst.status):
+            spoilt.setdefault(doubt.words, []).append(str(place + 1))
     return told + [
         f"Burst{'s' if len(places) > 1 else ''} {', '.join(places)}: {part}." for part, places in spoilt.items()
     ]

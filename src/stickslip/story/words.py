@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.estimate import UNKNOWN, Estimate, decimals
+from stickslip.estimate import UNKNOWN, Estimate, decimals, doubts_of
 from stickslip.record.check import Fault
 from stickslip.units import NOTHING, prefixed
 
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
 WITHIN_DIGIT = "within its last digit"  # an interval narrower than the digits shown
 FIGURES = 5  # significant figures at most: what is surer than that still reads well
-FEW = r"only (\d+) (\w+): the interval is crude"  # of a number that rests on few of anything
-ONLY_FEW = rf": {FEW}\.$"
 
 
 def number(value: float, sd: float, unit: str) -> str:
@@ -74,7 +71,8 @@ def interval_of(estimate: Estimate) -> str:
 def cautions(findings: Findings | DecayFindings) -> list[str]:
     """What should keep the reader from trusting a number."""
     flagged = _flags(findings.estimates)
-    flagged += [sentence(words) for words in getattr(findings, "doubts", ()) if not re.search(ONLY_FEW, words)]
+    wholes = getattr(findings, "doubts", ())
+    flagged += [sentence(f"{name}: {status}.") for name, status in wholes if not _only_few(status)]
     flagged += _of_few([estimate.status for estimate in findings.estimates])
     if findings.faults:
         many = len(findings.faults)
@@ -90,19 +88,24 @@ def doubts(estimates: Sequence[Estimate]) -> list[str]:
 def _flags(estimates: Sequence[Estimate]) -> list[str]:
     flagged: dict[str, list[str]] = {}
     for estimate in estimates:
-        if estimate.status != "ok" and not re.fullmatch(FEW, estimate.status):
+        if estimate.status != "ok" and not _only_few(estimate.status):
             flagged.setdefault(estimate.status, []).append(estimate.name)
     return [sentence(f"{_few(names)}: {status}.") for status, names in flagged.items()]
 
 
+def _only_few(status: str) -> bool:
+    """Whether nothing is wrong but that the number rests on few cycles: that is said once for all numbers."""
+    return any(doubt.count for doubt in doubts_of(status)) and len(doubts_of(status)) == 1
+
+
 def _of_few(statuses: Sequence[str]) -> Iterator[str]:
     """One sentence for all intervals that few cycles leave crude."""
-    found = [match for status in statuses if (match := re.fullmatch(FEW, status))]
-    if found:
-        counts, kinds = sorted({int(each[1]) for each in found}), dict.fromkeys(each[2].rstrip("s") for each in found)
+    few = [doubts_of(status)[0] for status in statuses if _only_few(status)]
+    if few:
+        counts, kinds = sorted({doubt.count for doubt in few}), dict.fromkeys(doubt.of for doubt in few)
         many = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
         plural = "" if counts[-1] == 1 else "s"
-        those = "the interval of one number is" if len(found) == 1 else f"the intervals of {len(found)} numbers are"
+        those = "the interval of one number is" if len(few) == 1 else f"the intervals of {len(few)} numbers are"
         yield f"There are only {many} {' or '.join(kind + plural for kind in kinds)}: {those} crude."
 
 
