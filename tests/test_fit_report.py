@@ -73,8 +73,8 @@ def test_a_law_fitted_to_a_pull_is_written_with_the_pull(tmp_path: Path) -> None
     z = 0.003 + 2e-3 * t + 1e-6 * np.sin(60 * t) + rng.normal(0, 1e-6, t.size)
     v = 2e-3 * (1 + np.sin(40 * t))
     made = {"x": np.cumsum(v) / 1000, "v": v, "z": z, "friction": 1.1 + rng.normal(0, 0.01, t.size)}
-    step = ss.record.Step("friction_force", {"mass": 2.42, "stiffness": 2310.0, "contact": "ground"}, "")
-    record = dataclasses.replace(ss.Record.of(made, fs=1000), history=(step,))
+    rig = ss.record.StatedRig("smoother", mass=2.42, stiffness=2310.0)
+    record = dataclasses.replace(ss.Record.of(made, fs=1000), rig=rig)
     folder = ss.publish(ss.fit_curve(record, curve="coulomb"), folder=tmp_path / "fit", record=record)
     drive = ss.systems.read_system(folder / "law" / "law.toml").system.drive
     assert isinstance(drive, ss.drives.Ramp)

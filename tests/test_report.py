@@ -19,7 +19,7 @@ from stickslip.answers.comparison import compare
 from stickslip.answers.findings import Findings
 from stickslip.answers.questions import analyze
 from stickslip.errors import EstimateError, ModelError, StickslipError
-from stickslip.estimate import Estimate
+from stickslip.estimate import Doubt, Estimate, Status
 from stickslip.story import folder as folder_module
 from stickslip.story.folder import publish
 from stickslip.story.page import report
@@ -288,14 +288,14 @@ def test_the_digits_of_an_interval_do_not_exclude_the_value():
 
 def test_few_cycles_are_told_once_and_last() -> None:
     few = [
-        Estimate.normal(name, 1.0, sd=0.1, unit="N", method="m", status=f"only {count} cycles: the interval is crude")
+        Estimate.normal(name, 1.0, sd=0.1, unit="N", method="m", status=Status(Doubt.few(count, "cycle")))
         for name, count in (("one", 6), ("two", 7), ("three", 6))
     ]
     wrong = Estimate.normal("four", 1.0, sd=0.1, unit="N", method="m", status="z has the wrong sign")
     assert doubts([*few, wrong]) == [
         "Four: z has the wrong sign.", "There are only 6 to 7 cycles: the intervals of 3 numbers are crude.",
     ]  # fmt: skip
-    alone = replace(few[0], status="only 5 turns: the interval is crude")
+    alone = replace(few[0], status=Status(Doubt.few(5, "turn")))
     assert doubts([alone]) == ["There are only 5 turns: the interval of one number is crude."]
 
 
