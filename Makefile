@@ -42,6 +42,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/rig.py --draws 5
 	$(BIN)/python benchmarks/events.py --draws 2
 	$(BIN)/python benchmarks/breakaway.py --draws 2
+	$(BIN)/python benchmarks/twins.py --draws 2 --twins 12
 	$(BIN)/python benchmarks/kills.py
 	$(BIN)/python benchmarks/delay.py 5
 	$(BIN)/python benchmarks/curves.py 20

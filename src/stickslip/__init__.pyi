@@ -25,6 +25,7 @@ from stickslip.answers.comparison import compare as compare
 from stickslip.answers.decays import analyze_decay as analyze_decay
 
 # questions
+from stickslip.answers.on_twins import tried as tried
 from stickslip.answers.questions import analyze as analyze
 from stickslip.answers.squeaks import analyze_squeaks as analyze_squeaks
 from stickslip.balance.force import friction_force as friction_force

@@ -22,6 +22,7 @@ from stickslip.cycle.regression import Regression
 from stickslip.cycle.sticks import Sticks
 from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record
+from stickslip.twin.trial import Trial
 
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
@@ -57,6 +58,8 @@ class Findings(Result):
         Of the accelerometer behind the displacement.
     comparison : ForceComparison or None
         The friction felt by the load cell against the friction computed from the motion.
+    trial : Trial or None
+        What came of its twins, where it was tried on them: see :func:`~stickslip.tried`.
     normal : float or None
         Normal load [N] on the contact, where stated or measured.
     notes : tuple of str
@@ -83,6 +86,7 @@ class Findings(Result):
     consistency: Consistency | None = None
     delay: SensorDelay | None = None
     comparison: ForceComparison | None = None
+    trial: Trial | None = None
     normal: float | None = None
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -149,6 +153,7 @@ class Findings(Result):
             "estimates": [estimate.to_dict() for estimate in self.estimates],
             "regression_residual": None if self.regression is None else self.regression.residual,
             "truth": dict(self.record.truth),
+            "twins": None if self.trial is None else self.trial.to_dict(),
             "notes": list(self.notes),
             "history": [step.to_dict() for step in self.record.history],
         }

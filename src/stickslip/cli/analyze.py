@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,9 +44,19 @@ from stickslip.cli.show import show
     show_default=True,
     help="How the friction is found: by all sensors together (fusion), by some, or by derivatives; auto says why.",
 )
+@click.option(
+    "--twins",
+    type=click.IntRange(min=0),
+    default=0,
+    metavar="N",
+    help="Try the answers on N simulated rigs that may have written the record (40 is good): their bias is taken off, "
+    "and nothing is claimed that rigs without it show too. 0 for the quick answers.",
+)
 @result_options("FILE-stickslip")
 @reading_options
-def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: str, **options: Any) -> None:
+def analyze(
+    files: tuple[str, ...], output: Path | None, as_json: bool, method: str, twins: int, **options: Any
+) -> None:
     """Find the friction in one record or several.
 
     FILES that belong to one record are joined with +, as in x.mat+z.mat. A quoted pattern ("run_*.csv") stands for
@@ -62,7 +74,7 @@ def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: 
     folder = output or default_folder(groups)
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(
-            groups, rig, lambda record: ss.analyze(record, rig=rig, method=method), tell,
+            groups, rig, lambda record: _tried(ss.analyze(record, rig=rig, method=method), twins, tell), tell,
             of_parts=lambda parts, say: ss.answers.analyze_blocks(parts, rig=rig, method=method, progress=say),
         )  # fmt: skip
         results = with_left_out(ss.compare(found) if len(found) > 1 else found[0], refused)
@@ -70,6 +82,16 @@ def analyze(files: tuple[str, ...], output: Path | None, as_json: bool, method: 
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
     show(results, written, as_json=as_json)
+
+
+def _tried(findings: ss.answers.Findings, twins: int, tell: Callable[..., None]) -> ss.answers.Findings:
+    """The answers as their twins leave them; with a note of why, where the record has no twin."""
+    if not twins:
+        return findings
+    try:
+        return ss.tried(findings, twins=twins, progress=lambda share: tell(f"asking twins, {100 * share:.0f} %"))
+    except ss.errors.EstimateError as error:
+        return replace(findings, notes=(*findings.notes, f"Twins: {error}"))
 
 
 @click.command()

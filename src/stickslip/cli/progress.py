@@ -39,10 +39,10 @@ def compiling() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def progress(steps: int) -> Iterator[Callable[[str, float], None]]:
+def progress(steps: int) -> Iterator[Callable[..., None]]:
     """What is being done, on the error stream, for work that lasts; silent where nobody watches."""
     if not sys.stderr.isatty():
-        yield lambda words, done: None
+        yield lambda words, done=None: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -57,7 +57,7 @@ def progress(steps: int) -> Iterator[Callable[[str, float], None]]:
     if PATIENCE <= 0:
         patience.join()
     try:
-        yield lambda words, done: bar.update(task, completed=done, description=printable(words), refresh=True)
+        yield lambda words, done=None: bar.update(task, completed=done, description=printable(words), refresh=True)
     finally:
         patience.cancel()
         bar.stop()

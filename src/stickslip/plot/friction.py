@@ -22,6 +22,7 @@ from stickslip.plot.force import plot_force_comparison
 from stickslip.plot.plate import Plate, plate
 from stickslip.plot.regression import plot_regression
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
+from stickslip.plot.twin import plot_twin
 
 
 def plates_of(findings: Findings) -> list[Plate]:
@@ -118,6 +119,12 @@ def _of_contact(findings: Findings) -> list[Plate]:
             plate("force-comparison", partial(plot_force_comparison, compared), "The force felt and the force computed",
                    "Both forces over time, their size in each band, and their ratio: above the frequency up to which "
                    "they agree, the mounts of the sensors swing.")
+        )  # fmt: skip
+    if findings.trial is not None:
+        plates.append(
+            plate("twin", partial(plot_twin, findings.trial, record=close_up(findings)), "The record and its twin",
+                  "Above the displacement as measured and as the rig believed in moves; below what is left. Where that "
+                  "is more than noise, the rig is not of this kind.")
         )  # fmt: skip
     if findings.consistency is not None and findings.consistency.failed:
         plates.append(

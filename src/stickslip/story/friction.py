@@ -136,6 +136,9 @@ def _of_loops(findings: Findings) -> Iterator[str]:
 def _of_sticks(findings: Findings) -> Iterator[str]:
     sticks = findings.sticks
     assert sticks is not None
+    if findings.trial is not None and sticks.share.known and sticks.share.interval[0] == 0.0 < sticks.share.interval[1]:
+        yield f"No stick can be told from none: it sticks {100 * sticks.share.interval[1]:.2g} % of the time at most."
+        return
     if not any(event.kind == "stick" for event in sticks.events):
         brief = sticks.share.value >= RARELY
         share = value_of(sticks.share)

@@ -1,0 +1,132 @@
+"""An analysis tried on its twins: each answer as the rigs that the record may come from let it stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any, TypeVar
+
+from stickslip.answers.findings import Findings
+from stickslip.balance.force import friction_force
+from stickslip.cycle.before_slip import Presliding, presliding
+from stickslip.cycle.loops import Loops, friction_loops
+from stickslip.cycle.onset import Breakaway, breakaway
+from stickslip.cycle.sticks import Sticks, find_sticks
+from stickslip.errors import StickslipError
+from stickslip.estimate import Estimate, Result
+from stickslip.record.record import Record
+from stickslip.twin.belief import believe
+from stickslip.twin.trial import Trial, try_on_twins
+
+Answer = TypeVar("Answer", Loops | None, Sticks | None, Breakaway | None)
+ASKED = (friction_loops, find_sticks, breakaway, presliding)
+
+
+def tried(
+    findings: Findings, *, twins: int = 40, rng: int = 0, progress: Callable[[float], None] = lambda share: None
+) -> Findings:
+    r"""What of an analysis holds on rigs that the record may come from, whose truth is known?
+
+    The rig that the record is believed to come from (:func:`~stickslip.twin.believe`) writes so many records of its
+    own, and is asked the same questions (:func:`~stickslip.twin.try_on_twins`): the bias of each answer is taken off,
+    its interval is what the twins' errors leave, and a static friction above the sliding one is claimed only where
+    twins without it would not have shown it.
+
+    Parameters
+    ----------
+    findings : Findings
+        From :func:`~stickslip.analyze`, of a record whose friction came from a balance of forces.
+    twins : int
+        How many are asked, eight at least.
+    rng : int
+        Seed: the same one gives the same answers.
+    progress : callable, optional
+        Called with the share done.
+
+    Returns
+    -------
+    Findings
+        The same, its answers as the trial left them, with the :class:`~stickslip.twin.Trial` itself.
+
+    Raises
+    ------
+    EstimateError
+        The record has no twin: its friction was measured, or nothing in it tells what moved the mass.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(mass=0.54, stiffness=188, damping=0.136, law=ss.laws.Coulomb(0.0126),
+    ...                        drive=ss.drives.HarmonicBase(0.289e-3, frequency=3.387))
+    >>> rig = ss.Rig.perfect("x", "z").having("x", white=1e-7).having("z", white=1e-7)
+    >>> record = rig.measure(ss.simulate(slider, duration=6), fs=1000, rng=1)
+    >>> quick = ss.analyze(record, mass=0.54, stiffness=188, damping=0.136)
+    >>> sure = ss.tried(quick, twins=10)
+    >>> sure.breakaway.ratio.known  # what such a record says of static friction its twins without any say too
+    False
+    """
+    belief = believe(findings.record)
+    answers = {estimate.name: estimate for estimate in findings.estimates}
+    trial = try_on_twins(belief, answers, partial(_ask, like=findings.record), count=twins, rng=rng, progress=progress)
+    return replace(
+        findings,
+        loops=_with(findings.loops, trial.estimates),
+        sticks=_with(findings.sticks, trial.estimates),
+        breakaway=_with(findings.breakaway, trial.estimates),
+        presliding=_yields(findings.presliding, trial),
+        trial=trial,
+        notes=(*findings.notes, _note(trial)),
+    )
+
+
+def _note(trial: Trial) -> str:
+    law = trial.belief.law
+    return (
+        f"Tried on {trial.count} twins: simulated rigs with the constants as stated and the law f = {law.kinetic:.4g} "
+        f"N sgn v + {law.slope:.4g} N s/m v, whose sensors have the noise and the counts of the record's. What the "
+        "same questions get wrong of them is taken off, and the intervals are as wide as their errors."
+    )
+
+
+def _yields(found: Presliding | None, trial: Trial) -> Presliding | None:
+    """What a contact does before it slips, as far as rigid twins do not show it too, or are like the record."""
+    power = trial.yields
+    if found is not None and power is not None and not power.claimed:
+        why = (
+            f"twins of a rigid contact seem to give way by {power.null:.3g} m/N too, and {power.felt:.3g} m/N would be "
+            "needed"
+        )
+    elif found is not None and found.verdict == "rigid" and trial.unlike:
+        why = f"x strays {trial.strays:.2g} times as far from the twins of a rigid contact as noise explains"
+    else:
+        return found
+    unknown = (found.compliance_forward.unknown(why), found.compliance_back.unknown(why))
+    return replace(
+        found, stiffness=None, stiffness_forward=None, stiffness_back=None, backlash=None,
+        compliance_forward=unknown[0], compliance_back=unknown[1], verdict="can not be told", evidence=why,
+    )  # fmt: skip
+
+
+def _ask(record: Record, *, like: Record) -> dict[str, Estimate]:
+    """The answers of a twin, found as those of its record were."""
+    stated = like.rig
+    assert stated is not None  # it was believed in
+    record = friction_force(record, method=stated.method, **stated.constants)
+    answers: dict[str, Estimate] = {}
+    for question in ASKED:
+        try:
+            found: Result = question(record, contact=stated.contact)
+        except StickslipError:  # as of the record itself: a question without an answer is left out
+            continue
+        answers |= {estimate.name: estimate for estimate in found.estimates}
+    return answers
+
+
+def _with(answer: Answer, estimates: Mapping[str, Estimate]) -> Answer:
+    """The answer with its numbers as tried."""
+    if answer is None:
+        return answer
+    numbers = {key: value for key, value in vars(answer).items() if isinstance(value, Estimate)}
+    changes: dict[str, Any] = {key: estimates[e.name] for key, e in numbers.items() if e.name in estimates}
+    return replace(answer, **changes)

@@ -1,0 +1,166 @@
+"""Rigs by an integrator of our own with nothing of the engine in it: fixed Runge-Kutta steps, bisected turns.
+
+What is tried on the engine's twins is drawn here, so that a fault of the engine is no truth of a test.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+
+import stickslip as ss
+
+STEPS = 16  # in a sample: the displacement is then right to 1e-9 of its amplitude
+KINDS = ("Coulomb", "static", "Stribeck", "compliant", "viscous", "none")
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A mass on a spring, shaken at its base: (kinetic + drop exp(-|v|/speed)) sgn v + slope v, or a spring."""
+
+    kind: str
+    mass: float
+    stiffness: float
+    damping: float
+    amplitude: float
+    frequency: float
+    kinetic: float = 0.0
+    static: float = 0.0
+    slope: float = 0.0
+    speed: float = 0.0
+    contact: float = 0.0
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """What its user knows."""
+        return {"mass": self.mass, "stiffness": self.stiffness, "damping": self.damping}
+
+
+@numba.njit
+def _accelerated(t, x, v, way, p):  # type: ignore[no-untyped-def]
+    m, k, c, amplitude, w, kinetic, static, slope, speed = p[:9]
+    drop = (static - kinetic) * np.exp(-abs(v) / speed) if speed > 0 else 0.0
+    return (k * (amplitude * np.sin(w * t) - x) - c * v - way * (kinetic + drop) - slope * v) / m
+
+
+@numba.njit
+def _step(t, x, v, way, h, p):  # type: ignore[no-untyped-def]
+    a1 = _accelerated(t, x, v, way, p)
+    a2 = _accelerated(t + h / 2, x + h / 2 * v, v + h / 2 * a1, way, p)
+    a3 = _accelerated(t + h / 2, x + h / 2 * (v + h / 2 * a1), v + h / 2 * a2, way, p)
+    a4 = _accelerated(t + h, x + h * (v + h / 2 * a2), v + h * a3, way, p)
+    return x + h * v + h * h / 6 * (a1 + a2 + a3), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+
+
+@numba.njit
+def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
+    """Displacement, velocity and acceleration at each sample; time stuck, and stops."""
+    k, amplitude, w, static = p[1], p[3], p[4], p[6]
+    out = np.zeros((3, samples))
+    x, v, t, way, stuck, held, stops = 0.0, 0.0, 0.0, 0, True, 0.0, 0
+    for number in range((settle + samples - 1) * steps + 1):
+        row = number // steps - settle
+        if number % steps == 0 and row >= 0:
+            out[0, row], out[1, row] = x, v
+            out[2, row] = 0.0 if stuck else _accelerated(t, x, v, way, p)
+        left = h
+        while left > 1e-15 * h:
+            if stuck:
+                pull = k * (amplitude * np.sin(w * (t + left)) - x)
+                if abs(pull) <= static:
+                    held += left if row >= 0 else 0.0
+                    t, left = t + left, 0.0
+                    continue
+                low, high = 0.0, left  # the instant at which the pull passes what the contact bears
+                for _ in range(60):
+                    middle = (low + high) / 2
+                    over = abs(k * (amplitude * np.sin(w * (t + middle)) - x)) > static
+                    low, high = (low, middle) if over else (middle, high)
+                held += high if row >= 0 else 0.0
+                t, left, stuck, way = t + high, left - high, False, 1 if pull > 0 else -1
+                continue
+            new_x, new_v = _step(t, x, v, way, left, p)
+            if new_v * way >= 0 or p[5] + p[6] == 0.0:
+                x, v, t, left = new_x, new_v, t + left, 0.0
+                continue
+            low, high = 0.0, left  # the instant at which it turns
+            for _ in range(60):
+                middle = (low + high) / 2
+                turned = _step(t, x, v, way, middle, p)[1] * way < 0
+                low, high = (low, middle) if turned else (middle, high)
+            x, v = _step(t, x, v, way, high, p)[0], 0.0
+            t, left = t + high, left - high
+            pull = k * (amplitude * np.sin(w * t) - x)
+            stuck = abs(pull) <= static
+            stops += 1 if stuck and row >= 0 else 0
+            way = way if stuck else (1 if pull > 0 else -1)
+    return out, held, stops
+
+
+@numba.njit
+def _compliant(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
+    """The same of a contact that is a spring until it slides; no sticks are counted."""
+    m, k, c, amplitude, w, kinetic, stiffness = p[0], p[1], p[2], p[3], p[4], p[5], p[9]
+    out = np.zeros((3, samples))
+    x, v, t, y = 0.0, 0.0, 0.0, 0.0
+    for number in range((settle + samples - 1) * steps + 1):
+        a = (k * (amplitude * np.sin(w * t) - x) - c * v - stiffness * y) / m
+        row = number // steps - settle
+        if number % steps == 0 and row >= 0:
+            out[0, row], out[1, row], out[2, row] = x, v, a
+        half_v = v + h / 2 * a  # leap-frog: the contact's spring is clipped at what it bears
+        x += h * half_v
+        y = min(max(y + h * half_v, -kinetic / stiffness), kinetic / stiffness)
+        t += h
+        v = (half_v + h / 2 * (k * (amplitude * np.sin(w * t) - x) - stiffness * y) / m) / (1 + h / 2 * c / m)
+    return out, 0.0, 0
+
+
+def record(rig: Rig, rng: np.random.Generator, *, noise: float = 1e-3, cycles: int = 10, off: float = 0.0) -> ss.Record:
+    """What its sensors write of it: x and z with noise (a share of the base's amplitude) and gains off by chance."""
+    fs = float(np.clip(400 * rig.frequency, 200, 5000))
+    cycle = fs / rig.frequency
+    samples, settle = round(cycles * cycle), round(30 * cycle)
+    p = np.array([
+        rig.mass, rig.stiffness, rig.damping, rig.amplitude, 2 * np.pi * rig.frequency, rig.kinetic,
+        max(rig.static, rig.kinetic), rig.slope, rig.speed, rig.contact,
+    ])  # fmt: skip
+    march, steps = (_compliant, 20 * STEPS) if rig.kind == "compliant" else (_rigid, STEPS)
+    (x, _, _), held, stops = march(p, samples, settle, 1 / (fs * steps), steps)
+    time = (settle + np.arange(samples)) / fs
+    z = rig.amplitude * np.sin(2 * np.pi * rig.frequency * time)
+    gains = 1 + off * rng.standard_normal(2)
+    level = noise * rig.amplitude
+    written = {name: gain * values + level * rng.standard_normal(samples)
+               for name, gain, values in zip("xz", gains, (x, z), strict=True)}  # fmt: skip
+    truth: dict[str, Any] = {
+        "sliding friction": rig.kinetic, "slope of friction against speed": rig.slope,
+        "stuck share of the time": held * fs / samples, "stops per cycle": stops * cycle / samples,
+        "static over sliding friction": max(1.0, rig.static / rig.kinetic) if rig.kinetic else np.nan,
+    }  # fmt: skip
+    return ss.Record.of(written, fs=fs, truth=truth)
+
+
+def drawn(kind: str, rng: np.random.Generator) -> Rig:
+    """A rig of a kind, by chance: 0.1 to 20 kg, 0.2 to 15 Hz, shaken below to above its resonance."""
+    mass, natural = np.exp(rng.uniform(np.log([0.1, 0.5]), np.log([20.0, 12.0])))
+    stiffness = mass * (2 * np.pi * natural) ** 2
+    frequency, amplitude = natural * rng.uniform(0.3, 1.6), 10 ** rng.uniform(-3.5, -2.3)
+    damping = 2 * rng.uniform(0.001, 0.03) * np.sqrt(stiffness * mass)
+    begun = Rig(kind, mass, stiffness, damping, amplitude, frequency)
+    pull = stiffness * amplitude  # what shakes it: friction of a share of it lets it move
+    kinetic, more = {}, {}
+    if kind not in ("viscous", "none"):
+        kinetic = {"kinetic": pull * rng.uniform(0.1, 0.6)}
+    if kind in ("static", "Stribeck"):
+        more["static"] = kinetic["kinetic"] * rng.uniform(1.1, 1.6)
+    if kind == "Stribeck":
+        more["speed"] = rng.uniform(0.05, 0.3) * amplitude * 2 * np.pi * frequency
+    if kind == "viscous":
+        more["slope"] = rng.uniform(0.1, 0.5) * np.sqrt(stiffness * mass)
+    if kind == "compliant":
+        more["contact"] = stiffness * rng.uniform(5, 50)
+    return Rig(**{**vars(begun), **kinetic, **more})

@@ -1,0 +1,126 @@
+"""Answers tried on twins, on rigs by an integrator that has nothing of the engine in it."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import stepped
+import stickslip as ss
+from stickslip.cli.program import main
+from stickslip.estimate import kinds
+from stickslip.twin.trial import ASTRAY
+
+RATIO = "static over sliding friction"
+PULL = 800 * 4e-3  # N: what shakes these rigs
+SLIDES = stepped.Rig("Coulomb", 2.0, 800.0, 1.0, 4e-3, 3.9, kinetic=0.1 * PULL)
+STOPS = stepped.Rig("Coulomb", 2.0, 800.0, 1.0, 4e-3, 1.6, kinetic=0.5 * PULL)
+BEARS = stepped.Rig("static", 2.0, 800.0, 1.0, 4e-3, 1.6, kinetic=0.3 * PULL, static=0.45 * PULL)
+DAMPED = stepped.Rig("viscous", 2.0, 800.0, 1.0, 4e-3, 3.0, slope=12.0)
+YIELDS = stepped.Rig("compliant", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.3 * PULL, contact=8000.0)
+
+
+@cache
+def asked(rig: stepped.Rig) -> tuple[ss.answers.Findings, ss.answers.Findings]:
+    """The quick answers and those tried on twins."""
+    record = stepped.record(rig, np.random.default_rng(11))
+    quick = ss.analyze(record, **rig.stated)
+    return quick, ss.tried(quick, twins=16)
+
+
+def estimate(findings: ss.answers.Findings, name: str) -> ss.Estimate:
+    return next(each for each in findings.estimates if each.name == name)
+
+
+def test_the_stepped_rigs_move_as_the_engine_does() -> None:
+    law = ss.laws.Coulomb(STOPS.kinetic)
+    drive = ss.drives.HarmonicBase(STOPS.amplitude, frequency=STOPS.frequency, phase=-np.pi / 2)
+    run = ss.simulate(ss.Oscillator(law=law, drive=drive, **STOPS.stated), start={}, cycles=41)
+    record = stepped.record(STOPS, np.random.default_rng(0), noise=0.0)
+    settled = round(30 * record.fs / STOPS.frequency)
+    time = (settled + np.arange(len(record))) / record.fs
+    (x,), _ = run.sample(time, ("x",))
+    assert np.abs(record["x"] - x).max() < 1e-7 * STOPS.amplitude
+
+
+@pytest.mark.parametrize("rig", [SLIDES, STOPS, BEARS, DAMPED], ids=lambda rig: f"{rig.kind} {rig.frequency:g}")
+def test_what_is_tried_holds_the_truth(rig: stepped.Rig) -> None:
+    _, tried = asked(rig)
+    assert not tried.trial.unlike
+    truth = tried.record.truth
+    for name in ("sliding friction", "slope of friction against speed", "stuck share of the time", "stops per cycle"):
+        answer = estimate(tried, name)
+        # 99.9 % of the interval's own law: what is tested is the bias, not one draw in twenty
+        assert abs(answer.value - truth[name]) <= 1.7 * max(answer.interval[1] - answer.value, 1e-9), str(answer)
+
+
+def test_a_damper_is_no_dry_friction() -> None:
+    quick, tried = asked(DAMPED)
+    assert quick.loops.level.interval[0] > 0
+    assert tried.loops.level.interval[0] == 0
+    assert "No sliding friction can be told from none" in " ".join(ss.summary(tried).headline)
+
+
+@pytest.mark.parametrize("rig", [SLIDES, STOPS, DAMPED], ids=lambda rig: f"{rig.kind} {rig.frequency:g}")
+def test_static_friction_that_is_not_there_is_not_claimed(rig: stepped.Rig) -> None:
+    _, tried = asked(rig)
+    if tried.breakaway is not None:
+        assert not tried.breakaway.ratio.interval[0] > 1
+
+
+def test_static_friction_that_is_there_is_found() -> None:
+    _, tried = asked(BEARS)
+    assert tried.trial.static.claimed
+    ratio = tried.breakaway.ratio
+    assert ratio.value == pytest.approx(1.5, abs=0.04)
+
+
+def test_stuck_time_is_counted_without_the_bias_of_a_threshold() -> None:
+    quick, tried = asked(STOPS)
+    true = tried.record.truth["stuck share of the time"]
+    assert abs(tried.sticks.share.value - true) < 0.02 * true < abs(quick.sticks.share.value - true)
+
+
+def test_a_contact_of_another_kind_is_unlike_its_twins() -> None:
+    _, tried = asked(YIELDS)
+    assert tried.trial.unlike
+    assert ASTRAY in kinds(tried.loops.level.status)
+    assert tried.loops.level.includes(tried.record.truth["sliding friction"])
+
+
+def test_the_same_seed_gives_the_same_answers() -> None:
+    quick, _ = asked(SLIDES)
+    first, again, other = (ss.tried(quick, twins=8, rng=seed) for seed in (3, 3, 4))
+    assert [str(e) for e in first.estimates] == [str(e) for e in again.estimates]
+    assert first.loops.level.interval != other.loops.level.interval
+
+
+def test_a_record_without_a_twin_is_refused_in_a_sentence() -> None:
+    time = np.arange(4000) / 500
+    v = np.cos(2 * np.pi * time)
+    x, friction = np.sin(2 * np.pi * time) / (2 * np.pi), np.sign(v) + np.random.default_rng(1).normal(0, 0.01, v.size)
+    measured = ss.analyze(ss.Record.of({"x": x, "friction": friction}, fs=500))
+    with pytest.raises(ss.errors.EstimateError, match="without a balance of forces"):
+        ss.tried(measured)
+    quick, _ = asked(SLIDES)
+    with pytest.raises(ss.errors.EstimateError, match="eight at least"):
+        ss.tried(quick, twins=3)
+
+
+def test_the_command_tries_and_tells(tmp_path: Path) -> None:
+    path = tmp_path / "slides.csv"
+    ss.write_record(stepped.record(SLIDES, np.random.default_rng(11)), path)
+    words = ["analyze", str(path), "--twins", "8", "--output", str(tmp_path / "out"), "--json"]
+    for name, value in SLIDES.stated.items():
+        words += [f"--{name}", str(value)]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 0, result.output
+    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
+    assert told["twins"]["count"] == 8
+    assert (tmp_path / "out" / "figures" / "twin.png").exists()
+    assert any(note.startswith("Tried on 8 twins") for note in told["notes"])
