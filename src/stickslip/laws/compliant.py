@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
-from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+from stickslip.laws.base import Exit, Mode, Row, static_level
 from stickslip.laws.coulomb import held_until
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class CompliantContact:
     r"""Coulomb friction through a massless contact of stiffness :math:`K_y` and damping :math:`c`.
 
@@ -19,21 +18,6 @@ class CompliantContact:
     :math:`|f|` reaches `static`; slip then goes in the direction of f. Should the mass move against that direction
     (possible only with much damping; it does not happen in the thesis's cases), friction keeps its sign until the
     velocity has reversed and come back to zero.
-
-    Attributes
-    ----------
-    kinetic : float
-        Friction force while sliding [N].
-    stiffness : float
-        Tangential contact stiffness [N/m].
-    damping : float
-        Damping coefficient of the contact [N s/m].
-    static : float or None
-        Friction force at which microstick ends [N]; None: as `kinetic`.
-    rule : {"literal", "consistent"}
-        "literal": during slip the contact stays at its full deflection :math:`f_k/K_y`, as the thesis has it.
-        "consistent": a Kelvin-Voigt contact whose deflection relaxes in slip, :math:`c\dot y + K_y y = \pm f_k`;
-        it sticks when the slider's velocity :math:`\dot x - \dot y` vanishes. Equal where c is zero.
 
     Raises
     ------
@@ -47,19 +31,24 @@ class CompliantContact:
     {'x': 1.0}
     """
 
-    kinetic: float
-    stiffness: float
-    damping: float = 0.0
-    static: float | None = None
-    rule: str = "literal"
+    kinetic: float = parameter("N", "sliding friction")
+    stiffness: float = parameter("N/m", "contact stiffness", positive=True)
+    damping: float = parameter("N s/m", "contact damping", default=0.0)
+    static: float | None = parameter(
+        "N", "static friction", default=None, note="at which microstick ends; None: as `kinetic`"
+    )
+    rule: str = parameter(
+        "",
+        "how the contact moves in slip",
+        default="literal",
+        choices=("literal", "consistent"),
+        note='"literal": it stays at its full deflection :math:`f_k/K_y`, as the thesis has it; "consistent": a '
+        r"Kelvin-Voigt contact whose deflection relaxes, :math:`c\dot y + K_y y = \pm f_k`, and which sticks when the "
+        r"slider's velocity :math:`\dot x - \dot y` vanishes; equal where c is zero",
+    )
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N")
-        finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        finite("damping", self.damping, unit="N s/m")
         static_level(self.static, self.kinetic)
-        if self.rule not in ("literal", "consistent"):
-            raise ModelError(f"rule = '{self.rule}'", "the rule is 'literal' or 'consistent'", "choose one of the two")
 
     @property
     def memory(self) -> Mapping[str, Row]:

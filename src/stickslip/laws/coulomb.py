@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from stickslip.laws.base import Exit, Mode, Rigid, static_level
+from stickslip.parameters import parameter, parametric
 
-from stickslip.laws.base import Exit, Mode, Rigid, finite, static_level
 
-
-@dataclass(frozen=True)
+@parametric
 class Coulomb(Rigid):
     r"""Rigid dry friction: :math:`f = f_k\,\mathrm{sgn}\,v` in slip, :math:`|f| \le f_s` in stick.
 
     A slip that comes to rest passes through the stuck mode; where the holding force would exceed `static` it goes on
     at once, in the direction of that force.
-
-    Attributes
-    ----------
-    kinetic : float
-        Friction force while sliding [N].
-    static : float or None
-        Largest friction force while stuck [N]; None: as `kinetic`.
 
     Raises
     ------
@@ -32,11 +24,10 @@ class Coulomb(Rigid):
     ['back', 'stuck', 'forward']
     """
 
-    kinetic: float
-    static: float | None = None
+    kinetic: float = parameter("N", "sliding friction")
+    static: float | None = parameter("N", "static friction", default=None, note="None: as `kinetic`")
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N")
         static_level(self.static, self.kinetic)
 
     def modes(self) -> tuple[Mode, ...]:

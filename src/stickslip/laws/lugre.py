@@ -3,34 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
-from stickslip.laws.base import Row, finite
+from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol
 from stickslip.laws.stribeck import require_static_above, stribeck_curve
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class LuGre(Sliding):
     r"""Friction of bristles (Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40, 1995).
 
     .. math:: f = \sigma_0 z + \sigma_1 \dot z + \sigma_2 v, \quad \dot z = v - \sigma_0 |v| z / g(v), \quad
               g = f_k + (f_s - f_k) e^{-(|v|/v_s)^\delta}
-
-    Attributes
-    ----------
-    kinetic, static : float
-        f_k and f_s [N], the levels of fast and of slowest sliding.
-    speed : float
-        v_s [m/s], the Stribeck speed.
-    stiffness : float
-        sigma_0 [N/m].
-    damping : float
-        sigma_1 [N s/m].
-    viscous : float
-        sigma_2 [N s/m].
-    exponent : float
-        delta; 2 where left out.
 
     Raises
     ------
@@ -44,22 +29,15 @@ class LuGre(Sliding):
     1.184339721
     """
 
-    kinetic: float
-    static: float
-    speed: float
-    stiffness: float
-    damping: float = 0.0
-    viscous: float = 0.0
-    exponent: float = 2.0
+    kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k, of fast sliding")
+    static: float = parameter("N", "static friction", positive=True, note="f_s, of slowest sliding")
+    speed: float = parameter("m/s", "Stribeck speed", positive=True, note="v_s")
+    stiffness: float = parameter("N/m", "contact stiffness", positive=True, note="sigma_0, of the bristles")
+    damping: float = parameter("N s/m", "contact damping", default=0.0, note="sigma_1, of the bristles")
+    viscous: float = parameter("N s/m", "viscous friction", default=0.0, note="sigma_2")
+    exponent: float = parameter("1", "exponent", default=2.0, positive=True, note="delta")
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N", positive=True)
-        finite("static", self.static, unit="N", positive=True)
-        finite("speed", self.speed, unit="m/s", positive=True)
-        finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        finite("damping", self.damping, unit="N s/m")
-        finite("viscous", self.viscous, unit="N s/m")
-        finite("exponent", self.exponent, unit="", positive=True)
         require_static_above(self)
 
     @property

@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
-from stickslip.laws.base import Row, finite
+from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol, tanh
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class SmoothStateVariable(Sliding):
     r"""Friction that tracks a smooth backbone: :math:`\dot\theta = -f_k\gamma(\theta - f_k\tanh\alpha v)`.
 
     Thesis, equations 4.1 and 4.2, where the backbone lacks its factor :math:`f_k`; `printed` keeps it out, which
     limits friction to 1 N. The product :math:`f_k\gamma` is the rate.
-
-    Attributes
-    ----------
-    kinetic : float
-        f_k [N].
-    rate : float
-        gamma [1/(N s)].
-    steepness : float
-        alpha [s/m].
-    printed : bool
-        Backbone of 1 N, as printed.
 
     Raises
     ------
@@ -39,15 +28,10 @@ class SmoothStateVariable(Sliding):
     121.0
     """
 
-    kinetic: float
-    rate: float
-    steepness: float
-    printed: bool = False
-
-    def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N", positive=True)
-        finite("rate", self.rate, unit="1/(N s)", positive=True)
-        finite("steepness", self.steepness, unit="s/m", positive=True)
+    kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
+    rate: float = parameter("1/(N s)", "rate", positive=True, note="gamma")
+    steepness: float = parameter("s/m", "steepness", positive=True, note="alpha")
+    printed: bool = parameter("", "backbone of 1 N, as printed", default=False)
 
     @property
     def memory(self) -> Mapping[str, Row]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Rigid, finite
+from stickslip.laws.base import Exit, Rigid
 from stickslip.laws.coulomb import held_until
 from stickslip.laws.curved import CurvedMode, Expression, exp, symbol
+from stickslip.parameters import finite, parameter, parametric
 
 if TYPE_CHECKING:
     from stickslip.laws.lugre import LuGre
@@ -43,24 +43,11 @@ def require_static_above(law: Stribeck | LuGre) -> None:
         )
 
 
-@dataclass(frozen=True)
+@parametric
 class Stribeck(Rigid):
     r"""Friction that falls with the speed: :math:`f = f_k + (f_s - f_k) e^{-(|v|/v_s)^\delta} + \sigma |v|` in slip.
 
     Stribeck's curve in the form of Bo and Pavelescu (Wear 82, 1982); in stick :math:`|f| \le f_s`, held exactly.
-
-    Attributes
-    ----------
-    kinetic : float
-        f_k [N], the level at high speed.
-    static : float
-        f_s [N], the level at rest.
-    speed : float
-        v_s [m/s], the Stribeck speed.
-    exponent : float
-        delta; 2 is Gauss's curve, 1 Tustin's.
-    viscous : float
-        sigma [N s/m].
 
     Raises
     ------
@@ -73,18 +60,15 @@ class Stribeck(Rigid):
     1.18394
     """
 
-    kinetic: float
-    static: float
-    speed: float
-    exponent: float = 2.0
-    viscous: float = 0.0
+    kinetic: float = parameter("N", "sliding friction", note="f_k, at high speed")
+    static: float = parameter("N", "static friction", note="f_s, the level at rest")
+    speed: float = parameter("m/s", "Stribeck speed", positive=True, note="v_s")
+    exponent: float = parameter(
+        "1", "exponent", default=2.0, positive=True, note="delta; 2 is Gauss's curve, 1 Tustin's"
+    )
+    viscous: float = parameter("N s/m", "viscous friction", default=0.0, note="sigma")
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N")
-        finite("static", self.static, unit="N")
-        finite("speed", self.speed, unit="m/s", positive=True)
-        finite("exponent", self.exponent, unit="", positive=True)
-        finite("viscous", self.viscous, unit="N s/m")
         require_static_above(self)
 
     def _curve(self, speed: Expression) -> Expression:
@@ -119,16 +103,9 @@ class Stribeck(Rigid):
         return slips_and_stick(self._curve, self.breakaway)
 
 
-@dataclass(frozen=True)
+@parametric
 class FrictionCurve(Rigid):
     """Any smooth curve of friction over the sliding speed, odd in the velocity, with exact sticking.
-
-    Attributes
-    ----------
-    curve : callable
-        Takes the sliding speed as an Expression and returns the friction force [N] as one.
-    static : float or None
-        Largest friction force while stuck [N]; None: the curve at speed 0.
 
     Raises
     ------
@@ -142,8 +119,12 @@ class FrictionCurve(Rigid):
     2.339669
     """
 
-    curve: Curve = field(repr=False)
-    static: float | None = None
+    curve: Curve = parameter(
+        "",
+        "friction over the speed",
+        note="from the sliding speed [m/s] to the force [N], both Expressions",
+    )
+    static: float | None = parameter("N", "static friction", default=None, note="None: the curve at speed 0")
 
     def __post_init__(self) -> None:
         if not (callable(self.curve) and isinstance(self.curve(symbol("v")), Expression)):

@@ -2,10 +2,6 @@
 import { prefixed, spelled } from "./canvas.js";
 
 const WORDS = {
-  law: { kinetic: "kinetic friction", static: "static friction", stiffness: "contact stiffness", damping: "contact damping", speed: "Stribeck speed", viscous: "viscous part", mass: "contact mass", lag: "time lag", gradient: "gradient of the load" },
-  system: { mass: "mass", stiffness: "spring", damping: "damper", damper: "damper fixed to the", acts_on: "drive acts on" },
-  drive: { contact: "the mass rubs on the", on: "moves the" },
-  contact: { preload: "normal load", stiffness: "normal stiffness", carried: "share of the belt" },
   start: { x: "displacement at the start", v: "velocity at the start" },
   run: { cycles: "cycles", duration: "time" },
 };
@@ -108,7 +104,7 @@ export class Controls {
     const knob = box.appendChild(document.createElement("div")), id = [...path, each.name].join("-");
     knob.className = "knob";
     const label = knob.appendChild(document.createElement("label"));
-    Object.assign(label, { htmlFor: id, textContent: WORDS[kind]?.[each.name] ?? each.name.replaceAll("_", " "), title: each.words });
+    Object.assign(label, { htmlFor: id, textContent: each.label ?? WORDS[kind]?.[each.name] ?? each.name.replaceAll("_", " "), title: each.words });
     this.knobs.set([...path, each.name].join("."), knob);
     return [knob, id, label.textContent];
   }
