@@ -30,10 +30,10 @@ class Oscillator:
     """
 
     mass: float = parameter("kg", "mass", positive=True, note="m")
-    stiffness: float = parameter("N/m", "spring", note="k; zero: no spring")
+    stiffness: float = parameter("N/m", "stiffness", note="k; zero: no spring")
     law: Law | CurvedLaw = parameter("", "friction law of the contact")
     drive: Drive = parameter("", "what moves", default=Release(), note="nothing (free decay) where left out")
-    damping: float = parameter("N s/m", "damper", default=0.0, signed=True, note="c; negative: self-excited")
+    damping: float = parameter("N s/m", "damping", default=0.0, signed=True, note="c; negative: self-excited")
     damper: str = parameter("", "what the damper is fixed to", default="ground", choices=("ground", "base"))
 
     def __post_init__(self) -> None:

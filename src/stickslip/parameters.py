@@ -237,8 +237,13 @@ def unit(system: Any, name: str) -> str:
     >>> unit(pushed, "law.damping"), unit(pushed, "drive.amplitude"), unit(contact, "kinetic")
     ('N s/m', 'N', 'N')
     """
+    return named(system, name).unit or "1"
+
+
+def named(system: Any, name: str) -> Parameter:
+    """What is declared of the parameter that a name means, by :func:`find`."""
     path = find(system, name)[0]
-    return declared(type(places(system)[path]), path[-1]).unit or "1"
+    return declared(type(places(system)[path]), path[-1])
 
 
 def changed(system: Part, changes: Mapping[str, Any]) -> Part:

@@ -115,6 +115,8 @@ class Release:
     inf
     """
 
+    label = "Nothing: free decay"
+
     def motion(self) -> Motion:
         """No signals."""
         return Motion()
@@ -129,6 +131,8 @@ class HarmonicBase:
     >>> HarmonicBase(0.65e-3, frequency=2.5).motion().period
     0.4
     """
+
+    label = "Base moves harmonically"
 
     amplitude: float = parameter("m", "amplitude", signed=True, note="Z")
     frequency: float = parameter("Hz", "frequency", positive=True, note="F")
@@ -154,6 +158,8 @@ class HarmonicForce:
     0.5
     """
 
+    label = "Harmonic force"
+
     amplitude: float = parameter("N", "amplitude", signed=True, note="P")
     frequency: float = parameter("Hz", "frequency", positive=True, note="F")
     phase: float = parameter("rad", "phase", default=0.0, signed=True)
@@ -176,6 +182,8 @@ class MultiTone:
     >>> len(MultiTone([(1e-3, 2.0, 0.0), (1e-5, 180.0, 0.0)]).motion().tones)
     2
     """
+
+    label = "Several tones"
 
     tones: Sequence[tuple[float, float, float]] = parameter(
         "", "tones", note="amplitude [m or N], frequency [Hz] and phase [rad] of every one"
@@ -220,6 +228,8 @@ class Belt:
     {'way': 0.01}
     """
 
+    label = "Belt at a steady speed"
+
     speed: float = parameter("m/s", "speed of the belt", signed=True, note="not zero")
 
     def __post_init__(self) -> None:
@@ -239,6 +249,8 @@ class Ramp:
     >>> Ramp(1e-4).motion().base
     {'way': 0.0001}
     """
+
+    label = "Spring pulled steadily"
 
     speed: float = parameter("m/s", "speed of the spring's end", signed=True, note="not zero")
 
@@ -261,6 +273,8 @@ class RecordedBase:
     >>> RecordedBase([0.0, 1e-3, 0.0, -1e-3], fs=10.0).motion().knots.shape
     (3, 5)
     """
+
+    label = "Recorded base motion"
 
     samples: ArrayLike = parameter(
         "m", "displacement of the spring's end", array=True, note="two values at least, four for cubic pieces"
@@ -333,6 +347,8 @@ class SpeedProfile:
     array([0.  , 0.25, 1.25, 1.5 ])
     """
 
+    label = "Profile of speeds"
+
     times: Sequence[float] = parameter("s", "instants", array=True, note="increasing from 0")
     speeds: Sequence[float] = parameter("m/s", "speeds", array=True, note="one at every instant")
     on: str = parameter(
@@ -382,6 +398,8 @@ class Dithered:
     >>> Dithered(HarmonicBase(1e-3, frequency=2.5), amplitude=1e-5, frequency=250.0).motion().period
     0.4
     """
+
+    label = "Drive with dither"
 
     drive: Drive = parameter("", "what moves the system besides")
     amplitude: float = parameter(

@@ -52,8 +52,9 @@ def _presets() -> list[dict[str, Any]]:
 
 
 def _part(make: Any) -> dict[str, Any]:
-    """A class in a line, and parameter by parameter."""
+    """A class by its label, in a line, and parameter by parameter."""
     return {
+        "label": getattr(make, "label", ""),
         "about": _plain(inspect.cleandoc(make.__doc__ or "").split("\n\n")[0]),
         "parameters": [_parameter(field) for field in dataclasses.fields(make)],
     }

@@ -31,6 +31,12 @@ class CompliantContact:
     {'x': 1.0}
     """
 
+    label = "Compliant contact"
+    formula = (
+        "f = kinetic sign(v) while sliding; f = stiffness (x - anchor) + damping v from each reversal until |f| = "
+        "static, the anchor then kinetic/stiffness behind"
+    )
+
     kinetic: float = parameter("N", "sliding friction")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True)
     damping: float = parameter("N s/m", "contact damping", default=0.0)
@@ -49,6 +55,12 @@ class CompliantContact:
 
     def __post_init__(self) -> None:
         static_level(self.static, self.kinetic)
+
+    def own_formula(self) -> str:
+        """The formula, with how the contact moves in slip by this rule."""
+        if self.rule == "literal":
+            return self.formula
+        return f"{self.formula}; while sliding the deflection (x - anchor) relaxes as stiffness and damping let it"
 
     @property
     def memory(self) -> Mapping[str, Row]:

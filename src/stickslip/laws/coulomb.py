@@ -24,18 +24,25 @@ class Coulomb(Rigid):
     ['back', 'stuck', 'forward']
     """
 
+    label = "Coulomb: rigid contact"
+    formula = "f = kinetic sign(v) while sliding, |f| <= static at rest"
+
     kinetic: float = parameter("N", "sliding friction")
     static: float | None = parameter("N", "static friction", default=None, note="None: as `kinetic`")
 
     def __post_init__(self) -> None:
         static_level(self.static, self.kinetic)
 
+    @property
+    def breakaway(self) -> float:
+        """Largest friction force while stuck [N]."""
+        return static_level(self.static, self.kinetic)
+
     def modes(self) -> tuple[Mode, ...]:
         """Slip on either side, and stick."""
-        level = static_level(self.static, self.kinetic)
         return (
             Mode("back", "slip", -1, {"1": -self.kinetic}, (Exit({"v": 1.0}, "stuck"),)),
-            Mode("stuck", "stick", 0, None, held_until(level)),
+            Mode("stuck", "stick", 0, None, held_until(self.breakaway)),
             Mode("forward", "slip", 1, {"1": self.kinetic}, (Exit({"v": -1.0}, "stuck"),)),
         )
 

@@ -27,6 +27,9 @@ class Dahl(Sliding):
     ['back', 'forward']
     """
 
+    label = "Dahl"
+    formula = "f' = stiffness v (1 - (f/kinetic) sign(v))^exponent"
+
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True, note="sigma_0, the slope at f = 0")
     exponent: float = parameter("1", "exponent", default=1.0, positive=True, note="n")

@@ -21,6 +21,9 @@ class InertialContact:
     ['stretch', 'u']
     """
 
+    label = "Contact with inertia"
+    formula = "f = stiffness (x - y) + damping (x' - y'), mass y'' = f - kinetic sign(y')"
+
     kinetic: float = parameter("N", "sliding friction", note="under the contact")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True)
     mass: float = parameter("kg", "contact mass", positive=True)

@@ -20,6 +20,9 @@ class LinearSlope(Rigid):
     {'1': 1.0, 'v': -0.2}
     """
 
+    label = "Friction linear in speed"
+    formula = "f = kinetic sign(v) + slope v while sliding, |f| <= static at rest"
+
     kinetic: float = parameter("N", "sliding friction", note="at vanishing speed")
     slope: float = parameter(
         "N s/m", "slope over the speed", signed=True, note="s; negative: friction falls with speed and feeds vibration"

@@ -29,6 +29,12 @@ class LuGre(Sliding):
     1.184339721
     """
 
+    label = "LuGre: bristles"
+    formula = (
+        "f = stiffness z + damping z' + viscous v, z' = v - stiffness |v| z / g, g = kinetic + (static - kinetic) "
+        "exp(-(|v|/speed)^exponent)"
+    )
+
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k, of fast sliding")
     static: float = parameter("N", "static friction", positive=True, note="f_s, of slowest sliding")
     speed: float = parameter("m/s", "Stribeck speed", positive=True, note="v_s")

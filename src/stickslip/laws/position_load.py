@@ -18,6 +18,9 @@ class PositionLoad(Rigid):
     {'1': 1.0, 'x': 1.5}
     """
 
+    label = "Load that varies with position"
+    formula = "f = (kinetic + gradient x) sign(v) where that load is positive, else no contact"
+
     kinetic: float = parameter("N", "sliding friction", note="at x = 0")
     gradient: float = parameter("N/m", "gradient of the load", signed=True, note="g")
 

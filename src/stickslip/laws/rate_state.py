@@ -35,6 +35,12 @@ class RateState(Sliding):
     0.588487075
     """
 
+    label = "Rate and state"
+    formula = (
+        "f = direct normal asinh(v/(2 reference) exp((friction + evolution ln(reference age/distance))/direct)), "
+        "age' = 1 - |v| age/distance (aging) or -(|v| age/distance) ln(|v| age/distance) (slip)"
+    )
+
     normal: float = parameter("N", "normal load", positive=True, note="N")
     friction: float = parameter("1", "coefficient of friction", positive=True, note="mu_0, at the reference speed")
     direct: float = parameter("1", "direct effect", positive=True, note="a")

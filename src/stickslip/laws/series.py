@@ -33,6 +33,9 @@ class InSeries:
     [('back', 'slip'), ('stuck', 'microstick'), ('forward', 'slip')]
     """
 
+    label = "Slider in series with a spring"
+    formula = "a slider without mass under the law, tied to the mass by f = stiffness (x - y) + damping (x' - y')"
+
     law: Law = parameter("", "law at the slider", note="of linear modes")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True, note="K_y")
     damping: float = parameter(

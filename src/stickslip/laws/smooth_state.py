@@ -28,6 +28,11 @@ class SmoothStateVariable(Sliding):
     121.0
     """
 
+    label = "Smooth state variable"
+    formula = (
+        "f = theta, theta' = -kinetic rate (theta - level tanh(steepness v)), level = kinetic, 1 where printed is true"
+    )
+
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
     rate: float = parameter("1/(N s)", "rate", positive=True, note="gamma")
     steepness: float = parameter("s/m", "steepness", positive=True, note="alpha")

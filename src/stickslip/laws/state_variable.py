@@ -22,6 +22,9 @@ class StateVariable(Rigid):
     ['back', 'held', 'forward']
     """
 
+    label = "State variable"
+    formula = "f = theta, theta' = -kinetic rate (theta - level sign(v)), level = kinetic, 1 where printed is true"
+
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
     rate: float = parameter("1/(N s)", "rate", positive=True, note="gamma")
     printed: bool = parameter("", "backbone of 1 N, as printed", default=False)
@@ -34,6 +37,11 @@ class StateVariable(Rigid):
         r"thesis's :math:`\tanh\alpha v`. None: it jumps. The jump makes a strongly damped rest tremble ever faster, "
         "without end; a steepness ends that",
     )
+
+    def own_formula(self) -> str:
+        """The formula, with the slope near rest where there is one."""
+        near_rest = "" if self.steepness is None else "; steepness v for sign(v) near rest"
+        return f"{self.formula}{near_rest}"
 
     @property
     def memory(self) -> Mapping[str, Row]:

@@ -10,6 +10,8 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Rigid
 from stickslip.laws.coulomb import held_until
 from stickslip.laws.curved import CurvedMode, Expression, exp, symbol
+from stickslip.laws.formula import Formula
+from stickslip.laws.written import written
 from stickslip.parameters import finite, parameter, parametric
 
 if TYPE_CHECKING:
@@ -59,6 +61,12 @@ class Stribeck(Rigid):
     >>> round(Stribeck(1.0, 1.5, speed=0.1).friction(0.1), 6)
     1.18394
     """
+
+    label = "Stribeck curve"
+    formula = (
+        "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + viscous v while sliding, |f| <= "
+        "static at rest"
+    )
 
     kinetic: float = parameter("N", "sliding friction", note="f_k, at high speed")
     static: float = parameter("N", "static friction", note="f_s, the level at rest")
@@ -119,6 +127,9 @@ class FrictionCurve(Rigid):
     2.339669
     """
 
+    label = "Any curve over speed"
+    formula = "f = F(|v|) sign(v) while sliding, |f| <= static at rest"
+
     curve: Curve = parameter(
         "",
         "friction over the speed",
@@ -158,6 +169,15 @@ class FrictionCurve(Rigid):
         if not math.isfinite(speed):
             raise ModelError(f"speed = {speed} m/s", "a speed is finite", "correct it")
         return self.curve(symbol("v")).at(v=speed)
+
+    @property
+    def text(self) -> str:
+        """The curve over v as text."""
+        return self.curve.text if isinstance(self.curve, Formula) else written(self.curve(symbol("v")))
+
+    def own_formula(self) -> str:
+        """The formula, with the curve."""
+        return f"{self.formula}, F = {self.text}"
 
     @property
     def breakaway(self) -> float:

@@ -27,6 +27,12 @@ class Tabulated(Rigid):
     (203, 0.000152)
     """
 
+    label = "Table over speed"
+    formula = (
+        "f = F(|v|) sign(v) while sliding, F a polygon through forces at speeds, level beyond the last; |f| <= "
+        "static at rest"
+    )
+
     speeds: Sequence[float] = parameter("m/s", "sliding speeds", signed=True, note="increasing, the first one 0")
     forces: Sequence[float] = parameter("N", "friction forces", note="one at each speed")
     static: float | None = parameter("N", "static friction", default=None, note="None: the force at speed 0")

@@ -61,6 +61,9 @@ class TimeDelay(Rigid):
     1.2
     """
 
+    label = "Friction with a time lag"
+    formula = "f = F(|v(t - lag)|) sign(v) while sliding, F of the law"
+
     law: SpeedCurve = parameter(
         "",
         "friction over the speed",

@@ -5,7 +5,6 @@ const WORDS = {
   start: { x: "displacement at the start", v: "velocity at the start" },
   run: { cycles: "cycles", duration: "time" },
 };
-const SHORT = { Coulomb: "Coulomb: rigid contact", CompliantContact: "Compliant contact", LinearSlope: "Friction linear in speed", Tabulated: "Table over speed", StateVariable: "State variable", InertialContact: "Contact with inertia", ElastoSlip: "Elasto-slip elements", PositionLoad: "Load that varies with position", Stribeck: "Stribeck curve", Dahl: "Dahl", LuGre: "LuGre: bristles", RateState: "Rate and state", SmoothStateVariable: "Smooth state variable", FrictionCurve: "Any curve over speed", InSeries: "Slider in series with a spring", TimeDelay: "Friction with a time lag", Release: "Nothing: free decay", HarmonicBase: "Base moves harmonically", HarmonicForce: "Harmonic force", MultiTone: "Several tones", Belt: "Belt at a steady speed", Ramp: "Spring pulled steadily", RecordedBase: "Recorded base motion", SpeedProfile: "Profile of speeds", Dithered: "Drive with dither" };
 const UNITS = { s: "s", x: "m", v: "m/s", duration: "s", cycles: "1" };
 const NOT_DRAWN = new Set(["RecordedBase"]); // needs a file: kept where a state has it
 
@@ -76,7 +75,7 @@ export class Controls {
     Object.assign(label, { htmlFor: id, className: "hidden", textContent: words });
     const choice = field.appendChild(document.createElement("select"));
     choice.id = id;
-    for (const name of Object.keys(known)) if (!NOT_DRAWN.has(name) || name === part.name) choice.add(new Option(SHORT[name] ?? name, name, false, name === part.name));
+    for (const name of Object.keys(known)) if (!NOT_DRAWN.has(name) || name === part.name) choice.add(new Option(known[name].label, name, false, name === part.name));
     const note = field.appendChild(document.createElement("p"));
     note.className = "note";
     note.textContent = known[part.name].about;
