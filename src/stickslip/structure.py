@@ -13,18 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
-from stickslip.laws.compliant import CompliantContact
-from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.curved import CurvedLaw
-from stickslip.laws.elastoslip import ElastoSlip
-from stickslip.laws.inertial import InertialContact
 from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.register import registered
 from stickslip.laws.tabulated import Tabulated
 from stickslip.parameters import changed, finite, parameter, parametric
 
 Array = NDArray[np.float64]
 ROUNDED = 1e-6  # of the largest stiffness: an asymmetry below it is no one's intention
-LOADED = (Coulomb, LinearSlope, Tabulated, CompliantContact)  # laws that may be told as a coefficient of friction
 
 
 @parametric(eq=False)
@@ -45,6 +41,7 @@ class Contact:
 
     Examples
     --------
+    >>> from stickslip.laws.coulomb import Coulomb
     >>> pad = Contact(Coulomb(0.4), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
     >>> [mode.name for mode in pad.modes()]
     ['back', 'stuck', 'forward', 'lifted', 'landing']
@@ -100,19 +97,20 @@ class Contact:
                     "give normal=, or leave out stiffness=",
                 )
             if self.preload != 1:
-                self._require("under a preload", *LOADED, ElastoSlip, InertialContact)
+                self._require("preload", "under a preload")
             return
         object.__setattr__(self, "normal", _direction("normal", self.normal))
         finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        self._require("under a load that follows the motion", *LOADED)
+        self._require("normal", "under a load that follows the motion")
 
-    def _require(self, where: str, *proportional: type) -> None:
+    def _require(self, pressed: str, where: str) -> None:
         """Refuse a law whose forces are not all proportional to the load."""
-        if not isinstance(self.law, proportional):
+        if pressed not in _loads(self.law):
+            fitting = [name for name, law in registered().items() if pressed in _loads(law)]
             raise ModelError(
                 f"{type(self.law).__name__} {where}",
                 "its forces are not proportional to the load in every mode",
-                f"use {' or '.join(law.__name__ for law in proportional)}, or leave out normal= and preload=",
+                f"use {' or '.join(fitting)}, or leave out normal= and preload=",
             )
 
     def modes(self) -> tuple[Mode, ...]:
@@ -180,6 +178,7 @@ class Structure:
     coefficient both motions couple and grow:
 
     >>> from stickslip.drives.kinds import Belt
+    >>> from stickslip.laws.coulomb import Coulomb
     >>> from stickslip.solve.simulate import simulate
     >>> pad = Contact(Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
     >>> springs = [[23.25, 3.9], [3.9, 7.75]]
@@ -265,6 +264,11 @@ class Structure:
         Structure
         """
         return changed(self, changes)
+
+
+def _loads(law: object) -> tuple[str, ...]:
+    """By which of its parameters a contact may press a law: what of them all its forces are proportional to."""
+    return getattr(law, "loads", ())
 
 
 def _of_speed(quantity: Row) -> Row:

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+
+import numpy as np
 
 from stickslip.laws.base import Exit, Mode, Row, static_level
 from stickslip.laws.coulomb import held_until
+from stickslip.laws.guessing import GRID, Array, Family, Hypothesis, Observed, share
 from stickslip.parameters import parameter, parametric
+
+STIFFEST, SOFTEST = 3000.0, 3.0  # of a guess, against the spring that its friction bends over the stroke
+LIGHT = 0.02  # damping of a guess over sqrt(stiffness * mass): a hundredth of the critical
 
 
 @parametric
@@ -31,6 +38,7 @@ class CompliantContact:
     {'x': 1.0}
     """
 
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     label = "Compliant contact"
     formula = (
         "f = kinetic sign(v) while sliding; f = stiffness (x - anchor) + damping v from each reversal until |f| = "
@@ -55,6 +63,11 @@ class CompliantContact:
 
     def __post_init__(self) -> None:
         static_level(self.static, self.kinetic)
+
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """A contact that gives way."""
+        return (Hypothesis("compliant", Family("compliant", "that of a compliant contact"), guesses),)
 
     def own_formula(self) -> str:
         """The formula, with how the contact moves in slip by this rule."""
@@ -98,3 +111,28 @@ class CompliantContact:
 
 
 _NAMES = {-1: "back", 1: "forward"}
+
+
+def guesses(seen: Observed) -> list[CompliantContact]:
+    """The spring that the friction bends where it turns, and what is left of it in phase with the speed."""
+    stiffest = 2 * seen.level * STIFFEST / float(np.ptp(np.cumsum(seen.slip)))
+    stiffness = np.geomspace(stiffest * SOFTEST / STIFFEST, stiffest, 2 * GRID)
+    tried = []
+    for k, force in zip(stiffness, _elastoplastic(seen, stiffness).T, strict=True):
+        held = np.abs(force) < seen.level * (1 - 1e-9)
+        damping = share(seen.speed[held], (seen.friction - force)[held])
+        modelled = np.where(held, force + damping * seen.speed, force)
+        # a number that is zero is not fitted: a loss that the friction does not show is begun small
+        damping = max(damping, LIGHT * math.sqrt(float(k) * seen.mass))
+        tried.append((seen.left(modelled), CompliantContact(seen.level, stiffness=float(k), damping=damping)))
+    return [min(tried, key=lambda each: each[0])[1]]
+
+
+def _elastoplastic(seen: Observed, stiffness: Array) -> Array:
+    """Force of springs that yield at the level, one column each."""
+    force = np.empty((len(seen.slip), len(stiffness)))
+    now = np.zeros(len(stiffness))
+    for row, slip in zip(force, seen.slip, strict=True):
+        row[:] = now
+        now = np.clip(now + stiffness * slip, -seen.level, seen.level)
+    return force

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from stickslip.laws.base import Exit, Mode, Rigid, static_level
+from stickslip.laws.guessing import RIGID, Hypothesis
 from stickslip.parameters import parameter, parametric
 
 
@@ -24,6 +25,7 @@ class Coulomb(Rigid):
     ['back', 'stuck', 'forward']
     """
 
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     label = "Coulomb: rigid contact"
     formula = "f = kinetic sign(v) while sliding, |f| <= static at rest"
 
@@ -32,6 +34,19 @@ class Coulomb(Rigid):
 
     def __post_init__(self) -> None:
         static_level(self.static, self.kinetic)
+
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """One level of friction; and static friction above it."""
+        return (
+            Hypothesis("Coulomb", RIGID, lambda seen: [cls(seen.level)]),
+            Hypothesis(
+                "static",
+                RIGID,
+                lambda seen: [cls(seen.level, static=seen.level * (1 + seen.excess))],
+                holds=lambda law: law.static is not None,
+            ),
+        )
 
     @property
     def breakaway(self) -> float:

@@ -23,6 +23,7 @@ class ElastoSlip:
     (21, 15.0)
     """
 
+    loads = ("preload",)  # of a contact: its levels are proportional to a steady load
     label = "Elasto-slip elements"
     formula = "f = sum of elements, each a spring of its stiffness that slips at its force"
 

@@ -21,6 +21,7 @@ class InertialContact:
     ['stretch', 'u']
     """
 
+    loads = ("preload",)  # of a contact: its levels are proportional to a steady load
     label = "Contact with inertia"
     formula = "f = stiffness (x - y) + damping (x' - y'), mass y'' = f - kinetic sign(y')"
 

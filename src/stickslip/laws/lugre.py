@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
+from stickslip.laws import compliant
 from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol
+from stickslip.laws.guessing import LEAST_EXCESS, SPEEDS, Array, Family, Hypothesis, Observed
 from stickslip.laws.stribeck import require_static_above, stribeck_curve
 from stickslip.parameters import parameter, parametric
 
@@ -46,6 +50,11 @@ class LuGre(Sliding):
     def __post_init__(self) -> None:
         require_static_above(self)
 
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """Bristles."""
+        return (Hypothesis("LuGre", Family("LuGre", "that of bristles (LuGre)"), _guesses),)
+
     @property
     def memory(self) -> Mapping[str, Row]:
         """Deflection z of the bristles [m], zero at the start."""
@@ -76,3 +85,30 @@ class LuGre(Sliding):
             force = self.stiffness * z + self.damping * rate + self.viscous * v
             modes.append(CurvedMode(name, "slip", side, force, (turn,), {"bristle": rate}))
         return tuple(modes)
+
+
+def _guesses(seen: Observed) -> list[LuGre]:
+    """The bristles whose bending under the measured sliding follows the friction best."""
+    contact = compliant.guesses(seen)[0]
+    mesh = np.meshgrid(
+        contact.stiffness * np.array([1.0, 1.5, 2.5]), seen.fastest * np.geomspace(*SPEEDS, 6),
+        np.array([LEAST_EXCESS, 0.1, 0.2, 0.35, 0.6]),
+    )  # fmt: skip
+    stiffness, speed, excess = (values.ravel() for values in mesh)
+    force = _bristles(seen, stiffness, speed, excess)
+    best = int(np.argmin(np.mean((force - seen.friction[:, None]) ** 2, axis=0)))
+    static = seen.level * (1 + float(excess[best]))
+    return [
+        LuGre(seen.level, static, speed=float(speed[best]), stiffness=float(stiffness[best]), damping=contact.damping)
+    ]
+
+
+def _bristles(seen: Observed, stiffness: Array, speed: Array, excess: Array) -> Array:
+    """Force of bristles without damping, one column each; an implicit step, since sliding bends them stiffly."""
+    force = np.empty((len(seen.slip), len(stiffness)))
+    now = np.zeros(len(stiffness))
+    levels = seen.level * (1 + excess * np.exp(-((seen.speed[:, None] / speed) ** 2)))
+    for row, slip, level in zip(force, seen.slip, levels, strict=True):
+        row[:] = now
+        now = (now + stiffness * slip) / (1 + stiffness * abs(slip) / level)
+    return force

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol, tanh
+from stickslip.laws.guessing import GRID, Family, Hypothesis, Observed, share
 from stickslip.parameters import parameter, parametric
+
+RATES = (2.0, 80.0)  # of a guess, over the oscillation's angular frequency
+STEEPEST = 60.0  # of a guess, over the largest speed
 
 
 @parametric
@@ -38,6 +44,12 @@ class SmoothStateVariable(Sliding):
     steepness: float = parameter("s/m", "steepness", positive=True, note="alpha")
     printed: bool = parameter("", "backbone of 1 N, as printed", default=False)
 
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """Friction that lags."""
+        family = Family("state variable", "that of a state variable, which lags behind the velocity")
+        return (Hypothesis("state variable", family, _guesses),)
+
     @property
     def memory(self) -> Mapping[str, Row]:
         """The friction force [N], zero at the start."""
@@ -50,3 +62,20 @@ class SmoothStateVariable(Sliding):
         pull = decay * (1.0 if self.printed else self.kinetic)
         rates = {"theta": pull * tanh(self.steepness * v) - decay * theta}
         return tuple(CurvedMode(name, "slip", side, theta, (turn,), rates) for name, side, turn in either_side())
+
+
+def _guesses(seen: Observed) -> list[SmoothStateVariable]:
+    """The rate and steepness whose lagging backbone follows the friction best."""
+    from scipy.signal import lfilter
+
+    step, tried = float(seen.step[0]), []
+    for steepness in np.geomspace(3.0, STEEPEST, GRID) / seen.fastest:
+        backbone = np.tanh(steepness * seen.speed)
+        for rate in seen.frequency * np.geomspace(*RATES, GRID):
+            kept = np.exp(-rate * step)
+            lagging = lfilter([1 - kept], [1, -kept], backbone)
+            level = share(lagging, seen.friction)
+            tried.append((seen.left(level * lagging), level, rate, steepness))
+    _, level, rate, steepness = min(tried)
+    level = max(level, 0.1 * seen.level)
+    return [SmoothStateVariable(level, rate=float(rate) / level, steepness=float(steepness))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from stickslip.laws.base import Exit, Mode, Rigid, Row
+from stickslip.laws.smooth_state import SmoothStateVariable
 from stickslip.parameters import parameter, parametric
 
 
@@ -37,6 +38,8 @@ class StateVariable(Rigid):
         r"thesis's :math:`\tanh\alpha v`. None: it jumps. The jump makes a strongly damped rest tremble ever faster, "
         "without end; a steepness ends that",
     )
+
+    hypotheses = SmoothStateVariable.hypotheses  # records are asked for its smooth form
 
     def own_formula(self) -> str:
         """The formula, with the slope near rest where there is one."""

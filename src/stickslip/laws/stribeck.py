@@ -6,11 +6,14 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Rigid
 from stickslip.laws.coulomb import held_until
 from stickslip.laws.curved import CurvedMode, Expression, exp, symbol
 from stickslip.laws.formula import Formula
+from stickslip.laws.guessing import GRID, LEAST_EXCESS, RIGID, SPEEDS, Hypothesis, Observed
 from stickslip.laws.written import written
 from stickslip.parameters import finite, parameter, parametric
 
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from stickslip.laws.lugre import LuGre
 
 Curve = Callable[[Expression], Expression]
+SLIDING = 0.01  # of the largest speed, above which friction tells the curve
 
 
 def slips_and_stick(curve: Curve, level: float) -> tuple[CurvedMode, ...]:
@@ -79,6 +83,11 @@ class Stribeck(Rigid):
     def __post_init__(self) -> None:
         require_static_above(self)
 
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """Friction that falls with the speed."""
+        return (Hypothesis("Stribeck", RIGID, _guesses),)
+
     def _curve(self, speed: Expression) -> Expression:
         return stribeck_curve(self, speed) + self.viscous * speed
 
@@ -109,6 +118,21 @@ class Stribeck(Rigid):
     def rates(self) -> tuple[CurvedMode, ...]:
         """Slip on either side, and stick."""
         return slips_and_stick(self._curve, self.breakaway)
+
+
+def _guesses(seen: Observed) -> list[Stribeck]:
+    """The curves that the sliding friction fits best, of three falls that differ: its likelihood has several tops."""
+    sliding = np.abs(seen.speed) > SLIDING * seen.fastest
+    speed, friction = np.abs(seen.speed[sliding]), (seen.friction * np.sign(seen.speed))[sliding]
+    tried = []
+    for fall in seen.fastest * np.geomspace(*SPEEDS, GRID):
+        columns = np.column_stack([np.ones(len(speed)), np.exp(-((speed / fall) ** 2))])
+        (level, excess), left, *_ = np.linalg.lstsq(columns, friction, rcond=None)
+        static = float(level + max(LEAST_EXCESS * level, excess))
+        tried.append((float(left[0]) if len(left) else np.inf, Stribeck(float(level), static, speed=float(fall))))
+    best = min(range(GRID), key=lambda i: tried[i][0])
+    apart = dict.fromkeys((best, max(0, best - GRID // 3), min(GRID - 1, best + GRID // 3)))
+    return [tried[i][1] for i in apart]
 
 
 @parametric

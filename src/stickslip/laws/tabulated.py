@@ -27,6 +27,7 @@ class Tabulated(Rigid):
     (203, 0.000152)
     """
 
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     label = "Table over speed"
     formula = (
         "f = F(|v|) sign(v) while sliding, F a polygon through forces at speeds, level beyond the last; |f| <= "
