@@ -25,7 +25,6 @@ from stickslip.law.trials import (
     PASSES,
     Trial,
     evidence_of,
-    from_simpler,
     predicted,
     resumed,
     searched,
@@ -246,7 +245,7 @@ def compare_laws(
             least = min((each.point.chi2 for each in {**before, **found}.values()), default=math.inf)
             trial = resumed(before[name], stretches, least, passes, tell) if name in before else None
             if trial is None:
-                begun = [*(given or hypotheses()[name].guesses(seen)), *from_simpler(name, found)]
+                begun = _begun(name, given, seen, found)
                 trial = searched(name, begun, oscillator, stretches, known, least, passes, tell)
             if trial is not None:
                 found[name] = trial
@@ -392,6 +391,14 @@ def _nuisance(shown: Sequence[Shown]) -> tuple[str, ...]:
     """The gains of all channels, and the delay of the displacement against the others."""
     channels = dict.fromkeys(name for each in shown for name in each.channels)
     return (*(f"{name}.gain" for name in channels), *(["x.delay"] if "x" in channels and len(channels) > 1 else []))
+
+
+def _begun(name: str, given: Sequence[Any], seen: Seen, before: Mapping[str, Trial]) -> list[Any]:
+    """Where the search for a law begins: at the laws given, or its own guesses; and where simpler ones have ended."""
+    known = hypotheses().get(name)
+    if known is None:
+        return [*given]
+    return [*(given or known.guesses(seen)), *known.continued(before)]
 
 
 def _teller(progress: Callable[[float], object] | None, laws: int) -> Callable[[], None]:

@@ -9,10 +9,10 @@ import numpy as np
 
 from stickslip.laws.base import Exit, Mode, Row, static_level
 from stickslip.laws.coulomb import held_until
-from stickslip.laws.guessing import GRID, Array, Family, Hypothesis, Observed, share
+from stickslip.laws.guessing import GRID, STIFFEST, Array, Family, Hypothesis, Observed, Searched, share
 from stickslip.parameters import parameter, parametric
 
-STIFFEST, SOFTEST = 3000.0, 3.0  # of a guess, against the spring that its friction bends over the stroke
+HARDEST, SOFTEST = 3000.0, 3.0  # of a guess, against the spring that its friction bends over the stroke
 LIGHT = 0.02  # damping of a guess over sqrt(stiffness * mass): a hundredth of the critical
 
 
@@ -67,7 +67,7 @@ class CompliantContact:
     @classmethod
     def hypotheses(cls) -> tuple[Hypothesis, ...]:
         """A contact that gives way."""
-        return (Hypothesis("compliant", Family("compliant", "that of a compliant contact"), guesses),)
+        return (Hypothesis("compliant", Family("compliant", "that of a compliant contact"), guesses, _from_coulomb),)
 
     def own_formula(self) -> str:
         """The formula, with how the contact moves in slip by this rule."""
@@ -115,8 +115,8 @@ _NAMES = {-1: "back", 1: "forward"}
 
 def guesses(seen: Observed) -> list[CompliantContact]:
     """The spring that the friction bends where it turns, and what is left of it in phase with the speed."""
-    stiffest = 2 * seen.level * STIFFEST / float(np.ptp(np.cumsum(seen.slip)))
-    stiffness = np.geomspace(stiffest * SOFTEST / STIFFEST, stiffest, 2 * GRID)
+    stiffest = 2 * seen.level * HARDEST / float(np.ptp(np.cumsum(seen.slip)))
+    stiffness = np.geomspace(stiffest * SOFTEST / HARDEST, stiffest, 2 * GRID)
     tried = []
     for k, force in zip(stiffness, _elastoplastic(seen, stiffness).T, strict=True):
         held = np.abs(force) < seen.level * (1 - 1e-9)
@@ -126,6 +126,15 @@ def guesses(seen: Observed) -> list[CompliantContact]:
         damping = max(damping, LIGHT * math.sqrt(float(k) * seen.mass))
         tried.append((seen.left(modelled), CompliantContact(seen.level, stiffness=float(k), damping=damping)))
     return [min(tried, key=lambda each: each[0])[1]]
+
+
+def _from_coulomb(simpler: Mapping[str, Searched]) -> list[CompliantContact]:
+    """A contact next to rigid."""
+    if "Coulomb" not in simpler:
+        return []
+    rigid = simpler["Coulomb"]
+    stiffness = rigid.law.kinetic / (STIFFEST * float(rigid.scales[:, 0].max()))
+    return [CompliantContact(rigid.law.kinetic, stiffness=stiffness, damping=0.2 * math.sqrt(stiffness * rigid.mass))]
 
 
 def _elastoplastic(seen: Observed, stiffness: Array) -> Array:

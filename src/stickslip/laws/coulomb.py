@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stickslip.laws.base import Exit, Mode, Rigid, static_level
-from stickslip.laws.guessing import RIGID, Hypothesis
+from stickslip.laws.guessing import LITTLE, RIGID, Hypothesis
 from stickslip.parameters import parameter, parametric
 
 
@@ -43,7 +43,8 @@ class Coulomb(Rigid):
             Hypothesis(
                 "static",
                 RIGID,
-                lambda seen: [cls(seen.level, static=seen.level * (1 + seen.excess))],
+                lambda seen: [_exceeding(seen.level, seen.excess)],
+                lambda simpler: [_exceeding(simpler["Coulomb"].law.kinetic, LITTLE)] if "Coulomb" in simpler else [],
                 holds=lambda law: law.static is not None,
             ),
         )
@@ -60,6 +61,10 @@ class Coulomb(Rigid):
             Mode("stuck", "stick", 0, None, held_until(self.breakaway)),
             Mode("forward", "slip", 1, {"1": self.kinetic}, (Exit({"v": -1.0}, "stuck"),)),
         )
+
+
+def _exceeding(level: float, excess: float) -> Coulomb:
+    return Coulomb(level, static=(1 + excess) * level)
 
 
 def held_until(level: float, *, back: str = "back", forward: str = "forward") -> tuple[Exit, Exit]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,7 +10,18 @@ import numpy as np
 from stickslip.laws import compliant
 from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol
-from stickslip.laws.guessing import LEAST_EXCESS, SPEEDS, Array, Family, Hypothesis, Observed
+from stickslip.laws.guessing import (
+    FALLS,
+    LEAST_EXCESS,
+    LITTLE,
+    SPEEDS,
+    STIFF,
+    Array,
+    Family,
+    Hypothesis,
+    Observed,
+    Searched,
+)
 from stickslip.laws.stribeck import require_static_above, stribeck_curve
 from stickslip.parameters import parameter, parametric
 
@@ -53,7 +65,7 @@ class LuGre(Sliding):
     @classmethod
     def hypotheses(cls) -> tuple[Hypothesis, ...]:
         """Bristles."""
-        return (Hypothesis("LuGre", Family("LuGre", "that of bristles (LuGre)"), _guesses),)
+        return (Hypothesis("LuGre", Family("LuGre", "that of bristles (LuGre)"), _guesses, _from_simpler),)
 
     @property
     def memory(self) -> Mapping[str, Row]:
@@ -101,6 +113,21 @@ def _guesses(seen: Observed) -> list[LuGre]:
     return [
         LuGre(seen.level, static, speed=float(speed[best]), stiffness=float(stiffness[best]), damping=contact.damping)
     ]
+
+
+def _from_simpler(simpler: Mapping[str, Searched]) -> list[LuGre]:
+    """The Stribeck curve with bristles next to rigid, where the contact is; else the contact with a steep curve."""
+    contact, curve = simpler.get("compliant"), simpler.get("Stribeck")
+    if contact is not None and not contact.stiff:
+        held, speed = contact.law, FALLS[-1] * float(contact.scales[:, 1].max())
+        static = (1 + LITTLE) * held.kinetic
+        return [LuGre(held.kinetic, static, speed=speed, stiffness=held.stiffness, damping=held.damping)]
+    if contact is None or curve is None:
+        return []
+    law = curve.law
+    stiffness = 2 * law.kinetic / (STIFF * float(curve.scales[:, 0].min()))
+    damping = 0.2 * math.sqrt(stiffness * curve.mass)
+    return [LuGre(law.kinetic, law.static, speed=law.speed, stiffness=stiffness, damping=damping)]
 
 
 def _bristles(seen: Observed, stiffness: Array, speed: Array, excess: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +13,7 @@ from stickslip.laws.base import Exit, Rigid
 from stickslip.laws.coulomb import held_until
 from stickslip.laws.curved import CurvedMode, Expression, exp, symbol
 from stickslip.laws.formula import Formula
-from stickslip.laws.guessing import GRID, LEAST_EXCESS, RIGID, SPEEDS, Hypothesis, Observed
+from stickslip.laws.guessing import FALLS, GRID, LEAST_EXCESS, RIGID, SPEEDS, Hypothesis, Observed, Searched
 from stickslip.laws.written import written
 from stickslip.parameters import finite, parameter, parametric
 
@@ -86,7 +86,7 @@ class Stribeck(Rigid):
     @classmethod
     def hypotheses(cls) -> tuple[Hypothesis, ...]:
         """Friction that falls with the speed."""
-        return (Hypothesis("Stribeck", RIGID, _guesses),)
+        return (Hypothesis("Stribeck", RIGID, _guesses, _from_static),)
 
     def _curve(self, speed: Expression) -> Expression:
         return stribeck_curve(self, speed) + self.viscous * speed
@@ -133,6 +133,15 @@ def _guesses(seen: Observed) -> list[Stribeck]:
     best = min(range(GRID), key=lambda i: tried[i][0])
     apart = dict.fromkeys((best, max(0, best - GRID // 3), min(GRID - 1, best + GRID // 3)))
     return [tried[i][1] for i in apart]
+
+
+def _from_static(simpler: Mapping[str, Searched]) -> list[Stribeck]:
+    """A fall that is steep."""
+    if "static" not in simpler:
+        return []
+    law, fastest = simpler["static"].law, float(simpler["static"].scales[:, 1].max())
+    static = max(law.static, 1.02 * law.kinetic)
+    return [Stribeck(law.kinetic, static, speed=share * fastest) for share in FALLS]
 
 
 @parametric
