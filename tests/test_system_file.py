@@ -320,3 +320,20 @@ def test_any_values_give_a_system_or_one_sentence(
     path.write_text(text, encoding="utf-8", errors="replace")
     refused = one_sentence(lambda: read_system(path))
     assert refused is None or refused.startswith("any.toml")
+
+
+@pytest.mark.parametrize(
+    ("law", "start", "value"),
+    [
+        ("name = 'LuGre', kinetic = 1, static = 1.5, speed = 1e-3, stiffness = 1e5", "bristle = '2 um'", 2e-6),
+        ("name = 'Dahl', kinetic = 1, stiffness = 1e5", "force_state = '300 mN'", 0.3),
+        (
+            "name = 'InSeries', stiffness = 1e5, law = {name = 'StateVariable', kinetic = 1, rate = 100}",
+            "theta = '0.2 N'",
+            0.2,
+        ),
+    ],
+)
+def test_what_a_law_remembers_is_given_in_its_unit(tmp_path: Path, law: str, start: str, value: float) -> None:
+    text = f"system = {{mass = 1, stiffness = 4}}\nlaw = {{{law}}}\nstart = {{{start}}}\nrun = {{duration = 1}}\n"
+    assert read_system(written(tmp_path, text)).start == {start.split()[0]: value}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol
@@ -29,6 +30,7 @@ class Dahl(Sliding):
 
     label = "Dahl"
     formula = "f' = stiffness v (1 - (f/kinetic) sign(v))^exponent"
+    memory_units: ClassVar[Mapping[str, str]] = {"force_state": "N"}
 
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True, note="sigma_0, the slope at f = 0")

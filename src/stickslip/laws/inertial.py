@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from stickslip.laws.base import Exit, Mode, Row, static_level
 from stickslip.parameters import parameter, parametric
@@ -24,6 +25,7 @@ class InertialContact:
     loads = ("preload",)  # of a contact: its levels are proportional to a steady load
     label = "Contact with inertia"
     formula = "f = stiffness (x - y) + damping (x' - y'), mass y'' = f - kinetic sign(y')"
+    memory_units: ClassVar[Mapping[str, str]] = {"stretch": "m", "u": "m/s"}
 
     kinetic: float = parameter("N", "sliding friction", note="under the contact")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True)

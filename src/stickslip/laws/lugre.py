@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -50,6 +51,7 @@ class LuGre(Sliding):
         "f = stiffness z + damping z' + viscous v, z' = v - stiffness |v| z / g, g = kinetic + (static - kinetic) "
         "exp(-(|v|/speed)^exponent)"
     )
+    memory_units: ClassVar[Mapping[str, str]] = {"bristle": "m"}
 
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k, of fast sliding")
     static: float = parameter("N", "static friction", positive=True, note="f_s, of slowest sliding")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import ClassVar
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Row
@@ -40,6 +41,7 @@ class RateState(Sliding):
         "f = direct normal asinh(v/(2 reference) exp((friction + evolution ln(reference age/distance))/direct)), "
         "age' = 1 - |v| age/distance (aging) or -(|v| age/distance) ln(|v| age/distance) (slip)"
     )
+    memory_units: ClassVar[Mapping[str, str]] = {"age": "s"}
 
     normal: float = parameter("N", "normal load", positive=True, note="N")
     friction: float = parameter("1", "coefficient of friction", positive=True, note="mu_0, at the reference speed")

@@ -66,6 +66,11 @@ class InSeries:
         return {self.slider: {"x": 1.0}, **self.law.memory}
 
     @property
+    def memory_units(self) -> Mapping[str, str]:
+        """Of the law's own memory."""
+        return getattr(self.law, "memory_units", {})
+
+    @property
     def places(self) -> tuple[str, ...]:
         """The slider's, and the law's own."""
         return (self.slider, *self.law.places)

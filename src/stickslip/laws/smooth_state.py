@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -38,6 +39,7 @@ class SmoothStateVariable(Sliding):
     formula = (
         "f = theta, theta' = -kinetic rate (theta - level tanh(steepness v)), level = kinetic, 1 where printed is true"
     )
+    memory_units: ClassVar[Mapping[str, str]] = {"theta": "N"}
 
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
     rate: float = parameter("1/(N s)", "rate", positive=True, note="gamma")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from stickslip.laws.base import Exit, Mode, Rigid, Row
 from stickslip.laws.smooth_state import SmoothStateVariable
@@ -25,6 +26,7 @@ class StateVariable(Rigid):
 
     label = "State variable"
     formula = "f = theta, theta' = -kinetic rate (theta - level sign(v)), level = kinetic, 1 where printed is true"
+    memory_units: ClassVar[Mapping[str, str]] = {"theta": "N"}
 
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
     rate: float = parameter("1/(N s)", "rate", positive=True, note="gamma")

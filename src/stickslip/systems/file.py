@@ -31,8 +31,6 @@ from stickslip.solve.joint import numbered
 from stickslip.solve.tables import System
 from stickslip.structure import Contact, Structure
 
-# The unit of what a law may remember.
-STATE_UNITS = {"x": "m", "v": "m/s", "stretch": "m", "u": "m/s", "theta": "N"}
 CYCLES = 20.0  # of a run where nothing is said
 MOST_CYCLES = 1e9  # more would not end, nor be counted
 
@@ -469,7 +467,7 @@ def _start_of(system: System) -> type[BaseModel]:
     laws = [contact.law for contact in system.contacts] if isinstance(system, Structure) else [system.law]
     for number, law in enumerate(laws, start=1):
         for name in law.memory:
-            unit = "m" if name in law.places else STATE_UNITS.get(name, "1")
+            unit = "m" if name in law.places else getattr(law, "memory_units", {}).get(name, "1")
             names[f"{name}{number}" if len(laws) > 1 else name] = unit
     known: dict[str, Any] = {name: (Annotated[float, quantity(unit)] | None, None) for name, unit in names.items()}
     known["mode"] = (str | None if isinstance(system, Structure) else Literal[_modes(system)] | None, None)
