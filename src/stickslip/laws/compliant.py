@@ -38,12 +38,12 @@ class CompliantContact:
     {'x': 1.0}
     """
 
-    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     label = "Compliant contact"
     formula = (
         "f = kinetic sign(v) while sliding; f = stiffness (x - anchor) + damping v from each reversal until |f| = "
         "static, the anchor then kinetic/stiffness behind"
     )
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
 
     kinetic: float = parameter("N", "sliding friction")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True)

@@ -25,9 +25,9 @@ class Coulomb(Rigid):
     ['back', 'stuck', 'forward']
     """
 
-    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     label = "Coulomb: rigid contact"
     formula = "f = kinetic sign(v) while sliding, |f| <= static at rest"
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
 
     kinetic: float = parameter("N", "sliding friction")
     static: float | None = parameter("N", "static friction", default=None, note="None: as `kinetic`")

@@ -31,6 +31,7 @@ class Dahl(Sliding):
     label = "Dahl"
     formula = "f' = stiffness v (1 - (f/kinetic) sign(v))^exponent"
     memory_units: ClassVar[Mapping[str, str]] = {"force_state": "N"}
+    chosen = ("exponent",)  # not fitted where nothing else is said
 
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True, note="sigma_0, the slope at f = 0")

@@ -23,9 +23,9 @@ class ElastoSlip:
     (21, 15.0)
     """
 
-    loads = ("preload",)  # of a contact: its levels are proportional to a steady load
     label = "Elasto-slip elements"
     formula = "f = sum of elements, each a spring of its stiffness that slips at its force"
+    loads = ("preload",)  # of a contact: its levels are proportional to a steady load
 
     stiffnesses: Sequence[float] = parameter("N/m", "stiffnesses", positive=True, note="the spring of every element")
     forces: Sequence[float] = parameter("N", "yield forces", positive=True, note="one of every element")

@@ -22,10 +22,10 @@ class InertialContact:
     ['stretch', 'u']
     """
 
-    loads = ("preload",)  # of a contact: its levels are proportional to a steady load
     label = "Contact with inertia"
     formula = "f = stiffness (x - y) + damping (x' - y'), mass y'' = f - kinetic sign(y')"
     memory_units: ClassVar[Mapping[str, str]] = {"stretch": "m", "u": "m/s"}
+    loads = ("preload",)  # of a contact: its levels are proportional to a steady load
 
     kinetic: float = parameter("N", "sliding friction", note="under the contact")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True)

@@ -20,9 +20,9 @@ class LinearSlope(Rigid):
     {'1': 1.0, 'v': -0.2}
     """
 
-    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     label = "Friction linear in speed"
     formula = "f = kinetic sign(v) + slope v while sliding, |f| <= static at rest"
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
 
     kinetic: float = parameter("N", "sliding friction", note="at vanishing speed")
     slope: float = parameter(

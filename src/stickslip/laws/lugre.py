@@ -52,6 +52,7 @@ class LuGre(Sliding):
         "exp(-(|v|/speed)^exponent)"
     )
     memory_units: ClassVar[Mapping[str, str]] = {"bristle": "m"}
+    chosen = ("exponent",)  # not fitted where nothing else is said
 
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k, of fast sliding")
     static: float = parameter("N", "static friction", positive=True, note="f_s, of slowest sliding")

@@ -47,6 +47,8 @@ class RoughSurface:
     (66, True)
     """
 
+    chosen = ("seed",)  # not fitted
+
     contact: Coulomb | CompliantContact = parameter("", "contact on the even surface")
     share: float = parameter(
         "1", "unevenness", note="standard deviation of r along the surface: 0.03 is 3 % of the friction"

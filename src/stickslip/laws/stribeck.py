@@ -71,6 +71,7 @@ class Stribeck(Rigid):
         "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + viscous v while sliding, |f| <= "
         "static at rest"
     )
+    chosen = ("exponent",)  # not fitted where nothing else is said
 
     kinetic: float = parameter("N", "sliding friction", note="f_k, at high speed")
     static: float = parameter("N", "static friction", note="f_s, the level at rest")

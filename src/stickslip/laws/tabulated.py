@@ -27,12 +27,13 @@ class Tabulated(Rigid):
     (203, 0.000152)
     """
 
-    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     label = "Table over speed"
     formula = (
         "f = F(|v|) sign(v) while sliding, F a polygon through forces at speeds, level beyond the last; |f| <= "
         "static at rest"
     )
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
+    chosen = ("error",)  # not fitted where nothing else is said
 
     speeds: Sequence[float] = parameter("m/s", "sliding speeds", signed=True, note="increasing, the first one 0")
     forces: Sequence[float] = parameter("N", "friction forces", note="one at each speed")
