@@ -71,8 +71,8 @@ class Law(Protocol):
     """What the solver asks of a friction law.
 
     What others ask, its class says where it has an answer: `label` and `formula` (how it is called and written),
-    `hypotheses` (how records are asked for it), `loads` (by which parameters of a Contact it may be pressed: what all its
-    forces are proportional to), `chosen` (numbers that are not fitted), `memory_units`.
+    `hypotheses` (how records are asked for it), `loads` (by which parameters of a Contact it may be pressed: all its
+    forces are proportional to them), `chosen` (numbers that are not fitted), `memory_units`.
     """
 
     @property
