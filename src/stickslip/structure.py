@@ -189,10 +189,7 @@ class Structure:
     """
 
     mass: ArrayLike = parameter(
-        "kg",
-        "mass matrix",
-        array=True,
-        note="M (n, n), positive definite; a number for one degree of freedom",
+        "kg", "mass matrix", array=True, note="M (n, n), positive definite; a number for one degree of freedom"
     )
     damping: ArrayLike = parameter("N s/m", "damping matrix", array=True, note="C (n, n)")
     stiffness: ArrayLike = parameter(

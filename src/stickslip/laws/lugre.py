@@ -107,7 +107,7 @@ def _guesses(seen: Observed) -> list[LuGre]:
     contact = compliant.guesses(seen)[0]
     mesh = np.meshgrid(
         contact.stiffness * np.array([1.0, 1.5, 2.5]), seen.fastest * np.geomspace(*SPEEDS, 6),
-        np.array([LEAST_EXCESS, 0.1, 0.2, 0.35, 0.6]),
+        np.array([LEAST_EXCESS, 0.1, 0.2, 0.35, 0.6])
     )  # fmt: skip
     stiffness, speed, excess = (values.ravel() for values in mesh)
     force = _bristles(seen, stiffness, speed, excess)

@@ -165,9 +165,7 @@ class FrictionCurve(Rigid):
     formula = "f = F(|v|) sign(v) while sliding, |f| <= static at rest"
 
     curve: Curve = parameter(
-        "",
-        "friction over the speed",
-        note="from the sliding speed [m/s] to the force [N], both Expressions",
+        "", "friction over the speed", note="from the sliding speed [m/s] to the force [N], both Expressions"
     )
     static: float | None = parameter("N", "static friction", default=None, note="None: the curve at speed 0")
 
