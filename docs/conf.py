@@ -1,11 +1,12 @@
 """Sphinx settings: strict (``make docs`` turns warnings into errors) and offline (``offline.py``)."""
 
+import importlib
 import sys
 from pathlib import Path
 
 from stickslip import __version__
 
-sys.path.insert(0, str(Path(__file__).parent))  # offline.py, gallery.py
+sys.path.insert(0, str(Path(__file__).parent))  # offline.py, gallery.py, law_table.py
 
 project = "stickslip"
 author = "The stickslip developers"
@@ -16,7 +17,8 @@ extensions = [
     "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_parser", "sphinx_gallery.gen_gallery", "offline",
 ]  # fmt: skip
 exclude_patterns = ["_build", "_templates", "examples"]
-myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "substitution"]
+myst_substitutions = {"law_table": importlib.import_module("law_table").table()}
 myst_heading_anchors = 3
 autosummary_generate = True
 autodoc_typehints = "none"

@@ -19,7 +19,7 @@ from stickslip import scenarios
 from stickslip.errors import ModelError
 from stickslip.laws.c_code import at, modes_of
 from stickslip.laws.curved import exp
-from stickslip.laws.export import FORMATS, FORMULAS, formula_of
+from stickslip.laws.export import FORMATS, formula_of
 from stickslip.laws.formula import Formula
 
 LAWS = {
@@ -50,7 +50,7 @@ CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 def test_every_law_is_here() -> None:
     assert set(scenarios.LAWS) <= {type(law).__name__ for law in LAWS.values()}
-    assert set(scenarios.LAWS) == set(FORMULAS)
+    assert all(law.label and law.formula for law in scenarios.LAWS.values())
 
 
 ALL = {

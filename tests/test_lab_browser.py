@@ -25,7 +25,7 @@ from labs import Lab, running_lab
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PICTURES = Path(__file__).parent / "pictures"
 PATIENCE = 600_000.0  # ms: that an analysis on a busy machine ends, not how soon
-KINETIC = 'input[type=range][aria-label="kinetic friction, slider"]'
+KINETIC = 'input[type=range][aria-label="sliding friction, slider"]'
 SHOWN = """(rows) => JSON.stringify(rows) === JSON.stringify(
   [...document.querySelectorAll("#rows tr")].map((row) => [...row.cells].map((cell) => cell.textContent)))"""
 STATE = {

@@ -15,7 +15,8 @@ from click.testing import CliRunner
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.law.choice import CERTAIN, Evidence, Misfit, standings
-from stickslip.law.guess import GUESSES, Seen
+from stickslip.law.guess import Seen
+from stickslip.law.hypotheses import hypotheses
 from stickslip.law.search import Knob, Problem
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
@@ -50,7 +51,7 @@ def slider() -> ss.Oscillator:
 @pytest.mark.parametrize("name", TRUE)
 def test_a_search_begins_near_the_truth(name: str) -> None:
     """The level within 15 %, stiffnesses and rates within a factor of three."""
-    starts = GUESSES[name](Seen.of([record(name)], slider()))
+    starts = hypotheses()[name].guesses(Seen.of([record(name)], slider()))
     for key, value in vars(TRUE[name]).items():
         if isinstance(value, float) and key in ("kinetic", "stiffness", "rate") and value:
             ratios = [getattr(start, key) / value for start in starts]

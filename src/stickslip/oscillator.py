@@ -3,34 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import Any
 
 from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.errors import ModelError
-from stickslip.laws.base import Law, finite
+from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
-from stickslip.parameters import changed
+from stickslip.parameters import changed, parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class Oscillator:
     r"""One mass: :math:`m\ddot x + c\,(\dot x - \dot d) + k\,(x - z) + f = P(t)`, z the spring's end, d the damper's.
-
-    Attributes
-    ----------
-    mass : float
-        m [kg].
-    stiffness : float
-        k [N/m]; zero: no spring.
-    law : Law or CurvedLaw
-        Friction law of the contact.
-    drive : Drive
-        What moves; nothing (free decay) where left out.
-    damping : float
-        c [N s/m]; negative: a self-excited oscillator.
-    damper : {"ground", "base"}
-        What the damper's other end is fixed to.
 
     Raises
     ------
@@ -45,24 +29,17 @@ class Oscillator:
     (4.917, Coulomb(kinetic=1.28, static=None))
     """
 
-    mass: float
-    stiffness: float
-    law: Law | CurvedLaw
-    drive: Drive = field(default_factory=Release)
-    damping: float = 0.0
-    damper: str = "ground"
+    mass: float = parameter("kg", "mass", positive=True, note="m")
+    stiffness: float = parameter("N/m", "stiffness", note="k; zero: no spring")
+    law: Law | CurvedLaw = parameter("", "friction law of the contact")
+    drive: Drive = parameter("", "what moves", default=Release(), note="nothing (free decay) where left out")
+    damping: float = parameter("N s/m", "damping", default=0.0, signed=True, note="c; negative: self-excited")
+    damper: str = parameter("", "what the damper is fixed to", default="ground", choices=("ground", "base"))
 
     def __post_init__(self) -> None:
-        finite("mass", self.mass, unit="kg", positive=True)
-        finite("stiffness", self.stiffness, unit="N/m")
-        finite("damping", self.damping, unit="N s/m", signed=True)
         if isinstance(self.law, type) or not (hasattr(self.law, "modes") or hasattr(self.law, "rates")):
             raise ModelError(f"law = {self.law!r}", "a mass rubs under a friction law", "give one, as law=Coulomb(1.1)")
         require_drive(self.drive)
-        if self.damper not in ("ground", "base"):
-            raise ModelError(
-                f"damper = '{self.damper}'", "the damper is fixed to the 'ground' or the 'base'", "choose one"
-            )
 
     @property
     def frequency(self) -> float:

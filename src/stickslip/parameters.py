@@ -1,24 +1,185 @@
-"""The parameters of a system by name: "kinetic" wherever it stands, "law.stiffness" in one place."""
+"""A parameter is declared once, as a field of its class: unit, name, bounds; and is found by name in a system.
+
+``kinetic: float = parameter("N", "sliding friction")`` is all that is said of it: what is refused, the
+docstring, the keys of a system's file, the forms of the lab and the names of what was fitted are read from there.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass, replace
-from typing import Any, TypeVar
+import inspect
+import math
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
+from typing import Any, TypeVar, dataclass_transform, overload
 
 from stickslip.errors import ModelError
 from stickslip.settings import nearest
 
 Path = tuple[str, ...]
 Part = TypeVar("Part")
-UNITS = {
-    "kinetic": "N", "static": "N", "forces": "N", "error": "N", "mass": "kg", "stiffness": "N/m", "stiffnesses": "N/m",
-    "damping": "N s/m", "slope": "N s/m", "gradient": "N/m", "rate": "1/(N s)", "steepness": "s/m", "speeds": "m/s",
-    "speed": "m/s", "amplitude": "m", "frequency": "Hz", "phase": "rad", "fs": "Hz", "samples": "m",
-    "HarmonicForce.amplitude": "N", "viscous": "N s/m", "normal": "N", "distance": "m", "reference": "m/s",
-    "preload": "N", "times": "s", "lag": "s",
-}  # fmt: skip
 PARTS = ("law", "drive", "contacts")  # what holds parameters of its own
+SECTION = re.compile(r"^\S.*\n-{3,}$", re.MULTILINE)  # the heading of a numpydoc section
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What is declared of a field: how :func:`parameter` was called."""
+
+    unit: str = ""
+    name: str = ""
+    note: str = ""
+    positive: bool = False
+    signed: bool = False
+    choices: tuple[str, ...] = ()
+    array: bool = False
+
+    @property
+    def described(self) -> str:
+        """The sentence of the docstring: "Sliding friction [N]; the level at high speed."."""
+        unit = f" [{self.unit}]" if self.unit not in ("", "1") else ""
+        note = f"; {self.note}" if self.note else ""
+        return f"{self.name[:1].upper()}{self.name[1:]}{unit}{note}."
+
+    def check(self, name: str, value: Any) -> None:
+        """Refuse a value that the parameter can not have; the numbers of an array are its class's to check."""
+        if self.choices and value not in self.choices:
+            raise ModelError(
+                f"{name} = {value!r}", f"{self.name}: {' or '.join(map(repr, self.choices))}", f"choose one as {name}="
+            )
+        if self.unit and not self.array:
+            for number in value if isinstance(value, Iterable) and not isinstance(value, str) else [value]:
+                finite(name, number, unit=self.unit, positive=self.positive, signed=self.signed)
+
+
+def parameter(
+    unit: str,
+    name: str,
+    *,
+    default: Any = MISSING,
+    note: str = "",
+    positive: bool = False,
+    signed: bool = False,
+    choices: tuple[str, ...] = (),
+    array: bool = False,
+) -> Any:
+    """A field of a law, a drive or a system: finite and not negative where nothing else is said.
+
+    Parameters
+    ----------
+    unit : str
+        In SI (Hz for a frequency), "1" of a plain number; empty where it is no number.
+    name : str
+        What it is called, "sliding friction".
+    default
+        As of any dataclass's field.
+    note : str
+        What else the docstring says.
+    positive, signed : bool
+        Zero is refused; a negative number is not.
+    choices : tuple of str
+        The words that it may be.
+    array : bool
+        An array or matrix, which its class checks as a whole.
+
+    Returns
+    -------
+    Field
+        The field, with all of this in its metadata.
+
+    Examples
+    --------
+    >>> @parametric
+    ... class Viscous:
+    ...     slope: float = parameter("N s/m", "damping", signed=True)
+    >>> declared(Viscous, "slope").described
+    'Damping [N s/m].'
+    """
+    told = Parameter(unit, name, note, positive, signed, choices, array)
+    return field(default=default, metadata={"parameter": told})
+
+
+@overload
+def parametric(part: type[Part], *, eq: bool = ...) -> type[Part]: ...
+@overload
+def parametric(part: None = ..., *, eq: bool = ...) -> Callable[[type[Part]], type[Part]]: ...
+@dataclass_transform(frozen_default=True, field_specifiers=(parameter, field))
+def parametric(part: Any = None, *, eq: bool = True) -> Any:
+    """A frozen dataclass whose parameters are checked before its own ``__post_init__``, and stand in its docstring.
+
+    Examples
+    --------
+    >>> @parametric
+    ... class Grip:
+    ...     level: float = parameter("N", "level", positive=True)
+    >>> Grip(-1.0)
+    Traceback (most recent call last):
+    stickslip.errors.ModelError: level = -1.0 N; level is finite and positive; correct level=.
+    """
+    if part is None:
+        return lambda part: parametric(part, eq=eq)
+    own = getattr(part, "__post_init__", None)
+
+    def check_all(self: Any) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if not (value is None and each.default is None):  # left out
+                declaration(each).check(each.name, value)
+        if own is not None:
+            own(self)
+
+    part.__post_init__ = check_all
+    made = dataclass(frozen=True, eq=eq)(part)
+    made.__doc__ = _documented(made)
+    return made
+
+
+def declaration(of: Field[Any]) -> Parameter:
+    """What a field declares; nothing, where it is a plain one."""
+    told = of.metadata.get("parameter")
+    return told if isinstance(told, Parameter) else Parameter()
+
+
+def declared(part: type, name: str) -> Parameter:
+    """What the class of a part declares of the parameter `name`."""
+    return next(declaration(each) for each in fields(part) if each.name == name)
+
+
+def _documented(part: Any) -> str | None:
+    """The docstring with its section Attributes, before the first section that is written."""
+    written: str | None = part.__doc__
+    if not written or not fields(part):
+        return written
+    text = inspect.cleandoc(written)
+    first = SECTION.search(text)
+    place = first.start() if first else len(text)
+    lines = [line for each in fields(part) for line in _entry(each)]
+    before, after = text[:place].rstrip(), text[place:]
+    return "\n".join([before, "", "Attributes", "----------", *lines, "", after]).rstrip() + "\n"
+
+
+def _entry(of: Field[Any]) -> Iterator[str]:
+    told = declaration(of)
+    kind = "{" + ", ".join(f'"{choice}"' for choice in told.choices) + "}" if told.choices else str(of.type)
+    default = "" if of.default is MISSING or of.default is None else f", default {of.default!r}"
+    yield f"{of.name} : {kind.replace(' | ', ' or ')}{default}"
+    yield from textwrap.wrap(told.described, 112, initial_indent="    ", subsequent_indent="    ")
+
+
+def finite(name: str, value: float, *, unit: str, positive: bool = False, signed: bool = False) -> float:
+    """`value`, if the parameter can have it: finite, and not negative unless `signed`, not zero if `positive`."""
+    try:
+        known, number = math.isfinite(value), float(value)
+    except (TypeError, ValueError):
+        raise ModelError(f"{name} = {value!r}", f"{name} is a number [{unit}]", f"correct {name}=") from None
+    if not known or (number < 0 and not signed) or (number == 0 and positive):
+        rule = (
+            "is a finite number" if signed else "is finite and positive" if positive else "is finite and not negative"
+        )
+        told = value if unit in ("", "1") else f"{value} {unit}"
+        raise ModelError(f"{name} = {told}", f"{name} {rule}", f"correct {name}=")
+    return number
 
 
 def places(part: Any, within: Path = ()) -> dict[Path, Any]:
@@ -76,9 +237,13 @@ def unit(system: Any, name: str) -> str:
     >>> unit(pushed, "law.damping"), unit(pushed, "drive.amplitude"), unit(contact, "kinetic")
     ('N s/m', 'N', 'N')
     """
+    return named(system, name).unit or "1"
+
+
+def named(system: Any, name: str) -> Parameter:
+    """What is declared of the parameter that a name means, by :func:`find`."""
     path = find(system, name)[0]
-    part = type(places(system)[path]).__name__
-    return UNITS.get(f"{part}.{path[-1]}", UNITS.get(path[-1], "1"))
+    return declared(type(places(system)[path]), path[-1])
 
 
 def changed(system: Part, changes: Mapping[str, Any]) -> Part:

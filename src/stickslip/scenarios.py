@@ -13,34 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.drives.kinds import (
-    Belt,
-    Dithered,
-    HarmonicBase,
-    HarmonicForce,
-    MultiTone,
-    Ramp,
-    RecordedBase,
-    Release,
-    SpeedProfile,
-)
+from stickslip import drives
+from stickslip.drives.kinds import HarmonicForce, Ramp
 from stickslip.errors import ModelError
-from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.dahl import Dahl
-from stickslip.laws.elastoslip import ElastoSlip
 from stickslip.laws.formula import Formula
-from stickslip.laws.inertial import InertialContact
-from stickslip.laws.linear_slope import LinearSlope
-from stickslip.laws.lugre import LuGre
-from stickslip.laws.position_load import PositionLoad
-from stickslip.laws.rate_state import RateState
-from stickslip.laws.series import InSeries
-from stickslip.laws.smooth_state import SmoothStateVariable
-from stickslip.laws.state_variable import StateVariable
-from stickslip.laws.stribeck import FrictionCurve, Stribeck
-from stickslip.laws.tabulated import Tabulated
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.register import registered
 from stickslip.oscillator import Oscillator
 from stickslip.solve.orbit import SteadyState
 from stickslip.solve.periodic import steady_state
@@ -50,18 +28,8 @@ from stickslip.solve.tables import System, table_of
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Contact, Structure
 
-LAWS: dict[str, Callable[..., Any]] = {
-    "Coulomb": Coulomb, "CompliantContact": CompliantContact, "LinearSlope": LinearSlope, "Tabulated": Tabulated,
-    "StateVariable": StateVariable, "InertialContact": InertialContact, "ElastoSlip": ElastoSlip,
-    "PositionLoad": PositionLoad, "Stribeck": Stribeck, "Dahl": Dahl, "LuGre": LuGre, "RateState": RateState,
-    "SmoothStateVariable": SmoothStateVariable, "FrictionCurve": FrictionCurve, "InSeries": InSeries,
-    "TimeDelay": TimeDelay,
-}  # fmt: skip
-DRIVES: dict[str, Callable[..., Any]] = {
-    "Release": Release, "HarmonicBase": HarmonicBase, "HarmonicForce": HarmonicForce, "MultiTone": MultiTone,
-    "Belt": Belt, "Ramp": Ramp, "RecordedBase": RecordedBase,
-    "SpeedProfile": SpeedProfile, "Dithered": Dithered,
-}  # fmt: skip
+LAWS = registered()
+DRIVES: dict[str, type[Any]] = {name: getattr(drives, name) for name in drives.__all__}
 
 
 @dataclass(frozen=True)

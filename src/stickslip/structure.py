@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,22 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Law, Mode, Row, finite
-from stickslip.laws.compliant import CompliantContact
-from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.base import Exit, Law, Mode, Row
 from stickslip.laws.curved import CurvedLaw
-from stickslip.laws.elastoslip import ElastoSlip
-from stickslip.laws.inertial import InertialContact
 from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.register import registered
 from stickslip.laws.tabulated import Tabulated
-from stickslip.parameters import changed
+from stickslip.parameters import changed, finite, parameter, parametric
 
 Array = NDArray[np.float64]
 ROUNDED = 1e-6  # of the largest stiffness: an asymmetry below it is no one's intention
-LOADED = (Coulomb, LinearSlope, Tabulated, CompliantContact)  # laws that may be told as a coefficient of friction
 
 
-@dataclass(frozen=True, eq=False)
+@parametric(eq=False)
 class Contact:
     r"""One place where a structure rubs: a direction of sliding, a friction law, and the load that presses it.
 
@@ -38,23 +34,6 @@ class Contact:
     the contact separates, and it closes again where N would rise above zero. Without `normal` the
     load is the preload; as that is 1 where left out, the levels of the law are then forces [N], as in an Oscillator.
 
-    Attributes
-    ----------
-    law : Law
-        Friction law. Under a load that follows the motion: Coulomb, LinearSlope, Tabulated or CompliantContact; under a
-        preload also ElastoSlip and InertialContact; any other with linear modes where its levels are forces.
-    tangent : array_like (n,)
-        Direction of sliding, :math:`w_t`: the contact slides by :math:`w_t\cdot q` less the counter-face's motion.
-    normal : array_like (n,), optional
-        Direction that presses the contact, :math:`w_n`; that of `tangent` where one motion slides and presses, as a
-        sprag does.
-    stiffness : float
-        Normal contact stiffness k_n [N/m]; positive where `normal` is given. It is not part of the structure's K.
-    preload : float
-        N_0 [N].
-    carried : float
-        Share of the counter-face's motion (belt, moving base) seen here; 0: the counter-face is at rest here.
-
     Raises
     ------
     ModelError
@@ -62,21 +41,47 @@ class Contact:
 
     Examples
     --------
+    >>> from stickslip.laws.coulomb import Coulomb
     >>> pad = Contact(Coulomb(0.4), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
     >>> [mode.name for mode in pad.modes()]
     ['back', 'stuck', 'forward', 'lifted', 'landing']
     """
 
-    law: Law
-    tangent: ArrayLike
-    normal: ArrayLike | None = None
-    stiffness: float = 0.0
-    preload: float = 1.0
-    carried: float = 1.0
+    law: Law = parameter(
+        "",
+        "friction law",
+        note="under a load that follows the motion: Coulomb, LinearSlope, Tabulated or CompliantContact; under a "
+        "preload also ElastoSlip and InertialContact; any other with linear modes where its levels are forces",
+    )
+    tangent: ArrayLike = parameter(
+        "1",
+        "direction of sliding",
+        array=True,
+        note="w_t (n,): the contact slides by :math:`w_t q` less the counter-face's motion",
+    )
+    normal: ArrayLike | None = parameter(
+        "1",
+        "direction that presses the contact",
+        default=None,
+        array=True,
+        note="w_n (n,); that of `tangent` where one motion slides and presses, as a sprag does",
+    )
+    stiffness: float = parameter(
+        "N/m",
+        "normal stiffness",
+        default=0.0,
+        note="k_n; positive where `normal` is given. It is not part of the structure's K",
+    )
+    preload: float = parameter("N", "normal load", default=1.0, note="N_0")
+    carried: float = parameter(
+        "1",
+        "share of the belt",
+        default=1.0,
+        signed=True,
+        note="of the motion of the counter-face (belt, moving base) seen here; 0: the counter-face is at rest here",
+    )
 
     def __post_init__(self) -> None:
-        finite("preload", self.preload, unit="N")
-        finite("carried", self.carried, unit="", signed=True)
         object.__setattr__(self, "tangent", _direction("tangent", self.tangent))
         if isinstance(self.law, CurvedLaw):
             raise ModelError(
@@ -92,19 +97,20 @@ class Contact:
                     "give normal=, or leave out stiffness=",
                 )
             if self.preload != 1:
-                self._require("under a preload", *LOADED, ElastoSlip, InertialContact)
+                self._require("preload", "under a preload")
             return
         object.__setattr__(self, "normal", _direction("normal", self.normal))
         finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        self._require("under a load that follows the motion", *LOADED)
+        self._require("normal", "under a load that follows the motion")
 
-    def _require(self, where: str, *proportional: type) -> None:
+    def _require(self, pressed: str, where: str) -> None:
         """Refuse a law whose forces are not all proportional to the load."""
-        if not isinstance(self.law, proportional):
+        if pressed not in _loads(self.law):
+            fitting = [name for name, law in registered().items() if pressed in _loads(law)]
             raise ModelError(
                 f"{type(self.law).__name__} {where}",
                 "its forces are not proportional to the load in every mode",
-                f"use {' or '.join(law.__name__ for law in proportional)}, or leave out normal= and preload=",
+                f"use {' or '.join(fitting)}, or leave out normal= and preload=",
             )
 
     def modes(self) -> tuple[Mode, ...]:
@@ -152,7 +158,7 @@ class Contact:
         return "landing" if len(set(self.law.entry)) > 1 else self.law.entry[1]
 
 
-@dataclass(frozen=True, eq=False)
+@parametric(eq=False)
 class Structure:
     r"""Several degrees of freedom that rub at several contacts.
 
@@ -160,27 +166,6 @@ class Structure:
 
     z is the base's displacement and d the dampers' other ends'; each contact adds its friction f and its load N, as in
     :class:`Contact`. Contacts that hold rigidly share their forces through M.
-
-    Attributes
-    ----------
-    mass : array_like (n, n)
-        M [kg], symmetric and positive definite; a number for one degree of freedom.
-    damping : array_like (n, n)
-        C [N s/m].
-    stiffness : array_like (n, n)
-        K [N/m], symmetric, without the contacts'.
-    contacts : sequence of Contact
-        Where it rubs.
-    drive : Drive
-        What moves; nothing where left out.
-    acts_on : array_like (n,), optional
-        r: the share of the drive's force on each degree of freedom, or of the base's motion in it; 1 for all where
-        left out.
-    damper : {"ground", "base"}
-        What the dampers' other ends are fixed to.
-    rotations : sequence of int
-        Numbers, from 1, of the degrees of freedom that are angles [rad]; their rows and columns are then in kg m^2,
-        N m s and N m.
 
     Raises
     ------
@@ -193,6 +178,7 @@ class Structure:
     coefficient both motions couple and grow:
 
     >>> from stickslip.drives.kinds import Belt
+    >>> from stickslip.laws.coulomb import Coulomb
     >>> from stickslip.solve.simulate import simulate
     >>> pad = Contact(Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
     >>> springs = [[23.25, 3.9], [3.9, 7.75]]
@@ -202,14 +188,29 @@ class Structure:
     ['back', 'forward', 'lifted', 'stuck']
     """
 
-    mass: ArrayLike
-    damping: ArrayLike
-    stiffness: ArrayLike
-    contacts: Sequence[Contact] = ()
-    drive: Drive = field(default_factory=Release)
-    acts_on: ArrayLike | None = None
-    damper: str = "ground"
-    rotations: Sequence[int] = ()
+    mass: ArrayLike = parameter(
+        "kg", "mass matrix", array=True, note="M (n, n), positive definite; a number for one degree of freedom"
+    )
+    damping: ArrayLike = parameter("N s/m", "damping matrix", array=True, note="C (n, n)")
+    stiffness: ArrayLike = parameter(
+        "N/m", "stiffness matrix", array=True, note="K (n, n), symmetric, without the contacts'"
+    )
+    contacts: Sequence[Contact] = parameter("", "where it rubs", default=())
+    drive: Drive = parameter("", "what moves", default=Release(), note="nothing where left out")
+    acts_on: ArrayLike | None = parameter(
+        "1",
+        "share of the drive",
+        default=None,
+        array=True,
+        note="r (n,): of its force on every degree of freedom, or of the base's motion in it; 1 for all where left out",
+    )
+    damper: str = parameter("", "what the dampers are fixed to", default="ground", choices=("ground", "base"))
+    rotations: Sequence[int] = parameter(
+        "",
+        "degrees of freedom that are angles [rad]",
+        default=(),
+        note="by number, from 1; their rows and columns are then in kg m^2, N m s and N m",
+    )
 
     def __post_init__(self) -> None:
         size = len(_matrix("mass", self.mass))
@@ -226,10 +227,6 @@ class Structure:
         if share.shape != (size,):
             raise ModelError(f"acts_on of {len(share)} numbers", f"it has {size}", "correct acts_on=")
         object.__setattr__(self, "acts_on", share)
-        if self.damper not in ("ground", "base"):
-            raise ModelError(
-                f"damper = '{self.damper}'", "the dampers are fixed to the 'ground' or the 'base'", "choose one"
-            )
         object.__setattr__(self, "rotations", _angles(self.rotations, size))
         _require_determined(self.contacts)
 
@@ -264,6 +261,11 @@ class Structure:
         Structure
         """
         return changed(self, changes)
+
+
+def _loads(law: object) -> tuple[str, ...]:
+    """By which of its parameters a contact may press a law: what of them all its forces are proportional to."""
+    return getattr(law, "loads", ())
 
 
 def _of_speed(quantity: Row) -> Row:

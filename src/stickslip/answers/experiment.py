@@ -16,8 +16,8 @@ from stickslip.balance.lag import sensor_delay
 from stickslip.contact.contact import contact_stiffness
 from stickslip.cycle.loops import friction_loops
 from stickslip.errors import ModelError, StickslipError
-from stickslip.laws.base import finite
 from stickslip.oscillator import Oscillator
+from stickslip.parameters import finite
 from stickslip.record.record import Record
 from stickslip.rig.rig import Rig
 from stickslip.solve.trajectory import Trajectory

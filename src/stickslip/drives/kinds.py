@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError
+from stickslip.parameters import finite, parameter, parametric
 
 Row = Mapping[str, float]
 LARGEST_FREQUENCY = 1e10  # Hz; more is a wrong unit
@@ -72,39 +73,17 @@ def require_drive(drive: object) -> None:
     )  # fmt: skip
 
 
-def _finite(value: object) -> bool:
-    try:
-        return math.isfinite(value)  # type: ignore[arg-type]
-    except TypeError:
-        return False  # no number at all
-
-
 def _check_frequency(frequency: float) -> None:
     _require(
-        _finite(frequency) and 0 < frequency <= LARGEST_FREQUENCY,
+        0 < finite("frequency", frequency, unit="Hz", signed=True) <= LARGEST_FREQUENCY,
         f"frequency = {frequency} Hz",
         f"a drive repeats between 0 and {LARGEST_FREQUENCY:g} times a second",
         "give frequency= in Hz",
     )
 
 
-def _check_finite(**values: float) -> None:
-    for name, value in values.items():
-        _require(_finite(value), f"{name} = {value}", f"{name} is a finite number", f"correct {name}=")
-
-
 def _check_speed(speed: float, *, rule: str) -> None:
-    _check_finite(speed=speed)
     _require(speed != 0, "speed = 0 m/s", rule, "give its speed=, or use Release() for a mass at rest")
-
-
-def _check_contact(contact: str) -> None:
-    _require(
-        contact in ("ground", "base"),
-        f"contact = '{contact}'",
-        "the mass rubs on the 'ground' or on the 'base'",
-        "choose one of the two",
-    )
 
 
 def _tones(tones: Sequence[tuple[float, float, float]]) -> tuple[Motion, Row]:
@@ -115,7 +94,8 @@ def _tones(tones: Sequence[tuple[float, float, float]]) -> tuple[Motion, Row]:
     row = {}
     for j, (amplitude, frequency, phase) in enumerate(tones):
         _check_frequency(frequency)
-        _check_finite(amplitude=amplitude, phase=phase)
+        finite("amplitude", amplitude, unit="m or N", signed=True)
+        finite("phase", phase, unit="rad", signed=True)
         cosine, sine, omega = f"cos{j}", f"sin{j}", 2 * math.pi * frequency
         rates |= {cosine: {sine: -omega}, sine: {cosine: omega}}
         start |= {cosine: math.cos(phase), sine: math.sin(phase)}
@@ -125,7 +105,7 @@ def _tones(tones: Sequence[tuple[float, float, float]]) -> tuple[Motion, Row]:
     return Motion(rates, start, tuple(turning), period), row
 
 
-@dataclass(frozen=True)
+@parametric
 class Release:
     """Nothing moves: free decay from wherever the mass is let go.
 
@@ -135,25 +115,16 @@ class Release:
     inf
     """
 
+    label = "Nothing: free decay"
+
     def motion(self) -> Motion:
         """No signals."""
         return Motion()
 
 
-@dataclass(frozen=True)
+@parametric
 class HarmonicBase:
     r"""The spring's end moves as :math:`z = Z \cos(2\pi F t + \varphi)` (thesis, equation 3.8).
-
-    Attributes
-    ----------
-    amplitude : float
-        Z [m].
-    frequency : float
-        F [Hz].
-    phase : float
-        Phase [rad].
-    contact : {"ground", "base"}
-        Whether the mass rubs on the ground or on the moving base.
 
     Examples
     --------
@@ -161,13 +132,14 @@ class HarmonicBase:
     0.4
     """
 
-    amplitude: float
-    frequency: float
-    phase: float = 0.0
-    contact: str = "ground"
+    label = "Base moves harmonically"
+
+    amplitude: float = parameter("m", "amplitude", signed=True, note="Z")
+    frequency: float = parameter("Hz", "frequency", positive=True, note="F")
+    phase: float = parameter("rad", "phase", default=0.0, signed=True)
+    contact: str = parameter("", "what the mass rubs on", default="ground", choices=("ground", "base"))
 
     def __post_init__(self) -> None:
-        _check_contact(self.contact)
         self.motion()
 
     def motion(self) -> Motion:
@@ -176,18 +148,9 @@ class HarmonicBase:
         return _moved(motion, base=row, face=row if self.contact == "base" else {})
 
 
-@dataclass(frozen=True)
+@parametric
 class HarmonicForce:
     r"""A force :math:`P \cos(2\pi F t + \varphi)` on the mass.
-
-    Attributes
-    ----------
-    amplitude : float
-        P [N].
-    frequency : float
-        F [Hz].
-    phase : float
-        Phase [rad].
 
     Examples
     --------
@@ -195,9 +158,11 @@ class HarmonicForce:
     0.5
     """
 
-    amplitude: float
-    frequency: float
-    phase: float = 0.0
+    label = "Harmonic force"
+
+    amplitude: float = parameter("N", "amplitude", signed=True, note="P")
+    frequency: float = parameter("Hz", "frequency", positive=True, note="F")
+    phase: float = parameter("rad", "phase", default=0.0, signed=True)
 
     def __post_init__(self) -> None:
         self.motion()
@@ -208,18 +173,9 @@ class HarmonicForce:
         return _moved(motion, force=row)
 
 
-@dataclass(frozen=True)
+@parametric
 class MultiTone:
     """Several tones at once: a drive with dither, two shakers.
-
-    Attributes
-    ----------
-    tones : sequence of (float, float, float)
-        Amplitude [m or N], frequency [Hz] and phase [rad] of each.
-    on : {"base", "force", "face"}
-        What they move: the spring's end, the mass (a force), or the counter-face.
-    contact : {"ground", "base"}
-        For ``on="base"``: what the mass rubs on.
 
     Examples
     --------
@@ -227,19 +183,24 @@ class MultiTone:
     2
     """
 
-    tones: Sequence[tuple[float, float, float]]
-    on: str = "base"
-    contact: str = "ground"
+    label = "Several tones"
+
+    tones: Sequence[tuple[float, float, float]] = parameter(
+        "", "tones", note="amplitude [m or N], frequency [Hz] and phase [rad] of every one"
+    )
+    on: str = parameter(
+        "",
+        "what the tones move",
+        default="base",
+        choices=("base", "force", "face"),
+        note="the spring's end, the mass (a force), or the counter-face",
+    )
+    contact: str = parameter(
+        "", "what the mass rubs on", default="ground", choices=("ground", "base"), note='for ``on="base"``'
+    )
 
     def __post_init__(self) -> None:
-        _check_contact(self.contact)
         _require(len(self.tones) > 0, "no tones", "at least one tone is needed", "give (amplitude, frequency, phase)")
-        _require(
-            self.on in ("base", "force", "face"),
-            f"on = '{self.on}'",
-            "tones move the 'base', the 'face' or act as 'force'",
-            "choose one of the three",
-        )
         object.__setattr__(self, "tones", tuple(map(tuple, self.tones)))
         _require(
             all(len(tone) == 3 for tone in self.tones),
@@ -257,14 +218,9 @@ class MultiTone:
         return _moved(motion, force=row) if self.on == "force" else _moved(motion, face=row)
 
 
-@dataclass(frozen=True)
+@parametric
 class Belt:
     """The counter-face runs at a steady speed under a mass whose spring is held.
-
-    Attributes
-    ----------
-    speed : float
-        Speed of the belt [m/s]; not zero.
 
     Examples
     --------
@@ -272,7 +228,9 @@ class Belt:
     {'way': 0.01}
     """
 
-    speed: float
+    label = "Belt at a steady speed"
+
+    speed: float = parameter("m/s", "speed of the belt", signed=True, note="not zero")
 
     def __post_init__(self) -> None:
         _check_speed(self.speed, rule="a belt runs")
@@ -282,14 +240,9 @@ class Belt:
         return Motion({"way": {"1": 1.0}}, {"way": 0.0}, face={"way": self.speed})
 
 
-@dataclass(frozen=True)
+@parametric
 class Ramp:
     """The spring's end is pulled at a steady speed over a counter-face at rest.
-
-    Attributes
-    ----------
-    speed : float
-        Speed of the spring's end [m/s]; not zero.
 
     Examples
     --------
@@ -297,7 +250,9 @@ class Ramp:
     {'way': 0.0001}
     """
 
-    speed: float
+    label = "Spring pulled steadily"
+
+    speed: float = parameter("m/s", "speed of the spring's end", signed=True, note="not zero")
 
     def __post_init__(self) -> None:
         _check_speed(self.speed, rule="a ramp moves")
@@ -307,23 +262,11 @@ class Ramp:
         return Motion({"way": {"1": 1.0}}, {"way": 0.0}, base={"way": self.speed})
 
 
-@dataclass(frozen=True, eq=False)
+@parametric(eq=False)
 class RecordedBase:
     """A recorded base motion: between samples a linear or a cubic (natural spline) piece, solved in closed form.
 
     After the last sample there is no motion to follow: a longer run is refused.
-
-    Attributes
-    ----------
-    samples : array_like
-        Displacement of the spring's end [m], n values, at least two (four for cubic).
-    fs : float
-        Sampling rate [Hz]; the first sample is at time 0.
-    order : {3, 1}
-        Degree of the pieces. Linear pieces kick the base's velocity at every sample: use them with the contact and
-        the damper on the ground only.
-    contact : {"ground", "base"}
-        Whether the mass rubs on the ground or on the moving base.
 
     Examples
     --------
@@ -331,14 +274,22 @@ class RecordedBase:
     (3, 5)
     """
 
-    samples: ArrayLike
-    fs: float
-    order: int = 3
-    contact: str = "ground"
+    label = "Recorded base motion"
+
+    samples: ArrayLike = parameter(
+        "m", "displacement of the spring's end", array=True, note="two values at least, four for cubic pieces"
+    )
+    fs: float = parameter("Hz", "sampling rate", positive=True, note="the first sample is at time 0")
+    order: int = parameter(
+        "",
+        "degree of the pieces",
+        default=3,
+        note="3 or 1; linear pieces kick the base's velocity at every sample: use them with the contact and the damper "
+        "on the ground only",
+    )
+    contact: str = parameter("", "what the mass rubs on", default="ground", choices=("ground", "base"))
 
     def __post_init__(self) -> None:
-        _check_contact(self.contact)
-        _require(_finite(self.fs) and self.fs > 0, f"fs = {self.fs} Hz", "the rate is positive", "give fs= in Hz")
         _require(self.order in (1, 3), f"order = {self.order}", "pieces are linear (1) or cubic (3)", "choose one")
         _require(
             self.order == 3 or self.contact == "ground",
@@ -383,21 +334,12 @@ class RecordedBase:
         )
 
 
-@dataclass(frozen=True)
+@parametric
 class SpeedProfile:
     """The spring's end or the counter-face follows a profile of speeds, straight between given instants.
 
     A motor's trapezoid, a start and a stop, or dither of any shape: triangles, near squares. The displacement starts at
     zero and is a parabola between two instants; after the last one the speed stays.
-
-    Attributes
-    ----------
-    times : sequence of float
-        Instants [s], increasing from 0.
-    speeds : sequence of float
-        Speed at each [m/s].
-    on : {"base", "face"}
-        What they move: the spring's end or the counter-face.
 
     Examples
     --------
@@ -405,12 +347,15 @@ class SpeedProfile:
     array([0.  , 0.25, 1.25, 1.5 ])
     """
 
-    times: Sequence[float]
-    speeds: Sequence[float]
-    on: str = "base"
+    label = "Profile of speeds"
+
+    times: Sequence[float] = parameter("s", "instants", array=True, note="increasing from 0")
+    speeds: Sequence[float] = parameter("m/s", "speeds", array=True, note="one at every instant")
+    on: str = parameter(
+        "", "what moves", default="base", choices=("base", "face"), note="the spring's end or the counter-face"
+    )
 
     def __post_init__(self) -> None:
-        _require(self.on in ("base", "face"), f"on = '{self.on}'", "speeds move the 'base' or the 'face'", "choose one")
         for name in ("times", "speeds"):
             object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
         values = np.array([*self.times, *self.speeds])
@@ -444,22 +389,9 @@ class SpeedProfile:
         )
 
 
-@dataclass(frozen=True)
+@parametric
 class Dithered:
     r"""Any drive, with a fast small tone along the contact on top: :math:`a \cos(2\pi F t + \varphi)`.
-
-    Attributes
-    ----------
-    drive : Drive
-        What moves the system besides.
-    amplitude : float
-        a [m] of the counter-face or of the spring's end, or [N] of a force on the mass.
-    frequency : float
-        F [Hz].
-    phase : float
-        Phase [rad].
-    on : {"face", "base", "force"}
-        What the tone moves: the counter-face, the spring's end, or the mass (a force).
 
     Examples
     --------
@@ -467,16 +399,24 @@ class Dithered:
     0.4
     """
 
-    drive: Drive
-    amplitude: float
-    frequency: float
-    phase: float = 0.0
-    on: str = "face"
+    label = "Drive with dither"
+
+    drive: Drive = parameter("", "what moves the system besides")
+    amplitude: float = parameter(
+        "m", "amplitude", signed=True, note="a, of the counter-face or of the spring's end; in N of a force on the mass"
+    )
+    frequency: float = parameter("Hz", "frequency", positive=True, note="F")
+    phase: float = parameter("rad", "phase", default=0.0, signed=True)
+    on: str = parameter(
+        "",
+        "what the tone moves",
+        default="face",
+        choices=("face", "base", "force"),
+        note="the counter-face, the spring's end, or the mass (a force)",
+    )
 
     def __post_init__(self) -> None:
         require_drive(self.drive)
-        _require(self.on in ("face", "base", "force"), f"on = '{self.on}'",
-                 "dither moves the 'face', the 'base' or acts as 'force'", "choose one of the three")  # fmt: skip
         _require(
             not isinstance(self.drive, Dithered),
             "dither on a dithered drive",
@@ -489,7 +429,6 @@ class Dithered:
         """The drive's signals and a turning pair; it repeats where the drive holds a whole number of its cycles."""
         own, omega = self.drive.motion(), 2 * math.pi * self.frequency
         _check_frequency(self.frequency)
-        _check_finite(amplitude=self.amplitude, phase=self.phase)
         moved = {part: dict(getattr(own, part)) for part in ("force", "base", "face")}
         moved[self.on]["dither"] = self.amplitude
         cycles = own.period * self.frequency

@@ -13,8 +13,6 @@ from typing import Any
 import stickslip as ss
 
 Answer = tuple[dict[str, Any], dict[str, Any]]
-CHOICE = re.compile(r"\{(.+)\}")
-UNIT = re.compile(r"\[([^\]]+)\]")
 TEX = (
     (r":math:`([^`]*)`", r"\1"), (r"``?", ""), (r"\\mathrm{(\w+)}", r"\1"),
     (r"\\dot\s*\\?(\w+)", r"\1'"), (r"\^{(.*?)}", r"^(\1)"),
@@ -54,11 +52,11 @@ def _presets() -> list[dict[str, Any]]:
 
 
 def _part(make: Any) -> dict[str, Any]:
-    """A class by what its docstring says: in a line, and parameter by parameter."""
-    text = inspect.cleandoc(make.__doc__ or "")
+    """A class by its label, in a line, and parameter by parameter."""
     return {
-        "about": _plain(text.split("\n\n")[0]),
-        "parameters": [_parameter(field, text) for field in dataclasses.fields(make)],
+        "label": getattr(make, "label", ""),
+        "about": _plain(inspect.cleandoc(make.__doc__ or "").split("\n\n")[0]),
+        "parameters": [_parameter(field) for field in dataclasses.fields(make)],
     }
 
 
@@ -69,19 +67,18 @@ def _plain(text: str) -> str:
     return " ".join(text.split())
 
 
-def _parameter(field: dataclasses.Field[Any], text: str) -> dict[str, Any]:
-    found = re.search(rf"^(?:\w+, )*{field.name}(?:, \w+)* : (.*)\n((?:    .*\n?)+)", text, re.MULTILINE)
-    kind, words = (found[1], " ".join(found[2].split())) if found else ("", "")
-    choice, unit = CHOICE.match(kind), UNIT.search(words)
+def _parameter(field: dataclasses.Field[Any]) -> dict[str, Any]:
+    declared = field.metadata["parameter"]
     default = None if field.default is dataclasses.MISSING else field.default
     told = {
         "name": field.name,
-        "unit": unit[1] if unit else "",
-        "words": _plain(words),
+        "label": declared.name,
+        "unit": "" if declared.unit == "1" else declared.unit,
+        "words": _plain(declared.described),
         "default": default if isinstance(default, int | float | str | None) else None,
-        "optional": "None" in kind or field.default is not dataclasses.MISSING,
-        "choices": re.findall(r'"(.*?)"', choice[1]) if choice else [],
-        "part": field.name in MORE and not choice,
+        "optional": field.default is not dataclasses.MISSING,
+        "choices": list(declared.choices),
+        "part": field.name in MORE and not declared.choices,
     }
     empty: dict[str, Any] = {"unit": "", "words": "", "default": None, "optional": False, "choices": [], "part": False}
-    return {name: value for name, value in told.items() if name == "name" or value != empty[name]}
+    return {name: value for name, value in told.items() if name in ("name", "label") or value != empty[name]}

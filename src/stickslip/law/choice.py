@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.law.hypotheses import family_of
 from stickslip.statistics import correlation_time
 
 Array = NDArray[np.float64]
@@ -26,7 +27,6 @@ CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
 BLUNT = 4.0  # of the criterion, by which the odds between families fall e-fold; 2 were the stories Gaussian
 SHARPNESS = 4.0  # power of the ratio of predictions' misfits that the odds between families follow
 UNLIKELY = 0.05  # odds to the best law, below which another is rejected
-FAMILIES = {"Coulomb": "rigid", "static": "rigid", "Stribeck": "rigid"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Misfit:
     @property
     def family(self) -> str:
         """Rigid laws are one family; each other law is its own."""
-        return FAMILIES.get(self.name, self.name)
+        return family_of(self.name).name
 
 
 @dataclass(frozen=True)

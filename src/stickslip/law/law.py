@@ -31,16 +31,13 @@ from stickslip.law.surety import Surety, surety
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
+from stickslip.parameters import named
 from stickslip.parameters import unit as unit_of
 from stickslip.record.record import Record
 from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
 
-WORDS = {
-    "kinetic": "sliding friction", "static": "static friction", "law.stiffness": "contact stiffness",
-    "law.damping": "contact damping", "speed": "Stribeck speed", "law.mass": "contact mass",
-}  # fmt: skip
 METHOD = "least squares of what the sensors read, the motion simulated"
 MISFIT = 1.2  # times its noise that a channel's residual may be
 STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
@@ -316,7 +313,7 @@ def _mean_friction(problem: Problem, point: Point, level: float) -> Estimate:
     values = level * np.array([k.value(u) for k, u in zip(problem.knobs, point.u, strict=True) if k.kind == "profile"])
     sd, freedom = mean_uncertainty(values[1:-1])
     return Estimate.normal(
-        WORDS["kinetic"], float(values[1:-1].mean()), sd=sd, unit="N", quantile=student(freedom),
+        "sliding friction", float(values[1:-1].mean()), sd=sd, unit="N", quantile=student(freedom),
         method="mean of the friction along the surface",
         checks=(f"it varies by {100 * np.std(values[1:-1]) / values[1:-1].mean():.2g} % along the surface",),
     )  # fmt: skip
@@ -331,16 +328,15 @@ def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Osc
         unit = {"gain": "1", "delay": "s"}.get(each.kind) or unit_of(system, each.name)
         sd = abs(_value(each, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
         interval = (values[1], values[2]) if sure else (math.nan, math.nan)
-        found[each.name] = Estimate(
-            _words(each.name), values[0], interval, sd, unit, METHOD, _told(each, values, unit, sure)
-        )
+        word = _words(each.name, system)
+        found[each.name] = Estimate(word, values[0], interval, sd, unit, METHOD, _told(each, word, values, unit, sure))
     return found
 
 
-def _words(name: str) -> str:
+def _words(name: str, system: Oscillator) -> str:
     """What a parameter is called."""
     head, _, tail = name.rpartition(".")
-    return f"{tail} of {head}" if tail in ("gain", "delay") else WORDS.get(name, name)
+    return f"{tail} of {head}" if tail in ("gain", "delay") else named(system, name).name or name
 
 
 def _value(knob: Knob, u: float, system: Oscillator) -> float:
@@ -350,12 +346,11 @@ def _value(knob: Knob, u: float, system: Oscillator) -> float:
     return float(getattr(system.law, "kinetic", 1.0)) * (1 + value) if knob.kind == "above" else value
 
 
-def _told(knob: Knob, values: Sequence[float], unit: str, sure: Surety | None) -> str:
+def _told(knob: Knob, word: str, values: Sequence[float], unit: str, sure: Surety | None) -> str:
     """What the records can say of a parameter, in words."""
     if sure is None:
         return "not asked how sure"
     _, low, high = values
-    word = _words(knob.name)
     if not math.isinf(high) and not math.isinf(low) and (low > 0 or knob.kind != "log"):
         return "ok"
     if low > 0 and math.isinf(high):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result, Status
-from stickslip.laws.base import finite
+from stickslip.parameters import finite
 from stickslip.statistics import student
 from stickslip.units import parse_value
 

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,6 @@ UNTURNED, STEADY = 0.005, 0.1  # of the samples that noise may carry through zer
 EDGE = 0.02  # of the record at its ends, where a derivative is poor
 FINEST = 1e-5  # of a channel's range: noise below it is not asked for
 AUDIBLE = 2.0  # times its noise that a motion must stray
-SHAPES = ("exponent", "printed", "rule", "seed", "error")  # of a law, that are chosen and not fitted
 GRID = {
     "stiffness": (0.25, 1.0, 4.0, 64.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0),
 }  # fmt: skip
@@ -186,9 +186,11 @@ def free_names(oscillator: Oscillator, free: Sequence[str] | None) -> tuple[str,
             find(oscillator, name)
         return tuple(free)
     found = []
-    for field in fields(oscillator.law):  # type: ignore[arg-type]
-        value = getattr(oscillator.law, field.name)
-        if isinstance(value, int | float) and not isinstance(value, bool) and value and field.name not in SHAPES:
+    law: Any = oscillator.law
+    chosen = getattr(law, "chosen", ())
+    for field in fields(law):
+        value = getattr(law, field.name)
+        if isinstance(value, int | float) and not isinstance(value, bool) and value and field.name not in chosen:
             alone = find(oscillator, field.name) == (("law", field.name),)
             found.append(field.name if alone else f"law.{field.name}")
     if not found:

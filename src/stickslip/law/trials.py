@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,12 +13,9 @@ from numpy.typing import NDArray
 from stickslip.law.choice import Evidence, Key, independent
 from stickslip.law.drive import Sampled
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
-from stickslip.law.start import Shown, bounded, free_names, knob, stiffest, thinned
+from stickslip.law.start import Shown, bounded, free_names, knob, thinned
 from stickslip.law.stretch import Motion, Stretch, attempted
-from stickslip.laws.compliant import CompliantContact
-from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.lugre import LuGre
-from stickslip.laws.stribeck import Stribeck
+from stickslip.laws.guessing import STIFF, STIFFEST
 from stickslip.oscillator import Oscillator
 
 Array = NDArray[np.float64]
@@ -29,10 +26,6 @@ FINALISTS = 2  # starts that are followed
 ENOUGH = 1e-3  # of the misfit: what a step lowers it less by tells no law from another
 CONTENDING = 10.0  # times the least misfit of the others: a law beyond is not followed to its end
 PASSES, FEW = 12, 3  # of a descent: of a law, and of one that stands near its end
-LITTLE = 0.01  # of the kinetic friction, by which the static one exceeds it at a start
-RIGID = 1e-2  # of the smallest stroke, by which a contact gives way that counts as rigid where a rigid law does as well
-STIFFEST = 1e-4  # of the stroke: what a contact that is next to rigid gives way
-FALLS = (0.01, 0.05)  # of the largest speed, within which a Stribeck curve falls
 TURNS = 24  # of the motion, after which a record tells laws apart no better
 DETUNED = (0.01, 0.0025)  # steps in which a mount is tried, against what is stated
 SILENT = 0.2  # of a channel's size, left by the best law: nothing is known of such a sensor
@@ -54,6 +47,21 @@ class Trial:
         return self.problem.system(self.point.u)
 
     @property
+    def law(self) -> Any:
+        """With its values."""
+        return self.system.law
+
+    @property
+    def mass(self) -> float:
+        """What slides [kg]."""
+        return self.system.mass
+
+    @property
+    def scales(self) -> Array:
+        """Largest way [m] and speed [m/s] of every stretch (n, 2)."""
+        return np.array([each.scales for each in self.problem.stretches])
+
+    @property
     def count(self) -> int:
         """Parameters of the law."""
         return len(free_names(self.problem.oscillator, None))
@@ -61,12 +69,11 @@ class Trial:
     @property
     def stiff(self) -> bool:
         """Whether friction is there before the contact has moved by a noticeable part of the smallest stroke."""
-        law: Any = self.system.law
-        scales = np.array([each.scales for each in self.problem.stretches])
-        stroke, fastest = scales.min(axis=0)
+        law = self.law
+        stroke, fastest = self.scales.min(axis=0)
         if hasattr(law, "stiffness"):
-            return bool(law.kinetic < RIGID * stroke * law.stiffness)
-        return hasattr(law, "rate") and bool(fastest < RIGID * stroke * law.rate * law.kinetic)
+            return bool(law.kinetic < STIFF * stroke * law.stiffness)
+        return hasattr(law, "rate") and bool(fastest < STIFF * stroke * law.rate * law.kinetic)
 
     @property
     def left(self) -> Left:
@@ -163,36 +170,6 @@ def with_static(trial: Trial, excess: float) -> Trial:
     knobs = tuple(trial.problem.knobs[j]._replace(origin=trial.problem.knobs[j].value(trial.point.u[j])) for j in left)
     problem = replace(trial.problem, oscillator=system.having(static=static), knobs=knobs)
     return replace(trial, problem=problem, point=problem.at(np.zeros(len(knobs)), trial.point.starts))
-
-
-def from_simpler(name: str, trials: Mapping[str, Trial]) -> list[Any]:
-    """Starts of a law at the end of a simpler one's search, which it contains: what it adds hardly felt."""
-    laws = {each: trial.system.law for each, trial in trials.items()}
-    if name == "static" and "Coulomb" in laws:
-        level = laws["Coulomb"].kinetic  # type: ignore[union-attr]
-        return [Coulomb(level, static=(1 + LITTLE) * level)]
-    if name == "Stribeck" and "static" in laws:
-        law: Any = laws["static"]
-        fastest = max(float(each.scales[1]) for each in trials["static"].problem.stretches)
-        static = max(law.static, 1.02 * law.kinetic)
-        return [Stribeck(law.kinetic, static, speed=share * fastest) for share in FALLS]
-    if name == "compliant" and "Coulomb" in laws:
-        rigid: Any = trials["Coulomb"].system
-        stiffness = stiffest(rigid, trials["Coulomb"].problem.stretches, STIFFEST)
-        damping = 0.2 * math.sqrt(stiffness * rigid.mass)
-        return [CompliantContact(rigid.law.kinetic, stiffness=stiffness, damping=damping)]
-    if name == "LuGre" and "Stribeck" in laws and "compliant" in laws and trials["compliant"].stiff:
-        curve: Any = laws["Stribeck"]
-        smallest = min(float(each.scales[0]) for each in trials["Stribeck"].problem.stretches)
-        stiffness = 2 * curve.kinetic / (RIGID * smallest)
-        damping = 0.2 * math.sqrt(stiffness * trials["Stribeck"].system.mass)
-        return [LuGre(curve.kinetic, curve.static, speed=curve.speed, stiffness=stiffness, damping=damping)]
-    if name == "LuGre" and "compliant" in laws and not trials["compliant"].stiff:
-        held: Any = laws["compliant"]
-        fastest = max(float(each.scales[1]) for each in trials["compliant"].problem.stretches)
-        static = (1 + LITTLE) * held.kinetic
-        return [LuGre(held.kinetic, static, speed=FALLS[-1] * fastest, stiffness=held.stiffness, damping=held.damping)]
-    return []
 
 
 def predicted(trial: Trial, tell: Tell) -> Left:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Estimate, Result, Status
 from stickslip.law.choice import CALIBRATIONS, Misfit, Standing, standings, times, undescribed
-from stickslip.law.guess import GUESSES, Seen
+from stickslip.law.guess import Seen
+from stickslip.law.hypotheses import family_of, hypotheses
 from stickslip.law.law import LawFit, answered
 from stickslip.law.search import descend
 from stickslip.law.start import Shown, require_apart, too_few
@@ -24,7 +25,6 @@ from stickslip.law.trials import (
     PASSES,
     Trial,
     evidence_of,
-    from_simpler,
     predicted,
     resumed,
     searched,
@@ -34,28 +34,13 @@ from stickslip.law.trials import (
     weighed,
     with_static,
 )
-from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, Step
 
 Array = NDArray[np.float64]
 
-CLASSES = {
-    "Coulomb": "Coulomb",
-    "Stribeck": "Stribeck",
-    "CompliantContact": "compliant",
-    "StateVariable": "state variable",
-    "SmoothStateVariable": "state variable",
-    "LuGre": "LuGre",
-}
 CALIBRATION = 0.01  # by which gains are wrong, if nothing is known
 CALLS = 40.0  # of progress that the trial of a law is taken for
-SAID = {
-    "rigid": "that of a rigid contact",
-    "compliant": "that of a compliant contact",
-    "state variable": "that of a state variable, which lags behind the velocity",
-    "LuGre": "that of bristles (LuGre)",
-}
 BAD = 0.3  # of a channel's own size: a law that leaves more beyond the noise describes little
 LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
 RETUNED = 8  # times that mounts and law are found in turn
@@ -260,7 +245,7 @@ def compare_laws(
             least = min((each.point.chi2 for each in {**before, **found}.values()), default=math.inf)
             trial = resumed(before[name], stretches, least, passes, tell) if name in before else None
             if trial is None:
-                begun = [*(given or GUESSES[name](seen)), *from_simpler(name, found)]
+                begun = _begun(name, given, seen, found)
                 trial = searched(name, begun, oscillator, stretches, known, least, passes, tell)
             if trial is not None:
                 found[name] = trial
@@ -408,6 +393,14 @@ def _nuisance(shown: Sequence[Shown]) -> tuple[str, ...]:
     return (*(f"{name}.gain" for name in channels), *(["x.delay"] if "x" in channels and len(channels) > 1 else []))
 
 
+def _begun(name: str, given: Sequence[Any], seen: Seen, before: Mapping[str, Trial]) -> list[Any]:
+    """Where the search for a law begins: at the laws given, or its own guesses; and where simpler ones have ended."""
+    known = hypotheses().get(name)
+    if known is None:
+        return [*given]
+    return [*(given or known.guesses(seen)), *known.continued(before)]
+
+
 def _teller(progress: Callable[[float], object] | None, laws: int) -> Callable[[], None]:
     """Progress that comes nearer to its end with each call, as nobody knows how many there will be."""
     calls = 0
@@ -424,27 +417,26 @@ def _teller(progress: Callable[[float], object] | None, laws: int) -> Callable[[
 def _kinds(laws: Sequence[Any] | None) -> list[tuple[str, list[Any]]]:
     """The laws to try: name, and the values to start from where they are given."""
     found: dict[str, list[Any]] = {}
-    for each in GUESSES if laws is None else [laws] if isinstance(laws, str) else laws:
+    for each in hypotheses() if laws is None else [laws] if isinstance(laws, str) else laws:
         name = _name(each)
         found.setdefault(name, []).extend([] if isinstance(each, str | type) else [each])
     if not found:
-        raise ModelError("no law", "laws are compared by trying some", f"name some of {', '.join(GUESSES)}")
-    order = list(GUESSES)
+        raise ModelError("no law", "laws are compared by trying some", f"name some of {', '.join(hypotheses())}")
+    order = list(hypotheses())
     return sorted(found.items(), key=lambda each: order.index(each[0]) if each[0] in order else len(order))
 
 
 def _name(law: Any) -> str:
     if isinstance(law, str):
         plain = law.strip().lower().replace("-", " ").replace("_", " ")
-        fits = [name for name in GUESSES if name.lower() == plain]
+        fits = [name for name in hypotheses() if name.lower() == plain]
         if not fits:
-            raise ModelError(f"law '{law}'", f"laws are {', '.join(GUESSES)}", "choose among these, or give a law")
+            raise ModelError(f"law '{law}'", f"laws are {', '.join(hypotheses())}", "choose among these, or give a law")
         return fits[0]
     kind = law if isinstance(law, type) else type(law)
-    if isinstance(law, Coulomb) and law.static is not None:
-        return "static"
-    if kind.__name__ in CLASSES:
-        return CLASSES[kind.__name__]
+    if hasattr(kind, "hypotheses"):
+        fits = [each.name for each in kind.hypotheses() if law is kind or each.holds(law)]
+        return fits[0] if law is kind else fits[-1]
     if isinstance(law, type) or not (hasattr(law, "modes") or hasattr(law, "rates")):
         raise ModelError(
             f"law {law!r}", "a law without a guess of its own needs values to start from", "give it with its values"
@@ -523,7 +515,7 @@ def _sentences(
         if limits:
             said.append(f"{_either(limits)} would have to be so stiff that it says the same")
         told = "; ".join(said) or "no law of another family was tried"
-        yield f"The friction is {SAID.get(best.family, best.family)}: {told}."
+        yield f"The friction is {family_of(best.name).said}: {told}."
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:
         low, high = excess_.interval
         exceeds = (

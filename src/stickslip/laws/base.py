@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -69,7 +68,12 @@ class Mode:
 
 
 class Law(Protocol):
-    """What the solver asks of a friction law."""
+    """What the solver asks of a friction law.
+
+    What others ask, its class says where it has an answer: `label` and `formula` (how it is called and written),
+    `hypotheses` (how records are asked for it), `loads` (by which parameters of a Contact it may be pressed: all its
+    forces are proportional to them), `chosen` (numbers that are not fitted), `memory_units`.
+    """
 
     @property
     def memory(self) -> Mapping[str, Row]:
@@ -107,23 +111,9 @@ class Rigid:
         return "back", "stuck", "forward"
 
 
-def finite(name: str, value: float, *, unit: str, positive: bool = False, signed: bool = False) -> float:
-    """`value`, if the parameter can have it: finite, and not negative unless `signed`, not zero if `positive`."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise ModelError(f"{name} = {value!r}", f"{name} is a number [{unit}]", f"correct {name}=") from None
-    if not math.isfinite(number) or (number < 0 and not signed) or (number == 0 and positive):
-        rule = (
-            "is a finite number" if signed else "is finite and positive" if positive else "is finite and not negative"
-        )
-        raise ModelError(f"{name} = {value} {unit}", f"{name} {rule}", f"correct {name}=")
-    return number
-
-
 def static_level(static: float | None, kinetic: float) -> float:
     """The break-away force [N]: `static` where given, else the kinetic level."""
-    level = kinetic if static is None else finite("static", static, unit="N")
+    level = kinetic if static is None else float(static)
     if level < kinetic:
         raise ModelError(
             f"static = {level:.6g} N below kinetic = {kinetic:.6g} N",

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
-from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+import numpy as np
+
+from stickslip.laws.base import Exit, Mode, Row, static_level
 from stickslip.laws.coulomb import held_until
+from stickslip.laws.guessing import GRID, STIFFEST, Array, Family, Hypothesis, Observed, Searched, share
+from stickslip.parameters import parameter, parametric
+
+HARDEST, SOFTEST = 3000.0, 3.0  # of a guess, against the spring that its friction bends over the stroke
+LIGHT = 0.02  # damping of a guess over sqrt(stiffness * mass): a hundredth of the critical
 
 
-@dataclass(frozen=True)
+@parametric
 class CompliantContact:
     r"""Coulomb friction through a massless contact of stiffness :math:`K_y` and damping :math:`c`.
 
@@ -19,21 +25,6 @@ class CompliantContact:
     :math:`|f|` reaches `static`; slip then goes in the direction of f. Should the mass move against that direction
     (possible only with much damping; it does not happen in the thesis's cases), friction keeps its sign until the
     velocity has reversed and come back to zero.
-
-    Attributes
-    ----------
-    kinetic : float
-        Friction force while sliding [N].
-    stiffness : float
-        Tangential contact stiffness [N/m].
-    damping : float
-        Damping coefficient of the contact [N s/m].
-    static : float or None
-        Friction force at which microstick ends [N]; None: as `kinetic`.
-    rule : {"literal", "consistent"}
-        "literal": during slip the contact stays at its full deflection :math:`f_k/K_y`, as the thesis has it.
-        "consistent": a Kelvin-Voigt contact whose deflection relaxes in slip, :math:`c\dot y + K_y y = \pm f_k`;
-        it sticks when the slider's velocity :math:`\dot x - \dot y` vanishes. Equal where c is zero.
 
     Raises
     ------
@@ -47,19 +38,42 @@ class CompliantContact:
     {'x': 1.0}
     """
 
-    kinetic: float
-    stiffness: float
-    damping: float = 0.0
-    static: float | None = None
-    rule: str = "literal"
+    label = "Compliant contact"
+    formula = (
+        "f = kinetic sign(v) while sliding; f = stiffness (x - anchor) + damping v from each reversal until |f| = "
+        "static, the anchor then kinetic/stiffness behind"
+    )
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
+
+    kinetic: float = parameter("N", "sliding friction")
+    stiffness: float = parameter("N/m", "contact stiffness", positive=True)
+    damping: float = parameter("N s/m", "contact damping", default=0.0)
+    static: float | None = parameter(
+        "N", "static friction", default=None, note="at which microstick ends; None: as `kinetic`"
+    )
+    rule: str = parameter(
+        "",
+        "how the contact moves in slip",
+        default="literal",
+        choices=("literal", "consistent"),
+        note='"literal": it stays at its full deflection :math:`f_k/K_y`, as the thesis has it; "consistent": a '
+        r"Kelvin-Voigt contact whose deflection relaxes, :math:`c\dot y + K_y y = \pm f_k`, and which sticks when the "
+        r"slider's velocity :math:`\dot x - \dot y` vanishes; equal where c is zero",
+    )
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N")
-        finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        finite("damping", self.damping, unit="N s/m")
         static_level(self.static, self.kinetic)
-        if self.rule not in ("literal", "consistent"):
-            raise ModelError(f"rule = '{self.rule}'", "the rule is 'literal' or 'consistent'", "choose one of the two")
+
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """A contact that gives way."""
+        return (Hypothesis("compliant", Family("compliant", "that of a compliant contact"), guesses, _from_coulomb),)
+
+    def own_formula(self) -> str:
+        """The formula, with how the contact moves in slip by this rule."""
+        if self.rule == "literal":
+            return self.formula
+        return f"{self.formula}; while sliding the deflection (x - anchor) relaxes as stiffness and damping let it"
 
     @property
     def memory(self) -> Mapping[str, Row]:
@@ -97,3 +111,37 @@ class CompliantContact:
 
 
 _NAMES = {-1: "back", 1: "forward"}
+
+
+def guesses(seen: Observed) -> list[CompliantContact]:
+    """The spring that the friction bends where it turns, and what is left of it in phase with the speed."""
+    stiffest = 2 * seen.level * HARDEST / float(np.ptp(np.cumsum(seen.slip)))
+    stiffness = np.geomspace(stiffest * SOFTEST / HARDEST, stiffest, 2 * GRID)
+    tried = []
+    for k, force in zip(stiffness, _elastoplastic(seen, stiffness).T, strict=True):
+        held = np.abs(force) < seen.level * (1 - 1e-9)
+        damping = share(seen.speed[held], (seen.friction - force)[held])
+        modelled = np.where(held, force + damping * seen.speed, force)
+        # a number that is zero is not fitted: a loss that the friction does not show is begun small
+        damping = max(damping, LIGHT * math.sqrt(float(k) * seen.mass))
+        tried.append((seen.left(modelled), CompliantContact(seen.level, stiffness=float(k), damping=damping)))
+    return [min(tried, key=lambda each: each[0])[1]]
+
+
+def _from_coulomb(simpler: Mapping[str, Searched]) -> list[CompliantContact]:
+    """A contact next to rigid."""
+    if "Coulomb" not in simpler:
+        return []
+    rigid = simpler["Coulomb"]
+    stiffness = rigid.law.kinetic / (STIFFEST * float(rigid.scales[:, 0].max()))
+    return [CompliantContact(rigid.law.kinetic, stiffness=stiffness, damping=0.2 * math.sqrt(stiffness * rigid.mass))]
+
+
+def _elastoplastic(seen: Observed, stiffness: Array) -> Array:
+    """Force of springs that yield at the level, one column each."""
+    force = np.empty((len(seen.slip), len(stiffness)))
+    now = np.zeros(len(stiffness))
+    for row, slip in zip(force, seen.slip, strict=True):
+        row[:] = now
+        now = np.clip(now + stiffness * slip, -seen.level, seen.level)
+    return force

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from stickslip.laws.base import Exit, Mode, Rigid, static_level
+from stickslip.laws.guessing import LITTLE, RIGID, Hypothesis
+from stickslip.parameters import parameter, parametric
 
-from stickslip.laws.base import Exit, Mode, Rigid, finite, static_level
 
-
-@dataclass(frozen=True)
+@parametric
 class Coulomb(Rigid):
     r"""Rigid dry friction: :math:`f = f_k\,\mathrm{sgn}\,v` in slip, :math:`|f| \le f_s` in stick.
 
     A slip that comes to rest passes through the stuck mode; where the holding force would exceed `static` it goes on
     at once, in the direction of that force.
-
-    Attributes
-    ----------
-    kinetic : float
-        Friction force while sliding [N].
-    static : float or None
-        Largest friction force while stuck [N]; None: as `kinetic`.
 
     Raises
     ------
@@ -32,21 +25,46 @@ class Coulomb(Rigid):
     ['back', 'stuck', 'forward']
     """
 
-    kinetic: float
-    static: float | None = None
+    label = "Coulomb: rigid contact"
+    formula = "f = kinetic sign(v) while sliding, |f| <= static at rest"
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
+
+    kinetic: float = parameter("N", "sliding friction")
+    static: float | None = parameter("N", "static friction", default=None, note="None: as `kinetic`")
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N")
         static_level(self.static, self.kinetic)
+
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """One level of friction; and static friction above it."""
+        return (
+            Hypothesis("Coulomb", RIGID, lambda seen: [cls(seen.level)]),
+            Hypothesis(
+                "static",
+                RIGID,
+                lambda seen: [_exceeding(seen.level, seen.excess)],
+                lambda simpler: [_exceeding(simpler["Coulomb"].law.kinetic, LITTLE)] if "Coulomb" in simpler else [],
+                holds=lambda law: law.static is not None,
+            ),
+        )
+
+    @property
+    def breakaway(self) -> float:
+        """Largest friction force while stuck [N]."""
+        return static_level(self.static, self.kinetic)
 
     def modes(self) -> tuple[Mode, ...]:
         """Slip on either side, and stick."""
-        level = static_level(self.static, self.kinetic)
         return (
             Mode("back", "slip", -1, {"1": -self.kinetic}, (Exit({"v": 1.0}, "stuck"),)),
-            Mode("stuck", "stick", 0, None, held_until(level)),
+            Mode("stuck", "stick", 0, None, held_until(self.breakaway)),
             Mode("forward", "slip", 1, {"1": self.kinetic}, (Exit({"v": -1.0}, "stuck"),)),
         )
+
+
+def _exceeding(level: float, excess: float) -> Coulomb:
+    return Coulomb(level, static=(1 + excess) * level)
 
 
 def held_until(level: float, *, back: str = "back", forward: str = "forward") -> tuple[Exit, Exit]:

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import ClassVar
 
-from stickslip.laws.base import Row, finite
+from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class Dahl(Sliding):
     r"""Friction by :math:`\dot f = \sigma_0 v\,(1 - (f/f_k)\,\mathrm{sgn}\,v)^n` (Dahl, Aerospace TOR-0158, 1968).
 
     Friction depends on the way, not on the speed. Where n is not whole, the parenthesis must stay positive: it does on
     every motion that starts with :math:`|f| < f_k`.
-
-    Attributes
-    ----------
-    kinetic : float
-        f_k [N], the level of sliding.
-    stiffness : float
-        sigma_0 [N/m], slope at f = 0.
-    exponent : float
-        n; 1 where left out.
 
     Raises
     ------
@@ -36,14 +28,14 @@ class Dahl(Sliding):
     ['back', 'forward']
     """
 
-    kinetic: float
-    stiffness: float
-    exponent: float = 1.0
+    label = "Dahl"
+    formula = "f' = stiffness v (1 - (f/kinetic) sign(v))^exponent"
+    memory_units: ClassVar[Mapping[str, str]] = {"force_state": "N"}
+    chosen = ("exponent",)  # not fitted where nothing else is said
 
-    def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N", positive=True)
-        finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        finite("exponent", self.exponent, unit="", positive=True)
+    kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
+    stiffness: float = parameter("N/m", "contact stiffness", positive=True, note="sigma_0, the slope at f = 0")
+    exponent: float = parameter("1", "exponent", default=1.0, positive=True, note="n")
 
     @property
     def memory(self) -> Mapping[str, Row]:

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Mode, Row, finite
+from stickslip.laws.base import Exit, Mode, Row
+from stickslip.parameters import finite, parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class ElastoSlip:
     """Parallel elements, each a spring in series with a Coulomb slider; one element is a Jenkins element.
 
     Elements yield in the order of their yield displacement f/k. From the virgin start (all springs relaxed) this
     order holds on every branch for ever, so n elements need 2 n + 1 modes.
-
-    Attributes
-    ----------
-    stiffnesses : tuple of float
-        Spring of each element [N/m].
-    forces : tuple of float
-        Yield force of each element [N].
 
     Examples
     --------
@@ -30,8 +23,12 @@ class ElastoSlip:
     (21, 15.0)
     """
 
-    stiffnesses: Sequence[float]
-    forces: Sequence[float]
+    label = "Elasto-slip elements"
+    formula = "f = sum of elements, each a spring of its stiffness that slips at its force"
+    loads = ("preload",)  # of a contact: its levels are proportional to a steady load
+
+    stiffnesses: Sequence[float] = parameter("N/m", "stiffnesses", positive=True, note="the spring of every element")
+    forces: Sequence[float] = parameter("N", "yield forces", positive=True, note="one of every element")
 
     def __post_init__(self) -> None:
         if len(self.stiffnesses) != len(self.forces) or len(self.forces) == 0:
@@ -40,9 +37,6 @@ class ElastoSlip:
                 "one of each an element",
                 "complete it",
             )
-        for k, f in zip(self.stiffnesses, self.forces, strict=True):
-            finite("stiffnesses", k, unit="N/m", positive=True)
-            finite("forces", f, unit="N", positive=True)
         pairs = sorted(
             zip(map(float, self.stiffnesses), map(float, self.forces), strict=True), key=lambda p: p[1] / p[0]
         )

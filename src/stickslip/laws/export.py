@@ -12,11 +12,11 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.c_code import c_code, modes_of
 from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.curved import CurvedLaw, lifted, symbol
-from stickslip.laws.formula import Formula
+from stickslip.laws.curved import CurvedLaw, lifted
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.lugre import LuGre
 from stickslip.laws.python_code import python_code
+from stickslip.laws.register import registered
 from stickslip.laws.rough import RoughSurface
 from stickslip.laws.stribeck import FrictionCurve
 from stickslip.laws.tabulated import Tabulated
@@ -26,32 +26,6 @@ from stickslip.settings import nearest
 
 TABLE = 33  # points of a curve over the speed, where a program takes a table
 WIDE, FASTEST = 10.0, 1.0  # it goes to ten times the law's own speed, or to 1 m/s where it has none
-FORMULAS = {
-    "Coulomb": "f = kinetic sign(v) while sliding, |f| <= static at rest",
-    "LinearSlope": "f = kinetic sign(v) + slope v while sliding, |f| <= static at rest",
-    "Stribeck": "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + viscous v while sliding, "
-    "|f| <= static at rest",
-    "Tabulated": "f = F(|v|) sign(v) while sliding, F a polygon through forces at speeds, level beyond the last; "
-    "|f| <= static at rest",
-    "FrictionCurve": "f = F(|v|) sign(v) while sliding, |f| <= static at rest",
-    "PositionLoad": "f = (kinetic + gradient x) sign(v) where that load is positive, else no contact",
-    "CompliantContact": "f = kinetic sign(v) while sliding; f = stiffness (x - anchor) + damping v from each reversal "
-    "until |f| = static, the anchor then kinetic/stiffness behind",
-    "InertialContact": "f = stiffness (x - y) + damping (x' - y'), mass y'' = f - kinetic sign(y')",
-    "ElastoSlip": "f = sum of elements, each a spring of its stiffness that slips at its force",
-    "StateVariable": "f = theta, theta' = -kinetic rate (theta - level sign(v)), level = kinetic, 1 where printed is "
-    "true; steepness v for sign(v) near rest where it has a steepness",
-    "SmoothStateVariable": "f = theta, theta' = -kinetic rate (theta - level tanh(steepness v)), level = kinetic, "
-    "1 where printed is true",
-    "Dahl": "f' = stiffness v (1 - (f/kinetic) sign(v))^exponent",
-    "LuGre": "f = stiffness z + damping z' + viscous v, z' = v - stiffness |v| z / g, "
-    "g = kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)",
-    "RateState": "f = direct normal asinh(v/(2 reference) exp((friction + evolution "
-    "ln(reference age/distance))/direct)), age' = 1 - |v| age/distance (aging) or "
-    "-(|v| age/distance) ln(|v| age/distance) (slip)",
-    "InSeries": "a slider without mass under the law, tied to the mass by f = stiffness (x - y) + damping (x' - y')",
-    "TimeDelay": "f = F(|v(t - lag)|) sign(v) while sliding, F of the law",
-}
 
 
 def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
@@ -106,21 +80,15 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
     return FORMATS[format](law).rstrip("\n") + "\n" * (format == "c")
 
 
-def formula_of(law: Law | CurvedLaw) -> str:
+def formula_of(law: Any) -> str:
     """The law's friction in the names of its parameters."""
-    if not _of_package(law):
+    if not _registered(law):
         return _formula_of_modes(law)
-    told = FORMULAS[type(law).__name__]
+    told: str = law.own_formula() if hasattr(law, "own_formula") else law.formula
     if getattr(law, "static", "") is None:  # a parameter that is not there is not named
         told = told.replace("static", "kinetic" if hasattr(law, "kinetic") else "F(0)")
-    if getattr(law, "steepness", "") is None:
-        told = told.partition("; steepness")[0]
-    if getattr(law, "rule", "") == "consistent":
-        told += "; while sliding the deflection (x - anchor) relaxes as stiffness and damping let it"
-    if isinstance(law, FrictionCurve):
-        told += f", F = {_curve_text(law)}"
     inner = getattr(law, "law", None)
-    return f"{told}; {formula_of(inner)}" if is_dataclass(inner) else told  # type: ignore[arg-type]
+    return f"{told}; {formula_of(inner)}" if is_dataclass(inner) else told
 
 
 def _is_law(law: object) -> bool:
@@ -134,9 +102,9 @@ def _nested(law: Any) -> Iterator[Any]:
         law = getattr(law, "law", None)
 
 
-def _of_package(law: object) -> bool:
-    """Whether it is a law of this package, by more than its name."""
-    return type(law).__name__ in FORMULAS and type(law).__module__.startswith(f"{__package__}.")
+def _registered(law: object) -> bool:
+    """Whether it is the law that its name means."""
+    return registered().get(type(law).__name__) is type(law)
 
 
 def _formula_of_modes(law: Law | CurvedLaw) -> str:
@@ -149,27 +117,18 @@ def _formula_of_modes(law: Law | CurvedLaw) -> str:
     return "; ".join(told)
 
 
-def breakaway_of(law: Law | CurvedLaw) -> float | None:
-    """Largest friction at rest [N], of a law that has one."""
-    if isinstance(law, Coulomb):
-        return float(law.kinetic if law.static is None else law.static)
-    return float(law.breakaway) if isinstance(law, SpeedCurve) else None
-
-
-def _curve_text(law: FrictionCurve) -> str:
-    return law.curve.text if isinstance(law.curve, Formula) else written(law.curve(symbol("v")))
-
-
 def _values(law: object) -> Iterator[tuple[str, Any]]:
     for field in fields(law) if is_dataclass(law) else ():
         value = getattr(law, field.name)
         if value is not None:
-            yield field.name, _curve_text(law) if field.name == "curve" and isinstance(law, FrictionCurve) else value
+            yield field.name, law.text if isinstance(law, FrictionCurve) and field.name == "curve" else value
 
 
 def _toml(law: Law | CurvedLaw) -> str:
-    if strange := [type(part).__name__ for part in _nested(law) if not _of_package(part)]:
-        raise ModelError(f"a {strange[0]}", f"a system's file names one of {', '.join(FORMULAS)}", "export Python or C")
+    if strange := [type(part).__name__ for part in _nested(law) if not _registered(part)]:
+        raise ModelError(
+            f"a {strange[0]}", f"a system's file names one of {', '.join(registered())}", "export Python or C"
+        )
     return f"# {remark(formula_of(law))}\n{toml_table('law', law)}"
 
 
@@ -189,7 +148,7 @@ def _toml_value(value: Any) -> str:
 
 
 def _python(law: Law | CurvedLaw) -> str:
-    return python_code(law, formula_of(law), breakaway_of(law))
+    return python_code(law, formula_of(law), getattr(law, "breakaway", None))
 
 
 def _flat(law: object, within: str = "") -> Iterator[tuple[str, Any]]:

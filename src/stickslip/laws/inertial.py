@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import ClassVar
 
-from stickslip.laws.base import Exit, Mode, Row, finite, static_level
+from stickslip.laws.base import Exit, Mode, Row, static_level
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class InertialContact:
     r"""A contact with a mass of its own: spring and damper to the slider, Coulomb friction to the counter-face.
 
     :math:`m_c\ddot y = K_y(x-y) + c(\dot x-\dot y) - f_k\,\mathrm{sgn}\,\dot y`; the slider feels
     :math:`f = K_y(x-y) + c(\dot x-\dot y)` (thesis, equation 4.3, with the imposed motion replaced by the slider's).
-
-    Attributes
-    ----------
-    kinetic : float
-        Friction force under the contact while it slides [N].
-    stiffness : float
-        Contact stiffness [N/m].
-    mass : float
-        Mass of the contact [kg].
-    damping : float
-        Damping of the contact [N s/m].
-    static : float or None
-        Largest friction force while the contact holds [N]; None: as `kinetic`.
 
     Examples
     --------
@@ -34,17 +22,20 @@ class InertialContact:
     ['stretch', 'u']
     """
 
-    kinetic: float
-    stiffness: float
-    mass: float
-    damping: float = 0.0
-    static: float | None = None
+    label = "Contact with inertia"
+    formula = "f = stiffness (x - y) + damping (x' - y'), mass y'' = f - kinetic sign(y')"
+    memory_units: ClassVar[Mapping[str, str]] = {"stretch": "m", "u": "m/s"}
+    loads = ("preload",)  # of a contact: its levels are proportional to a steady load
+
+    kinetic: float = parameter("N", "sliding friction", note="under the contact")
+    stiffness: float = parameter("N/m", "contact stiffness", positive=True)
+    mass: float = parameter("kg", "contact mass", positive=True)
+    damping: float = parameter("N s/m", "contact damping", default=0.0)
+    static: float | None = parameter(
+        "N", "static friction", default=None, note="under the contact while it holds; None: as `kinetic`"
+    )
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N")
-        finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        finite("mass", self.mass, unit="kg", positive=True)
-        finite("damping", self.damping, unit="N s/m")
         static_level(self.static, self.kinetic)
 
     @property

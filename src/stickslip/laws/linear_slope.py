@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from stickslip.laws.base import Exit, Mode, Rigid, finite, static_level
+from stickslip.laws.base import Exit, Mode, Rigid, static_level
 from stickslip.laws.coulomb import held_until
 from stickslip.laws.curved import Expression
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class LinearSlope(Rigid):
     r"""Rigid contact with :math:`f = f_k\,\mathrm{sgn}\,v + s\,v` in slip, :math:`|f| \le f_s` in stick.
-
-    Attributes
-    ----------
-    kinetic : float
-        Friction force at vanishing speed [N].
-    slope : float
-        s [N s/m]; negative: friction falls with speed and feeds vibration.
-    static : float or None
-        Largest friction force while stuck [N]; None: as `kinetic`.
 
     Examples
     --------
@@ -29,13 +20,17 @@ class LinearSlope(Rigid):
     {'1': 1.0, 'v': -0.2}
     """
 
-    kinetic: float
-    slope: float
-    static: float | None = None
+    label = "Friction linear in speed"
+    formula = "f = kinetic sign(v) + slope v while sliding, |f| <= static at rest"
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
+
+    kinetic: float = parameter("N", "sliding friction", note="at vanishing speed")
+    slope: float = parameter(
+        "N s/m", "slope over the speed", signed=True, note="s; negative: friction falls with speed and feeds vibration"
+    )
+    static: float | None = parameter("N", "static friction", default=None, note="None: as `kinetic`")
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N")
-        finite("slope", self.slope, unit="N s/m", signed=True)
         static_level(self.static, self.kinetic)
 
     @property

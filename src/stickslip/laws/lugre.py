@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import ClassVar
 
-from stickslip.laws.base import Row, finite
+import numpy as np
+
+from stickslip.laws import compliant
+from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol
+from stickslip.laws.guessing import (
+    FALLS,
+    LEAST_EXCESS,
+    LITTLE,
+    SPEEDS,
+    STIFF,
+    Array,
+    Family,
+    Hypothesis,
+    Observed,
+    Searched,
+)
 from stickslip.laws.stribeck import require_static_above, stribeck_curve
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class LuGre(Sliding):
     r"""Friction of bristles (Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40, 1995).
 
     .. math:: f = \sigma_0 z + \sigma_1 \dot z + \sigma_2 v, \quad \dot z = v - \sigma_0 |v| z / g(v), \quad
               g = f_k + (f_s - f_k) e^{-(|v|/v_s)^\delta}
-
-    Attributes
-    ----------
-    kinetic, static : float
-        f_k and f_s [N], the levels of fast and of slowest sliding.
-    speed : float
-        v_s [m/s], the Stribeck speed.
-    stiffness : float
-        sigma_0 [N/m].
-    damping : float
-        sigma_1 [N s/m].
-    viscous : float
-        sigma_2 [N s/m].
-    exponent : float
-        delta; 2 where left out.
 
     Raises
     ------
@@ -44,23 +46,29 @@ class LuGre(Sliding):
     1.184339721
     """
 
-    kinetic: float
-    static: float
-    speed: float
-    stiffness: float
-    damping: float = 0.0
-    viscous: float = 0.0
-    exponent: float = 2.0
+    label = "LuGre: bristles"
+    formula = (
+        "f = stiffness z + damping z' + viscous v, z' = v - stiffness |v| z / g, g = kinetic + (static - kinetic) "
+        "exp(-(|v|/speed)^exponent)"
+    )
+    memory_units: ClassVar[Mapping[str, str]] = {"bristle": "m"}
+    chosen = ("exponent",)  # not fitted where nothing else is said
+
+    kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k, of fast sliding")
+    static: float = parameter("N", "static friction", positive=True, note="f_s, of slowest sliding")
+    speed: float = parameter("m/s", "Stribeck speed", positive=True, note="v_s")
+    stiffness: float = parameter("N/m", "contact stiffness", positive=True, note="sigma_0, of the bristles")
+    damping: float = parameter("N s/m", "contact damping", default=0.0, note="sigma_1, of the bristles")
+    viscous: float = parameter("N s/m", "viscous friction", default=0.0, note="sigma_2")
+    exponent: float = parameter("1", "exponent", default=2.0, positive=True, note="delta")
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N", positive=True)
-        finite("static", self.static, unit="N", positive=True)
-        finite("speed", self.speed, unit="m/s", positive=True)
-        finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        finite("damping", self.damping, unit="N s/m")
-        finite("viscous", self.viscous, unit="N s/m")
-        finite("exponent", self.exponent, unit="", positive=True)
         require_static_above(self)
+
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """Bristles."""
+        return (Hypothesis("LuGre", Family("LuGre", "that of bristles (LuGre)"), _guesses, _from_simpler),)
 
     @property
     def memory(self) -> Mapping[str, Row]:
@@ -92,3 +100,45 @@ class LuGre(Sliding):
             force = self.stiffness * z + self.damping * rate + self.viscous * v
             modes.append(CurvedMode(name, "slip", side, force, (turn,), {"bristle": rate}))
         return tuple(modes)
+
+
+def _guesses(seen: Observed) -> list[LuGre]:
+    """The bristles whose bending under the measured sliding follows the friction best."""
+    contact = compliant.guesses(seen)[0]
+    mesh = np.meshgrid(
+        contact.stiffness * np.array([1.0, 1.5, 2.5]), seen.fastest * np.geomspace(*SPEEDS, 6),
+        np.array([LEAST_EXCESS, 0.1, 0.2, 0.35, 0.6])
+    )  # fmt: skip
+    stiffness, speed, excess = (values.ravel() for values in mesh)
+    force = _bristles(seen, stiffness, speed, excess)
+    best = int(np.argmin(np.mean((force - seen.friction[:, None]) ** 2, axis=0)))
+    static = seen.level * (1 + float(excess[best]))
+    return [
+        LuGre(seen.level, static, speed=float(speed[best]), stiffness=float(stiffness[best]), damping=contact.damping)
+    ]
+
+
+def _from_simpler(simpler: Mapping[str, Searched]) -> list[LuGre]:
+    """The Stribeck curve with bristles next to rigid, where the contact is; else the contact with a steep curve."""
+    contact, curve = simpler.get("compliant"), simpler.get("Stribeck")
+    if contact is not None and not contact.stiff:
+        held, speed = contact.law, FALLS[-1] * float(contact.scales[:, 1].max())
+        static = (1 + LITTLE) * held.kinetic
+        return [LuGre(held.kinetic, static, speed=speed, stiffness=held.stiffness, damping=held.damping)]
+    if contact is None or curve is None:
+        return []
+    law = curve.law
+    stiffness = 2 * law.kinetic / (STIFF * float(curve.scales[:, 0].min()))
+    damping = 0.2 * math.sqrt(stiffness * curve.mass)
+    return [LuGre(law.kinetic, law.static, speed=law.speed, stiffness=stiffness, damping=damping)]
+
+
+def _bristles(seen: Observed, stiffness: Array, speed: Array, excess: Array) -> Array:
+    """Force of bristles without damping, one column each; an implicit step, since sliding bends them stiffly."""
+    force = np.empty((len(seen.slip), len(stiffness)))
+    now = np.zeros(len(stiffness))
+    levels = seen.level * (1 + excess * np.exp(-((seen.speed[:, None] / speed) ** 2)))
+    for row, slip, level in zip(force, seen.slip, levels, strict=True):
+        row[:] = now
+        now = (now + stiffness * slip) / (1 + stiffness * abs(slip) / level)
+    return force

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from stickslip.laws.base import Exit, Mode, Rigid
+from stickslip.parameters import parameter, parametric
 
-from stickslip.laws.base import Exit, Mode, Rigid, finite
 
-
-@dataclass(frozen=True)
+@parametric
 class PositionLoad(Rigid):
     r"""Rigid contact with :math:`|f| = n(x)`, :math:`n(x) = f_k + g\,x` where positive, else the contact is lifted.
 
     The oscillator of Feeny and Moon: chaotic under a harmonic drive.
-
-    Attributes
-    ----------
-    kinetic : float
-        Friction force at x = 0 [N].
-    gradient : float
-        g [N/m].
 
     Examples
     --------
@@ -26,12 +18,11 @@ class PositionLoad(Rigid):
     {'1': 1.0, 'x': 1.5}
     """
 
-    kinetic: float
-    gradient: float
+    label = "Load that varies with position"
+    formula = "f = (kinetic + gradient x) sign(v) where that load is positive, else no contact"
 
-    def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N")
-        finite("gradient", self.gradient, unit="N/m", signed=True)
+    kinetic: float = parameter("N", "sliding friction", note="at x = 0")
+    gradient: float = parameter("N/m", "gradient of the load", signed=True, note="g")
 
     def modes(self) -> tuple[Mode, ...]:
         """Slip and flight on either side, and stick."""

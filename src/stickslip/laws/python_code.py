@@ -49,7 +49,7 @@ def python_code(law: Law | CurvedLaw, formula: str, breakaway: float | None) -> 
     """The law's friction: of the speed, where that alone tells it, or of a contact that is led step by step."""
     modes = modes_of(law)
     alone = breakaway is not None and [mode.name for mode in modes] == OVER_SPEED
-    body = _function(modes, breakaway or 0.0) if alone else _class(law, modes)
+    body = _function(modes, float(breakaway or 0.0)) if alone else _class(law, modes)
     used = [name for name in OTHERS if re.search(rf"\b{name}\b", body)]
     functions = [name for name in FUNCTIONS if re.search(rf"\b{name}\(", body)]
     head = [

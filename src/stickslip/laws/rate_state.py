@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import ClassVar
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Row, finite
+from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, asinh, either_side, exp, log, symbol
+from stickslip.parameters import finite, parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class RateState(Sliding):
     r"""Friction by speed and age (Dieterich 1979, Ruina 1983), regular at rest (Rice and Ben-Zion, PNAS 93, 1996).
 
@@ -22,21 +23,6 @@ class RateState(Sliding):
 
     For speeds above :math:`V_0 e^{-\mu_0/a}` this is :math:`N[\mu_0 + a \ln(v/V_0) + b \ln(V_0\theta/D_c)]` to
     rounding.
-
-    Attributes
-    ----------
-    normal : float
-        N [N], the normal load.
-    friction : float
-        mu_0, the coefficient at the reference speed.
-    direct, evolution : float
-        a and b.
-    distance : float
-        D_c [m], the way over which the contact renews itself.
-    reference : float
-        V_0 [m/s], the reference speed.
-    law : {"aging", "slip"}
-        How the age evolves.
 
     Raises
     ------
@@ -50,23 +36,22 @@ class RateState(Sliding):
     0.588487075
     """
 
-    normal: float
-    friction: float
-    direct: float
-    evolution: float
-    distance: float
-    reference: float
-    law: str = "aging"
+    label = "Rate and state"
+    formula = (
+        "f = direct normal asinh(v/(2 reference) exp((friction + evolution ln(reference age/distance))/direct)), "
+        "age' = 1 - |v| age/distance (aging) or -(|v| age/distance) ln(|v| age/distance) (slip)"
+    )
+    memory_units: ClassVar[Mapping[str, str]] = {"age": "s"}
+
+    normal: float = parameter("N", "normal load", positive=True, note="N")
+    friction: float = parameter("1", "coefficient of friction", positive=True, note="mu_0, at the reference speed")
+    direct: float = parameter("1", "direct effect", positive=True, note="a")
+    evolution: float = parameter("1", "evolution effect", note="b")
+    distance: float = parameter("m", "critical distance", positive=True, note="D_c: the contact renews itself over it")
+    reference: float = parameter("m/s", "reference speed", positive=True, note="V_0")
+    law: str = parameter("", "how the age evolves", default="aging", choices=("aging", "slip"))
 
     def __post_init__(self) -> None:
-        finite("normal", self.normal, unit="N", positive=True)
-        finite("friction", self.friction, unit="", positive=True)
-        finite("direct", self.direct, unit="", positive=True)
-        finite("evolution", self.evolution, unit="")
-        finite("distance", self.distance, unit="m", positive=True)
-        finite("reference", self.reference, unit="m/s", positive=True)
-        if self.law not in ("aging", "slip"):
-            raise ModelError(f"law = '{self.law}'", "the age follows the 'aging' or the 'slip' law", "choose one")
         if self.friction / self.direct > 600:
             raise ModelError(
                 f"friction / direct = {self.friction / self.direct:g}",

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Mode, Row, finite
+from stickslip.laws.base import Exit, Mode, Row
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
+from stickslip.parameters import parameter, parametric
 
 CELLS = 60  # from the middle to either end: a run that starts far out crosses them without time between
 
@@ -27,27 +28,12 @@ class _Over(Mode):
             yield 0, before, self
 
 
-@dataclass(frozen=True)
+@parametric
 class RoughSurface:
     r"""A contact whose friction forces are multiplied by a random profile along the counter-face, :math:`1 + r(x)`.
 
     The profile is a polygon through independent Gaussian values, one in each `length`; beyond `span` it stays as it
     is there. Friction is piecewise linear in x, so that the motion stays a closed form between events.
-
-    Attributes
-    ----------
-    contact : Coulomb or CompliantContact
-        The contact on the even surface.
-    share : float
-        Standard deviation of r along the surface: 0.03 is 3 % of the friction.
-    length : float
-        Distance [m] within which the friction changes.
-    span : float
-        Half the length [m] of the surface, around x = 0.
-    seed : int
-        Which surface: one of the same seed is the same.
-    values : sequence of float, optional
-        The profile 1 + r itself, at equal distances of `length` around x = 0, where it is known.
 
     Raises
     ------
@@ -61,17 +47,24 @@ class RoughSurface:
     (66, True)
     """
 
-    contact: Coulomb | CompliantContact
-    share: float
-    length: float
-    span: float
-    seed: int = 0
-    values: Sequence[float] | None = None
+    chosen = ("seed",)  # not fitted
+
+    contact: Coulomb | CompliantContact = parameter("", "contact on the even surface")
+    share: float = parameter(
+        "1", "unevenness", note="standard deviation of r along the surface: 0.03 is 3 % of the friction"
+    )
+    length: float = parameter("m", "length", positive=True, note="within which the friction changes")
+    span: float = parameter("m", "span", positive=True, note="half the length of the surface, around x = 0")
+    seed: int = parameter("", "which surface", default=0, note="one of the same seed is the same")
+    values: Sequence[float] | None = parameter(
+        "1",
+        "profile",
+        default=None,
+        array=True,
+        note="1 + r itself, at equal distances of `length` around x = 0, where it is known",
+    )
 
     def __post_init__(self) -> None:
-        finite("share", self.share, unit="(ratio)")
-        finite("length", self.length, unit="m", positive=True)
-        finite("span", self.span, unit="m", positive=True)
         if (
             not isinstance(self.contact, Coulomb | CompliantContact)
             or getattr(self.contact, "rule", "") == "consistent"

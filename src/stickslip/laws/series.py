@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Law, Mode, Row, finite
+from stickslip.laws.base import Law, Mode, Row
 from stickslip.laws.curved import CurvedLaw
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class InSeries:
     r"""A law at a slider without mass, tied to the mass by the tangential contact stiffness and damping.
 
@@ -18,15 +19,6 @@ class InSeries:
     for the slider's motion. Where the law is :math:`f = \alpha y + b\dot y + r`, the slider follows
     :math:`(b+c)\,\dot y = K_y x + c\dot x - (K_y+\alpha) y - r`; with b = c = 0 it stands at
     :math:`y = (K_y x - r)/(K_y+\alpha)`. A law holds the slider where it would hold the mass.
-
-    Attributes
-    ----------
-    law : Law
-        Law at the slider; linear modes.
-    stiffness : float
-        K_y [N/m].
-    damping : float
-        c [N s/m]; where the law's friction falls with speed, c must exceed that slope, or a slider without mass jumps.
 
     Raises
     ------
@@ -41,13 +33,19 @@ class InSeries:
     [('back', 'slip'), ('stuck', 'microstick'), ('forward', 'slip')]
     """
 
-    law: Law
-    stiffness: float
-    damping: float = 0.0
+    label = "Slider in series with a spring"
+    formula = "a slider without mass under the law, tied to the mass by f = stiffness (x - y) + damping (x' - y')"
+
+    law: Law = parameter("", "law at the slider", note="of linear modes")
+    stiffness: float = parameter("N/m", "contact stiffness", positive=True, note="K_y")
+    damping: float = parameter(
+        "N s/m",
+        "contact damping",
+        default=0.0,
+        note="c; where the law's friction falls with speed, it must exceed that slope, or a slider without mass jumps",
+    )
 
     def __post_init__(self) -> None:
-        finite("stiffness", self.stiffness, unit="N/m", positive=True)
-        finite("damping", self.damping, unit="N s/m")
         if isinstance(self.law, CurvedLaw):
             raise ModelError(
                 f"{type(self.law).__name__} in series",
@@ -66,6 +64,11 @@ class InSeries:
     def memory(self) -> Mapping[str, Row]:
         """The slider's displacement [m], under the mass at the start, and the law's own memory."""
         return {self.slider: {"x": 1.0}, **self.law.memory}
+
+    @property
+    def memory_units(self) -> Mapping[str, str]:
+        """Of the law's own memory."""
+        return getattr(self.law, "memory_units", {})
 
     @property
     def places(self) -> tuple[str, ...]:

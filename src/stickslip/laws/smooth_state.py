@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import ClassVar
 
-from stickslip.laws.base import Row, finite
+import numpy as np
+
+from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol, tanh
+from stickslip.laws.guessing import GRID, Family, Hypothesis, Observed, share
+from stickslip.parameters import parameter, parametric
+
+RATES = (2.0, 80.0)  # of a guess, over the oscillation's angular frequency
+STEEPEST = 60.0  # of a guess, over the largest speed
 
 
-@dataclass(frozen=True)
+@parametric
 class SmoothStateVariable(Sliding):
     r"""Friction that tracks a smooth backbone: :math:`\dot\theta = -f_k\gamma(\theta - f_k\tanh\alpha v)`.
 
     Thesis, equations 4.1 and 4.2, where the backbone lacks its factor :math:`f_k`; `printed` keeps it out, which
     limits friction to 1 N. The product :math:`f_k\gamma` is the rate.
-
-    Attributes
-    ----------
-    kinetic : float
-        f_k [N].
-    rate : float
-        gamma [1/(N s)].
-    steepness : float
-        alpha [s/m].
-    printed : bool
-        Backbone of 1 N, as printed.
 
     Raises
     ------
@@ -39,15 +35,22 @@ class SmoothStateVariable(Sliding):
     121.0
     """
 
-    kinetic: float
-    rate: float
-    steepness: float
-    printed: bool = False
+    label = "Smooth state variable"
+    formula = (
+        "f = theta, theta' = -kinetic rate (theta - level tanh(steepness v)), level = kinetic, 1 where printed is true"
+    )
+    memory_units: ClassVar[Mapping[str, str]] = {"theta": "N"}
 
-    def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N", positive=True)
-        finite("rate", self.rate, unit="1/(N s)", positive=True)
-        finite("steepness", self.steepness, unit="s/m", positive=True)
+    kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
+    rate: float = parameter("1/(N s)", "rate", positive=True, note="gamma")
+    steepness: float = parameter("s/m", "steepness", positive=True, note="alpha")
+    printed: bool = parameter("", "backbone of 1 N, as printed", default=False)
+
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """Friction that lags."""
+        family = Family("state variable", "that of a state variable, which lags behind the velocity")
+        return (Hypothesis("state variable", family, _guesses),)
 
     @property
     def memory(self) -> Mapping[str, Row]:
@@ -61,3 +64,20 @@ class SmoothStateVariable(Sliding):
         pull = decay * (1.0 if self.printed else self.kinetic)
         rates = {"theta": pull * tanh(self.steepness * v) - decay * theta}
         return tuple(CurvedMode(name, "slip", side, theta, (turn,), rates) for name, side, turn in either_side())
+
+
+def _guesses(seen: Observed) -> list[SmoothStateVariable]:
+    """The rate and steepness whose lagging backbone follows the friction best."""
+    from scipy.signal import lfilter
+
+    step, tried = float(seen.step[0]), []
+    for steepness in np.geomspace(3.0, STEEPEST, GRID) / seen.fastest:
+        backbone = np.tanh(steepness * seen.speed)
+        for rate in seen.frequency * np.geomspace(*RATES, GRID):
+            kept = np.exp(-rate * step)
+            lagging = lfilter([1 - kept], [1, -kept], backbone)
+            level = share(lagging, seen.friction)
+            tried.append((seen.left(level * lagging), level, rate, steepness))
+    _, level, rate, steepness = min(tried)
+    level = max(level, 0.1 * seen.level)
+    return [SmoothStateVariable(level, rate=float(rate) / level, steepness=float(steepness))]

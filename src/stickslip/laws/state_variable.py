@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import ClassVar
 
-from stickslip.laws.base import Exit, Mode, Rigid, Row, finite
+from stickslip.laws.base import Exit, Mode, Rigid, Row
+from stickslip.laws.smooth_state import SmoothStateVariable
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class StateVariable(Rigid):
     r"""Friction that tracks Coulomb's: :math:`\dot\theta = -f_k\gamma(\theta - f_k\,\mathrm{sgn}\,v)`.
 
@@ -16,35 +18,35 @@ class StateVariable(Rigid):
     limits friction to 1 N. The product :math:`f_k\gamma` is the rate. Where velocity and acceleration vanish together
     the mass may be held: :math:`\mathrm{sgn}\,0` takes whatever value between -1 and 1 keeps it at rest.
 
-    Attributes
-    ----------
-    kinetic : float
-        f_k [N].
-    rate : float
-        gamma [1/(N s)].
-    printed : bool
-        Backbone of 1 N, as printed.
-    steepness : float or None
-        alpha [s/m]: the backbone rises as :math:`\alpha v` to its full level instead of jumping, a polygon for the
-        thesis's :math:`\tanh\alpha v`. None: it jumps. The jump makes a strongly damped rest tremble ever faster,
-        without end; a steepness ends that.
-
     Examples
     --------
     >>> [mode.name for mode in StateVariable(1.1, rate=100.0).modes()]
     ['back', 'held', 'forward']
     """
 
-    kinetic: float
-    rate: float
-    printed: bool = False
-    steepness: float | None = None
+    label = "State variable"
+    formula = "f = theta, theta' = -kinetic rate (theta - level sign(v)), level = kinetic, 1 where printed is true"
+    memory_units: ClassVar[Mapping[str, str]] = {"theta": "N"}
 
-    def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N", positive=True)
-        finite("rate", self.rate, unit="1/(N s)", positive=True)
-        if self.steepness is not None:
-            finite("steepness", self.steepness, unit="s/m", positive=True)
+    kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
+    rate: float = parameter("1/(N s)", "rate", positive=True, note="gamma")
+    printed: bool = parameter("", "backbone of 1 N, as printed", default=False)
+    steepness: float | None = parameter(
+        "s/m",
+        "steepness",
+        default=None,
+        positive=True,
+        note=r"alpha: the backbone rises as :math:`\alpha v` to its full level instead of jumping, a polygon for the "
+        r"thesis's :math:`\tanh\alpha v`. None: it jumps. The jump makes a strongly damped rest tremble ever faster, "
+        "without end; a steepness ends that",
+    )
+
+    hypotheses = SmoothStateVariable.hypotheses  # records are asked for its smooth form
+
+    def own_formula(self) -> str:
+        """The formula, with the slope near rest where there is one."""
+        near_rest = "" if self.steepness is None else "; steepness v for sign(v) near rest"
+        return f"{self.formula}{near_rest}"
 
     @property
     def memory(self) -> Mapping[str, Row]:

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Rigid, finite
+from stickslip.laws.base import Exit, Rigid
 from stickslip.laws.coulomb import held_until
 from stickslip.laws.curved import CurvedMode, Expression, exp, symbol
+from stickslip.laws.formula import Formula
+from stickslip.laws.guessing import FALLS, GRID, LEAST_EXCESS, RIGID, SPEEDS, Hypothesis, Observed, Searched
+from stickslip.laws.written import written
+from stickslip.parameters import finite, parameter, parametric
 
 if TYPE_CHECKING:
     from stickslip.laws.lugre import LuGre
 
 Curve = Callable[[Expression], Expression]
+SLIDING = 0.01  # of the largest speed, above which friction tells the curve
 
 
 def slips_and_stick(curve: Curve, level: float) -> tuple[CurvedMode, ...]:
@@ -43,24 +49,11 @@ def require_static_above(law: Stribeck | LuGre) -> None:
         )
 
 
-@dataclass(frozen=True)
+@parametric
 class Stribeck(Rigid):
     r"""Friction that falls with the speed: :math:`f = f_k + (f_s - f_k) e^{-(|v|/v_s)^\delta} + \sigma |v|` in slip.
 
     Stribeck's curve in the form of Bo and Pavelescu (Wear 82, 1982); in stick :math:`|f| \le f_s`, held exactly.
-
-    Attributes
-    ----------
-    kinetic : float
-        f_k [N], the level at high speed.
-    static : float
-        f_s [N], the level at rest.
-    speed : float
-        v_s [m/s], the Stribeck speed.
-    exponent : float
-        delta; 2 is Gauss's curve, 1 Tustin's.
-    viscous : float
-        sigma [N s/m].
 
     Raises
     ------
@@ -73,19 +66,28 @@ class Stribeck(Rigid):
     1.18394
     """
 
-    kinetic: float
-    static: float
-    speed: float
-    exponent: float = 2.0
-    viscous: float = 0.0
+    label = "Stribeck curve"
+    formula = (
+        "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + viscous v while sliding, |f| <= "
+        "static at rest"
+    )
+    chosen = ("exponent",)  # not fitted where nothing else is said
+
+    kinetic: float = parameter("N", "sliding friction", note="f_k, at high speed")
+    static: float = parameter("N", "static friction", note="f_s, the level at rest")
+    speed: float = parameter("m/s", "Stribeck speed", positive=True, note="v_s")
+    exponent: float = parameter(
+        "1", "exponent", default=2.0, positive=True, note="delta; 2 is Gauss's curve, 1 Tustin's"
+    )
+    viscous: float = parameter("N s/m", "viscous friction", default=0.0, note="sigma")
 
     def __post_init__(self) -> None:
-        finite("kinetic", self.kinetic, unit="N")
-        finite("static", self.static, unit="N")
-        finite("speed", self.speed, unit="m/s", positive=True)
-        finite("exponent", self.exponent, unit="", positive=True)
-        finite("viscous", self.viscous, unit="N s/m")
         require_static_above(self)
+
+    @classmethod
+    def hypotheses(cls) -> tuple[Hypothesis, ...]:
+        """Friction that falls with the speed."""
+        return (Hypothesis("Stribeck", RIGID, _guesses, _from_static),)
 
     def _curve(self, speed: Expression) -> Expression:
         return stribeck_curve(self, speed) + self.viscous * speed
@@ -119,16 +121,33 @@ class Stribeck(Rigid):
         return slips_and_stick(self._curve, self.breakaway)
 
 
-@dataclass(frozen=True)
+def _guesses(seen: Observed) -> list[Stribeck]:
+    """The curves that the sliding friction fits best, of three falls that differ: its likelihood has several tops."""
+    sliding = np.abs(seen.speed) > SLIDING * seen.fastest
+    speed, friction = np.abs(seen.speed[sliding]), (seen.friction * np.sign(seen.speed))[sliding]
+    tried = []
+    for fall in seen.fastest * np.geomspace(*SPEEDS, GRID):
+        columns = np.column_stack([np.ones(len(speed)), np.exp(-((speed / fall) ** 2))])
+        (level, excess), left, *_ = np.linalg.lstsq(columns, friction, rcond=None)
+        static = float(level + max(LEAST_EXCESS * level, excess))
+        tried.append((float(left[0]) if len(left) else np.inf, Stribeck(float(level), static, speed=float(fall))))
+    best = min(range(GRID), key=lambda i: tried[i][0])
+    apart = dict.fromkeys((best, max(0, best - GRID // 3), min(GRID - 1, best + GRID // 3)))
+    return [tried[i][1] for i in apart]
+
+
+def _from_static(simpler: Mapping[str, Searched]) -> list[Stribeck]:
+    """A fall that is steep."""
+    if "static" not in simpler:
+        return []
+    law, fastest = simpler["static"].law, float(simpler["static"].scales[:, 1].max())
+    static = max(law.static, 1.02 * law.kinetic)
+    return [Stribeck(law.kinetic, static, speed=share * fastest) for share in FALLS]
+
+
+@parametric
 class FrictionCurve(Rigid):
     """Any smooth curve of friction over the sliding speed, odd in the velocity, with exact sticking.
-
-    Attributes
-    ----------
-    curve : callable
-        Takes the sliding speed as an Expression and returns the friction force [N] as one.
-    static : float or None
-        Largest friction force while stuck [N]; None: the curve at speed 0.
 
     Raises
     ------
@@ -142,8 +161,13 @@ class FrictionCurve(Rigid):
     2.339669
     """
 
-    curve: Curve = field(repr=False)
-    static: float | None = None
+    label = "Any curve over speed"
+    formula = "f = F(|v|) sign(v) while sliding, |f| <= static at rest"
+
+    curve: Curve = parameter(
+        "", "friction over the speed", note="from the sliding speed [m/s] to the force [N], both Expressions"
+    )
+    static: float | None = parameter("N", "static friction", default=None, note="None: the curve at speed 0")
 
     def __post_init__(self) -> None:
         if not (callable(self.curve) and isinstance(self.curve(symbol("v")), Expression)):
@@ -177,6 +201,15 @@ class FrictionCurve(Rigid):
         if not math.isfinite(speed):
             raise ModelError(f"speed = {speed} m/s", "a speed is finite", "correct it")
         return self.curve(symbol("v")).at(v=speed)
+
+    @property
+    def text(self) -> str:
+        """The curve over v as text."""
+        return self.curve.text if isinstance(self.curve, Formula) else written(self.curve(symbol("v")))
+
+    def own_formula(self) -> str:
+        """The formula, with the curve."""
+        return f"{self.formula}, F = {self.text}"
 
     @property
     def breakaway(self) -> float:

@@ -3,33 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Mode, Rigid, finite, static_level
+from stickslip.laws.base import Exit, Mode, Rigid, static_level
 from stickslip.laws.coulomb import held_until
 from stickslip.laws.curved import Expression
+from stickslip.parameters import parameter, parametric
 
 
-@dataclass(frozen=True)
+@parametric
 class Tabulated(Rigid):
     """Rigid contact whose friction follows a polygon over the sliding speed, odd in the velocity.
 
     Beyond the last speed the force stays as it is there.
-
-    Attributes
-    ----------
-    speeds : tuple of float
-        Sliding speeds [m/s], increasing, the first one 0.
-    forces : tuple of float
-        Friction force at each speed [N].
-    static : float or None
-        Largest friction force while stuck [N]; None: the force at speed 0.
-    error : float
-        Largest distance [N] to the smooth curve the table stands for; 0 where the table is the law.
 
     Examples
     --------
@@ -38,10 +27,23 @@ class Tabulated(Rigid):
     (203, 0.000152)
     """
 
-    speeds: Sequence[float]
-    forces: Sequence[float]
-    static: float | None = None
-    error: float = 0.0
+    label = "Table over speed"
+    formula = (
+        "f = F(|v|) sign(v) while sliding, F a polygon through forces at speeds, level beyond the last; |f| <= "
+        "static at rest"
+    )
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
+    chosen = ("error",)  # not fitted where nothing else is said
+
+    speeds: Sequence[float] = parameter("m/s", "sliding speeds", signed=True, note="increasing, the first one 0")
+    forces: Sequence[float] = parameter("N", "friction forces", note="one at each speed")
+    static: float | None = parameter("N", "static friction", default=None, note="None: the force at speed 0")
+    error: float = parameter(
+        "N",
+        "error of the table",
+        default=0.0,
+        note="largest distance to the curve that it stands for; 0: it is the law",
+    )
 
     def __post_init__(self) -> None:
         speeds, forces = tuple(map(float, self.speeds)), tuple(map(float, self.forces))
@@ -55,9 +57,6 @@ class Tabulated(Rigid):
             raise ModelError(
                 "the speeds do not increase from 0", "a friction curve starts at 0 and is sorted", "sort it"
             )
-        for force in forces:
-            finite("forces", force, unit="N")
-        finite("speeds", speeds[-1], unit="m/s")
         static_level(self.static, forces[0])
         object.__setattr__(self, "speeds", speeds)
         object.__setattr__(self, "forces", forces)

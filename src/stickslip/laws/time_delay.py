@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Rigid, finite
+from stickslip.laws.base import Exit, Rigid
 from stickslip.laws.coulomb import held_until
 from stickslip.laws.curved import CurvedMode, symbol
 from stickslip.laws.stribeck import Curve
+from stickslip.parameters import parameter, parametric
 
 DELAYED = "delayed_speed"
 
@@ -38,7 +39,7 @@ class DelayedMode(CurvedMode):
             yield 0, before, self
 
 
-@dataclass(frozen=True)
+@parametric
 class TimeDelay(Rigid):
     r"""Rigid contact with friction of the speed a while ago: :math:`f(t) = F(|v(t-\tau)|)\,\mathrm{sgn}\,v(t)` in slip.
 
@@ -46,13 +47,6 @@ class TimeDelay(Rigid):
     thesis (1.4). The friction-velocity curve F gives the level by the delayed speed; direction and sticking are those
     of the present: a mass that has stopped is held while :math:`|f| \le f_s`, and friction always opposes the slip.
     All velocities are those relative to the counter-face. Before time 0 the mass is taken to have slid as at time 0.
-
-    Attributes
-    ----------
-    law : Stribeck, FrictionCurve, LinearSlope or Tabulated
-        F, with its own break-away force f_s.
-    lag : float
-        tau [s], the time between a change of speed and the answer of the friction.
 
     Raises
     ------
@@ -67,8 +61,17 @@ class TimeDelay(Rigid):
     1.2
     """
 
-    law: SpeedCurve
-    lag: float
+    label = "Friction with a time lag"
+    formula = "f = F(|v(t - lag)|) sign(v) while sliding, F of the law"
+
+    law: SpeedCurve = parameter(
+        "",
+        "friction over the speed",
+        note="of Stribeck, FrictionCurve, LinearSlope or Tabulated, with its break-away force",
+    )
+    lag: float = parameter(
+        "s", "time lag", positive=True, note="tau, from a change of speed to the answer of the friction"
+    )
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, SpeedCurve):
@@ -77,7 +80,6 @@ class TimeDelay(Rigid):
                 "a time lag is that of a law whose friction follows the speed alone",
                 "give a Stribeck, FrictionCurve, LinearSlope or Tabulated",
             )
-        finite("lag", self.lag, unit="s", positive=True)
 
     @property
     def entry(self) -> tuple[str, str, str]:

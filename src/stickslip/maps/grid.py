@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.parameters import UNITS, changed, find, places
+from stickslip.parameters import changed, find
+from stickslip.parameters import unit as unit_of
 from stickslip.solve.tables import System
 
 MOST = 10_000_000  # values along an axis; more fit no memory
@@ -163,9 +164,8 @@ def unit(system: System, name: str) -> str:
     """The unit of a parameter, as far as it is known."""
     if name.startswith(START):
         return {"x": "m", "v": "m/s"}.get(name.removeprefix(START)[:1], "")
-    path = find(system, name)[0]
-    part = type(places(system)[path]).__name__
-    return UNITS.get(f"{part}.{path[-1]}", UNITS.get(path[-1], ""))
+    known = unit_of(system, name)
+    return "" if known == "1" else known
 
 
 def _is_number(value: Any) -> bool:

@@ -14,7 +14,7 @@ from stickslip.maps.bifurcation import Bifurcation
 from stickslip.maps.boundaries import Boundary
 from stickslip.maps.dither import Dither, dithered_friction
 from stickslip.oscillator import Oscillator
-from stickslip.parameters import UNITS
+from stickslip.parameters import unit as unit_of
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -43,13 +43,6 @@ if TYPE_CHECKING:
 
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK, FAINT, SHADE)
 MOST_NAMED = 8  # attractors in a legend
-
-
-def unit_of(system: System, parameter: str) -> str:
-    """The unit of a parameter."""
-    name = parameter.rpartition(".")[2]
-    drive = f"{type(system.drive).__name__}.{name}"
-    return UNITS.get(drive, UNITS.get(name, "1"))
 
 
 @styled
@@ -144,8 +137,7 @@ def _name_regimes(ax: Axes, found: Bifurcation) -> None:
 
 
 def _named(system: System, parameter: str) -> str:
-    unit = unit_of(system, parameter)
-    return axis_label(parameter.replace(".", " ").replace("_", " "), unit)
+    return axis_label(parameter.replace(".", " ").replace("_", " "), unit_of(system, parameter))
 
 
 @styled

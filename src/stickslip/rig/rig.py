@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import finite
 from stickslip.oscillator import Oscillator
+from stickslip.parameters import finite
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
 from stickslip.rig.sensor import Digitiser, Mount, Noise, Sensor

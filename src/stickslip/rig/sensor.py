@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import finite
+from stickslip.parameters import finite
 from stickslip.signals.response import Response, leak, resonance
 
 Array = NDArray[np.float64]

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import finite
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
+from stickslip.parameters import finite
 from stickslip.solve import kernel
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
 from stickslip.solve.interrupts import held_back

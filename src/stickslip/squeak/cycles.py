@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
-from stickslip.laws.base import finite
+from stickslip.parameters import finite
 from stickslip.solve.autonomous import settled_cycle
 from stickslip.solve.energies import EnergyFlow, energy_flow
 from stickslip.solve.poincare import Table, stretch, tables

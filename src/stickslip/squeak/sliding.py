@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, finite
+from stickslip.laws.base import Exit
 from stickslip.laws.curved import lifted, symbol
 from stickslip.oscillator import Oscillator
+from stickslip.parameters import finite
 from stickslip.structure import Contact, Structure
 
 Array = NDArray[np.float64]

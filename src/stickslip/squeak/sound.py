@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, RecordError
-from stickslip.laws.base import finite
+from stickslip.parameters import finite
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
 from stickslip.structure import Structure

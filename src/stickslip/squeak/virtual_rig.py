@@ -9,8 +9,8 @@ import numpy as np
 
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import ModelError
-from stickslip.laws.base import finite
 from stickslip.laws.linear_slope import LinearSlope
+from stickslip.parameters import finite
 from stickslip.structure import Contact, Structure
 
 MASS, STIFFNESS, BEARING = 1.92, 2310.0, 0.0177  # kg, N/m and damping ratio of the linear bearing (sections 2.2, 6.5)

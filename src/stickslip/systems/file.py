@@ -24,15 +24,13 @@ from stickslip.laws.formula import Formula
 from stickslip.laws.stribeck import Curve
 from stickslip.laws.time_delay import SpeedCurve
 from stickslip.oscillator import Oscillator
-from stickslip.parameters import PARTS, UNITS, changed, find, places
+from stickslip.parameters import PARTS, changed, declared, find, places
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
 from stickslip.solve.joint import numbered
 from stickslip.solve.tables import System
 from stickslip.structure import Contact, Structure
 
-# The unit of each parameter of a law or drive; a test holds them to the docstrings.
-STATE_UNITS = {"x": "m", "v": "m/s", "stretch": "m", "u": "m/s", "theta": "N"}
 CYCLES = 20.0  # of a run where nothing is said
 MOST_CYCLES = 1e9  # more would not end, nor be counted
 
@@ -442,8 +440,7 @@ def _kind(factory: type, name: str, on: str = "") -> Any:
         return Annotated[Any, BeforeValidator(functools.partial(_table_of, "law", "{name = 'Coulomb', kinetic = 1}"))]
     if hint is Drive:
         return Annotated[Any, BeforeValidator(functools.partial(_table_of, "drive", "{name = 'Belt', speed = 0.1}"))]
-    unit = UNITS.get(f"{factory.__name__}.{name}", UNITS.get(name, "1"))
-    number = Annotated[float, quantity(unit)]
+    number = Annotated[float, quantity(declared(factory, name).unit or "1")]
     if name == "samples" or hint == Sequence[float]:
         return list[number]
     return {float: number, float | None: number | None}.get(hint, hint)
@@ -470,7 +467,7 @@ def _start_of(system: System) -> type[BaseModel]:
     laws = [contact.law for contact in system.contacts] if isinstance(system, Structure) else [system.law]
     for number, law in enumerate(laws, start=1):
         for name in law.memory:
-            unit = "m" if name in law.places else STATE_UNITS.get(name, "1")
+            unit = "m" if name in law.places else getattr(law, "memory_units", {}).get(name, "1")
             names[f"{name}{number}" if len(laws) > 1 else name] = unit
     known: dict[str, Any] = {name: (Annotated[float, quantity(unit)] | None, None) for name, unit in names.items()}
     known["mode"] = (str | None if isinstance(system, Structure) else Literal[_modes(system)] | None, None)

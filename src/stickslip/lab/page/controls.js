@@ -2,14 +2,9 @@
 import { prefixed, spelled } from "./canvas.js";
 
 const WORDS = {
-  law: { kinetic: "kinetic friction", static: "static friction", stiffness: "contact stiffness", damping: "contact damping", speed: "Stribeck speed", viscous: "viscous part", mass: "contact mass", lag: "time lag", gradient: "gradient of the load" },
-  system: { mass: "mass", stiffness: "spring", damping: "damper", damper: "damper fixed to the", acts_on: "drive acts on" },
-  drive: { contact: "the mass rubs on the", on: "moves the" },
-  contact: { preload: "normal load", stiffness: "normal stiffness", carried: "share of the belt" },
   start: { x: "displacement at the start", v: "velocity at the start" },
   run: { cycles: "cycles", duration: "time" },
 };
-const SHORT = { Coulomb: "Coulomb: rigid contact", CompliantContact: "Compliant contact", LinearSlope: "Friction linear in speed", Tabulated: "Table over speed", StateVariable: "State variable", InertialContact: "Contact with inertia", ElastoSlip: "Elasto-slip elements", PositionLoad: "Load that varies with position", Stribeck: "Stribeck curve", Dahl: "Dahl", LuGre: "LuGre: bristles", RateState: "Rate and state", SmoothStateVariable: "Smooth state variable", FrictionCurve: "Any curve over speed", InSeries: "Slider in series with a spring", TimeDelay: "Friction with a time lag", Release: "Nothing: free decay", HarmonicBase: "Base moves harmonically", HarmonicForce: "Harmonic force", MultiTone: "Several tones", Belt: "Belt at a steady speed", Ramp: "Spring pulled steadily", RecordedBase: "Recorded base motion", SpeedProfile: "Profile of speeds", Dithered: "Drive with dither" };
 const UNITS = { s: "s", x: "m", v: "m/s", duration: "s", cycles: "1" };
 const NOT_DRAWN = new Set(["RecordedBase"]); // needs a file: kept where a state has it
 
@@ -80,7 +75,7 @@ export class Controls {
     Object.assign(label, { htmlFor: id, className: "hidden", textContent: words });
     const choice = field.appendChild(document.createElement("select"));
     choice.id = id;
-    for (const name of Object.keys(known)) if (!NOT_DRAWN.has(name) || name === part.name) choice.add(new Option(SHORT[name] ?? name, name, false, name === part.name));
+    for (const name of Object.keys(known)) if (!NOT_DRAWN.has(name) || name === part.name) choice.add(new Option(known[name].label, name, false, name === part.name));
     const note = field.appendChild(document.createElement("p"));
     note.className = "note";
     note.textContent = known[part.name].about;
@@ -108,7 +103,7 @@ export class Controls {
     const knob = box.appendChild(document.createElement("div")), id = [...path, each.name].join("-");
     knob.className = "knob";
     const label = knob.appendChild(document.createElement("label"));
-    Object.assign(label, { htmlFor: id, textContent: WORDS[kind]?.[each.name] ?? each.name.replaceAll("_", " "), title: each.words });
+    Object.assign(label, { htmlFor: id, textContent: each.label ?? WORDS[kind]?.[each.name] ?? each.name.replaceAll("_", " "), title: each.words });
     this.knobs.set([...path, each.name].join("."), knob);
     return [knob, id, label.textContent];
   }

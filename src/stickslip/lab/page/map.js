@@ -108,13 +108,12 @@ const called = (path) =>
   path.join(" ").replace(/^system /, "").replace("contacts ", "contact ").replaceAll("_", " ");
 // As the library names it: the system's own parameters without their table, contacts counted from one.
 const named = (dotted) => dotted.replace(/^system\./, "").replace(/^contacts\.(\d+)/, (_, j) => `contacts.${+j + 1}`);
-const UNITS = {
-  frequency: "Hz", kinetic: "N", static: "N", mass: "kg", damping: "N s/m", speed: "m/s", viscous: "N s/m",
-};
+// As the library declares it, of the law or drive, the system, or the contact that the parameter belongs to.
 function unitOf(dotted) {
-  const name = dotted.split(".").at(-1), drive = state.drive?.name;
-  if (name === "amplitude") return drive === "HarmonicForce" ? "N" : "m";
-  return UNITS[name] ?? (name === "stiffness" ? "N/m" : "");
+  const path = dotted.split("."), name = path.pop(), kind = path.at(-1), { catalog } = lab;
+  const declared = { law: catalog.laws, drive: catalog.drives }[kind]?.[at(state, path)?.name]
+    ?? (kind === "system" ? catalog.system : catalog.contact);
+  return declared.parameters.find((each) => each.name === name)?.unit ?? "";
 }
 
 // A ratio where the field speaks of one: frequency over the natural, friction over the drive's force.

@@ -33,7 +33,7 @@ export async function start(given) {
   const catalog = await lab.ask("catalog").catch((error) => lab.say(error.message, true));
   clearTimeout(slow);
   if (!catalog) return;
-  lab.boundary = catalog.boundary;
+  Object.assign(lab, { catalog, boundary: catalog.boundary });
   whole(catalog);
   controls = new Controls($("parts"), catalog, (path, since, afresh = false) => {
     changedLast = path;

@@ -1,0 +1,132 @@
+"""Where the search for a law's parameters begins: what a law may ask of measured friction, and how it is then tried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LEAST_EXCESS = 0.03  # of the static friction over the kinetic, at a start
+SPEEDS = (0.02, 0.3)  # of the largest speed: where a Stribeck curve falls
+GRID = 16  # values that are tried of one parameter
+LITTLE = 0.01  # of the kinetic friction, by which the static one exceeds it at a start
+FALLS = (0.01, 0.05)  # of the largest speed, within which a Stribeck curve falls
+STIFF = 1e-2  # of the smallest stroke, by which a contact gives way that counts as rigid where a rigid law does as well
+STIFFEST = 1e-4  # of the stroke: what a contact that is next to rigid gives way
+
+
+class Observed(Protocol):
+    """Sliding and friction of all records, end to end, as the sensors tell them without any law."""
+
+    @property
+    def slip(self) -> Array:
+        """Way from one sample to the next [m]."""
+
+    @property
+    def speed(self) -> Array:
+        """Velocity at the contact [m/s]."""
+
+    @property
+    def friction(self) -> Array:
+        """Friction [N]."""
+
+    @property
+    def step(self) -> Array:
+        """Time to the next sample [s]."""
+
+    @property
+    def level(self) -> float:
+        """Friction of fast sliding [N]."""
+
+    @property
+    def excess(self) -> float:
+        """By what part friction exceeds the level at a release, or at rest."""
+
+    @property
+    def fastest(self) -> float:
+        """The largest speed [m/s]."""
+
+    @property
+    def frequency(self) -> float:
+        """Angular frequency of the motion [rad/s]."""
+
+    @property
+    def mass(self) -> float:
+        """What slides [kg]."""
+
+    def left(self, modelled: Array) -> float:
+        """Mean square of what a modelled friction leaves [N^2]."""
+
+
+class Searched(Protocol):
+    """A law at the end of its search."""
+
+    @property
+    def law(self) -> Any:
+        """With its values."""
+
+    @property
+    def mass(self) -> float:
+        """What slides [kg]."""
+
+    @property
+    def scales(self) -> Array:
+        """Largest way [m] and speed [m/s] of every stretch of a record (n, 2)."""
+
+    @property
+    def stiff(self) -> bool:
+        """Whether its contact is next to rigid."""
+
+
+class Family(NamedTuple):
+    """Laws that many records can not tell apart, and what is said where the friction is one of theirs."""
+
+    name: str
+    said: str
+
+
+RIGID = Family("rigid", "that of a rigid contact")
+
+
+def always(law: Any) -> bool:
+    """Whatever the law's values."""
+    return True
+
+
+def nothing(simpler: Mapping[str, Searched]) -> list[Any]:
+    """No start of a law that contains none of the simpler ones."""
+    return []
+
+
+class Hypothesis(NamedTuple):
+    """A law as :func:`compare_laws` tries it.
+
+    Attributes
+    ----------
+    name : str
+        What it is called there.
+    family : Family
+        With which others it is taken together.
+    guesses : callable
+        Where its search begins, from friction as it was observed.
+    continued : callable
+        Where else: at the end of the search of a simpler law that it contains, what it adds hardly felt.
+    holds : callable
+        Whether a law of the class is this one, by its values.
+    """
+
+    name: str
+    family: Family
+    guesses: Callable[[Observed], list[Any]]
+    continued: Callable[[Mapping[str, Searched]], list[Any]] = nothing
+    holds: Callable[[Any], bool] = always
+
+
+def share(column: Array, values: Array) -> float:
+    """The factor by which a column explains values best."""
+    power = float(column @ column)
+    return float(column @ values) / power if power > 0 else 0.0
