@@ -16,6 +16,7 @@ from stickslip.maps.measures import FAILED, LOG, NO_SYSTEM, ORDERS
 from stickslip.maps.plan import BLOCK, Arrays, Plan
 from stickslip.maps.watch import (
     CONSTANT,
+    LAP,
     MARK,
     ROOM,
     VARIES,
@@ -28,8 +29,7 @@ from stickslip.maps.watch import (
 )
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
-from stickslip.solve.batch import pasts
-from stickslip.solve.glide import Model, Pieces
+from stickslip.solve.glide import Model, Past, Pieces
 from stickslip.solve.kernel import scratch
 from stickslip.solve.phasors import phasors_of
 from stickslip.solve.tables import (
@@ -228,3 +228,10 @@ def rooms(count: int, size: int, physical: int) -> Rooms:
     )  # fmt: skip
     return Rooms(np.zeros((count, *scratch(size, 17).shape)), pasts(count), pieces, np.zeros((count, physical, size)),
                  np.zeros((count, 4, max(size + MARK + 1, log.ENTRIES))))  # fmt: skip
+
+
+def pasts(count: int) -> Past:
+    """The rings of motions before their first pieces."""
+    none = np.full((2, count, LAP), -1, np.int64)
+    return Past(none[0], none[1], np.zeros((count, LAP)), np.ones((count, LAP), np.int64),
+                np.zeros((count, 3), np.int64))  # fmt: skip
