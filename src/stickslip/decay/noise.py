@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from stickslip.decay.counts import add_counts
 from stickslip.decay.drift import restricted
 from stickslip.decay.likelihood import Objective, solve
-from stickslip.decay.search import Blocks, variance
-from stickslip.decay.waveform import normal_equations, sample_motion
+from stickslip.decay.search import variance
+from stickslip.decay.waveform import Blocks, normal_equations, sample_motion
 from stickslip.errors import EstimateError
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
     if kind == "quantised" or (kind is None and left < COARSE * step):
         return Noise(
             "quantised", max(left, 0.3 * step), f"counts of {step:.3g}",
-            lambda n: quantised(samples, n, step, blocks.dt, blocks.order),
+            lambda n: quantised(_single(samples, blocks), n, step),
         )  # fmt: skip
     if kind == "coloured" and len(blocks.means) <= SHORT:
         raise EstimateError(
@@ -103,9 +103,13 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
 
 def _left(samples: Array, blocks: Blocks, n: int, p: Array) -> float:
     """Standard deviation of the samples from a motion; the blocks' would take a count's steady error for more."""
-    values, jacobian = np.empty(len(samples)), np.empty((6, len(samples)))
-    sample_motion(p, n, 1, len(samples), blocks.dt, blocks.order, values, jacobian, np.empty((3, 7, 6)))
+    values, _ = _single(samples, blocks).motion(p, n)
     return float(np.sqrt(np.mean((samples - values) ** 2)))
+
+
+def _single(samples: Array, blocks: Blocks) -> Blocks:
+    """Each sample a block."""
+    return blocks._replace(means=samples, size=1, total=len(samples))
 
 
 def _refined(blocks: Blocks, n: int, p: Array, power: Array) -> Array:
@@ -122,17 +126,18 @@ def white_noise(blocks: Blocks, n: int, variance: float) -> Objective:
         slope, curvature = np.zeros(6), np.eye(6)
         if not (abs(p[1]) < STEEPEST and p[0] > 0):
             return math.inf, slope, curvature
-        squares = normal_equations(p, n, *blocks.data, curvature, slope, work)
+        squares = normal_equations(p, n, blocks, curvature, slope, work)
         return float(squares) / variance, slope / variance, curvature / variance
 
     return objective
 
 
-def quantised(samples: Array, n: int, step: float, dt: float, order: int) -> Objective:
+def quantised(counts: Blocks, n: int, step: float) -> Objective:
     """The likelihood of counts, of six parameters of the motion and the logarithm of the noise.
 
     Counts can not tell less noise than a small share of their step from none: that much is added to it.
     """
+    samples = counts.means
     values, jacobian, work = np.empty(len(samples)), np.empty((6, len(samples))), np.empty((3, 7, 6))
     least = FINEST * step
 
@@ -140,7 +145,7 @@ def quantised(samples: Array, n: int, step: float, dt: float, order: int) -> Obj
         slope, curvature = np.empty(7), np.empty((7, 7))
         if not (abs(p[1]) < STEEPEST and p[0] > 0 and p[6] < 700):
             return math.inf, slope, curvature
-        sample_motion(p[:6], n, 1, len(samples), dt, order, values, jacobian, work)
+        sample_motion(p[:6], n, counts, values, jacobian, work)
         level = math.hypot(math.exp(p[6]), least)
         total = add_counts(values, jacobian, samples, step, level, slope, curvature)
         share, off = (math.exp(p[6]) / level) ** 2, p[6] - math.log(least)
@@ -159,8 +164,7 @@ def _transformed(blocks: Blocks, n: int, p: Array) -> tuple[Array, Array]:
     from scipy.fft import dct
 
     whole = blocks.total // blocks.size
-    values, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
-    sample_motion(p, n, *blocks.data[1:], values, jacobian, np.empty((3, 7, 6)))
+    values, jacobian = blocks.motion(p, n)
     left = dct((blocks.means - values)[:whole], norm="ortho")
     return np.asarray(left), np.asarray(dct(jacobian[:, :whole], norm="ortho"))
 

@@ -16,6 +16,7 @@ from stickslip.record.flaws import clipped, spikes
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 from stickslip.signals.noise import noise_level, quantisation_step
+from stickslip.signals.turns import extreme
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -370,8 +371,6 @@ def _inner_turns(values: Array, middles: Array, levels: Array) -> list[int]:
 
 
 def _extreme(values: Array, first: float, last: float, *, upwards: bool) -> int:
-    from stickslip.signals.turns import extreme
-
     return int(extreme(values, round(first), round(last), 1.0 if upwards else -1.0))
 
 

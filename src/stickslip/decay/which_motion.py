@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stickslip.decay.choice import Candidate, Choice, choose, interval_of, kept_by_all
 from stickslip.decay.motions import MOTIONS, RESTORING, Restoring
 from stickslip.decay.release import CLIPPED, LOST, RingDown, find_releases
+from stickslip.decay.start import BLOCKS
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.record.record import Record
@@ -167,8 +168,6 @@ def choice_of(
             "the choice among motions is made on a displacement",
             "record or integrate the displacement, or use fit_decay(record)",
         )
-    from stickslip.decay.start import BLOCKS
-
     rows, start = _begin(ring_down, restoring)
     size = max(1, int(2 * math.pi / start[0] * ring_down.fs / BLOCKS))
     count = (rows.stop - rows.start) // size

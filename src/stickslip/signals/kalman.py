@@ -203,7 +203,7 @@ def _forward(motion, seen, unknown, kept, work):
     return total
 
 
-@compiled(**FAST)
+@compiled(**FAST, forceinline=True)
 def _update(t, k, motion, seen, kept, work):
     """Take reading k of sample t: its log likelihood."""
     a, p, line, form = work.vector, work.matrix, work.line, motion.readings[k]
@@ -227,7 +227,7 @@ def _update(t, k, motion, seen, kept, work):
     return -0.5 * (math.log(2 * math.pi * width) + surprise * surprise / width)
 
 
-@compiled(**FAST)
+@compiled(**FAST, forceinline=True)
 def _predict(t, motion, seen, unknown, work):
     """Step to the next sample."""
     a, p, line, square = work
@@ -267,7 +267,7 @@ def _backward(motion, seen, kept, forms, told, work):
         _tell(t, kept, forms, told, work)
 
 
-@compiled(**FAST)
+@compiled(**FAST, forceinline=True)
 def _score(t, motion, seen, told, work):
     """Slope and curvature by the unknown of a step."""
     r, m, spread = work.vector, work.matrix, motion.spread[seen.regime[t]]
@@ -281,7 +281,7 @@ def _score(t, motion, seen, told, work):
     told.score[t], told.information[t] = first, second
 
 
-@compiled(**FAST)
+@compiled(**FAST, forceinline=True)
 def _step_back(transition, work):
     """Slope and curvature by the state after a sample's readings."""
     r, m, line, square = work
@@ -306,7 +306,7 @@ def _step_back(transition, work):
             m[j, i] = total
 
 
-@compiled(**FAST)
+@compiled(**FAST, forceinline=True)
 def _give_back(t, k, motion, kept, work):
     """Slope and curvature by the state before reading k of sample t."""
     r, m, line, form, gains = work.vector, work.matrix, work.line, motion.readings[k], kept.gains[t, k]
@@ -325,7 +325,7 @@ def _give_back(t, k, motion, kept, work):
             m[i, j] += form[i] * form[j] * across - line[i] * form[j] - form[i] * line[j]
 
 
-@compiled(**FAST)
+@compiled(**FAST, forceinline=True)
 def _tell(t, kept, forms, told, work):
     """The linear forms that are wanted, at a sample."""
     r, m, line, n = work.vector, work.matrix, work.line, work.vector.shape[0]
