@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -64,15 +65,7 @@ def fit_pendulum(
     blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
     kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"
     choices = [each.choice for each in motions]
-
-    def estimate(parameter: str, name: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
-        found = chosen.estimate(parameter, name=name, unit=unit, factor=factor)
-        low, high = found.interval
-        return replace(
-            found, value=found.value + offset, interval=(low + offset, high + offset), status=status,
-            method=f"whole waveform, spring sin x, noise {kind}", checks=(f"{fitted.half_cycles} half cycles",),
-        )  # fmt: skip
-
+    estimate = _estimator(chosen, status, kind)
     begins, far = beginning(ring_down.held and not later)
     damping = estimate("damping_ratio", "damping ratio", "1")
     dry = estimate("dry_displacement", "dry friction displacement", "rad")
@@ -105,6 +98,19 @@ def fit_pendulum(
         history=(*history, Step("fit_decay", {"channel": ring_down.channel, "restoring": restoring}, done)),
         motions=motions,
     )
+
+
+def _estimator(chosen: Candidate, status: str, noise: str) -> Callable[..., Estimate]:
+    """What makes an Estimate of a parameter, by its name."""
+    method, checks = f"whole waveform, spring sin x, noise {noise}", (f"{chosen.fitted.half_cycles} half cycles",)
+
+    def estimate(parameter: str, name: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
+        plain = chosen.estimate(parameter, name=name, unit=unit, factor=factor)
+        low, high = plain.interval
+        value, interval = plain.value + offset, (low + offset, high + offset)
+        return replace(plain, value=value, interval=interval, status=status, method=method, checks=checks)
+
+    return estimate
 
 
 def _only(ring_downs: list[RingDown], noise: str | None) -> RingDown:
