@@ -9,10 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import stickslip as ss
+from stickslip.lab import DOORWAY
 
 LARGEST_MESSAGE = 2**20  # bytes on a socket
 HOST = "127.0.0.1"
-DOORWAY = "open.html"  # in the folder of a run, until a page is open
 
 
 def listening(port: int) -> socket.socket:
@@ -61,8 +61,7 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) ->
     try:
         import uvicorn
 
-        from stickslip.lab.patience import PatientProtocol
-        from stickslip.lab.server import lab_app
+        from stickslip.lab import server
     except ImportError as error:
         raise ss.errors.ModelError(
             f"the lab needs the package {error.name}",
@@ -76,12 +75,12 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) ->
             if self.started:
                 opened(app.state.data.folder)
 
-    app = lab_app(token=token, port=door.getsockname()[1])
+    app = server.lab_app(token=token, port=door.getsockname()[1])
     settings = uvicorn.Config(
-        app, http=PatientProtocol, log_level="warning", access_log=False, ws_max_size=LARGEST_MESSAGE,
+        app, http=server.PatientProtocol, log_level="warning", access_log=False, ws_max_size=LARGEST_MESSAGE,
         server_header=False, date_header=False, timeout_graceful_shutdown=2, ws_per_message_deflate=False,
     )  # fmt: skip
-    server = Server(settings)
+    listener = Server(settings)
     if hasattr(signal, "SIGHUP"):
-        signal.signal(signal.SIGHUP, server.handle_exit)  # a terminal that closes leaves no files behind either
-    server.run(sockets=[door])
+        signal.signal(signal.SIGHUP, listener.handle_exit)  # a terminal that closes leaves no files behind either
+    listener.run(sockets=[door])

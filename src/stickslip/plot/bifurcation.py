@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.consistent.sliding_balance import Slider
 from stickslip.maps.attractor import Attractor
 from stickslip.maps.basins import Basins
 from stickslip.maps.bifurcation import Bifurcation
@@ -238,8 +239,6 @@ def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
     >>> plot_boundary(found).get_lines()[1].get_label()
     'Den Hartog (1931)'
     """
-    from stickslip.consistent.sliding_balance import Slider
-
     ax = axes_of(ax)
     system = next(each for each in found.low if each is not None).orbit.orbit.system
     free = np.array([each is not None and each.status == "not unique" for each in found.low])

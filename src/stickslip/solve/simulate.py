@@ -16,11 +16,14 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve import kernel
+from stickslip.solve.curved import degree, run_curved
+from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
 from stickslip.solve.interrupts import held_back
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
 from stickslip.solve.tables import Array, System, Tables, table_of
+from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -107,10 +110,6 @@ def _simulate_curved(
     rtol: float,
     progress: Callable[[float], object] | None,
 ) -> Trajectory:
-    from stickslip.solve.curved import degree, run_curved
-    from stickslip.solve.delayed import delayed_tape, run_delayed
-    from stickslip.solve.tape import tape
-
     lags = isinstance(system.law, TimeDelay)
     table: Any = delayed_tape(system, degree(rtol)) if lags else tape(system)
     span = _end(system, table, *time_)

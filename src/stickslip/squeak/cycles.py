@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
 from stickslip.laws.base import finite
-from stickslip.solve.autonomous import settled_cycle
 from stickslip.solve.energies import EnergyFlow, energy_flow
 from stickslip.solve.poincare import Table, stretch, tables
+from stickslip.solve.self_excited import settled_cycle
 from stickslip.solve.simulate import opening
 from stickslip.solve.trajectory import Trajectory
 from stickslip.squeak.sliding import System
