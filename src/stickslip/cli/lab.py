@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 import webbrowser
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -34,10 +35,10 @@ def lab(port: int, no_browser: bool) -> None:
         token = secrets.token_urlsafe(24)
         address = f"http://127.0.0.1:{door.getsockname()[1]}/?token={token}"
 
-        def opened(folder: Path) -> None:
+        def opened(doorway: Callable[[str], Path]) -> None:
             say(f"The lab is open at {address}\nCtrl-C ends it.")
             if not no_browser:
-                webbrowser.open(serving.doorway(folder, address).as_uri())
+                webbrowser.open(doorway(address).as_uri())
 
         try:
             serving.serve(door, token=token, opened=opened)

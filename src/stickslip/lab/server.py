@@ -6,6 +6,7 @@ It waits only so long for the rest of a request, and for so many at a time: half
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
@@ -21,13 +22,14 @@ from starlette.staticfiles import StaticFiles
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 import stickslip as ss
-from stickslip.lab import DOORWAY, data, maps, play
+from stickslip.lab import data, maps, play
 from stickslip.lab.openapi import described, document
 from stickslip.lab.security import Guard
 from stickslip.lab.workers import Workers
 
 PAGE = Path(__file__).parent / "page"
 WORKERS = 2
+DOORWAY = "open.html"  # in the folder of a run, until a page is open
 PATIENCE = 10.0  # s from a connection's opening, or its last answer, to the end of the next request's head
 MOST = 256  # connections without a request at work that may take that long; a page keeps six, so some forty pages
 HURRY = 3.0  # s for those that come when there are more: an honest one sends its head as soon as it is open,
@@ -85,6 +87,14 @@ async def _lifespan(app: Starlette) -> AsyncIterator[None]:
         for task in beside:
             task.cancel()
         await asyncio.gather(*beside, return_exceptions=True)
+
+
+def doorway(folder: Path, address: str) -> Path:
+    """A file for this user's eyes that leads a browser to the address: arguments of a program are seen by all."""
+    page = folder / DOORWAY
+    with os.fdopen(os.open(page, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
+        file.write(f'<!doctype html><title>stickslip lab</title><meta http-equiv="refresh" content="0; url={address}">')
+    return page
 
 
 async def _shut(doorway: Path, opened: asyncio.Event) -> None:

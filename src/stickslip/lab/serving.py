@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import socket
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import stickslip as ss
-from stickslip.lab import DOORWAY
 
 LARGEST_MESSAGE = 2**20  # bytes on a socket
 HOST = "127.0.0.1"
@@ -42,16 +41,9 @@ def listening(port: int) -> socket.socket:
     return door
 
 
-def doorway(folder: Path, address: str) -> Path:
-    """A file for this user's eyes that leads a browser to the address: arguments of a program are seen by all."""
-    page = folder / DOORWAY
-    with os.fdopen(os.open(page, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
-        file.write(f'<!doctype html><title>stickslip lab</title><meta http-equiv="refresh" content="0; url={address}">')
-    return page
-
-
-def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) -> None:
-    """Answer at the door until Ctrl-C; `opened` is called with the folder of this run when it does.
+def serve(door: socket.socket, *, token: str, opened: Callable[[Callable[[str], Path]], None]) -> None:
+    """Answer at the door until Ctrl-C; `opened` is called when it does, with
+    what writes a page that leads a browser to an address.
 
     Raises
     ------
@@ -73,7 +65,7 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) ->
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
             if self.started:
-                opened(app.state.data.folder)
+                opened(partial(server.doorway, app.state.data.folder))
 
     app = server.lab_app(token=token, port=door.getsockname()[1])
     settings = uvicorn.Config(
