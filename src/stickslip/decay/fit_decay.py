@@ -170,9 +170,12 @@ def _from(ring_down: RingDown, first: int) -> RingDown:
     """The ring-down from row `first` on."""
     kept = ring_down.turns >= first
     return replace(
-        ring_down, first=ring_down.first + first / ring_down.fs, samples=ring_down.samples[first:],
-        turns=ring_down.turns[kept] - first, sound=ring_down.sound[kept],
-    )  # fmt: skip
+        ring_down,
+        first=ring_down.first + first / ring_down.fs,
+        samples=ring_down.samples[first:],
+        turns=ring_down.turns[kept] - first,
+        sound=ring_down.sound[kept],
+    )
 
 
 def _from_motion(ring_down: RingDown) -> RingDown:

@@ -138,9 +138,14 @@ def _static(candidate: Candidate, ring_down: RingDown) -> Estimate:
     high = _pull(fitted, fitted.half_cycles - 1) + error
     status = "ok" if ring_down.stopped else "the mass does not come to rest in the record: only an upper bound"
     return Estimate(
-        "static friction displacement", (low + high) / 2, (low, high), (high - low) / math.sqrt(12), ring_down.unit,
-        "between where it stayed and where it last turned", status,
-    )  # fmt: skip
+        "static friction displacement",
+        (low + high) / 2,
+        (low, high),
+        (high - low) / math.sqrt(12),
+        ring_down.unit,
+        "between where it stayed and where it last turned",
+        status,
+    )
 
 
 def _pull(fitted: Fitted, half_cycles: int) -> float:

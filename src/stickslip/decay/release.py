@@ -245,9 +245,14 @@ def _as_let_go(found: tuple[RingDown, ...]) -> tuple[RingDown, ...]:
         if each.stopped and stayed > HELD * turned + SEEN * each.noise:
             last = int(each.turns[-2])
             each = replace(
-                each, samples=each.samples[: last + 1], stop=each.first + last / each.fs, stopped=False,
-                turns=each.turns[:-1], sound=each.sound[:-1], notes=(*each.notes, CAUGHT),
-            )  # fmt: skip
+                each,
+                samples=each.samples[: last + 1],
+                stop=each.first + last / each.fs,
+                stopped=False,
+                turns=each.turns[:-1],
+                sound=each.sound[:-1],
+                notes=(*each.notes, CAUGHT),
+            )
         if len(each.turns) >= 4 or each is longest:
             kept.append(each)
     return tuple(kept)
@@ -357,11 +362,25 @@ def _ring_down(
         *([CAUGHT] if ends and not stopped and not run.parted else []),
     )
     return RingDown(
-        name, order, record.channels[name].unit, record.fs, record.start + first / record.fs,
-        values[first:last], record.start + start / record.fs, record.start + end / record.fs, bool(held),
-        bool(stopped), record.fs / (2 * half), rest, float(values[rows[0]] - rest), noise, step, rows - first,
-        sound, notes,
-    )  # fmt: skip
+        name,
+        order,
+        record.channels[name].unit,
+        record.fs,
+        record.start + first / record.fs,
+        values[first:last],
+        record.start + start / record.fs,
+        record.start + end / record.fs,
+        bool(held),
+        bool(stopped),
+        record.fs / (2 * half),
+        rest,
+        float(values[rows[0]] - rest),
+        noise,
+        step,
+        rows - first,
+        sound,
+        notes,
+    )
 
 
 def _inner_turns(values: Array, middles: Array, levels: Array) -> list[int]:

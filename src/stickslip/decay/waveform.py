@@ -307,9 +307,12 @@ def _add_blocks(rows, means, z, turn, tau, step, hessian, gradient, mixed):
         for j in range(5):
             line = gram[j]
             mixed[k, j] = (
-                rows[k, 0] * line[0] + rows[k, 1] * line[1] + rows[k, 2] * line[2] + rows[k, 3] * line[3]
+                rows[k, 0] * line[0]
+                + rows[k, 1] * line[1]
+                + rows[k, 2] * line[2]
+                + rows[k, 3] * line[3]
                 + rows[k, 4] * line[4]
-            )  # fmt: skip
+            )
     for k in range(6):
         for m in range(k + 1):
             for j in range(5):

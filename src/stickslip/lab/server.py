@@ -113,8 +113,10 @@ async def _alive(request: Request) -> Response:
 
 
 async def _refusal(request: Request, error: Any) -> Response:
-    bare = {"Not Found": f"There is nothing at {request.url.path}.",
-            "Method Not Allowed": f"{request.method} has no meaning at that address."}  # fmt: skip
+    bare = {
+        "Not Found": f"There is nothing at {request.url.path}.",
+        "Method Not Allowed": f"{request.method} has no meaning at that address.",
+    }
     sentence = bare.get(error.detail, error.detail)
     return JSONResponse({"error": str(sentence)}, error.status_code, headers=error.headers)
 

@@ -69,9 +69,16 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Callable[[str], 
 
     app = server.lab_app(token=token, port=door.getsockname()[1])
     settings = uvicorn.Config(
-        app, http=server.PatientProtocol, log_level="warning", access_log=False, ws_max_size=LARGEST_MESSAGE,
-        server_header=False, date_header=False, timeout_graceful_shutdown=2, ws_per_message_deflate=False,
-    )  # fmt: skip
+        app,
+        http=server.PatientProtocol,
+        log_level="warning",
+        access_log=False,
+        ws_max_size=LARGEST_MESSAGE,
+        server_header=False,
+        date_header=False,
+        timeout_graceful_shutdown=2,
+        ws_per_message_deflate=False,
+    )
     listener = Server(settings)
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, listener.handle_exit)  # a terminal that closes leaves no files behind either

@@ -61,8 +61,11 @@ class Patience:
             raise Overtaken
         self.until = min(self.until, time.monotonic() + PATIENCE)
         if time.monotonic() > self.until:
-            raise ss.errors.SolveError(f"the run is {share:.0%} done after {PATIENCE:g} s", "the page waits no longer",
-                                "ask for fewer cycles, or run it with stickslip simulate")  # fmt: skip
+            raise ss.errors.SolveError(
+                f"the run is {share:.0%} done after {PATIENCE:g} s",
+                "the page waits no longer",
+                "ask for fewer cycles, or run it with stickslip simulate",
+            )
 
 
 def answered(request: dict[str, Any], patience: Patience) -> bytes:

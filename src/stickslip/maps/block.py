@@ -97,9 +97,13 @@ def measured(run: Trajectory, plan: Plan, start: Mapping[str, float | str]) -> d
     found: dict[str, Any] = {}
     if set(measures) & EVENTS:
         sums = counted(run, begin)
-        found |= {"normal_stops": sums[log.NORMAL] / cycles, "abnormal_stops": sums[log.ABNORMAL] / cycles,
-                  "stick_share": sums[log.HELD] / (run.duration - begin), "micro_slips": sums[log.SHORT] / cycles,
-                  "transition_speed": sums[log.FASTEST] if sums[log.FASTEST] > 0 else math.nan}  # fmt: skip
+        found |= {
+            "normal_stops": sums[log.NORMAL] / cycles,
+            "abnormal_stops": sums[log.ABNORMAL] / cycles,
+            "stick_share": sums[log.HELD] / (run.duration - begin),
+            "micro_slips": sums[log.SHORT] / cycles,
+            "transition_speed": sums[log.FASTEST] if sums[log.FASTEST] > 0 else math.nan,
+        }
     if "amplitude" in measures:
         found["amplitude"] = farthest(run, begin)
     if "energy" in measures:

@@ -118,11 +118,20 @@ def model_of(models, j):
     linear, fast = models.linear, models.fast
     nodes = fast.nodes[fast.span[j, 0] : fast.span[j, 1]]
     return Model(
-        Linear(linear.flow[j], linear.cell[j], linear.hop[j], linear.series[j], linear.target, linear.crossing,
-               linear.reset[j], linear.first, linear.tones[j]),
+        Linear(
+            linear.flow[j],
+            linear.cell[j],
+            linear.hop[j],
+            linear.series[j],
+            linear.target,
+            linear.crossing,
+            linear.reset[j],
+            linear.first,
+            linear.tones[j],
+        ),
         Phasors(fast.drive[j], fast.mode[j], fast.level[j], fast.exit[j], fast.rest[j], nodes, fast.span[j]),
         models.period[j],
-    )  # fmt: skip
+    )
 
 
 @compiled(**OPTIONS)
@@ -214,9 +223,16 @@ def _carry(i, count, motion, mode, leaps, tangents):
     for p in range(count):
         set_tones(linear.tones, pieces.states[p], pieces.offsets[p])
     carry_tangents(
-        linear, leaps[i], pieces.modes[:count], pieces.states[:count], pieces.durations[:count], pieces.exits[:count],
-        mode, tangents, motion.work[7:16, : motion.state.shape[0]],
-    )  # fmt: skip
+        linear,
+        leaps[i],
+        pieces.modes[:count],
+        pieces.states[:count],
+        pieces.durations[:count],
+        pieces.exits[:count],
+        mode,
+        tangents,
+        motion.work[7:16, : motion.state.shape[0]],
+    )
 
 
 @compiled(**OPTIONS)
@@ -302,8 +318,12 @@ def _read(row, state, tones, time):
 def _count(i, count, motion, clock, settled, given, sums):
     """Count the pieces just written."""
     linear, period, state, unit, pieces = (
-        motion.model.linear, motion.model.period, motion.state, motion.unit, motion.pieces,
-    )  # fmt: skip
+        motion.model.linear,
+        motion.model.period,
+        motion.state,
+        motion.unit,
+        motion.pieces,
+    )
     look, paths, one = given.look, given.wants[PATHS] == 1, given.wants[ONE]
     n, tones = state.shape[0], linear.tones
     held = motion.work[6, :n]

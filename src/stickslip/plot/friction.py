@@ -71,10 +71,14 @@ def plates_of(findings: Findings) -> list[Plate]:
     plates = [*_of_friction(findings), *_over_time(findings, sticks=len(sticks)), *_of_contact(findings)]
     if any(event.whole for event in sticks):
         plates.append(
-            plate("sticks", partial(plot_sticks, findings), "How long it sticks and slips",
-                   "Each mark is one whole stretch of sticking or slipping; the bars count how often each duration "
-                   "occurred.")
-        )  # fmt: skip
+            plate(
+                "sticks",
+                partial(plot_sticks, findings),
+                "How long it sticks and slips",
+                "Each mark is one whole stretch of sticking or slipping; the bars count how often each duration "
+                "occurred.",
+            )
+        )
     return plates
 
 
@@ -84,26 +88,32 @@ def _of_friction(findings: Findings) -> list[Plate]:
     if findings.loops is not None:
         plates += [
             plate(
-                "friction-velocity", partial(plot_velocity_loop, findings), "Friction against velocity",
+                "friction-velocity",
+                partial(plot_velocity_loop, findings),
+                "Friction against velocity",
                 "Dry friction is a step: about the same force (dotted) at every speed, against the motion. A slope to "
                 "either side is friction that changes with speed; points between the levels at zero velocity are the "
                 "sticking contact, which bears any force up to the level.",
             ),
             plate(
-                "friction-displacement", partial(plot_displacement_loop, findings), "Friction against displacement",
+                "friction-displacement",
+                partial(plot_displacement_loop, findings),
+                "Friction against displacement",
                 "One turn is one cycle and its area is the work lost to friction. Flat top and bottom: sliding. Steep "
                 "sides: the contact sticks, and their slope is the contact's own stiffness. The band is the scatter "
                 "between cycles.",
             ),
-        ]  # fmt: skip
+        ]
     if findings.regression is not None:
         plates.append(
             plate(
-                "regression", partial(plot_regression, findings), "Does the friction model explain the force?",
+                "regression",
+                partial(plot_regression, findings),
+                "Does the friction model explain the force?",
                 "Top: the measured force and the force that inertia, viscous and dry friction together give. Bottom: "
                 "what is left over; a pattern there is friction that the model does not hold.",
             )
-        )  # fmt: skip
+        )
     return plates
 
 
@@ -119,14 +129,22 @@ def _over_time(findings: Findings, *, sticks: int) -> list[Plate]:
     ]
     if near is not None:
         plates.append(
-            plate("close-up", partial(plot_traces, findings, record=near), "A closer look",
-                   f"A few cycles from the middle of the record.{stuck}")
-        )  # fmt: skip
+            plate(
+                "close-up",
+                partial(plot_traces, findings, record=near),
+                "A closer look",
+                f"A few cycles from the middle of the record.{stuck}",
+            )
+        )
     if force_balance(findings.record) is not None:
         plates.append(
-            plate("force-balance", partial(plot_force_balance, findings, record=near),
-                  "Where the friction force comes from", f"{_how_it_adds_up(findings)}{stuck}")
-        )  # fmt: skip
+            plate(
+                "force-balance",
+                partial(plot_force_balance, findings, record=near),
+                "Where the friction force comes from",
+                f"{_how_it_adds_up(findings)}{stuck}",
+            )
+        )
     return plates
 
 
@@ -135,36 +153,56 @@ def _of_contact(findings: Findings) -> list[Plate]:
     plates, found = [], findings.breakaway
     if found is not None and findings.loops is not None and UNSURE not in found.ratio.status:
         plates.append(
-            plate("breakaway", partial(plot_breakaway, findings), "Before it slips, and while it slides",
-                   "Where the contact bears more before it slips than while it slides, its friction falls as slip "
-                   "begins; bars are 95 % intervals.")
-        )  # fmt: skip
+            plate(
+                "breakaway",
+                partial(plot_breakaway, findings),
+                "Before it slips, and while it slides",
+                "Where the contact bears more before it slips than while it slides, its friction falls as slip "
+                "begins; bars are 95 % intervals.",
+            )
+        )
     if findings.transition is not None:
         plates.append(
-            plate("transition", partial(plot_transition_speed, findings.transition), "From holding to sliding",
-                   "The mean friction after a turn against the velocity: it grows with the contact's give, and slides "
-                   "from the transition speed on. Bands are 95 % intervals of each way to find that speed.")
-        )  # fmt: skip
+            plate(
+                "transition",
+                partial(plot_transition_speed, findings.transition),
+                "From holding to sliding",
+                "The mean friction after a turn against the velocity: it grows with the contact's give, and slides "
+                "from the transition speed on. Bands are 95 % intervals of each way to find that speed.",
+            )
+        )
     events = findings.sticks.events if findings.sticks is not None else ()
     if any(event.kind == "microslip" for event in events):
         plates.append(
-            plate("micro-slips", partial(plot_micro_slips, findings), "Inside one stick",
-                   "The mass rings on its contact when it comes to rest, and slips a little again where the ring is "
-                   "more than the contact bears.")
-        )  # fmt: skip
+            plate(
+                "micro-slips",
+                partial(plot_micro_slips, findings),
+                "Inside one stick",
+                "The mass rings on its contact when it comes to rest, and slips a little again where the ring is "
+                "more than the contact bears.",
+            )
+        )
     compared = findings.comparison
     if compared is not None and (_is_fused(findings) or UNLIKE in compared.status):
         plates.append(
-            plate("force-comparison", partial(plot_force_comparison, compared), "The force felt and the force computed",
-                   "Both forces over time, their size in each band, and their ratio: above the frequency up to which "
-                   "they agree, the mounts of the sensors swing.")
-        )  # fmt: skip
+            plate(
+                "force-comparison",
+                partial(plot_force_comparison, compared),
+                "The force felt and the force computed",
+                "Both forces over time, their size in each band, and their ratio: above the frequency up to which "
+                "they agree, the mounts of the sensors swing.",
+            )
+        )
     if findings.consistency is not None and findings.consistency.failed:
         plates.append(
-            plate("consistency", partial(plot_consistency, findings.consistency), "What can not all be true",
-                   "Two sides of each check, and how far they are apart; to the right of the dotted line they can not "
-                   "be one. The sentences are above.")
-        )  # fmt: skip
+            plate(
+                "consistency",
+                partial(plot_consistency, findings.consistency),
+                "What can not all be true",
+                "Two sides of each check, and how far they are apart; to the right of the dotted line they can not "
+                "be one. The sentences are above.",
+            )
+        )
     return plates
 
 
@@ -187,14 +225,22 @@ def plates_together(comparison: Comparison) -> list[Plate]:
     plates = []
     if comparison.coefficient is not None:
         plates.append(
-            plate("friction-load", partial(plot_load_dependence, comparison), "Friction against normal load",
-                   "Points on a line through the origin mean one coefficient of friction for all records.")
-        )  # fmt: skip
+            plate(
+                "friction-load",
+                partial(plot_load_dependence, comparison),
+                "Friction against normal load",
+                "Points on a line through the origin mean one coefficient of friction for all records.",
+            )
+        )
     if any(findings.level is not None for findings in comparison.findings):
         plates.append(
-            plate("levels", partial(plot_levels, comparison), "Friction of each record",
-                   "The sliding friction found in each record, with its 95 % interval.")
-        )  # fmt: skip
+            plate(
+                "levels",
+                partial(plot_levels, comparison),
+                "Friction of each record",
+                "The sliding friction found in each record, with its 95 % interval.",
+            )
+        )
     return plates
 
 
@@ -263,9 +309,15 @@ def plot_consistency(found: Consistency, *, ax: Axes | None = None) -> Axes:
         ax.barh(place, min(max(apart, 1.2 * LEAST), MOST) if told else 0.0, color=colour, height=0.6)
         words = check.verdict if told else "can not be told"
         ax.annotate(
-            words, (1.0, place), xycoords=("axes fraction", "data"), xytext=(4, 0), textcoords="offset points",
-            va="center", fontsize=7, color=colour if check.verdict == "fails" else INK,
-        )  # fmt: skip
+            words,
+            (1.0, place),
+            xycoords=("axes fraction", "data"),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7,
+            color=colour if check.verdict == "fails" else INK,
+        )
     ax.axvline(APART, color=INK, linewidth=1.0, linestyle=":")
     ax.set(xscale="log", xlim=(LEAST, MOST), xlabel="standard deviations apart")
     ax.xaxis.set_major_formatter("{x:g}")
@@ -338,17 +390,30 @@ def plot_load_dependence(comparison: Comparison, *, ax: Axes | None = None) -> A
         reach = np.array([0.0, 1.1 * loads.max()])
         low, high = comparison.coefficient.interval
         ax.fill_between(
-            x_factor * reach, y_factor * low * reach, y_factor * high * reach, color=ORANGE, alpha=0.18, linewidth=0,
+            x_factor * reach,
+            y_factor * low * reach,
+            y_factor * high * reach,
+            color=ORANGE,
+            alpha=0.18,
+            linewidth=0,
             label="95 % band",
-        )  # fmt: skip
+        )
         ax.plot(
-            x_factor * reach, y_factor * comparison.coefficient.value * reach, color=ORANGE,
+            x_factor * reach,
+            y_factor * comparison.coefficient.value * reach,
+            color=ORANGE,
             label=f"friction = {comparison.coefficient.value:.3g} × normal load",
-        )  # fmt: skip
+        )
     ax.errorbar(
-        x_factor * loads, y_factor * values, yerr=y_factor * np.abs(ends - values[:, None]).T,
-        fmt="o", color=INK, capsize=3, markersize=5, label="records, 95 %",
-    )  # fmt: skip
+        x_factor * loads,
+        y_factor * values,
+        yerr=y_factor * np.abs(ends - values[:, None]).T,
+        fmt="o",
+        color=INK,
+        capsize=3,
+        markersize=5,
+        label="records, 95 %",
+    )
     ax.set(xlabel=axis_label("normal load", x_unit), ylabel=axis_label("sliding friction", y_unit))
     ax.set_xlim(left=0)
     ax.set_ylim(0, 1.4 * y_factor * float(ends.max()))

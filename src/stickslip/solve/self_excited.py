@@ -60,8 +60,9 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
         duration *= 2
     none = np.full(table.physical, np.nan, dtype=np.complex128)
     steady = len(motion.modes) == 1 or motion.durations[-1] > 0.5 * duration
-    return SteadyState("rest" if steady and table.modes[motion.modes[-1]].side == 0 else "not periodic",
-                       math.nan, 0, motion, none)  # fmt: skip
+    return SteadyState(
+        "rest" if steady and table.modes[motion.modes[-1]].side == 0 else "not periodic", math.nan, 0, motion, none
+    )
 
 
 def _without_sticks(motion: Trajectory) -> SteadyState | None:
@@ -119,10 +120,17 @@ def _between(motion: Trajectory, first: int, last: int) -> SteadyState:
         own = {name: getattr(motion, name)[steps] for name in ("step_lengths", "step_modes", "step_states")}
         own["step_starts"] = motion.step_starts[steps] - begin
     orbit = replace(
-        motion, laps=np.zeros(last - first, np.int32), offsets=motion.starts[part] - begin, modes=motion.modes[part],
-        durations=motion.durations[part], kept=motion.states[part], exits=motion.exits[part],
-        duration=float(end - begin), status="complete", **own,
-    )  # fmt: skip
+        motion,
+        laps=np.zeros(last - first, np.int32),
+        offsets=motion.starts[part] - begin,
+        modes=motion.modes[part],
+        durations=motion.durations[part],
+        kept=motion.states[part],
+        exits=motion.exits[part],
+        duration=float(end - begin),
+        status="complete",
+        **own,
+    )
     # a stick ends in one state alone: whatever came before is forgotten
     return SteadyState("unique", orbit.duration, 1, orbit, np.zeros(motion.table.physical, dtype=np.complex128))
 

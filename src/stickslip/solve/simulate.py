@@ -234,9 +234,12 @@ def run(
                 pieces.keep(count, passed, total)
                 _refuse(outcome, table, state, clock)
                 require_budget(
-                    count - (outcome == kernel.DONE), passed=passed, scale=scale, budget=budget,
+                    count - (outcome == kernel.DONE),
+                    passed=passed,
+                    scale=scale,
+                    budget=budget,
                     state=named(table.names[: table.physical], state),
-                )  # fmt: skip
+                )
                 if tell:
                     tell(pieces.passed / total)
     except KeyboardInterrupt:
@@ -284,17 +287,24 @@ class _Log:
 
 def _columns(room: int, size: int) -> Pieces:
     return Pieces(
-        np.empty(room, np.int32), np.empty(room), np.empty(room, np.int16), np.empty(room), np.empty((room, size)),
+        np.empty(room, np.int32),
+        np.empty(room),
         np.empty(room, np.int16),
-    )  # fmt: skip
+        np.empty(room),
+        np.empty((room, size)),
+        np.empty(room, np.int16),
+    )
 
 
 def stops_of(table: Tables | Tape, laps: float, offset: float) -> Any:
     """The times to which the march goes in turn, with the signals that take new values at each start."""
     knots, end = table.motion.knots, table.motion.end
     if offset > end * (1 + 1e-12):
-        raise ModelError(f"{offset:g} s of a drive recorded for {end:g} s", "a run ends where its drive is known last",
-                         f"simulate {end:g} s at most, or record longer")  # fmt: skip
+        raise ModelError(
+            f"{offset:g} s of a drive recorded for {end:g} s",
+            "a run ends where its drive is known last",
+            f"simulate {end:g} s at most, or record longer",
+        )
     if knots is None:
         yield (laps, offset), ([], [])
         return

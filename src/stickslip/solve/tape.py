@@ -330,14 +330,16 @@ class _Builder:
             motion=self.motion,
             physical=self.one,
             entry=(order[entry[0]], order[entry[1]], order[entry[2]]),
-            opening=np.array([
-                np.zeros(self.size),
-                self.row(self.face[1]),
-                *(
-                    self.row(combined((value, self.symbols()[name]) for name, value in row.items()))
-                    for row in self.law.memory.values()
-                ),
-            ]),
+            opening=np.array(
+                [
+                    np.zeros(self.size),
+                    self.row(self.face[1]),
+                    *(
+                        self.row(combined((value, self.symbols()[name]) for name, value in row.items()))
+                        for row in self.law.memory.values()
+                    ),
+                ]
+            ),
             tones=np.array(tones, dtype=np.float64).reshape(len(tones), 4),
             outputs={"face_rate": self.row(self.face[1]), "slip": self.row(self.symbols()["v"])},
             nodes=nodes,
@@ -347,7 +349,7 @@ class _Builder:
             exits=exits,
             guards=guards,
             places={name: np.array([part[4][name] for part in parts], dtype=np.int64) for name in parts[0][4]},
-        )  # fmt: skip
+        )
 
 
 def _flat(modes: list[_Operations]) -> tuple[NDArray[Any], ...]:

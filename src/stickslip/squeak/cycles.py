@@ -86,8 +86,9 @@ class LimitCycle:
         if not self.vibrates:
             return f"LimitCycle: {self.status}"
         named = {"sticks": self.stick_share, "lifted": self.separation_share}
-        shares = [f"{name} {', '.join(f'{one:.3g}' for one in each)} of the time"
-                  for name, each in named.items() if any(each)]  # fmt: skip
+        shares = [
+            f"{name} {', '.join(f'{one:.3g}' for one in each)} of the time" for name, each in named.items() if any(each)
+        ]
         head = f"LimitCycle: {self.status}, {self.frequency:.5g} Hz, contacts slide {self.amplitude:.4g} m to and fro"
         return "\n  ".join([head, *shares])
 
