@@ -15,8 +15,8 @@ from typing import Any, BinaryIO
 
 import stickslip as ss
 from stickslip.lab import drawn, explored, forms
-from stickslip.lab.bounds import bound
 from stickslip.lab.frames import frame
+from stickslip.lab.task import bound
 from stickslip.lab.workers import ANSWER, HEAD
 
 MEMORY = 4 * 2**30  # bytes of data

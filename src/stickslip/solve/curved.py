@@ -24,9 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve import collocation, march, taylor
 from stickslip.solve.collocation import Model
-from stickslip.solve.interrupts import held_back
 from stickslip.solve.march import LAPS, TIME, TRY, Dense, Shown, Steps, Work
-from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
+from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
 from stickslip.solve.series import expansion
 from stickslip.solve.tape import Tape
 from stickslip.solve.taylor import Array

@@ -19,9 +19,8 @@ from stickslip.solve import kernel
 from stickslip.solve.curved import degree, run_curved
 from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
-from stickslip.solve.interrupts import held_back
 from stickslip.solve.phasors import fast_tables
-from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
+from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
 from stickslip.solve.tables import Array, System, Tables, table_of
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
