@@ -21,7 +21,7 @@ import numpy as np
 import stickslip as ss
 from stickslip.decay.fit_decay import fit_decay
 from stickslip.decay.search import Search, weights
-from stickslip.decay.waveform import sample_motion
+from stickslip.decay.waveform import Blocks
 from stickslip.statistics import student
 
 OMEGA, REST = 2 * math.pi, 0.1
@@ -56,9 +56,7 @@ class Condition:
         return np.array([OMEGA, self.damping, self.dry, REST, 1.0, 0.25 + random.random() / self.rate])
 
     def motion(self, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        values, jacobian = np.empty(self.total), np.empty((6, self.total))
-        sample_motion(truth, self.half_cycles, 1, self.total, 1 / self.rate, 0, values, jacobian, np.empty((3, 7, 6)))
-        return values, jacobian
+        return Blocks(np.empty(self.total), 1, self.total, 1 / self.rate, 0).motion(truth, self.half_cycles)
 
     def __str__(self) -> str:
         return f"{self.damping:<7} {self.dry:<6} {self.noise:<7} {self.rate:<4} {self.length}"

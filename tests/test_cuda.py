@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from batches import Batch, simulate_batch
 from stickslip.errors import ModelError
-from stickslip.solve.batch import Batch, simulate_batch
 
 MASS, SPRING = 2.42, 2310.0
 RIGID = ss.Oscillator(

@@ -12,7 +12,7 @@ import pytest
 import stickslip as ss
 from stickslip.decay.motions import free_decay
 from stickslip.decay.search import Search
-from stickslip.decay.waveform import normal_equations, sample_motion
+from stickslip.decay.waveform import Blocks, normal_equations
 
 OMEGA, DAMPING, DRY, REST, AMPLITUDE, RELEASE = 2 * math.pi, 0.0316, 0.02, 0.1, 1.0, 0.26
 TRUTH = np.array([OMEGA, DAMPING, DRY, REST, AMPLITUDE, RELEASE])
@@ -27,9 +27,7 @@ def half_cycles(damping: float, dry: float, amplitude: float = 1.0) -> int:
 
 
 def motion(parameters, count: int, total: int, dt: float, *, size: int = 1, order: int = 0):
-    values, jacobian = np.empty(-(-total // size)), np.empty((6, -(-total // size)))
-    sample_motion(np.asarray(parameters), count, size, total, dt, order, values, jacobian, np.empty((3, 7, 6)))
-    return values, jacobian
+    return Blocks(np.empty(-(-total // size)), size, total, dt, order).motion(np.asarray(parameters), count)
 
 
 def ring_down(*, per_period: int = 100, noise: float = 1e-3, seed: int = 0, order: int = 0, truth=TRUTH):
@@ -80,7 +78,8 @@ def test_the_normal_equations_are_those_of_the_jacobian() -> None:
     means, jacobian = motion(TRUTH, 13, total, 0.01, size=size)
     data = means + 1e-3 * np.cos(np.arange(len(means)))
     hessian, gradient = np.empty((6, 6)), np.empty(6)
-    squares = normal_equations(TRUTH, 13, data, size, total, 0.01, 0, hessian, gradient, np.empty((3, 7, 6)))
+    blocks = Blocks(data, size, total, 0.01, 0)
+    squares = normal_equations(TRUTH, 13, blocks, hessian, gradient, np.empty((3, 7, 6)))
     weight = np.ones(len(means))
     weight[-1] = 0.3
     assert squares == pytest.approx(weight @ (data - means) ** 2, rel=1e-9)

@@ -14,7 +14,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.solve import kernel
-from stickslip.solve.interrupts import held_back
+from stickslip.solve.refusal import held_back
 
 RIGID = ss.Oscillator(
     mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5)

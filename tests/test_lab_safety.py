@@ -39,8 +39,8 @@ from websockets.sync.client import connect
 import stickslip as ss
 from labs import Lab, running_lab
 from stickslip.cli.program import main
-from stickslip.lab import data, patience, security
-from stickslip.lab.server import lab_app
+from stickslip.lab import data, security
+from stickslip.lab.server import PatientProtocol, lab_app
 
 ENDED = ("done", "refused", "broken", "cancelled")
 
@@ -331,9 +331,9 @@ WELCOME = HALVES["a body that nobody wants"].replace("Content", "Authorization: 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """The port of a lab's protocol, which waits a fifth of a second for eight connections, half of that for more."""
-    monkeypatch.setattr(patience.PatientProtocol, "patience", 0.2)
-    monkeypatch.setattr(patience.PatientProtocol, "hurry", 0.1)
-    monkeypatch.setattr(patience.PatientProtocol, "most", 8)
+    monkeypatch.setattr(PatientProtocol, "patience", 0.2)
+    monkeypatch.setattr(PatientProtocol, "hurry", 0.1)
+    monkeypatch.setattr(PatientProtocol, "most", 8)
     monkeypatch.setattr(security, "SILENCE", 0.2)
 
     async def reads(request: Request) -> Response:
@@ -346,7 +346,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
         app = Starlette(routes=[Route("/alive", reads), Route("/jobs", reads, methods=["POST"])],
                         middleware=[Middleware(security.Guard, token="t", port=port)],
                         exception_handlers=lab_app(token="t", port=port).exception_handlers)  # fmt: skip
-        server = uvicorn.Server(uvicorn.Config(app, http=patience.PatientProtocol, lifespan="off", log_config=None))
+        server = uvicorn.Server(uvicorn.Config(app, http=PatientProtocol, lifespan="off", log_config=None))
         serving = threading.Thread(target=server.run, kwargs={"sockets": [door]})
         serving.start()
         try:
@@ -354,7 +354,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
         finally:
             server.should_exit = True
             serving.join()
-    assert not patience.PatientProtocol.waiting
+    assert not PatientProtocol.waiting
 
 
 def everything_of(door: socket.socket) -> bytes:
@@ -384,7 +384,7 @@ def test_one_byte_now_and_then_keeps_no_half_request_open(impatient: int) -> Non
 
 
 def test_a_body_that_stops_coming_is_answered_so_and_closed(impatient: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(patience.PatientProtocol, "patience", 2.0)
+    monkeypatch.setattr(PatientProtocol, "patience", 2.0)
     with socket.create_connection(("127.0.0.1", impatient)) as door:
         door.sendall(WELCOME.format(port=impatient).encode())
         said = everything_of(door)
@@ -395,7 +395,7 @@ def test_a_body_that_stops_coming_is_answered_so_and_closed(impatient: int, monk
 def test_a_sender_that_goes_in_the_middle_is_no_fault(
     impatient: int, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(patience.PatientProtocol, "patience", 600.0)
+    monkeypatch.setattr(PatientProtocol, "patience", 600.0)
     for _ in range(3):
         with socket.create_connection(("127.0.0.1", impatient)) as door:
             door.sendall(WELCOME.format(port=impatient).encode())
@@ -406,8 +406,8 @@ def test_a_sender_that_goes_in_the_middle_is_no_fault(
 def test_of_too_many_half_requests_most_are_closed_soon_and_others_served(
     impatient: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(patience.PatientProtocol, "patience", 600.0)
-    monkeypatch.setattr(patience.PatientProtocol, "hurry", 2.0)
+    monkeypatch.setattr(PatientProtocol, "patience", 600.0)
+    monkeypatch.setattr(PatientProtocol, "hurry", 2.0)
     with ExitStack() as all_:
         halves = [all_.enter_context(socket.create_connection(("127.0.0.1", impatient))) for _ in range(40)]
         for door in halves:
@@ -415,15 +415,15 @@ def test_of_too_many_half_requests_most_are_closed_soon_and_others_served(
         assert alive(impatient)
         for door in halves[9:]:
             everything_of(door)
-        assert len(patience.PatientProtocol.waiting) <= 9  # and that of who asked whether it is alive
+        assert len(PatientProtocol.waiting) <= 9  # and that of who asked whether it is alive
         halves[0].sendall(b"ive HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
         assert halves[0].recv(12) == b"HTTP/1.1 400"
 
 
 def test_none_is_closed_before_what_it_sent_was_read(impatient: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many come at once, who sends a request is answered."""
-    monkeypatch.setattr(patience.PatientProtocol, "patience", 600.0)
-    monkeypatch.setattr(patience.PatientProtocol, "hurry", 20.0)
+    monkeypatch.setattr(PatientProtocol, "patience", 600.0)
+    monkeypatch.setattr(PatientProtocol, "hurry", 20.0)
     with ExitStack() as many:
         for _ in range(100):
             many.enter_context(socket.create_connection(("127.0.0.1", impatient)))

@@ -15,8 +15,8 @@ import stickslip as ss
 from stickslip.answers.comparison import compare
 from stickslip.answers.findings import Findings
 from stickslip.answers.questions import analyze
-from stickslip.plot.comparison import plot_load_dependence
 from stickslip.plot.contact import plot_velocity_loop
+from stickslip.plot.friction import plot_load_dependence
 from stickslip.plot.plate import Plate
 from stickslip.plot.style import COLUMNS, STYLE, envelope, prefixed, thinned
 from stickslip.plot.traces import close_up, plot_force_balance, plot_traces

@@ -88,12 +88,12 @@ def test_killed_at_random_it_goes_on_and_ends_with_the_same_bytes(whole: Path, t
 
 
 def test_what_is_done_is_not_run_again(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from stickslip.maps import serial
+    from stickslip.maps import engines
 
     def refuse(plan: Any, number: int) -> Any:
         raise AssertionError(f"block {number} is there already")
 
-    monkeypatch.setattr(serial, "run_block", refuse)
+    monkeypatch.setattr(engines, "run_block", refuse)
     before = files(whole)
     sweep(SLIDER, GRID, store=whole, **SETTINGS)
     assert files(whole) == before
@@ -261,12 +261,12 @@ def test_the_cluster_gives_the_same_bytes(whole: Path, tmp_path: Path) -> None:
 
 def test_workers_that_die_are_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    from stickslip.maps import cluster
+    from stickslip.maps import engines
 
     def deadly(run: Trajectory) -> float:
         os._exit(1)
 
-    monkeypatch.setattr(cluster, "DEATHS", 0)
+    monkeypatch.setattr(engines, "DEATHS", 0)
     with pytest.raises(SolveError, match="workers of the cluster died of one block"):
         sweep(SLIDER, {"kinetic": [0.5]}, measures=[deadly], settle=0, cycles=1, engine="dask")
 

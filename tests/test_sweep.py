@@ -17,7 +17,7 @@ import pytest
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Exit, Mode, Rigid
-from stickslip.maps import progress, serial
+from stickslip.maps import engines, progress
 from stickslip.maps.plan import Arrays, Plan
 
 pytest.importorskip("xarray")
@@ -232,7 +232,7 @@ def test_a_border_is_refined_with_few_runs_and_none_wrong() -> None:
 @pytest.mark.parametrize("last", [12, 17])
 def test_an_interrupt_ends_a_refinement_with_what_is_known(last: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Within a level, and before its first block."""
-    run_block, begun = serial.run_block, itertools.count(1)
+    run_block, begun = engines.run_block, itertools.count(1)
 
     def interrupted(plan: Plan, number: int) -> tuple[Arrays, Arrays | None]:
         if next(begun) == last:
@@ -243,7 +243,7 @@ def test_an_interrupt_ends_a_refinement_with_what_is_known(last: int, monkeypatc
     coarse = {"frequency": np.linspace(0.08, 0.3, 9), "kinetic": np.linspace(0.1, 1.2, 9)}
     options: dict[str, Any] = {"halvings": 1, "settle": 5, "cycles": 2, "engine": "serial"}
     whole = ss.maps.refine(slider, coarse, **options)
-    monkeypatch.setattr(serial, "run_block", interrupted)
+    monkeypatch.setattr(engines, "run_block", interrupted)
     found = ss.maps.refine(slider, coarse, **options)
     assert next(begun) == last + 1
     assert found.attrs["status"] == f"interrupted: {int(found.run.sum())} points were run"

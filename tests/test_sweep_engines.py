@@ -17,9 +17,9 @@ import pytest
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
 from stickslip.maps.block import _alone, run_block
+from stickslip.maps.engines import threads
 from stickslip.maps.measures import LOG, MEASURES
 from stickslip.maps.sweep import planned
-from stickslip.maps.threads import threads
 from stickslip.solve import cells
 from stickslip.solve.tables import systems_of, table_of, tables_of
 

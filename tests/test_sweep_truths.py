@@ -16,9 +16,9 @@ import pandas as pd
 import pytest
 
 import stickslip as ss
+from batches import simulate_batch
 from stickslip.errors import ModelError
 from stickslip.scenarios import forced, grid
-from stickslip.solve.batch import simulate_batch
 from stickslip.solve.tables import table_of
 
 pytest.importorskip("xarray")

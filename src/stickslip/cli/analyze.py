@@ -74,9 +74,12 @@ def analyze(
     folder = output or default_folder(groups)
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(
-            groups, rig, lambda record: _tried(ss.analyze(record, rig=rig, method=method), twins, tell), tell,
+            groups,
+            rig,
+            lambda record: _tried(ss.analyze(record, rig=rig, method=method), twins, tell),
+            tell,
             of_parts=lambda parts, say: ss.answers.analyze_blocks(parts, rig=rig, method=method, progress=say),
-        )  # fmt: skip
+        )
         results = with_left_out(ss.compare(found) if len(found) > 1 else found[0], refused)
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if output or not as_json else None

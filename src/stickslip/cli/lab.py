@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 import webbrowser
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -28,18 +29,18 @@ def lab(port: int, no_browser: bool) -> None:
     stickslip lab
     stickslip lab --port 9000 --no-browser
     """
-    from stickslip.lab.serving import doorway, listening, serve  # the server is imported where it is wanted
+    from stickslip.lab import serving  # the server is imported where it is wanted
 
-    with listening(port) as door:
+    with serving.listening(port) as door:
         token = secrets.token_urlsafe(24)
         address = f"http://127.0.0.1:{door.getsockname()[1]}/?token={token}"
 
-        def opened(folder: Path) -> None:
+        def opened(doorway: Callable[[str], Path]) -> None:
             say(f"The lab is open at {address}\nCtrl-C ends it.")
             if not no_browser:
-                webbrowser.open(doorway(folder, address).as_uri())
+                webbrowser.open(doorway(address).as_uri())
 
         try:
-            serve(door, token=token, opened=opened)
+            serving.serve(door, token=token, opened=opened)
         except KeyboardInterrupt:  # the server has shut down by then, and hands the signal on
             say("The lab has ended.")

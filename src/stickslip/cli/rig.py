@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.cases import case_options, folder_name, wanted_case
-from stickslip.cli.options import pair, result_options
+from stickslip.cli.options import case_options, folder_name, pair, result_options, wanted_case
 from stickslip.cli.progress import progress
 from stickslip.cli.show import show
 

@@ -47,9 +47,14 @@ if TYPE_CHECKING:
 @result_options("FILE-squeak")
 @reading_options
 def squeak(
-    files: tuple[str, ...], output: Path | None, as_json: bool, channel: str | None, frequencies: str | None,
-    lever: str | None, **options: Any,
-) -> None:  # fmt: skip
+    files: tuple[str, ...],
+    output: Path | None,
+    as_json: bool,
+    channel: str | None,
+    frequencies: str | None,
+    lever: str | None,
+    **options: Any,
+) -> None:
     """Find squeaks: when, how loud, at which frequency, which motions move together, and whether friction makes them.
 
     FILES hold a sound or a vibration, best with the motion and the friction force. Files that belong to one record are

@@ -33,8 +33,16 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     """
     asked = ss.maps.read_sweep(file)
     place = store if store is not None else file.with_suffix(".zarr")
-    found = ss.sweep(asked.case.system, asked.grid, measures=asked.measures, cycles=asked.cycles, settle=asked.settle,
-                     start=asked.case.start, engine=engine, store=place)  # fmt: skip
+    found = ss.sweep(
+        asked.case.system,
+        asked.grid,
+        measures=asked.measures,
+        cycles=asked.cycles,
+        settle=asked.settle,
+        start=asked.case.start,
+        engine=engine,
+        store=place,
+    )
     story, whole = ss.summary(found), found.attrs["status"] == "complete"
     written = ss.publish(found, folder=output, system=asked.case.system) if output is not None else None
     if as_json:

@@ -270,9 +270,16 @@ def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int |
         return -at(free)[1]
 
     found = least_squares(
-        residual_at, np.clip(parameters[columns] / units, low, high), jac=slope_at,
-        bounds=(low, high), x_scale="jac", xtol=CONVERGED, ftol=CONVERGED, gtol=None, max_nfev=EVALUATIONS,
-    )  # fmt: skip
+        residual_at,
+        np.clip(parameters[columns] / units, low, high),
+        jac=slope_at,
+        bounds=(low, high),
+        x_scale="jac",
+        xtol=CONVERGED,
+        ftol=CONVERGED,
+        gtol=None,
+        max_nfev=EVALUATIONS,
+    )
     parameters[columns] = units * found.x
     residual, jacobian, begun = at(found.x)
     return Fitted(motion, parameters, begun, half_cycles is not None, residual, jacobian / units, blocks)

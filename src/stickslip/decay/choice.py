@@ -21,7 +21,7 @@ from stickslip.decay.candidates import (
     first_speed,
     fit_candidates,
     fit_motion,
-)  # fmt: skip
+)
 from stickslip.decay.motions import MOTIONS, Restoring
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
@@ -177,9 +177,14 @@ class Candidate:
             low, high = value - math.hypot(reach, min(0.0, *moves)), value + math.hypot(reach, max(0.0, *moves))
             sd = (high - low) / (2 * NORMAL_95)
         return Estimate(
-            name or parameter, factor * value, (factor * low, factor * high), factor * sd, unit,
-            f"least squares, {self.fitted.motion.words}", self._status,
-        )  # fmt: skip
+            name or parameter,
+            factor * value,
+            (factor * low, factor * high),
+            factor * sd,
+            unit,
+            f"least squares, {self.fitted.motion.words}",
+            self._status,
+        )
 
     @property
     def _status(self) -> str:

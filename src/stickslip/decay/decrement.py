@@ -237,22 +237,42 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
     scatter = _scatter(upright, ex.rate(upright, i=i, m=m, form=form), form, *motion)
     of_rate, of_dry = EQUATIONS[form]
     damping_ratio = Estimate.normal(
-        "damping ratio", found[0], sd=spread[0], unit="1", status=status, checks=_quoted(scatter.damping_ratio),
+        "damping ratio",
+        found[0],
+        sd=spread[0],
+        unit="1",
+        status=status,
+        checks=_quoted(scatter.damping_ratio),
         method=f"equation {of_rate} over {m} half cycles",
-    )  # fmt: skip
+    )
     _require_loss(damping_ratio)
     dry_displacement = Estimate.normal(
-        "dry friction displacement", found[1], sd=spread[1], unit="rad" if ring_down.unit.startswith("rad") else "m",
-        status=status, checks=_quoted(scatter.dry_displacement),
+        "dry friction displacement",
+        found[1],
+        sd=spread[1],
+        unit="rad" if ring_down.unit.startswith("rad") else "m",
+        status=status,
+        checks=_quoted(scatter.dry_displacement),
         method=f"equation {of_dry}, mean of the last {last}",
-    ).within(0.0)  # fmt: skip
+    ).within(0.0)
     natural = frequency.scaled(1 / math.sqrt(1 - found[0] ** 2), "Hz", "natural frequency")
     bias = _bias(ring_down, form, centre + side * found[2], spread[2], status)
     return Decrement(
-        damping_ratio, dry_displacement, natural, bias, ex.frictions_seen(damping_ratio, dry_displacement), times,
-        values, sd, side * ex.differences(upright, form), _bounds(upright, errors, i, motion), scatter, ring_down, (),
+        damping_ratio,
+        dry_displacement,
+        natural,
+        bias,
+        ex.frictions_seen(damping_ratio, dry_displacement),
+        times,
+        values,
+        sd,
+        side * ex.differences(upright, form),
+        _bounds(upright, errors, i, motion),
+        scatter,
+        ring_down,
+        (),
         status,
-    )  # fmt: skip
+    )
 
 
 def _require_loss(damping_ratio: Estimate) -> None:
@@ -391,9 +411,14 @@ def _frequency(times: Array, values: Array, ring_down: RingDown) -> tuple[Estima
         notes = (f"the first cycles are {change:.2g} % {longer} than the middle ones: the spring is not linear",)
     method = f"straight line through {len(times)} turns"
     return Estimate.normal(
-        "frequency", 1 / (2 * half), sd=sd / (2 * half**2), unit="Hz", method=method, quantile=student(freedom),
+        "frequency",
+        1 / (2 * half),
+        sd=sd / (2 * half**2),
+        unit="Hz",
+        method=method,
+        quantile=student(freedom),
         status=notes[0] if notes else "ok",
-    ), notes  # fmt: skip
+    ), notes
 
 
 def _few(count: int) -> tuple[str, ...]:
@@ -450,6 +475,12 @@ def _together(parts: Sequence[Decrement], notes: tuple[str, ...], refused: Seque
         for name in ("damping_ratio", "dry_displacement", "frequency", "bias")
     )
     return replace(
-        surest, damping_ratio=ratio, dry_displacement=dry, frequency=frequency, bias=bias,
-        model=ex.frictions_seen(ratio, dry), parts=tuple(parts), status=status,
-    )  # fmt: skip
+        surest,
+        damping_ratio=ratio,
+        dry_displacement=dry,
+        frequency=frequency,
+        bias=bias,
+        model=ex.frictions_seen(ratio, dry),
+        parts=tuple(parts),
+        status=status,
+    )

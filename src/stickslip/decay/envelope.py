@@ -101,9 +101,13 @@ def log_decrement(record: Record, *, channel: str | None = None) -> EnvelopeDeca
         else "the amplitudes do not fall as a power: dry friction is read as viscous"
     )
     return EnvelopeDecay(
-        damping, None, _frequency(ring_down, damping.value, method), method,
-        "dry friction is read as viscous damping, the more the smaller the swings", status,
-    )  # fmt: skip
+        damping,
+        None,
+        _frequency(ring_down, damping.value, method),
+        method,
+        "dry friction is read as viscous damping, the more the smaller the swings",
+        status,
+    )
 
 
 def linear_decrement(record: Record, *, channel: str | None = None) -> EnvelopeDecay:
@@ -148,9 +152,13 @@ def linear_decrement(record: Record, *, channel: str | None = None) -> EnvelopeD
         "ok" if abs(bent) < 0.1 * sizes[0] else "the amplitudes do not fall on a line: viscous damping is read as dry"
     )
     return EnvelopeDecay(
-        None, dry, _frequency(ring_down, 0.0, method), method,
-        "viscous damping is read as dry friction, the more the larger the swings", status,
-    )  # fmt: skip
+        None,
+        dry,
+        _frequency(ring_down, 0.0, method),
+        method,
+        "viscous damping is read as dry friction, the more the larger the swings",
+        status,
+    )
 
 
 def extreme_decay(
@@ -197,15 +205,19 @@ def extreme_decay(
     signs = math.copysign(1.0, ring_down.amplitude) * (-1.0) ** numbers
     (beta, dry), (beta_sd, dry_sd) = _fitted_swings(sizes, numbers, signs, restoring)
     told: dict[str, Any] = {
-        "method": f"least squares over {len(sizes)} extremes", "quantile": student(max(1, len(sizes) - FREE)),
-    }  # fmt: skip
+        "method": f"least squares over {len(sizes)} extremes",
+        "quantile": student(max(1, len(sizes) - FREE)),
+    }
     damping = Estimate.normal("damping ratio", damping_ratio(beta), sd=beta_sd / (1 + beta**2) ** 1.5, unit="1", **told)
     displacement = Estimate.normal("dry friction displacement", dry, sd=dry_sd, unit=ring_down.unit, **told).within(0.0)
     return EnvelopeDecay(
-        damping, displacement, _frequency(ring_down, damping.value, told["method"]), told["method"],
+        damping,
+        displacement,
+        _frequency(ring_down, damping.value, told["method"]),
+        told["method"],
         "noise lengthens every extreme, and a sample seldom falls on one: some times less sure than the whole waveform",
         Status(*([Doubt.few(len(sizes), "extreme")] if len(sizes) < 8 else [])),
-    )  # fmt: skip
+    )
 
 
 def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDecay:
@@ -260,9 +272,13 @@ def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDeca
     damping = line.estimate(0, "damping ratio", "1", method).scaled(1 / w, "1")
     dry = line.estimate(1, "dry friction displacement", ring_down.unit, method)
     return EnvelopeDecay(
-        damping, dry.scaled(math.pi / (2 * w), ring_down.unit), _frequency(ring_down, damping.value, method), method,
-        "the transform's ends and the averaging bend the envelope: its interval does not hold that", "ok",
-    )  # fmt: skip
+        damping,
+        dry.scaled(math.pi / (2 * w), ring_down.unit),
+        _frequency(ring_down, damping.value, method),
+        method,
+        "the transform's ends and the averaging bend the envelope: its interval does not hold that",
+        "ok",
+    )
 
 
 def _analytic(values: Array) -> NDArray[np.complex128]:

@@ -5,27 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.decay import joint
 from stickslip.decay.answer import DecayFit, beginning, constants, spring_of
+from stickslip.decay.choice import Choice
+from stickslip.decay.joint import Release
+from stickslip.decay.motions import Restoring
+from stickslip.decay.noise import KINDS, find_noise
+from stickslip.decay.pendulum import fit_pendulum
+from stickslip.decay.profile import last_swing
 from stickslip.decay.release import CLIPPED, LOST, Releases, RingDown, find_releases
+from stickslip.decay.search import Search, variance, weights
+from stickslip.decay.start import roughness
+from stickslip.decay.waveform import Array
 from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Doubt, Estimate, Status
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
-
-if TYPE_CHECKING:
-    from stickslip.decay.choice import Choice
-    from stickslip.decay.joint import Release
-    from stickslip.decay.motions import Restoring
-    from stickslip.decay.search import Blocks
-
-Array = NDArray[np.float64]
 
 LEFT_OVER = "residual"  # the kind of doubt where the model leaves more than noise
 UNLIKE = 2.0  # times the noise that the residual may be before the model is doubted
@@ -116,8 +116,6 @@ def fit_decay(
     >>> found.damping_ratio_any.includes(found.damping_ratio.value)
     True
     """
-    from stickslip.decay.noise import KINDS
-
     if noise is not None and noise not in KINDS:
         raise EstimateError(f"noise = '{noise}'", f"it is one of {', '.join(KINDS)}", "choose one, or leave it out")
     records = [record] if isinstance(record, Record) else list(record)
@@ -129,8 +127,6 @@ def fit_decay(
     history = tuple(step for each in records for step in each.history)
     notes = tuple(dict.fromkeys(note for each in found for note in each.notes))
     if restoring != "linear":
-        from stickslip.decay.pendulum import fit_pendulum
-
         return fit_pendulum(
             ring_downs, restoring=restoring, noise=noise, motions=motions, known=known, notes=notes, history=history
         )
@@ -175,9 +171,12 @@ def _from(ring_down: RingDown, first: int) -> RingDown:
     """The ring-down from row `first` on."""
     kept = ring_down.turns >= first
     return replace(
-        ring_down, first=ring_down.first + first / ring_down.fs, samples=ring_down.samples[first:],
-        turns=ring_down.turns[kept] - first, sound=ring_down.sound[kept],
-    )  # fmt: skip
+        ring_down,
+        first=ring_down.first + first / ring_down.fs,
+        samples=ring_down.samples[first:],
+        turns=ring_down.turns[kept] - first,
+        sound=ring_down.sound[kept],
+    )
 
 
 def _from_motion(ring_down: RingDown) -> RingDown:
@@ -190,10 +189,6 @@ def _from_motion(ring_down: RingDown) -> RingDown:
 
 def _release(ring_down: RingDown, noise: str | None) -> Release:
     """One release: its blocks, its fits in white noise, its noise."""
-    from stickslip.decay.joint import Release
-    from stickslip.decay.noise import find_noise
-    from stickslip.decay.search import Search
-
     samples = np.ascontiguousarray(ring_down.samples)
     search = Search()
     blocks = search.blocks(samples, 1 / ring_down.fs, ring_down.order)
@@ -220,33 +215,27 @@ class _Motion:
 
 
 def _alone(release: Release) -> _Motion:
-    from stickslip.decay.search import Search, variance, weights
-    from stickslip.decay.waveform import sample_motion
-
     blocks, fits = release.blocks, release.fits
     share = weights(fits, blocks)
     best = fits[np.argmax(share)]
     ends = Search().intervals(blocks, fits)
-    values, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
-    sample_motion(best[3:], int(best[0]), *blocks.data[1:], values, jacobian, np.empty((3, 7, 6)))
+    _, jacobian = blocks.motion(best[3:], int(best[0]))
     covariance = np.asarray(variance(fits, blocks) * np.linalg.pinv(jacobian @ jacobian.T), dtype=np.float64)
     return _mean(fits[:, 3:], share, covariance, ends, [(int(n),) for n in fits[:, 0]], [(row[3:],) for row in fits])
 
 
 def _together(releases: list[Release]) -> _Motion:
-    from stickslip.decay.joint import candidates, ends, unlike
-
-    found = candidates(releases)
+    found = joint.candidates(releases)
     least = min(each.value for each in found)
     freedom = sum(each.blocks.freedom for each in releases)
     share = np.exp(-0.5 * np.array([each.value - least for each in found]))
     best = found[int(np.argmax(share))]
     covariance = np.asarray(np.linalg.pinv(best.curvature)[:6, :6], dtype=np.float64)
-    limits = ends(found, least + student(freedom) ** 2, 6)
+    limits = joint.ends(found, least + student(freedom) ** 2, 6)
     motions = [tuple(each.motion(k) for k in range(len(releases))) for each in found]
     rows = np.array([each.p[:6] for each in found])
     mean = _mean(rows, share / share.sum(), covariance, limits, [each.half_cycles for each in found], motions)
-    return replace(mean, alike=unlike(releases, found))
+    return replace(mean, alike=joint.unlike(releases, found))
 
 
 def _mean(
@@ -280,7 +269,8 @@ def _answer(
     name = ring_downs[0].channel
     length, unit = ("rad" if name == "theta" else "m"), ring_downs[0].unit
     half_cycles, likelihood = motion.candidates[0]
-    fitted = [_fitted(each.blocks, n, p) for each, n, p in zip(releases, half_cycles, motion.motions[0], strict=True)]
+    motions_first = zip(releases, half_cycles, motion.motions[0], strict=True)
+    fitted = [release.blocks.motion(p, n)[0] for release, n, p in motions_first]
     choices = [each.choice for each in motions]
     unlike = f"the releases do not share one friction and frequency (p = {motion.alike:.1g}): fit each alone"
     doubts = (Doubt(unlike),) if motion.alike < APART else _misfit(releases, fitted)
@@ -341,18 +331,8 @@ def _seen_beside(choices: list[Choice]) -> list[str]:
     return [words for each in choices if (words := each.seen_beside("both", "static"))][:1]
 
 
-def _fitted(blocks: Blocks, n: int, p: Array) -> Array:
-    from stickslip.decay.waveform import sample_motion
-
-    values, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
-    sample_motion(p, n, *blocks.data[1:], values, jacobian, np.empty((3, 7, 6)))
-    return values
-
-
 def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
     """Doubt where the residual is much more than the record's own noise from block to block."""
-    from stickslip.decay.start import roughness
-
     worst = 0.0
     for release, values in zip(releases, fitted, strict=True):
         left = release.blocks.means - values
@@ -368,8 +348,6 @@ def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
 
 def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:
     """Static friction lies between where the mass stayed and where it last turned, in every release."""
-    from stickslip.decay.profile import last_swing
-
     low, high, rested, method = 0.0, math.inf, False, "between where it stayed and where it last turned"
     for number, release in enumerate(releases):
         stayed, turned = [], []

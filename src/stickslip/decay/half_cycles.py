@@ -137,22 +137,13 @@ def _rest(sample, p, active, side, branch, x, jacobian):
 
 
 @compiled(**OPTIONS)
-def decay(times, p, active, sine, most, work, x, jacobian):
-    """Fill `x` (n,) and `jacobian` (n, active.size) at rising `times`; return the number of half cycles begun.
-
-    `most` half cycles at the most, -1 for as many as the dry friction lets it make; `work` is (13, 2 + 2 active).
-    """
-    count, terms = times.size, active.size
-    size = 2 + 2 * terms
-    branch, state, rates, end, end_rates, moved = work[7], work[8], work[9], work[10], work[11], work[12]
-    side = 1.0 if p[AMPLITUDE] >= 0 else -1.0
-    start = p[RELEASE]
-    # The first turning point: on the virgin backbone.
+def _first_branch(p, active, side, branch, moved):
+    """The branch from the first turning point, on the virgin backbone, and how its beginning moves."""
     amplitude = abs(p[AMPLITUDE])
     log = math.log(amplitude) if amplitude > 0 else 0.0
     power = math.exp((1 + p[EXPONENT]) * log) if amplitude > 0 else 0.0
     branch[0], branch[1] = amplitude, -p[SLIP] * power
-    for j in range(terms):
+    for j in range(active.size):
         name = active[j]
         branch[2 + 2 * j] = side if name == AMPLITUDE else 0.0
         branch[3 + 2 * j] = 0.0
@@ -162,18 +153,93 @@ def decay(times, p, active, sine, most, work, x, jacobian):
             branch[3 + 2 * j] = -p[SLIP] * power * log
         elif name == AMPLITUDE and amplitude > 0:
             branch[3 + 2 * j] = -side * p[SLIP] * (1 + p[EXPONENT]) * power / amplitude
-        moved[j] = 1.0 if name == RELEASE else 0.0  # how the half cycle's beginning moves
-    sample = 0
+        moved[j] = 1.0 if name == RELEASE else 0.0
+
+
+@compiled(**OPTIONS)
+def _next_branch(p, active, branch, state, rates, moved):
+    """The branch from the turning point that was reached, and how its beginning moves."""
+    depth = 0.5 * (branch[0] - state[0])
+    log = math.log(depth) if depth > 0 else 0.0
+    power = math.exp((1 + p[EXPONENT]) * log) if depth > 0 else 0.0
+    slope = p[SLIP] * (1 + p[EXPONENT]) * power / depth if depth > 0 else 0.0
+    for j in range(active.size):
+        if rates[1] > 0:
+            moved[j] -= state[3 + 2 * j] / rates[1]
+        change = slope * (branch[2 + 2 * j] - state[2 + 2 * j])
+        if active[j] == SLIP:
+            change += 2 * power
+        elif active[j] == EXPONENT:
+            change += 2 * p[SLIP] * power * log
+        branch[3 + 2 * j] = -branch[3 + 2 * j] - change
+        branch[2 + 2 * j] = -state[2 + 2 * j]
+    branch[1] = -branch[1] - 2 * p[SLIP] * power
+    branch[0] = -state[0]
+
+
+@compiled(**OPTIONS)
+def _step(p, active, sine, work):
+    """One step towards the next turning point, or onto it: its length [s], and whether it is there."""
+    branch, state, rates, end, end_rates = work[7], work[8], work[9], work[10], work[11]
+    length = STEP / p[FREQUENCY]
+    if p[SPEED] > 0:
+        length = min(length, 0.3 * (p[SPEED] + 0.3 * abs(state[1])) / abs(rates[1]))
+    _advance(state, length, p, active, sine, branch, rates, work, end)
+    _rates(end, p, active, sine, branch, end_rates)
+    if end[1] < 0:
+        return length, False
+    share = state[1] / (state[1] - end[1])
+    for _ in range(4):  # on the quintic
+        slope = rates[1] + (end_rates[1] - rates[1]) * share
+        change = _speed(share, length, state, rates, end, end_rates) / (length * slope) if slope > 0 else 0.0
+        share = min(1.0, max(0.0, share - change))
+    length *= share
+    for _ in range(2):  # on the motion itself
+        _advance(state, length, p, active, sine, branch, rates, work, end)
+        _rates(end, p, active, sine, branch, end_rates)
+        if end_rates[1] > 0:
+            length -= end[1] / end_rates[1]
+    _advance(state, length, p, active, sine, branch, rates, work, end)
+    end[1] = 0.0
+    _rates(end, p, active, sine, branch, end_rates)
+    return length, True
+
+
+@compiled(**OPTIONS)
+def _read(sample, share, length, p, active, side, work, x, jacobian):
+    """A sample at the share of a step."""
+    state, rates, end, end_rates, moved = work[8], work[9], work[10], work[11], work[12]
+    speed = _speed(share, length, state, rates, end, end_rates)
+    x[sample] = p[REST] + side * _quintic(share, length, state, rates, end, end_rates, 0)
+    for j in range(active.size):
+        change = _quintic(share, length, state, rates, end, end_rates, 2 + 2 * j)
+        jacobian[sample, j] = side * (change - speed * moved[j]) + (1.0 if active[j] == REST else 0.0)
+
+
+@compiled(**OPTIONS)
+def _leaves(p, sine, most, branch):
+    """Whether the mass leaves its turning point."""
+    pull = _turning_spring(branch, p, sine)
+    if most < 0 and (abs(pull) <= p[DRY] * (1 + p[RISE]) or branch[0] < LEAST * abs(p[AMPLITUDE])):
+        return False
+    return pull >= 0 and branch[0] > 0
+
+
+@compiled(**OPTIONS)
+def decay(times, p, active, sine, most, work, x, jacobian):
+    """Fill `x` (n,) and `jacobian` (n, active.size) at rising `times`; return the number of half cycles begun.
+
+    `most` half cycles at the most, -1 for as many as the dry friction lets it make; `work` is (13, 2 + 2 active).
+    """
+    count, size = times.size, 2 + 2 * active.size
+    branch, state, rates, end, end_rates, moved = work[7], work[8], work[9], work[10], work[11], work[12]
+    side = 1.0 if p[AMPLITUDE] >= 0 else -1.0
+    start, sample, half_cycles = p[RELEASE], 0, 0
+    _first_branch(p, active, side, branch, moved)
     while sample < count and times[sample] <= start:
         _rest(sample, p, active, side, branch, x, jacobian)
         sample += 1
-    half_cycles = 0
-    while sample < count and half_cycles != most:
-        pull = _turning_spring(branch, p, sine)
-        if most < 0 and (abs(pull) <= p[DRY] * (1 + p[RISE]) or branch[0] < LEAST * amplitude):
-            break
-        if pull < 0 or branch[0] <= 0:
-            break
+    while sample < count and half_cycles != most and _leaves(p, sine, most, branch):
         half_cycles += 1
         for i in range(size):
             state[i] = branch[i] if i % 2 == 0 else 0.0
@@ -182,36 +248,9 @@ def decay(times, p, active, sine, most, work, x, jacobian):
             break
         turned = False
         while sample < count and not turned:
-            length = STEP / p[FREQUENCY]
-            if p[SPEED] > 0:
-                length = min(length, 0.3 * (p[SPEED] + 0.3 * abs(state[1])) / abs(rates[1]))
-            _advance(state, length, p, active, sine, branch, rates, work, end)
-            _rates(end, p, active, sine, branch, end_rates)
-            if end[1] >= 0:
-                turned = True
-                share = state[1] / (state[1] - end[1])
-                for _ in range(4):
-                    slope = rates[1] + (end_rates[1] - rates[1]) * share
-                    change = (
-                        _speed(share, length, state, rates, end, end_rates) / (length * slope) if slope > 0 else 0.0
-                    )
-                    share = min(1.0, max(0.0, share - change))
-                length *= share
-                for _ in range(2):
-                    _advance(state, length, p, active, sine, branch, rates, work, end)
-                    _rates(end, p, active, sine, branch, end_rates)
-                    if end_rates[1] > 0:
-                        length -= end[1] / end_rates[1]
-                _advance(state, length, p, active, sine, branch, rates, work, end)
-                end[1] = 0.0
-                _rates(end, p, active, sine, branch, end_rates)
+            length, turned = _step(p, active, sine, work)
             while sample < count and times[sample] <= start + length:
-                s = (times[sample] - start) / length
-                speed = _speed(s, length, state, rates, end, end_rates)
-                x[sample] = p[REST] + side * _quintic(s, length, state, rates, end, end_rates, 0)
-                for j in range(terms):
-                    change = _quintic(s, length, state, rates, end, end_rates, 2 + 2 * j)
-                    jacobian[sample, j] = side * (change - speed * moved[j]) + (1.0 if active[j] == REST else 0.0)
+                _read(sample, (times[sample] - start) / length, length, p, active, side, work, x, jacobian)
                 sample += 1
             start += length
             for i in range(size):
@@ -219,22 +258,7 @@ def decay(times, p, active, sine, most, work, x, jacobian):
         if not turned:
             break
         side = -side
-        depth = 0.5 * (branch[0] - state[0])
-        log = math.log(depth) if depth > 0 else 0.0
-        power = math.exp((1 + p[EXPONENT]) * log) if depth > 0 else 0.0
-        slope = p[SLIP] * (1 + p[EXPONENT]) * power / depth if depth > 0 else 0.0
-        for j in range(terms):
-            if rates[1] > 0:
-                moved[j] -= state[3 + 2 * j] / rates[1]
-            change = slope * (branch[2 + 2 * j] - state[2 + 2 * j])
-            if active[j] == SLIP:
-                change += 2 * power
-            elif active[j] == EXPONENT:
-                change += 2 * p[SLIP] * power * log
-            branch[3 + 2 * j] = -branch[3 + 2 * j] - change
-            branch[2 + 2 * j] = -state[2 + 2 * j]
-        branch[1] = -branch[1] - 2 * p[SLIP] * power
-        branch[0] = -state[0]
+        _next_branch(p, active, branch, state, rates, moved)
     while sample < count:  # at rest
         _rest(sample, p, active, side, branch, x, jacobian)
         sample += 1

@@ -10,14 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip.decay.likelihood import Objective, extreme, minimise, solve
 from stickslip.decay.noise import Noise
 from stickslip.decay.profile import last_swing
-from stickslip.decay.search import Blocks
-
-Array = NDArray[np.float64]
+from stickslip.decay.waveform import Array, Blocks
 
 SHARED = 3
 WORSE = 20.0  # minus twice the log likelihood by which a number of half cycles may be worse and still count

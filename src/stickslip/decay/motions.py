@@ -8,6 +8,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stickslip.decay.half_cycles import decay
+
 Array = NDArray[np.float64]
 Restoring = Literal["linear", "pendulum"]
 RESTORING: tuple[str, ...] = get_args(Restoring)
@@ -135,8 +137,6 @@ def free_decay(
     >>> free_decay([0.0, 0.5, 1.0], dry)[0].round(6).tolist()  # each half cycle loses 2 x_k
     [1.0, -0.9, 0.8]
     """
-    from stickslip.decay.half_cycles import decay
-
     instants = np.ascontiguousarray(times, dtype=float)
     if spread is not None:
         apart = np.asarray(spread, dtype=float)

@@ -15,11 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.decay.counts import add_counts
-from stickslip.decay.drift import restricted
+from stickslip.compiled import FAST, compiled
 from stickslip.decay.likelihood import Objective, solve
-from stickslip.decay.search import Blocks, variance
-from stickslip.decay.waveform import normal_equations, sample_motion
+from stickslip.decay.profile import log_determinant
+from stickslip.decay.profile import solve as cholesky
+from stickslip.decay.search import variance
+from stickslip.decay.waveform import Blocks, normal_equations, sample_motion
 from stickslip.errors import EstimateError
 
 Array = NDArray[np.float64]
@@ -32,6 +33,7 @@ GAINED = 2.7  # minus twice the log likelihood that drift must gain before it is
 COARSE = 0.7  # of the step: noise, the counts' own included, below which counts are not a sum of white noises
 PRECISION = 1e-7  # of the range: a residual below it is rounding, and of no colour
 SHORT = 24  # blocks in which drift is not told from the motion
+SURE = 9.0  # standard deviations from which a count tells nothing
 KINDS = ("white", "quantised", "coloured")
 
 
@@ -80,9 +82,11 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
     left = _left(samples, blocks, int(row[0]), row[3:]) if step > 0 else math.inf
     if kind == "quantised" or (kind is None and left < COARSE * step):
         return Noise(
-            "quantised", max(left, 0.3 * step), f"counts of {step:.3g}",
-            lambda n: quantised(samples, n, step, blocks.dt, blocks.order),
-        )  # fmt: skip
+            "quantised",
+            max(left, 0.3 * step),
+            f"counts of {step:.3g}",
+            lambda n: quantised(_single(samples, blocks), n, step),
+        )
     if kind == "coloured" and len(blocks.means) <= SHORT:
         raise EstimateError(
             f"noise = 'coloured' of {len(blocks.means)} blocks",
@@ -103,9 +107,13 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
 
 def _left(samples: Array, blocks: Blocks, n: int, p: Array) -> float:
     """Standard deviation of the samples from a motion; the blocks' would take a count's steady error for more."""
-    values, jacobian = np.empty(len(samples)), np.empty((6, len(samples)))
-    sample_motion(p, n, 1, len(samples), blocks.dt, blocks.order, values, jacobian, np.empty((3, 7, 6)))
+    values, _ = _single(samples, blocks).motion(p, n)
     return float(np.sqrt(np.mean((samples - values) ** 2)))
+
+
+def _single(samples: Array, blocks: Blocks) -> Blocks:
+    """Each sample a block."""
+    return blocks._replace(means=samples, size=1, total=len(samples))
 
 
 def _refined(blocks: Blocks, n: int, p: Array, power: Array) -> Array:
@@ -122,17 +130,18 @@ def white_noise(blocks: Blocks, n: int, variance: float) -> Objective:
         slope, curvature = np.zeros(6), np.eye(6)
         if not (abs(p[1]) < STEEPEST and p[0] > 0):
             return math.inf, slope, curvature
-        squares = normal_equations(p, n, *blocks.data, curvature, slope, work)
+        squares = normal_equations(p, n, blocks, curvature, slope, work)
         return float(squares) / variance, slope / variance, curvature / variance
 
     return objective
 
 
-def quantised(samples: Array, n: int, step: float, dt: float, order: int) -> Objective:
+def quantised(counts: Blocks, n: int, step: float) -> Objective:
     """The likelihood of counts, of six parameters of the motion and the logarithm of the noise.
 
     Counts can not tell less noise than a small share of their step from none: that much is added to it.
     """
+    samples = counts.means
     values, jacobian, work = np.empty(len(samples)), np.empty((6, len(samples))), np.empty((3, 7, 6))
     least = FINEST * step
 
@@ -140,7 +149,7 @@ def quantised(samples: Array, n: int, step: float, dt: float, order: int) -> Obj
         slope, curvature = np.empty(7), np.empty((7, 7))
         if not (abs(p[1]) < STEEPEST and p[0] > 0 and p[6] < 700):
             return math.inf, slope, curvature
-        sample_motion(p[:6], n, 1, len(samples), dt, order, values, jacobian, work)
+        sample_motion(p[:6], n, counts, values, jacobian, work)
         level = math.hypot(math.exp(p[6]), least)
         total = add_counts(values, jacobian, samples, step, level, slope, curvature)
         share, off = (math.exp(p[6]) / level) ** 2, p[6] - math.log(least)
@@ -159,8 +168,7 @@ def _transformed(blocks: Blocks, n: int, p: Array) -> tuple[Array, Array]:
     from scipy.fft import dct
 
     whole = blocks.total // blocks.size
-    values, jacobian = np.empty_like(blocks.means), np.empty((6, len(blocks.means)))
-    sample_motion(p, n, *blocks.data[1:], values, jacobian, np.empty((3, 7, 6)))
+    values, jacobian = blocks.motion(p, n)
     left = dct((blocks.means - values)[:whole], norm="ortho")
     return np.asarray(left), np.asarray(dct(jacobian[:, :whole], norm="ortho"))
 
@@ -207,3 +215,101 @@ def drift(blocks: Blocks, n: int, p: Array) -> tuple[float, Array, float]:
         corner = float(corners[best])
     cost, squares = judged(corner)
     return corner, squares * (1 + corner / tones), judged(0.0)[0] - cost
+
+
+@compiled(**FAST)
+def mills(a: float) -> float:
+    """Probability beyond a >= 0 over the density there, of the normal law."""
+    if a < 30.0:
+        return 0.5 * math.erfc(a / math.sqrt(2.0)) * math.exp(0.5 * a * a) * math.sqrt(2.0 * math.pi)
+    return (1.0 - 1.0 / (a * a)) / a
+
+
+@compiled(**FAST)
+def add_counts(
+    values: Array, jacobian: Array, counts: Array, step: float, level: float, slope: Array, curvature: Array
+) -> float:
+    """Minus twice the log likelihood of counts; half its slope and curvature (7), the last for the noise's logarithm.
+
+    log(Phi(b) - Phi(a)) is concave in (a, b), so the curvature is positive.
+    """
+    total = 0.0
+    for k in range(7):
+        slope[k] = 0.0
+        for j in range(7):
+            curvature[k, j] = 0.0
+    for i in range(values.shape[0]):
+        a, b = (counts[i] - 0.5 * step - values[i]) / level, (counts[i] + 0.5 * step - values[i]) / level
+        if a < -SURE and b > SURE:
+            continue
+        side = 1.0
+        if a + b < 0.0:
+            a, b, side = -b, -a, -1.0
+        fade = math.exp(-0.5 * (b - a) * (b + a))
+        if a >= 0.0:
+            share = mills(a) - fade * mills(b)
+        else:
+            density = math.exp(-0.5 * a * a) / math.sqrt(2.0 * math.pi)
+            share = 0.5 * (math.erf(b / math.sqrt(2.0)) - math.erf(a / math.sqrt(2.0))) / max(density, 1e-300)
+        low = 1.0 / share
+        high = fade * low
+        total += a * a + math.log(2.0 * math.pi) - 2.0 * math.log(share)
+        aa, bb, ab = low * (low - a), high * (high + b), -low * high
+        # a and b fall with the value and, in size, with the noise
+        d_value = -side / level
+        s_value, s_noise = (high - low) * d_value, -(high * b - low * a)
+        c_value = (aa + 2.0 * ab + bb) / (level * level)
+        c_mixed = -d_value * ((aa + ab) * a + (ab + bb) * b)
+        c_noise = aa * a * a + 2.0 * ab * a * b + bb * b * b
+        for k in range(6):
+            slope[k] += s_value * jacobian[k, i]
+            curvature[6, k] += c_mixed * jacobian[k, i]
+            for j in range(k + 1):
+                curvature[k, j] += c_value * jacobian[k, i] * jacobian[j, i]
+        slope[6] += s_noise
+        curvature[6, 6] += c_noise
+    for k in range(7):
+        for j in range(k):
+            curvature[j, k] = curvature[k, j]
+    return total
+
+
+@compiled(**FAST)
+def restricted(left: Array, jacobian: Array, tones: Array, corner: float, work: Array) -> tuple[float, float]:
+    """Minus twice the restricted log likelihood, but for a constant, of noise of power ``s^2 (1 + corner / f)``; s^2.
+
+    Parameters
+    ----------
+    left : ndarray (n,)
+        Cosine transform of the residual.
+    jacobian : ndarray (6, n)
+        That of the motion's derivatives.
+    tones : ndarray (n,)
+        Frequencies [Hz].
+    work : ndarray (3, 6, 6)
+        Scratch.
+    """
+    curvature, factor, slope, step = work[0], work[1], work[2, 0], work[2, 1]
+    for j in range(6):
+        slope[j] = 0.0
+        for k in range(6):
+            curvature[j, k] = 0.0
+    squares, power = 0.0, 0.0
+    for i in range(left.shape[0]):
+        here = 1.0 + corner / tones[i]
+        power += math.log(here)
+        squares += left[i] * left[i] / here
+        for j in range(6):
+            weighted = jacobian[j, i] / here
+            slope[j] += weighted * left[i]
+            for k in range(j + 1):
+                curvature[j, k] += weighted * jacobian[k, i]
+    for j in range(6):
+        for k in range(j):
+            curvature[k, j] = curvature[j, k]
+    freedom = left.shape[0] - 6
+    if cholesky(curvature, slope, step, factor, 1e-13):
+        for j in range(6):
+            squares -= slope[j] * step[j]
+    squares /= freedom
+    return freedom * math.log(squares) + power + log_determinant(curvature, factor), squares

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -64,15 +65,7 @@ def fit_pendulum(
     blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
     kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"
     choices = [each.choice for each in motions]
-
-    def estimate(parameter: str, name: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
-        found = chosen.estimate(parameter, name=name, unit=unit, factor=factor)
-        low, high = found.interval
-        return replace(
-            found, value=found.value + offset, interval=(low + offset, high + offset), status=status,
-            method=f"whole waveform, spring sin x, noise {kind}", checks=(f"{fitted.half_cycles} half cycles",),
-        )  # fmt: skip
-
+    estimate = _estimator(chosen, status, kind)
     begins, far = beginning(ring_down.held and not later)
     damping = estimate("damping_ratio", "damping ratio", "1")
     dry = estimate("dry_displacement", "dry friction displacement", "rad")
@@ -107,6 +100,19 @@ def fit_pendulum(
     )
 
 
+def _estimator(chosen: Candidate, status: str, noise: str) -> Callable[..., Estimate]:
+    """What makes an Estimate of a parameter, by its name."""
+    method, checks = f"whole waveform, spring sin x, noise {noise}", (f"{chosen.fitted.half_cycles} half cycles",)
+
+    def estimate(parameter: str, name: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
+        plain = chosen.estimate(parameter, name=name, unit=unit, factor=factor)
+        low, high = plain.interval
+        value, interval = plain.value + offset, (low + offset, high + offset)
+        return replace(plain, value=value, interval=interval, status=status, method=method, checks=checks)
+
+    return estimate
+
+
 def _only(ring_downs: list[RingDown], noise: str | None) -> RingDown:
     """The one release that is fitted."""
     if len(ring_downs) > 1:
@@ -132,9 +138,14 @@ def _static(candidate: Candidate, ring_down: RingDown) -> Estimate:
     high = _pull(fitted, fitted.half_cycles - 1) + error
     status = "ok" if ring_down.stopped else "the mass does not come to rest in the record: only an upper bound"
     return Estimate(
-        "static friction displacement", (low + high) / 2, (low, high), (high - low) / math.sqrt(12), ring_down.unit,
-        "between where it stayed and where it last turned", status,
-    )  # fmt: skip
+        "static friction displacement",
+        (low + high) / 2,
+        (low, high),
+        (high - low) / math.sqrt(12),
+        ring_down.unit,
+        "between where it stayed and where it last turned",
+        status,
+    )
 
 
 def _pull(fitted: Fitted, half_cycles: int) -> float:

@@ -77,15 +77,15 @@ def _possible(p, before):
 
 
 @compiled(**FAST)
-def minimise(p, n, means, size, total, dt, order, hessian, gradient, work):
+def minimise(p, n, blocks, hessian, gradient, work):
     """Least squares by Levenberg and Marquardt from `p`, which becomes the answer; the sum of squares, or infinity.
 
     `hessian` is left as J'J there. `work` is (8, 7, 6).
     """
     step, trial, factor = work[3, 0], work[3, 1], work[4]
     other, slope, scratch = work[5, :6], work[6, 0], work[:3]
-    freedom = max(1.0, total / size - 6.0)
-    squares = normal_equations(p, n, means, size, total, dt, order, hessian, gradient, scratch)
+    freedom = max(1.0, blocks.total / blocks.size - 6.0)
+    squares = normal_equations(p, n, blocks, hessian, gradient, scratch)
     extra = 0.0
     for _ in range(STEPS):
         if not solve(hessian, gradient, step, factor, extra):
@@ -102,7 +102,7 @@ def minimise(p, n, means, size, total, dt, order, hessian, gradient, work):
                 for k in range(6):
                     p[k] = trial[k]
                 return squares - fall
-            now = normal_equations(trial, n, means, size, total, dt, order, other, slope, scratch)
+            now = normal_equations(trial, n, blocks, other, slope, scratch)
             if now < squares:
                 squares = now
                 for k in range(6):
@@ -118,14 +118,14 @@ def minimise(p, n, means, size, total, dt, order, hessian, gradient, work):
 
 
 @compiled(**FAST)
-def extreme(p, n, which, side, level, least, means, size, total, dt, order, hessian, gradient, work):
+def extreme(p, n, which, side, level, least, blocks, hessian, gradient, work):
     """Carry `p` to the extreme (`side` +1, -1) of one parameter where the sum of squares is `level`; whether it did."""
     step, across, factor, aim = work[3, 0], work[3, 1], work[4], work[3, 2]
     for k in range(6):
         aim[k] = 0.0
     aim[which] = 1.0
     for _ in range(STEPS):
-        squares = normal_equations(p, n, means, size, total, dt, order, hessian, gradient, work[:3])
+        squares = normal_equations(p, n, blocks, hessian, gradient, work[:3])
         if not solve(hessian, gradient, step, factor, 0.0) or not solve(hessian, aim, across, factor, 0.0):
             return False
         fall = 0.0
@@ -150,27 +150,27 @@ def extreme(p, n, which, side, level, least, means, size, total, dt, order, hess
 
 
 @compiled(**FAST)
-def over_half_cycles(start, first, means, size, total, dt, order, fits, work):
+def over_half_cycles(start, first, blocks, fits, work):
     """Fit every number of half cycles that may be, from `first` on upwards and downwards; how many were kept.
 
     A row of `fits` (rows, 9) holds n, the sum of squares, the log determinant of J'J, and the parameters.
     """
     hessian, gradient, p = work[8, :6], work[9, 0], work[9, 1]
-    kept, best = 0, math.inf
-    rows = fits.shape[0]
+    kept, best, rows = 0, math.inf, fits.shape[0]
+    worse = 1.0 + WORSE / max(1.0, blocks.total / blocks.size - 6.0)
     for direction in (1, -1):
         for k in range(6):
             p[k] = start[k] if direction == 1 or kept == 0 else fits[0, 3 + k]
         n = first if direction == 1 else first - 1
         bad = 0
         while n >= 1 and kept < rows and bad < 2:
-            squares = minimise(p, n, means, size, total, dt, order, hessian, gradient, work[:8])
-            limit = best * (1.0 + WORSE / max(1.0, total / size - 6.0))
+            squares = minimise(p, n, blocks, hessian, gradient, work[:8])
+            limit = best * worse
             possible = last_swing(p, n)[0] > 0.0
             if possible and squares <= limit:
                 if squares < best:
                     best = squares
-                    kept = _keep(fits, kept, best * (1.0 + WORSE / max(1.0, total / size - 6.0)))
+                    kept = _keep(fits, kept, best * worse)
                 fits[kept, 0], fits[kept, 1], fits[kept, 2] = n, squares, log_determinant(hessian, work[4])
                 for k in range(6):
                     fits[kept, 3 + k] = p[k]
@@ -179,7 +179,7 @@ def over_half_cycles(start, first, means, size, total, dt, order, fits, work):
             else:
                 bad += 2 if direction == 1 and not possible else 1 if kept > 0 else 0
             half = math.pi / (p[RATE] * math.sqrt(1.0 - p[DAMPING] ** 2))
-            if direction == 1 and p[RELEASE] + n * half > total * dt:
+            if direction == 1 and p[RELEASE] + n * half > blocks.total * blocks.dt:
                 break
             n += direction
     return kept
@@ -216,7 +216,7 @@ def log_determinant(matrix, factor):
 
 
 @compiled(**FAST)
-def intervals(fits, kept, level, means, size, total, dt, order, ends, work):
+def intervals(fits, kept, level, blocks, ends, work):
     """Ends (6, 2) of the profile likelihood of each parameter, by the best number of half cycles at each end.
 
     Returns how many ends were not found; they are left at the edge of the quadratic.
@@ -234,14 +234,14 @@ def intervals(fits, kept, level, means, size, total, dt, order, ends, work):
                     p[k] = fits[row, 3 + k]
                 n = int(fits[row, 0])
                 # which blocks an acceleration leaves out changes with the parameters: the quadratic serves there
-                found = order < 2 and extreme(
-                    p, n, which, side, level, fits[row, 1], means, size, total, dt, order, hessian, gradient, work[:8]
+                found = blocks.order < 2 and extreme(
+                    p, n, which, side, level, fits[row, 1], blocks, hessian, gradient, work[:8]
                 )
                 if not found:
-                    missed += order < 2
+                    missed += blocks.order < 2
                     for k in range(6):
                         p[k] = fits[row, 3 + k]
-                    normal_equations(p, n, means, size, total, dt, order, hessian, gradient, work[:3])
+                    normal_equations(p, n, blocks, hessian, gradient, work[:3])
                     aim, across = work[3, 2], work[3, 1]
                     for k in range(6):
                         aim[k] = 1.0 if k == which else 0.0

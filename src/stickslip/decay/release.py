@@ -17,6 +17,7 @@ from stickslip.record.flaws import clipped, spikes
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 from stickslip.signals.noise import noise_level, quantisation_step
+from stickslip.signals.turns import extreme
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -250,9 +251,14 @@ def _as_let_go(found: tuple[RingDown, ...]) -> tuple[RingDown, ...]:
         if each.stopped and stayed > HELD * turned + SEEN * each.noise:
             last = int(each.turns[-2])
             each = replace(
-                each, samples=each.samples[: last + 1], stop=each.first + last / each.fs, stopped=False,
-                turns=each.turns[:-1], sound=each.sound[:-1], notes=(*each.notes, CAUGHT),
-            )  # fmt: skip
+                each,
+                samples=each.samples[: last + 1],
+                stop=each.first + last / each.fs,
+                stopped=False,
+                turns=each.turns[:-1],
+                sound=each.sound[:-1],
+                notes=(*each.notes, CAUGHT),
+            )
         if len(each.turns) >= 4 or each is longest:
             kept.append(each)
     return tuple(kept)
@@ -362,11 +368,25 @@ def _ring_down(
         *([CAUGHT] if ends and not stopped and not run.parted else []),
     )
     return RingDown(
-        name, order, record.channels[name].unit, record.fs, record.start + first / record.fs,
-        values[first:last], record.start + start / record.fs, record.start + end / record.fs, bool(held),
-        bool(stopped), record.fs / (2 * half), rest, float(values[rows[0]] - rest), noise, step, rows - first,
-        sound, notes,
-    )  # fmt: skip
+        name,
+        order,
+        record.channels[name].unit,
+        record.fs,
+        record.start + first / record.fs,
+        values[first:last],
+        record.start + start / record.fs,
+        record.start + end / record.fs,
+        bool(held),
+        bool(stopped),
+        record.fs / (2 * half),
+        rest,
+        float(values[rows[0]] - rest),
+        noise,
+        step,
+        rows - first,
+        sound,
+        notes,
+    )
 
 
 def _inner_turns(values: Array, middles: Array, levels: Array) -> list[int]:
@@ -376,8 +396,6 @@ def _inner_turns(values: Array, middles: Array, levels: Array) -> list[int]:
 
 
 def _extreme(values: Array, first: float, last: float, *, upwards: bool) -> int:
-    from stickslip.signals.turns import extreme
-
     return int(extreme(values, round(first), round(last), 1.0 if upwards else -1.0))
 
 

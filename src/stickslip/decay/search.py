@@ -3,47 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip.decay.profile import intervals, over_half_cycles
 from stickslip.decay.start import block_means, block_size, guess
+from stickslip.decay.waveform import Array, Blocks
 from stickslip.statistics import student
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # of the range
 AT_ONCE = 0.1  # samples after the first one, within which a turn is before it
 CANDIDATES = 40  # numbers of half cycles kept
-
-
-@dataclass(frozen=True, eq=False)
-class Blocks:
-    """One release as a fit sees it: means of `size` samples each, `total` samples, their step [s], their order."""
-
-    means: Array
-    size: int
-    total: int
-    dt: float
-    order: int
-
-    @property
-    def data(self) -> tuple[Array, int, int, float, int]:
-        """What the compiled functions take."""
-        return self.means, self.size, self.total, self.dt, self.order
-
-    @property
-    def freedom(self) -> float:
-        """Degrees of freedom that the six parameters leave."""
-        return max(1.0, self.total / self.size - 6.0)
-
-    @property
-    def centres(self) -> Array:
-        """Time [s] of the blocks' centres, from the first sample."""
-        edges = np.minimum(np.arange(len(self.means) + 1) * self.size, self.total)
-        return np.asarray((edges[1:] + edges[:-1] - 1) / 2 * self.dt)
 
 
 class Search:
@@ -68,17 +38,17 @@ class Search:
 
     def candidates(self, blocks: Blocks) -> Array:
         """For each number of half cycles that may be: it, the sum of squares, log det J'J, and six parameters."""
-        first = guess(*blocks.data, self.rows, self.times, self.start, self.work)
-        kept = over_half_cycles(self.start, first, *blocks.data, self.fits, self.work) if first else 0
+        first = guess(blocks, self.rows, self.times, self.start, self.work)
+        kept = over_half_cycles(self.start, first, blocks, self.fits, self.work) if first else 0
         fits = np.array(self.fits[:kept])
         for row in fits:
-            _begin_late(row, *blocks.data[3:])
+            _begin_late(row, blocks.dt, blocks.order)
         return fits
 
     def intervals(self, blocks: Blocks, fits: Array) -> Array:
         """Ends (6, 2) of the 95 % profile likelihood of each parameter, the noise's level unknown."""
         level = fits[:, 1].min() + variance(fits, blocks) * student(blocks.freedom) ** 2
-        intervals(fits, len(fits), level, *blocks.data, self.ends, self.work)
+        intervals(fits, len(fits), level, blocks, self.ends, self.work)
         return self.ends
 
 

@@ -70,10 +70,10 @@ def half_period(values, rows, times, count):
 
 
 @compiled(**FAST)
-def linear_step(p, n, means, size, total, dt, order, hessian, gradient, work):
+def linear_step(p, n, blocks, hessian, gradient, work):
     """Best dry friction, rest and amplitude for the other three parameters: they enter linearly."""
     small, right, answer, factor = work[3, :3, :3], work[4, 0, :3], work[4, 1, :3], work[5, :3, :3]
-    squares = normal_equations(p, n, means, size, total, dt, order, hessian, gradient, work[:3])
+    squares = normal_equations(p, n, blocks, hessian, gradient, work[:3])
     places = (DRY, REST, AMPLITUDE)
     for j in range(3):
         right[j] = gradient[places[j]]
@@ -88,8 +88,9 @@ def linear_step(p, n, means, size, total, dt, order, hessian, gradient, work):
 
 
 @compiled(**FAST)
-def guess(means, size, total, dt, order, rows, times, p, work):
+def guess(blocks, rows, times, p, work):
     """First parameters of the motion in `p`; the number of half cycles seen, 0 where there are fewer than two."""
+    means, size, _, dt, order = blocks
     low, high = means[0], means[0]
     for j in range(means.shape[0]):
         low, high = min(low, means[j]), max(high, means[j])
@@ -109,7 +110,7 @@ def guess(means, size, total, dt, order, rows, times, p, work):
             trial[DRY], trial[REST] = 0.0, means[means.shape[0] - 1]
             trial[AMPLITUDE] = means[rows[0]] - trial[REST] if order == 0 else high - low
             n = max(1, count - 1 + shift // 4)
-            squares = linear_step(trial, n, means, size, total, dt, order, hessian, gradient, work)
+            squares = linear_step(trial, n, blocks, hessian, gradient, work)
             if squares < best and trial[AMPLITUDE] != 0.0:
                 best = squares
                 for k in range(6):

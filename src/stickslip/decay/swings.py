@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
+from stickslip.signals.turns import crossings, turning_points
 
 Array = NDArray[np.float64]
 
@@ -63,8 +64,6 @@ class Swings:
 
     @classmethod
     def _within(cls, values: Array, block: int, seen: float) -> Swings:
-        from stickslip.signals.turns import crossings, turning_points
-
         count = len(values) // block
         means = values[: count * block].reshape(count, block).mean(axis=1)
         turns = np.empty(count, dtype=np.intp)

@@ -22,11 +22,45 @@ rest position b, amplitude A (signed, from b), release time t_0 [s] from the fir
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from stickslip.compiled import FAST, compiled
 
+Array = NDArray[np.float64]
+
 RATE, DAMPING, DRY, REST, AMPLITUDE, RELEASE = range(6)
 VALUE = 6  # the row of the value itself, after those of its derivatives
+
+
+class Blocks(NamedTuple):
+    """One release as a fit sees it: means of `size` samples each (of the last block, of what is left), `total` samples,
+    their step [s], and the order of the derivative: 0, 1, 2 for displacement, velocity, acceleration."""
+
+    means: Array
+    size: int
+    total: int
+    dt: float
+    order: int
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom that the six parameters leave."""
+        return max(1.0, self.total / self.size - 6.0)
+
+    @property
+    def centres(self) -> Array:
+        """Time [s] of the blocks' centres, from the first sample."""
+        edges = np.minimum(np.arange(len(self.means) + 1) * self.size, self.total)
+        return np.asarray((edges[1:] + edges[:-1] - 1) / 2 * self.dt)
+
+    def motion(self, p: Array, n: int) -> tuple[Array, Array]:
+        """Means (blocks,) of a motion of n half cycles, and their derivatives (6, blocks) by its parameters."""
+        values, jacobian = np.empty_like(self.means), np.empty((6, len(self.means)))
+        sample_motion(p, n, self, values, jacobian, np.empty((3, 7, 6)))
+        return values, jacobian
 
 
 @compiled(**FAST)
@@ -135,7 +169,7 @@ def block_of(time, dt, size):
 
 
 @compiled(**FAST)
-def normal_equations(p, n, means, size, total, dt, order, hessian, gradient, work):
+def normal_equations(p, n, blocks, hessian, gradient, work):
     """Sum of squares of data minus model over the blocks, J'J in `hessian` (6, 6) and J'r in `gradient` (6).
 
     An acceleration jumps at every turning point. The blocks that hold one are left out, and the others count for them.
@@ -146,27 +180,20 @@ def normal_equations(p, n, means, size, total, dt, order, hessian, gradient, wor
         Parameters of the motion.
     n : int
         Half cycles until rest.
-    means : ndarray
-        Mean of each block of `size` samples; of `total` samples the last block has what is left, and counts less.
-    dt : float
-        Step of the samples [s].
-    order : int
-        0, 1, 2: displacement, velocity, acceleration.
+    blocks : Blocks
+        The last one counts less, by the samples that it has.
     work : ndarray (3, 7, 6)
         Scratch.
     """
+    means, size, total, dt, order = blocks
     rows, state, pending, mixed = work[0], work[1, 0], work[1, 1], work[2]
     for j in range(6):
-        gradient[j] = 0.0
+        gradient[j], pending[j] = 0.0, 0.0
         for k in range(6):
             hessian[j, k] = 0.0
-    zeta, w = p[DAMPING], p[RATE]
-    root = math.sqrt(1.0 - zeta * zeta)
-    lam, half = complex(-zeta * w, root * w), math.pi / (w * root)
+    lam, half = _pole(p)
     turn = _exponential(lam, size * dt)
-    squares, held, pending_value, used = 0.0, 0, 0.0, 0
-    for k in range(6):
-        pending[k] = 0.0
+    squares, held, mean, used = 0.0, 0, 0.0, 0
     fall(p, state, False)
     i = 0
     for piece in range(-1, n + 1):
@@ -180,39 +207,24 @@ def normal_equations(p, n, means, size, total, dt, order, hessian, gradient, wor
             used += max(stop - i, 0)
         described = 0
         while i < stop:
-            offset = i % size
-            count = min(stop - i, size - offset)
+            count = min(stop - i, size - i % size)
             if count != described:
                 describe(p, n, order, piece, count, dt, state, rows)
                 described = count
             tau = (i + 0.5 * (count - 1)) * dt - begin
             z = complex(1.0, 0.0) if piece < 0 or piece >= n else _exponential(lam, tau)
-            if count == size:
-                blocks = (stop - i) // size
-                squares += _add_blocks(
-                    rows, means, i // size, blocks, z, turn, tau, size * dt, hessian, gradient, mixed
-                )
-                i += blocks * size
+            if count == size:  # whole blocks, to the piece's end
+                first, last = i // size, i // size + (stop - i) // size
+                squares += _add_blocks(rows, means[first:last], z, turn, tau, size * dt, hessian, gradient, mixed)
+                i += (last - first) * size
                 continue
-            share = count / size
-            basis = (1.0, z.real, z.imag, tau * z.real, tau * z.imag)
-            for j in range(5):
-                pending_value += share * rows[VALUE, j] * basis[j]
-                for k in range(6):
-                    pending[k] += share * rows[k, j] * basis[j]
+            # a part of a block, which several pieces share
+            mean = _add_part(rows, count / size, z, tau, mean, pending)
             held += count
             i += count
             if i % size == 0 or i == total:
-                filled = held / size
-                left = means[(i - 1) // size] - pending_value / filled
-                squares += filled * left * left
-                for j in range(6):
-                    gradient[j] += pending[j] * left
-                    for k in range(j + 1):
-                        hessian[j, k] += pending[j] * pending[k] / filled
-                for k in range(6):
-                    pending[k] = 0.0
-                pending_value, held = 0.0, 0
+                squares += _add_block(means[(i - 1) // size], mean, held / size, pending, hessian, gradient)
+                mean, held = 0.0, 0
     share = total / used if order == 2 and used > 0 else 1.0
     for j in range(6):
         gradient[j] *= share
@@ -223,13 +235,44 @@ def normal_equations(p, n, means, size, total, dt, order, hessian, gradient, wor
 
 
 @compiled(**FAST)
-def _add_blocks(rows, means, first, blocks, z, turn, tau, step, hessian, gradient, mixed):
+def _pole(p):
+    """The oscillation's complex rate [1/s], and half its period [s]."""
+    root = math.sqrt(1.0 - p[DAMPING] * p[DAMPING])
+    return complex(-p[DAMPING] * p[RATE], root * p[RATE]), math.pi / (p[RATE] * root)
+
+
+@compiled(**FAST)
+def _add_part(rows, share, z, tau, mean, pending):
+    """Add a part of a block to its derivatives, `pending`; the block's mean with that part."""
+    basis = (1.0, z.real, z.imag, tau * z.real, tau * z.imag)
+    for j in range(5):
+        mean += share * rows[VALUE, j] * basis[j]
+        for k in range(6):
+            pending[k] += share * rows[k, j] * basis[j]
+    return mean
+
+
+@compiled(**FAST)
+def _add_block(measured, mean, filled, pending, hessian, gradient):
+    """Add a block made of parts, which fill that share of it, and forget its derivatives; its square."""
+    left = measured - mean / filled
+    for j in range(6):
+        gradient[j] += pending[j] * left
+        for k in range(j + 1):
+            hessian[j, k] += pending[j] * pending[k] / filled
+    for k in range(6):
+        pending[k] = 0.0
+    return filled * left * left
+
+
+@compiled(**FAST)
+def _add_blocks(rows, means, z, turn, tau, step, hessian, gradient, mixed):
     """Add the whole blocks of one piece, by the products of the five functions."""
     v0, v1, v2 = rows[6, 0], rows[6, 1], rows[6, 2]
     squares, r0, r1, r2, r3, r4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     g01, g02, g03, g04, g11, g12, g13, g14 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     g22, g23, g24, g33, g34, g44 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(first, first + blocks):
+    for j in range(means.shape[0]):
         c, s = z.real, z.imag
         tc, ts = tau * c, tau * s
         left = means[j] - (v0 + v1 * c + v2 * s)
@@ -256,7 +299,7 @@ def _add_blocks(rows, means, first, blocks, z, turn, tau, step, hessian, gradien
         z *= turn
         tau += step
     gram = (
-        (float(blocks), g01, g02, g03, g04), (g01, g11, g12, g13, g14), (g02, g12, g22, g23, g24),
+        (float(means.shape[0]), g01, g02, g03, g04), (g01, g11, g12, g13, g14), (g02, g12, g22, g23, g24),
         (g03, g13, g23, g33, g34), (g04, g14, g24, g34, g44),
     )  # fmt: skip
     for k in range(6):
@@ -264,9 +307,12 @@ def _add_blocks(rows, means, first, blocks, z, turn, tau, step, hessian, gradien
         for j in range(5):
             line = gram[j]
             mixed[k, j] = (
-                rows[k, 0] * line[0] + rows[k, 1] * line[1] + rows[k, 2] * line[2] + rows[k, 3] * line[3]
+                rows[k, 0] * line[0]
+                + rows[k, 1] * line[1]
+                + rows[k, 2] * line[2]
+                + rows[k, 3] * line[3]
                 + rows[k, 4] * line[4]
-            )  # fmt: skip
+            )
     for k in range(6):
         for m in range(k + 1):
             for j in range(5):
@@ -275,16 +321,15 @@ def _add_blocks(rows, means, first, blocks, z, turn, tau, step, hessian, gradien
 
 
 @compiled(**FAST)
-def sample_motion(p, n, size, total, dt, order, values, jacobian, work):
+def sample_motion(p, n, blocks, values, jacobian, work):
     """The model's block means, `values` (blocks,), and their derivatives, `jacobian` (6, blocks)."""
+    _, size, total, dt, order = blocks
     rows, state = work[0], work[1, 0]
     for j in range(values.shape[0]):
         values[j] = 0.0
         for k in range(6):
             jacobian[k, j] = 0.0
-    zeta, w = p[DAMPING], p[RATE]
-    root = math.sqrt(1.0 - zeta * zeta)
-    lam, half = complex(-zeta * w, root * w), math.pi / (w * root)
+    lam, half = _pole(p)
     turn, z = _exponential(lam, size * dt), complex(1.0, 0.0)
     fall(p, state, False)
     i = 0

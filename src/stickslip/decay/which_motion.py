@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stickslip.decay.choice import Candidate, Choice, choose, interval_of, kept_by_all
 from stickslip.decay.motions import MOTIONS, RESTORING, Restoring
 from stickslip.decay.release import CLIPPED, LOST, RingDown, find_releases
+from stickslip.decay.start import BLOCKS
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result, Status
 from stickslip.record.record import Record
@@ -167,18 +168,21 @@ def choice_of(
             "the choice among motions is made on a displacement",
             "record or integrate the displacement, or use fit_decay(record)",
         )
-    from stickslip.decay.start import BLOCKS
-
     rows, start = _begin(ring_down, restoring)
     size = max(1, int(2 * math.pi / start[0] * ring_down.fs / BLOCKS))
     count = (rows.stop - rows.start) // size
     samples = ring_down.samples[rows.start : rows.start + count * size]
     times = np.arange(count * size) / ring_down.fs
     choice = choose(
-        times.reshape(count, size).mean(axis=1), samples.reshape(count, size).mean(axis=1), fs=ring_down.fs,
-        start=start, counts=np.full(count, float(size)), restoring=restoring, candidates=candidates,
+        times.reshape(count, size).mean(axis=1),
+        samples.reshape(count, size).mean(axis=1),
+        fs=ring_down.fs,
+        start=start,
+        counts=np.full(count, float(size)),
+        restoring=restoring,
+        candidates=candidates,
         weights=(1 / _alike(ring_down)[rows.start : rows.start + count * size]).reshape(count, size).sum(axis=1),
-    )  # fmt: skip
+    )
     return choice, ring_down.first + rows.start / ring_down.fs
 
 
@@ -244,9 +248,13 @@ def whichever(choices: Sequence[Choice], estimate: Estimate, parameter: str) -> 
     (low, high), (lowest, highest) = estimate.interval, interval_of(choices, parameter)
     ends = min(low, lowest), max(high, highest)
     return replace(
-        estimate, name=f"{estimate.name}, whichever motion", interval=ends, sd=(ends[1] - ends[0]) / (2 * NORMAL_95),
-        method="all candidates not rejected", checks=(f"candidates: {', '.join(kept_by_all(choices))}",),
-    )  # fmt: skip
+        estimate,
+        name=f"{estimate.name}, whichever motion",
+        interval=ends,
+        sd=(ends[1] - ends[0]) / (2 * NORMAL_95),
+        method="all candidates not rejected",
+        checks=(f"candidates: {', '.join(kept_by_all(choices))}",),
+    )
 
 
 def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
@@ -255,11 +263,17 @@ def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
     dry = chosen.estimate("dry_displacement", name="dry friction displacement", unit=unit)
     frequency = chosen.estimate("angular_frequency", name="natural frequency", unit="Hz", factor=1 / (2 * math.pi))
     return DecayMotion(
-        damping, dry, frequency, whichever((choice,), damping, "damping_ratio"),
-        whichever((choice,), dry, "dry_displacement"), choice.model,
+        damping,
+        dry,
+        frequency,
+        whichever((choice,), damping, "damping_ratio"),
+        whichever((choice,), dry, "dry_displacement"),
+        choice.model,
         tuple((each.name, each.fitted.motion.words, each.verdict) for each in choice.candidates),
-        choice, told(ring_down, "" if choice.status == "ok" else choice.status), _terms(chosen, unit),
-    )  # fmt: skip
+        choice,
+        told(ring_down, "" if choice.status == "ok" else choice.status),
+        _terms(chosen, unit),
+    )
 
 
 def _terms(chosen: Candidate, unit: str) -> tuple[Estimate, ...]:

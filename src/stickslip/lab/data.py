@@ -158,9 +158,10 @@ def schema_of(model: type[BaseModel]) -> dict[str, Any]:
 def object_of(**properties: str) -> dict[str, Any]:
     """The JSON schema of an object that has all of these."""
     return {
-        "type": "object", "required": list(properties),
+        "type": "object",
+        "required": list(properties),
         "properties": {name: {"type": kind} for name, kind in properties.items()},
-    }  # fmt: skip
+    }
 
 
 FILE = object_of(id="string", name="string", size="integer")
@@ -244,9 +245,10 @@ async def send_file(request: Request) -> Response:
     """Keep a file; its own name is a label."""
     stated = request.headers.get("content-length", "")
     upload = await _of(request).uploads.receive(
-        request.stream(), label=request.query_params.get("name", ""),
+        request.stream(),
+        label=request.query_params.get("name", ""),
         stated=int(stated) if stated.isascii() and stated.isdigit() else 0,
-    )  # fmt: skip
+    )
     return JSONResponse({"id": upload.key, "name": upload.label, "size": upload.size}, status_code=201)
 
 
@@ -340,10 +342,12 @@ async def cancel(request: Request) -> Response:
 async def report(request: Request) -> Response:
     """The report of an analysis: to look at, or with ?keep=1 to keep."""
     return FileResponse(
-        _kept(_job(request), Path("results", "report.html")), media_type="text/html", filename="report.html",
+        _kept(_job(request), Path("results", "report.html")),
+        media_type="text/html",
+        filename="report.html",
         headers=REPORT_HEADERS,
         content_disposition_type="attachment" if request.query_params.get("keep") else "inline",
-    )  # fmt: skip
+    )
 
 
 @described("The numbers of an analysis", answer={"type": "object"})

@@ -49,22 +49,33 @@ def questions(channels: set[str], records: int) -> dict[str, dict[str, Any]]:
     measured = "friction" in channels or ("load" in channels and moves) or "force" in channels
     motion = "name the displacement x or the velocity v among the channels"
     return {
-        "analyze": _question(moves or forces, motion, needs=[] if measured or not moves else rig,
-                             may=[*rig, "damping", "damper", "contact", "normal"]),
-        "decay": _question(bool(channels & {"x", "theta", "v", "a"}), "name x, theta, v or a among the channels",
-                           may=rig),
+        "analyze": _question(
+            moves or forces,
+            motion,
+            needs=[] if measured or not moves else rig,
+            may=[*rig, "damping", "damper", "contact", "normal"],
+        ),
+        "decay": _question(
+            bool(channels & {"x", "theta", "v", "a"}), "name x, theta, v or a among the channels", may=rig
+        ),
         "wavelet": _question(records == 1, "one record is mapped at a time", may=["frequencies", *rig]),
         "squeak": _question(True, may=["frequencies", "normal"]),
-        "fit": _question(moves or felt, motion, needs=[] if felt and "x" not in channels else rig,
-                         may=["damping", "damper", "contact", "laws", "curve"]),
-    }  # fmt: skip
+        "fit": _question(
+            moves or felt,
+            motion,
+            needs=[] if felt and "x" not in channels else rig,
+            may=["damping", "damper", "contact", "laws", "curve"],
+        ),
+    }
 
 
 def _question(able: bool, why: str = "", *, needs: Sequence[str] = (), may: Sequence[str] = ()) -> dict[str, Any]:
     return {
-        "able": able, "why": "" if able else why, "needs": list(needs),
+        "able": able,
+        "why": "" if able else why,
+        "needs": list(needs),
         "may": [name for name in may if name not in needs],
-    }  # fmt: skip
+    }
 
 
 def _one(asked: Asked, number: int) -> tuple[dict[str, Any], list[str]]:
@@ -96,10 +107,16 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
         notes.append(f"the check-up looked at the first {len(first)} of {rows} rows")
     curves = thin.curves()
     return {
-        "name": name, "rows": rows, "fs": first.fs, "start": first.start, "duration": rows / first.fs,
+        "name": name,
+        "rows": rows,
+        "fs": first.fs,
+        "start": first.start,
+        "duration": rows / first.fs,
         "channels": [
             {
-                "name": channel.name, "unit": channel.unit, "words": channel.quantity,
+                "name": channel.name,
+                "unit": channel.unit,
+                "words": channel.quantity,
                 "column": channel.name if restored else channel.source.partition(UNTOLD)[0] or channel.name,
                 "low": plain(np.fmin.reduce(curves[channel.name])),
                 "high": plain(np.fmax.reduce(curves[channel.name])),
@@ -107,12 +124,14 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
             for channel in first.channels.values()
         ],
         "stated": {name: first.truth[name] for name in CONSTANTS if name in first.truth},
-        "faults": faults, "notes": notes, "unknown": [c.name for c in first.channels.values() if _untold(c)],
+        "faults": faults,
+        "notes": notes,
+        "unknown": [c.name for c in first.channels.values() if _untold(c)],
         "preview": {
             "time": numbers(first.start + thin.rows() / first.fs),
             "channels": {name: numbers(values) for name, values in curves.items()},
         },
-    }  # fmt: skip
+    }
 
 
 def _untold(channel: ss.record.Channel) -> bool:
@@ -177,9 +196,13 @@ def curve(record: str, channel: str, unit: str, time: Array, measured: Array, fi
         time = np.repeat(middles, 2)
         measured, fitted = extremes(measured, width).ravel(), extremes(fitted, width).ravel()
     return {
-        "record": record, "channel": channel, "unit": unit, "time": numbers(time), "measured": numbers(measured),
+        "record": record,
+        "channel": channel,
+        "unit": unit,
+        "time": numbers(time),
+        "measured": numbers(measured),
         "fitted": numbers(fitted),
-    }  # fmt: skip
+    }
 
 
 def numbers(values: Iterable[float]) -> list[float | None]:

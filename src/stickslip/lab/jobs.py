@@ -166,10 +166,18 @@ class Jobs:
         """Run the worker to its end: what became of it."""
         with (job.folder / "words.txt").open("wb") as words:
             job.process = process = await asyncio.create_subprocess_exec(
-                sys.executable, "-P", "-m", self.worker, str(job.folder), env=_environment(job.folder),
-                stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=words, limit=LONGEST_LINE,
+                sys.executable,
+                "-P",
+                "-m",
+                self.worker,
+                str(job.folder),
+                env=_environment(job.folder),
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=words,
+                limit=LONGEST_LINE,
                 start_new_session=True,
-            )  # fmt: skip
+            )
         try:
             async with asyncio.timeout(self.limits.wall):
                 await _follow(job, process)

@@ -73,16 +73,18 @@ async def _parts(
     for number, begin in enumerate(coarse, start=1):
         part = xs[begin : begin + STRIP]
         values[begin : begin + STRIP] = await _asked(socket, request, names, part, ys, want="sweep")
-        yield {"level": "coarse", "done": number, "of": len(coarse)}, {
-            "x": part, "y": ys, "values": values[begin : begin + STRIP].ravel(),
-        }  # fmt: skip
+        yield (
+            {"level": "coarse", "done": number, "of": len(coarse)},
+            {"x": part, "y": ys, "values": values[begin : begin + STRIP].ravel()},
+        )
     strips = _changing(values) if request["measure"] in COUNTED else []
     for number, (i, begin, end) in enumerate(strips, start=1):
         x, y = xs[i : i + 2], ys[begin:end]
         found = await _asked(socket, request, names, x, y, want="refine")
-        yield {"level": "fine", "done": number, "of": len(strips)}, {
-            "x": _finer(x), "y": _finer(y), "values": found.ravel(),
-        }  # fmt: skip
+        yield (
+            {"level": "fine", "done": number, "of": len(strips)},
+            {"x": _finer(x), "y": _finer(y), "values": found.ravel()},
+        )
 
 
 def _finer(values: NDArray[np.float64]) -> NDArray[np.float64]:

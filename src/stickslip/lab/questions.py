@@ -121,10 +121,13 @@ def fit(asked: Asked) -> dict[str, Any]:
     asked.say("reading", 0.0)
     records = [asked.record(number) for number in range(len(asked.records))]
     found, records = ss.answers.fit_records(
-        records, rig=rig, curve=asked.options.get("curve"), laws=_listed(asked.options.get("laws")),
+        records,
+        rig=rig,
+        curve=asked.options.get("curve"),
+        laws=_listed(asked.options.get("laws")),
         calibration=asked.options.get("calibration") or 0.01,
         progress=lambda share: asked.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
-    )  # fmt: skip
+    )
     ss.publish(found, folder=FOLDER, record=records)
     told = _told(ss.summary(found, record=records))
     curves = [*_law_curves(asked, records, found)]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import socket
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import stickslip as ss
 
 LARGEST_MESSAGE = 2**20  # bytes on a socket
 HOST = "127.0.0.1"
-DOORWAY = "open.html"  # in the folder of a run, until a page is open
 
 
 def listening(port: int) -> socket.socket:
@@ -42,16 +41,9 @@ def listening(port: int) -> socket.socket:
     return door
 
 
-def doorway(folder: Path, address: str) -> Path:
-    """A file for this user's eyes that leads a browser to the address: arguments of a program are seen by all."""
-    page = folder / DOORWAY
-    with os.fdopen(os.open(page, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
-        file.write(f'<!doctype html><title>stickslip lab</title><meta http-equiv="refresh" content="0; url={address}">')
-    return page
-
-
-def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) -> None:
-    """Answer at the door until Ctrl-C; `opened` is called with the folder of this run when it does.
+def serve(door: socket.socket, *, token: str, opened: Callable[[Callable[[str], Path]], None]) -> None:
+    """Answer at the door until Ctrl-C; `opened` is called when it does, with
+    what writes a page that leads a browser to an address.
 
     Raises
     ------
@@ -61,8 +53,7 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) ->
     try:
         import uvicorn
 
-        from stickslip.lab.patience import PatientProtocol
-        from stickslip.lab.server import lab_app
+        from stickslip.lab import server
     except ImportError as error:
         raise ss.errors.ModelError(
             f"the lab needs the package {error.name}",
@@ -74,14 +65,21 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Path], None]) ->
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
             if self.started:
-                opened(app.state.data.folder)
+                opened(partial(server.doorway, app.state.data.folder))
 
-    app = lab_app(token=token, port=door.getsockname()[1])
+    app = server.lab_app(token=token, port=door.getsockname()[1])
     settings = uvicorn.Config(
-        app, http=PatientProtocol, log_level="warning", access_log=False, ws_max_size=LARGEST_MESSAGE,
-        server_header=False, date_header=False, timeout_graceful_shutdown=2, ws_per_message_deflate=False,
-    )  # fmt: skip
-    server = Server(settings)
+        app,
+        http=server.PatientProtocol,
+        log_level="warning",
+        access_log=False,
+        ws_max_size=LARGEST_MESSAGE,
+        server_header=False,
+        date_header=False,
+        timeout_graceful_shutdown=2,
+        ws_per_message_deflate=False,
+    )
+    listener = Server(settings)
     if hasattr(signal, "SIGHUP"):
-        signal.signal(signal.SIGHUP, server.handle_exit)  # a terminal that closes leaves no files behind either
-    server.run(sockets=[door])
+        signal.signal(signal.SIGHUP, listener.handle_exit)  # a terminal that closes leaves no files behind either
+    listener.run(sockets=[door])

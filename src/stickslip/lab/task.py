@@ -6,10 +6,9 @@ import json
 import os
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
-
-from stickslip.lab.bounds import bound
 
 ASK, ANSWER = "ask.json", "answer.json"
 # What a page's analysis has no use for, and a file that takes over its reader would.
@@ -66,6 +65,25 @@ def _leave(answer: Mapping[str, Any], code: int) -> int:
     text = json.dumps(answer, ensure_ascii=False, allow_nan=False)
     Path(ANSWER).write_text(text, encoding="utf-8")
     return code
+
+
+def bound(**most: int) -> None:
+    """Bound this process, by the names of `resource`: ``RLIMIT_AS`` in bytes, ``RLIMIT_CPU`` in s of processor time.
+
+    Where the system has no such limit (Windows), or refuses it (macOS, of memory), the time that is given for an answer
+    is the only bound.
+    """
+    try:
+        import resource
+    except ImportError:
+        return
+    for name, value in most.items():
+        what = getattr(resource, name, None)
+        if what is None:
+            continue
+        hard = resource.getrlimit(what)[1]
+        with suppress(ValueError, OSError):
+            resource.setrlimit(what, (value if hard < 0 else min(value, hard), hard))
 
 
 if __name__ == "__main__":

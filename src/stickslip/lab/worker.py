@@ -15,8 +15,8 @@ from typing import Any, BinaryIO
 
 import stickslip as ss
 from stickslip.lab import drawn, explored, forms
-from stickslip.lab.bounds import bound
 from stickslip.lab.frames import frame
+from stickslip.lab.task import bound
 from stickslip.lab.workers import ANSWER, HEAD
 
 MEMORY = 4 * 2**30  # bytes of data
@@ -61,8 +61,11 @@ class Patience:
             raise Overtaken
         self.until = min(self.until, time.monotonic() + PATIENCE)
         if time.monotonic() > self.until:
-            raise ss.errors.SolveError(f"the run is {share:.0%} done after {PATIENCE:g} s", "the page waits no longer",
-                                "ask for fewer cycles, or run it with stickslip simulate")  # fmt: skip
+            raise ss.errors.SolveError(
+                f"the run is {share:.0%} done after {PATIENCE:g} s",
+                "the page waits no longer",
+                "ask for fewer cycles, or run it with stickslip simulate",
+            )
 
 
 def answered(request: dict[str, Any], patience: Patience) -> bytes:

@@ -57,9 +57,15 @@ class Worker:
         if self.process is None or self.process.returncode is not None:
             self.ready = False
             self.process = await asyncio.create_subprocess_exec(
-                sys.executable, "-P", "-m", "stickslip.lab.worker", stdin=asyncio.subprocess.PIPE,
-                stdout=asyncio.subprocess.PIPE, limit=2**22, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-            )  # fmt: skip
+                sys.executable,
+                "-P",
+                "-m",
+                "stickslip.lab.worker",
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+                limit=2**22,
+                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            )
         return self.process
 
     def interrupt(self, *, within: float | None = None) -> None:

@@ -150,9 +150,10 @@ def require_period(system: System, question: str) -> None:
     """Refuse a system whose drive does not repeat."""
     if not math.isfinite(tables(system).motion.period):
         raise ModelError(
-            f"drive = {type(system.drive).__name__}", f"{question} looks once in each period of a drive",
+            f"drive = {type(system.drive).__name__}",
+            f"{question} looks once in each period of a drive",
             "give drive= a period, as HarmonicBase(1e-3, frequency=2.5)",
-        )  # fmt: skip
+        )
 
 
 def require_number(parameter: str) -> None:
@@ -168,7 +169,5 @@ def numbers(name: str, values: ArrayLike) -> Array:
     except (TypeError, ValueError) as no_numbers:
         raise ModelError(f"{name} = {values!r}", "a range is made of numbers", "give numbers") from no_numbers
     if len(found) < 2 or not np.all(np.isfinite(found)):
-        raise ModelError(
-            f"{name} = {found.tolist()}", "a range has two different finite values at least", "give more"
-        )  # fmt: skip
+        raise ModelError(f"{name} = {found.tolist()}", "a range has two different finite values at least", "give more")
     return found

@@ -145,9 +145,10 @@ def basins(
 def _axes(grid: Mapping[str, ArrayLike]) -> tuple[tuple[str, str], tuple[Array, Array]]:
     if len(grid) != 2:
         raise ModelError(
-            f"a grid of {', '.join(grid) or 'nothing'}", "two start coordinates are needed",
+            f"a grid of {', '.join(grid) or 'nothing'}",
+            "two start coordinates are needed",
             'give grid={"x": np.linspace(-1, 1, 50), "v": np.linspace(-1, 1, 50)}',
-        )  # fmt: skip
+        )
     axes = [numbers(name, values) for name, values in grid.items()]
     first, second = grid
     return (first, second), (axes[0], axes[1])

@@ -1,21 +1,32 @@
-"""One block of a sweep: every motion of it run and measured, the same bytes wherever it is run."""
+"""One block of a sweep: every motion of it run and measured, the same bytes wherever it is run.
+
+The measures of a Trajectory are the slow way, for any law, and the truth of the compiled one.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
+from stickslip.maps import tally as log
 from stickslip.maps.crowd import Watch, crowds, on_cpu, watched
-from stickslip.maps.measures import FAILED, LOG, NO_SYSTEM, own_name
+from stickslip.maps.measures import AT_REST, EVENTS, FAILED, LOG, MOVING, NO_SYSTEM, ORDERS, own_name
 from stickslip.maps.plan import Arrays, Plan
-from stickslip.maps.trajectory import logged, measured, outcome
+from stickslip.maps.watch import repeats
+from stickslip.solve.exponents import lyapunov
+from stickslip.solve.poincare import derivative, lap, tables
 from stickslip.solve.simulate import simulate
-from stickslip.solve.trajectory import Event
+from stickslip.solve.tables import Array, System, Tables
+from stickslip.solve.trajectory import Event, Trajectory
 
 KEPT = {"time": np.float64, "kind": np.str_, "mode": np.str_}  # of an event; the rest are whole numbers
+ORDER = 12  # Gauss points of a cell
+SEEN = 8  # looks at a cell for a turn
+KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
 Alone = Callable[[Plan, tuple[int, ...]], Mapping[str, Any]]  # the measures of one point by itself
 
 
@@ -77,3 +88,139 @@ def _alone(plan: Plan, steps: tuple[int, ...]) -> Mapping[str, Any]:
         log = logged(run, plan.settle)
         told |= {LOG: len(log), "log": log}
     return told
+
+
+def measured(run: Trajectory, plan: Plan, start: Mapping[str, float | str]) -> dict[str, Any]:
+    """The variables of a plan's measures, of what the run does after the periods in which it settles."""
+    measures, settle, cycles = plan.measures, plan.settle, plan.cycles
+    begin = settle * period(run.system, run)
+    found: dict[str, Any] = {}
+    if set(measures) & EVENTS:
+        sums = counted(run, begin)
+        found |= {
+            "normal_stops": sums[log.NORMAL] / cycles,
+            "abnormal_stops": sums[log.ABNORMAL] / cycles,
+            "stick_share": sums[log.HELD] / (run.duration - begin),
+            "micro_slips": sums[log.SHORT] / cycles,
+            "transition_speed": sums[log.FASTEST] if sums[log.FASTEST] > 0 else math.nan,
+        }
+    if "amplitude" in measures:
+        found["amplitude"] = farthest(run, begin)
+    if "energy" in measures:
+        found["energy"] = work(run, begin) / cycles
+    if "period" in measures:
+        found["order"] = order(run, settle)
+    if "multipliers" in measures:
+        found["multiplier"] = multiplier(run, settle)
+    if "lyapunov" in measures and math.isfinite(run.table.motion.period):
+        found["lyapunov"] = lyapunov(run.system, cycles=cycles, transient=settle, start=start).value
+    return found | {own_name(measure): measure(run) for measure in measures if callable(measure)}
+
+
+def period(system: System, run: Trajectory) -> float:
+    """The drive's period [s]; without one, the natural period."""
+    driven = run.table.motion.period
+    return driven if math.isfinite(driven) else 1 / system.frequency
+
+
+def counted(run: Trajectory, begin: float) -> Array:
+    """The event log counted from a time on."""
+    modes = run.table.modes
+    parts = [getattr(mode, "parts", (mode,))[0] for mode in modes]
+    kinds = np.array([KINDS.get(part.kind, log.SLIP) for part in parts])
+    sides = np.array([part.side for part in parts], dtype=np.float64)
+    slip = run.sample(run.starts, ("slip",))[0][0]
+    sums = np.zeros(log.ENTRIES)
+    log.tally(kinds, sides, run.modes, run.starts - begin, run.durations, _paths(run), np.abs(slip), sums)
+    return sums
+
+
+def logged(run: Trajectory, settle: int) -> list[Event]:
+    """Every event after the periods in which the motion settles."""
+    begin = settle * period(run.system, run)
+    return [event for event in run.each_event() if event.time >= begin]
+
+
+def farthest(run: Trajectory, begin: float) -> float:
+    """Largest displacement from zero after a time, of any degree of freedom [m]."""
+    starts, widths = _cells(run, begin)
+    inner = np.linspace(0.0, 1.0, SEEN, endpoint=False)
+    times = np.append((starts[:, None] + widths[:, None] * inner).ravel(), run.duration)
+    (x, v, _), count = _moved(run, times)
+    best = float(np.max(np.abs(x)))
+    for degree in range(count):
+        turns = np.flatnonzero(v[degree, :-1] * v[degree, 1:] < 0)
+        if not len(turns):
+            continue
+        low, high = times[turns], times[turns + 1]
+        near = low + (high - low) * v[degree, turns] / (v[degree, turns] - v[degree, turns + 1])
+        for _ in range(4):
+            (x, slope, rate), _ = _moved(run, near)
+            best = max(best, float(np.max(np.abs(x[degree]))))
+            step = np.divide(slope[degree], rate[degree], out=np.zeros_like(near), where=rate[degree] != 0)
+            near = np.clip(near - step, low, high)
+    return best
+
+
+def _moved(run: Trajectory, times: Array) -> tuple[Array, int]:
+    values, _ = run.sample(times, ("x", "v", "a"))
+    return values.reshape(3, -1, len(times)), len(values) // 3
+
+
+def _paths(run: Trajectory) -> Array:
+    """How far the contact slips in each piece [m]."""
+    starts, widths = run.cells
+    (slip,), weights = _on_cells(run, starts, widths, ("slip",))
+    piece = np.searchsorted(run.starts, starts + widths / 2, side="right") - 1
+    return np.abs(np.bincount(piece, np.sum((slip * weights).reshape(-1, ORDER), axis=1), len(run.starts)))
+
+
+def work(run: Trajectory, begin: float) -> float:
+    """Work that friction takes from the motion after a time [J]."""
+    values, weights = _on_cells(run, *_cells(run, begin), ("friction", "slip"))
+    force, slip = np.split(values, 2)
+    return float(np.sum(np.sum(force * slip, axis=0) * weights))
+
+
+def _on_cells(run: Trajectory, starts: Array, widths: Array, outputs: tuple[str, ...]) -> tuple[Array, Array]:
+    """Outputs at the Gauss points of cells, and what each point weighs [s]."""
+    nodes, weights = np.polynomial.legendre.leggauss(ORDER)
+    times = np.minimum(starts[:, None] + widths[:, None] * (nodes + 1) / 2, run.duration)
+    return run.sample(times.ravel(), outputs)[0], (widths[:, None] * weights / 2).ravel()
+
+
+def _cells(run: Trajectory, begin: float) -> tuple[Array, Array]:
+    """Start and length of the stretches after a time on which the motion is one short polynomial."""
+    starts, widths = run.cells
+    ends = starts + widths
+    late = ends > begin
+    starts = np.maximum(starts[late], begin)
+    return starts, ends[late] - starts
+
+
+def order(run: Trajectory, settle: int) -> int:
+    """Periods of the drive after which the motion repeats; 0 where it does not up to 8."""
+    if not math.isfinite(run.table.motion.period):
+        return 0
+    return int(repeats(run.section()[settle + 1 :][-2 * ORDERS :]))
+
+
+def outcome(run: Trajectory) -> int:
+    """Whether the run still moves at its end: not where it is held through a whole period of the drive, or for good."""
+    table, mode = run.table, int(run.modes[-1])
+    still = not np.any(table.flow[mode][: table.physical]) if isinstance(table, Tables) else False
+    held = still and math.isfinite(table.motion.period) and run.durations[-1] >= (1 - 1e-9) * table.motion.period
+    return AT_REST if held or run.status == "at rest" else MOVING
+
+
+def multiplier(run: Trajectory, settle: int) -> complex:
+    """The largest Floquet multiplier of the orbit at the end; nan where none repeats."""
+    steps = order(run, settle)
+    if not steps:
+        return complex(math.nan, math.nan)
+    table = tables(run.system)
+    end = run.states[0].copy()
+    end[: table.physical] = run.section()[-1]
+    orbit = lap(run.system, table, end, int(run.modes[-1]), steps)
+    found = np.linalg.eigvals(derivative(orbit, orbit.end()[1])[0])
+    return complex(found[np.argmax(np.abs(found))])

@@ -76,10 +76,12 @@ class Boundary:
     @property
     def multipliers(self) -> Array:
         """Largest modulus of the orbit's multipliers on either side (n, 2): below 1 it is stable."""
-        return np.array([
-            [math.nan if each is None else float(np.max(np.abs(each.orbit.multipliers))) for each in pair]
-            for pair in zip(self.low, self.high, strict=True)
-        ])  # fmt: skip
+        return np.array(
+            [
+                [math.nan if each is None else float(np.max(np.abs(each.orbit.multipliers))) for each in pair]
+                for pair in zip(self.low, self.high, strict=True)
+            ]
+        )
 
     @property
     def data(self) -> xr.Dataset:
@@ -168,9 +170,10 @@ def boundary(
     low, high = map(float, between)
     if not (math.isfinite(low) and math.isfinite(high) and low < high and 0 < precision < 1):
         raise ModelError(
-            f"between = {between}, precision = {precision}", "a range has two different values, the lower one first, "
-            "and 0 < precision < 1", "correct them",
-        )  # fmt: skip
+            f"between = {between}, precision = {precision}",
+            "a range has two different values, the lower one first, and 0 < precision < 1",
+            "correct them",
+        )
     name, places = _along(system, parameter, along)
     ask = _question(kind)
 
@@ -186,8 +189,9 @@ def boundary(
     if all(below is None for _, _, below, _, _ in rows):
         raise SolveError(
             f"at {parameter} = {low:g} and {high:g} the motion is '{rows[0][4][0]}'",
-            "a boundary lies between two kinds of motion", "widen between=, or give another start= or kind=",
-        )  # fmt: skip
+            "a boundary lies between two kinds of motion",
+            "widen between=, or give another start= or kind=",
+        )
     values, errors, lows, highs, kinds = zip(*rows, strict=True)
     return Boundary(parameter, name, places, np.array(values), np.array(errors), lows, highs, kinds)
 

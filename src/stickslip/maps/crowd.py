@@ -16,6 +16,7 @@ from stickslip.maps.measures import FAILED, LOG, NO_SYSTEM, ORDERS
 from stickslip.maps.plan import BLOCK, Arrays, Plan
 from stickslip.maps.watch import (
     CONSTANT,
+    LAP,
     MARK,
     ROOM,
     VARIES,
@@ -28,8 +29,7 @@ from stickslip.maps.watch import (
 )
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
-from stickslip.solve.batch import pasts
-from stickslip.solve.glide import Model, Pieces
+from stickslip.solve.glide import Model, Past, Pieces
 from stickslip.solve.kernel import scratch
 from stickslip.solve.phasors import phasors_of
 from stickslip.solve.tables import (
@@ -77,9 +77,13 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Systems | None, dic
         moved, whose = np.unique(drive[rows], return_inverse=True)
         *numbers, base = values[own[rows]].T
         systems = oscillators(
-            [laws[j].law for j in used], its, [drives[j].drive for j in moved], whose, numbers=np.array(numbers),
+            [laws[j].law for j in used],
+            its,
+            [drives[j].drive for j in moved],
+            whose,
+            numbers=np.array(numbers),
             on_base=base == 1.0,
-        )  # fmt: skip
+        )
         yield rows, systems, {**plan.start, **_starts(plan, steps[rows])}
 
 
@@ -159,9 +163,12 @@ def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch
     models = Model(table.linear, phasors_of(table), table.period)
     given = Given(states, modes, units, models, _look(table, asked), wants, leaps, weights)
     out = Counted(
-        np.full(count, FAILED, np.int64), np.zeros((count, log.ENTRIES)), np.zeros((count, rows, physical)),
-        np.zeros(count), np.full((count, physical, physical), np.nan),
-    )  # fmt: skip
+        np.full(count, FAILED, np.int64),
+        np.zeros((count, log.ENTRIES)),
+        np.zeros((count, rows, physical)),
+        np.zeros(count),
+        np.full((count, physical, physical), np.nan),
+    )
     watch(given, out, states.shape[1], physical)
     found = _answers(plan, out, units, table.period)
     lost = out.statuses == FAILED
@@ -186,10 +193,15 @@ def _look(table: Tables, asked: set[str]) -> Look:
         still.append(rests)
     kinds = [KINDS.get(mode.kind, log.SLIP) for mode in table.modes]
     return Look(
-        np.array(kinds, dtype=np.int64), np.array([float(mode.side) for mode in table.modes]), np.array(inner),
-        np.array(works, dtype=np.int64), np.array(still), table.outputs["slip"], gap,
+        np.array(kinds, dtype=np.int64),
+        np.array([float(mode.side) for mode in table.modes]),
+        np.array(inner),
+        np.array(works, dtype=np.int64),
+        np.array(still),
+        table.outputs["slip"],
+        gap,
         np.ascontiguousarray(table.friction[:, :, 0]),
-    )  # fmt: skip
+    )
 
 
 def _answers(plan: Plan, out: Counted, units: Array, period: Array) -> Arrays:
@@ -223,8 +235,25 @@ def on_cpu(given: Given, out: Counted, size: int, physical: int) -> None:
 def rooms(count: int, size: int, physical: int) -> Rooms:
     """Room for what so many motions need while they are marched."""
     pieces = Pieces(
-        np.zeros((count, ROOM), np.int32), np.zeros((count, ROOM)), np.zeros((count, ROOM), np.int16),
-        np.zeros((count, ROOM)), np.zeros((count, ROOM, size)), np.zeros((count, ROOM), np.int16),
-    )  # fmt: skip
-    return Rooms(np.zeros((count, *scratch(size, 17).shape)), pasts(count), pieces, np.zeros((count, physical, size)),
-                 np.zeros((count, 4, max(size + MARK + 1, log.ENTRIES))))  # fmt: skip
+        np.zeros((count, ROOM), np.int32),
+        np.zeros((count, ROOM)),
+        np.zeros((count, ROOM), np.int16),
+        np.zeros((count, ROOM)),
+        np.zeros((count, ROOM, size)),
+        np.zeros((count, ROOM), np.int16),
+    )
+    return Rooms(
+        np.zeros((count, *scratch(size, 17).shape)),
+        pasts(count),
+        pieces,
+        np.zeros((count, physical, size)),
+        np.zeros((count, 4, max(size + MARK + 1, log.ENTRIES))),
+    )
+
+
+def pasts(count: int) -> Past:
+    """The rings of motions before their first pieces."""
+    none = np.full((2, count, LAP), -1, np.int64)
+    return Past(
+        none[0], none[1], np.zeros((count, LAP)), np.ones((count, LAP), np.int64), np.zeros((count, 3), np.int64)
+    )

@@ -108,11 +108,17 @@ def sensitivity(atlas: Any, *, variable: str, seed: int = 0) -> dict[str, dict[s
     names = [str(name) for name in atlas.coords]
     answers = np.asarray(atlas[variable].values, dtype=np.float64) if variable in atlas else np.zeros(0)
     if atlas.sizes.keys() != {"point"} or not len(answers) or not _is_sobol(atlas, names):
-        raise EstimateError(f"{len(answers)} points of '{variable}' over {', '.join(names)}",
-                            "the indices need the points of a Sobol design", "sweep over design(...)")  # fmt: skip
+        raise EstimateError(
+            f"{len(answers)} points of '{variable}' over {', '.join(names)}",
+            "the indices need the points of a Sobol design",
+            "sweep over design(...)",
+        )
     if not np.all(np.isfinite(answers)) or np.ptp(answers) == 0:
-        raise EstimateError(f"{variable} is not known at every point, or the same at all",
-                            "a share of a variance needs one", "narrow the bounds, or ask another")  # fmt: skip
+        raise EstimateError(
+            f"{variable} is not known at every point, or the same at all",
+            "a share of a variance needs one",
+            "narrow the bounds, or ask another",
+        )
     rows = answers.reshape(-1, len(names) + 2)
     rng = np.random.default_rng(seed)
     again = [_indices(rows[rng.integers(len(rows), size=len(rows))]) for _ in range(RESAMPLES)]

@@ -182,14 +182,16 @@ def dither(
     stick = longest_stick(plain, FORGET * duration)
     if stick == 0.0:
         raise SolveError(
-            "the system never sticks", "dither removes sticks, and there is nothing to remove",
+            "the system never sticks",
+            "dither removes sticks, and there is nothing to remove",
             "take a system that sticks and slips, or leave the dither out",
-        )  # fmt: skip
+        )
     if stick >= 0.999 * (1 - FORGET) * duration:
         raise SolveError(
-            "the mass is held all the time", "dither removes stick-slip, and nothing slips here",
+            "the mass is held all the time",
+            "dither removes stick-slip, and nothing slips here",
             "raise the drive's amplitude or speed, or start= it sliding",
-        )  # fmt: skip
+        )
     search = _Search(system, on, (start or {}, *_moments(plain)), duration)
     friction = float(np.max(np.abs(plain.sample(np.linspace(0, plain.duration, 4001), ("friction",))[0])))
     candidates = _frequencies(frequency, transition, period, stick)
@@ -200,7 +202,7 @@ def dither(
             f"no dither of {', '.join(f'{f:g}' for f in candidates)} Hz removes the stick of {stick:.3g} s",
             "its period is shorter than the stick, and its force a thousand times the friction at most",
             f"give frequency= more than {1 / stick:.3g} Hz, or dither on= something else",
-        )  # fmt: skip
+        )
     best = min(reached, key=lambda each: each.amplitude)
     return _designed(search, best, stick, friction, tuple(zip(candidates, found, strict=True)), transition)
 
@@ -294,15 +296,17 @@ class _Search:
 
 def _require(system: Oscillator, on: str, cycles: int, precision: float) -> None:
     if not isinstance(system, Oscillator):
-        raise ModelError(f"a {type(system).__name__}", "dither is sought for one mass with one contact",
-                         "give an Oscillator")  # fmt: skip
+        raise ModelError(
+            f"a {type(system).__name__}", "dither is sought for one mass with one contact", "give an Oscillator"
+        )
     if isinstance(system.drive, Dithered):
         raise ModelError("the drive is dithered already", "the dither is what is sought", "give the drive without it")
     if on not in UNITS:
         raise ModelError(f"on = '{on}'", f"dither moves one of {', '.join(UNITS)}", "choose one")
     if not (cycles >= 10 and 0 < precision < 0.5):
-        raise ModelError(f"cycles = {cycles}, precision = {precision}", "at least 10 cycles, and 0 < precision < 0.5",
-                         "correct them")  # fmt: skip
+        raise ModelError(
+            f"cycles = {cycles}, precision = {precision}", "at least 10 cycles, and 0 < precision < 0.5", "correct them"
+        )
     motion = tables(system).motion
     if not motion.rates and motion.knots is None:
         raise SolveError("nothing drives the system", "only a driven mass sticks and slips for good", "give a drive=")
@@ -313,8 +317,11 @@ def _slow_period(system: Oscillator) -> float:
     drive = tables(system).motion.period
     period = max(own, drive if math.isfinite(drive) else 0.0)
     if not period:
-        raise ModelError("a mass without a spring and a drive without a period", "a run is counted in cycles",
-                         "give a stiffness= or a periodic drive")  # fmt: skip
+        raise ModelError(
+            "a mass without a spring and a drive without a period",
+            "a run is counted in cycles",
+            "give a stiffness= or a periodic drive",
+        )
     return period
 
 
@@ -331,9 +338,10 @@ def _frequencies(
         raise ModelError(f"frequency = {given!r}", "a frequency is a number", "give it in Hz") from no_numbers
     if not (len(values) and np.all(np.isfinite(values)) and np.all(values > 1 / period)):
         raise ModelError(
-            f"frequency = {values.tolist()} Hz", f"dither is faster than the slow motion, {1 / period:.3g} Hz",
+            f"frequency = {values.tolist()} Hz",
+            f"dither is faster than the slow motion, {1 / period:.3g} Hz",
             f"give {FAST / period:.3g} Hz or more",
-        )  # fmt: skip
+        )
     return [float(value) for value in values]
 
 
@@ -367,9 +375,13 @@ def _designed(
         )
     low, high = best.too_small, best.amplitude
     amplitude = Estimate(
-        "dither amplitude", high, (low, high), (high - low) / math.sqrt(12), unit,
+        "dither amplitude",
+        high,
+        (low, high),
+        (high - low) / math.sqrt(12),
+        unit,
         f"bisection of exact runs of {search.duration:.4g} s, and 5 %",
-    )  # fmt: skip
+    )
     rows = tuple((f, math.nan if found is None else found.amplitude) for f, found in tried)
     return Dither(
         best.frequency, amplitude, search.on, speed, system, (stick, with_it), rows, best.scan, averaged, tuple(checks)
@@ -382,9 +394,7 @@ def averaged_friction(system: Oscillator, *, frequency: float, speed: float) -> 
     The mass is held by a soft spring and its critical damper: what they bear on average is the friction.
     """
     rate = 2 * math.pi * frequency / SLOW
-    probe = Oscillator(
-        system.mass, system.mass * rate**2, system.law, Belt(speed), damping=2 * system.mass * rate
-    )  # fmt: skip
+    probe = Oscillator(system.mass, system.mass * rate**2, system.law, Belt(speed), damping=2 * system.mass * rate)
     level = _mean_friction(probe, frequency)
     rows = []
     for share in PROBED:

@@ -1,18 +1,158 @@
-"""Where the blocks of a sweep are run: a register of engines."""
+"""Where the blocks of a sweep are run: a register of engines.
+
+``serial`` is the engine to which the others are held. On a Dask cluster workers that die are replaced, and their blocks
+run again.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+import signal
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from itertools import islice
+from logging import CRITICAL
+from typing import TYPE_CHECKING, Any
 
-from stickslip.errors import ModelError
-from stickslip.maps.cluster import on_cluster
-from stickslip.maps.cuda import cuda
-from stickslip.maps.plan import Keep, Plan
-from stickslip.maps.serial import serial
-from stickslip.maps.threads import threads
+from stickslip.errors import ModelError, SolveError
+from stickslip.maps.block import run_block
+from stickslip.maps.plan import Keep, Plan, required
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 Engine = Callable[[Plan, Sequence[int], Keep, str | None], None]
-ENGINES: dict[str, Engine] = {"serial": serial, "threads": threads, "dask": on_cluster, "cuda": cuda}
+
+AHEAD = 4  # blocks in flight a thread of a cluster: enough to hide the way, few enough to keep memory flat
+PATIENCE = 10  # s to wait for a scheduler
+DEATHS = 10  # workers that may die of one block
+
+
+def serial(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = None) -> None:
+    """Run the blocks in turn."""
+    for number in numbers:
+        keep(number, *run_block(plan, number))
+
+
+def threads(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = None) -> None:
+    """Run the blocks on as many threads as there are processors, or as `address` says; keep each in this thread.
+
+    The kernels let go of Python's lock while they march. No more blocks are under way than twice the threads, so that
+    memory stays flat; on an interrupt those not begun are dropped and those under way are kept.
+    """
+    count = int(address) if address else _processors()
+    left = iter(numbers)
+    with ThreadPoolExecutor(count, "sweep") as pool:
+        running = {pool.submit(run_block, plan, number): number for number in islice(left, 2 * count)}
+        try:
+            while running:
+                for task in wait(running, return_when=FIRST_COMPLETED).done:
+                    keep(running.pop(task), *task.result())
+                    running |= {pool.submit(run_block, plan, number): number for number in islice(left, 1)}
+        except KeyboardInterrupt:
+            for task, number in running.items():
+                if not task.cancel():
+                    keep(number, *task.result())
+            raise
+
+
+def _processors() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def on_gpu(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = None) -> None:
+    """Run the blocks in turn on an NVIDIA GPU, one motion to a thread; raises as :func:`stickslip.maps.cuda.run`."""
+    try:
+        from stickslip.maps.cuda import run  # numba-cuda is an extra
+    except ImportError as absent:
+        raise ModelError(
+            "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install ".[gpu]" in the checkout'
+        ) from absent
+    run(plan, numbers, keep)
+
+
+def on_cluster(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None) -> None:
+    """Run blocks on the Dask cluster whose scheduler is at `address`, or on one made of this machine's cores."""
+    from distributed import KilledWorker, as_completed
+
+    with _client(address) as client:
+        shared = client.scatter(plan, broadcast=True)
+        waiting = iter(numbers)
+
+        def send(count: int) -> list[Any]:
+            return [client.submit(_run, shared, number, pure=False) for number in islice(waiting, count)]
+
+        count = max(1, sum(client.nthreads().values()))
+        running = as_completed(send(AHEAD * count))
+        for future in running:
+            try:
+                done = future.result()
+            except KilledWorker as error:
+                raise SolveError(
+                    "workers of the cluster died of one block again and again",
+                    "a block fits its worker",
+                    "give the workers more memory, or look in their logs; what is kept stays",
+                ) from error
+            keep(*done)
+            future.release()
+            running.update(send(1))
+
+
+def _run(plan: Plan, number: int) -> tuple[int, Any, Any]:
+    return (number, *run_block(plan, number))
+
+
+def _unheard() -> None:
+    """Leave Ctrl-C, which a terminal sends to every process, to the one that asks: it ends its workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _client(address: str | None) -> Iterator[Client]:
+    """A cluster of one's own, or the one that stands at an address."""
+    dask, distributed = required("dask"), required("distributed")
+    if address is None:
+        with (
+            dask.config.set({"distributed.scheduler.allowed-failures": DEATHS}),
+            distributed.LocalCluster(
+                threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=CRITICAL
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            client.run(_unheard)
+            yield client
+        return
+    _require_port(address)
+    try:
+        client = distributed.Client(f"tcp://{address}", timeout=PATIENCE)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise _unanswered(address, f"it is asked for {PATIENCE} s") from error
+    with client:
+        yield client
+
+
+def _require_port(address: str) -> None:
+    """Refuse an address whose port is closed at once: the client of a scheduler goes on asking."""
+    host, _, port = address.rpartition(":")
+    if not (host and port.isdecimal()):
+        return
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=PATIENCE).close()
+    except ConnectionRefusedError as error:
+        raise _unanswered(address, "its port is closed") from error
+    except (OSError, OverflowError):
+        return  # the client says what is the matter
+
+
+def _unanswered(address: str, how: str) -> ModelError:
+    step = "start one there with `dask scheduler`, or leave the address for a cluster of this machine"
+    return ModelError(f"no Dask scheduler answers at {address}", how, step)
+
+
+ENGINES: dict[str, Engine] = {"serial": serial, "threads": threads, "dask": on_cluster, "cuda": on_gpu}
 ADDRESSES = ("threads", "dask")  # engines with something behind "://": how many, or which scheduler
 
 

@@ -56,9 +56,10 @@ def read_grid(system: System, grid: Grid) -> tuple[Axis, ...]:
         for path in _paths(system, name):
             if path in taken:
                 raise ModelError(
-                    f"'{taken[path]}' and '{name}' are one parameter", "a parameter lies along one axis",
+                    f"'{taken[path]}' and '{name}' are one parameter",
+                    "a parameter lies along one axis",
                     "leave one out, or name the place, as in 'law.stiffness'",
-                )  # fmt: skip
+                )
             taken[path] = name
     return axes
 
@@ -92,13 +93,17 @@ def _dimensions(grid: Mapping[Any, Any]) -> tuple[Axis, ...]:
 def _axis(key: Any, values: Any) -> Axis:
     names = (key,) if isinstance(key, str) else tuple(key)
     if not names or not all(isinstance(name, str) for name in names):
-        raise ModelError(f"the grid has {key!r}", "a parameter is a name, or several that change together a tuple",
-                         'write it as "kinetic"')  # fmt: skip
+        raise ModelError(
+            f"the grid has {key!r}",
+            "a parameter is a name, or several that change together a tuple",
+            'write it as "kinetic"',
+        )
     if isinstance(values, str) or not hasattr(values, "__len__"):
         raise ModelError(f"{key} = {values!r}", "along an axis stand several values", f"give a list, as [{values!r}]")
     if len(values) > MOST:
-        raise ModelError(f"{key} has {len(values)} values", f"along an axis stand {MOST} at most",
-                         "take fewer, or several axes")  # fmt: skip
+        raise ModelError(
+            f"{key} has {len(values)} values", f"along an axis stand {MOST} at most", "take fewer, or several axes"
+        )
     if len(values) == 0:
         raise ModelError(f"{key} has no values", "an empty grid has no map", "give at least one value")
     rows = tuple((value,) for value in values) if len(names) == 1 else tuple(tuple(row) for row in values)
@@ -123,8 +128,9 @@ def _checked(axis: Axis) -> Axis:
         if len(row) != len(axis.names):
             raise ModelError(
                 f"value {number + 1} of {', '.join(axis.names)} has {len(row)} entries",
-                f"there is one for each of {len(axis.names)} parameters", "give as many",
-            )  # fmt: skip
+                f"there is one for each of {len(axis.names)} parameters",
+                "give as many",
+            )
         for name, value in zip(axis.names, row, strict=True):
             if _is_number(value) and not np.isfinite(value):
                 raise ModelError(f"{name} = {value} in the grid", "a parameter is a finite number", "leave it out")

@@ -99,9 +99,10 @@ def read_sweep(path: str | Path) -> SweepFile:
     case = read_system(beside) if whole.system.endswith(".toml") else scenario_case(whole.system)
     if not whole.grid:
         raise ModelError(
-            f"{path.name}{line_of(['grid'], lines)} has an empty grid", "a sweep changes one parameter at least",
+            f"{path.name}{line_of(['grid'], lines)} has an empty grid",
+            "a sweep changes one parameter at least",
             "add one, as kinetic = [1.0, 1.1]",
-        )  # fmt: skip
+        )
     grid = dict(_axis(case.system, name, column, path.name, lines) for name, column in whole.grid.items())
     return SweepFile(case, grid, tuple(whole.measures), whole.cycles, whole.settle)
 

@@ -48,9 +48,12 @@ EVENTS = {"stops", "stick_share", "micro_slips", "transition_speed"}  # measures
 REPEATS = {"period", "multipliers"}  # measures of an orbit that is there twice in what is measured
 COUNTS = ("stops", "micro_slips", "period", LOG)  # measures of whole numbers, which have borders
 STATUS = Variable(
-    "1", "what became of the motion", "int8", -1,
+    "1",
+    "what became of the motion",
+    "int8",
+    -1,
     {"flag_values": list(range(-1, len(OUTCOMES))), "flag_meanings": " ".join(("not_run", *OUTCOMES))},
-)  # fmt: skip
+)
 MEASURES: dict[str, dict[str, Variable]] = {
     "stops": {
         "normal_stops": Variable("1", "stops per period after which the motion turns"),
@@ -121,9 +124,10 @@ def _names(measure: Measure) -> tuple[str, ...]:
         return (own_name(measure),)
     if measure not in MEASURES:
         raise ModelError(
-            f"no measure is called '{measure}'", f"there are {', '.join(MEASURES)}, and functions of a Trajectory",
+            f"no measure is called '{measure}'",
+            f"there are {', '.join(MEASURES)}, and functions of a Trajectory",
             nearest(str(measure), MEASURES),
-        )  # fmt: skip
+        )
     return tuple(MEASURES[measure])
 
 

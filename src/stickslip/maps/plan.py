@@ -109,10 +109,13 @@ class Plan:
     def attributes(self) -> dict[str, Any]:
         """The settings, in plain data."""
         return {
-            "system": repr(self.system), "start": json.dumps(dict(self.start), default=repr, sort_keys=True),
-            "measures": [_named(measure) for measure in self.measures], "cycles": self.cycles, "settle": self.settle,
+            "system": repr(self.system),
+            "start": json.dumps(dict(self.start), default=repr, sort_keys=True),
+            "measures": [_named(measure) for measure in self.measures],
+            "cycles": self.cycles,
+            "settle": self.settle,
             "version": __version__,
-        }  # fmt: skip
+        }
 
     @cached_property
     def checksum(self) -> str:

@@ -70,56 +70,66 @@ def refine(
     >>> bool(0.8174 <= border <= 0.8174 + 0.2 / 2**6), int(found.run.sum()), found.run.size
     (True, 9, 129)
     """
-    if not (isinstance(halvings, int | np.integer) and 1 <= halvings <= 20):
-        raise ModelError(f"halvings = {halvings}", "an interval is halved 1 to 20 times", "correct it")
-    if measure not in COUNTS:
-        raise ModelError(f"measure = '{measure}'", f"borders are of what counts: {', '.join(COUNTS)}",
-                         "choose one of them, or sweep() the whole grid")  # fmt: skip
-    for axis in read_grid(system, grid):
-        if len(axis.names) != 1 or len(axis.values) < 2 or f"{START}mode" in axis.names:
-            raise ModelError(f"{axis.dim} has {len(axis.values)} values", "between two there is something to halve",
-                             "give two numbers at least along each parameter")  # fmt: skip
-    step, left = 2**halvings, variables((measure,))
+    _require_borders(system, grid, measure, halvings)
+    step, kept = 2**halvings, variables((measure,))
     shape = tuple((len(column) - 1) * step + 1 for column in grid.values())
-    require_memory(math.prod(shape), left)
+    require_memory(math.prod(shape), kept)
     values = [_finer(np.asarray(column, dtype=np.float64), step) for column in grid.values()]
-    arrays = {name: np.full(shape, variable.fill, variable.dtype) for name, variable in left.items()}
+    arrays = {name: np.full(shape, variable.fill, variable.dtype) for name, variable in kept.items()}
     run, wanted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
     wanted[tuple(slice(None, None, step) for _ in shape)] = True
     whole = True
+    last: Any = None  # the answers of the last level
     while True:
-        for name, variable in left.items():
+        for name, variable in kept.items():
             arrays[name][wanted] = variable.fill
         places = np.argwhere(wanted)
         points = [dict(zip(grid, (v[j] for v, j in zip(values, p, strict=True)), strict=True)) for p in places]
-        if points:
-            try:
-                found = sweep(
+        try:
+            if points:
+                last = sweep(
                     system, points, measures=[measure], cycles=cycles, settle=settle, start=start, engine=engine
                 )
-            except NoSystem:  # of the points beside a border of what is a system
-                if not run.any():
-                    raise
-                arrays["status"][wanted] = NO_SYSTEM
-                run |= wanted
-            except KeyboardInterrupt:  # before a block of this level was done
-                if not run.any():
-                    raise
-                whole = False
-                break
-            else:
                 for name, array in arrays.items():
-                    array[tuple(places.T)] = found[name].values
+                    array[tuple(places.T)] = last[name].values
                 run |= wanted & (arrays["status"] != STATUS.fill)
-                whole = found.attrs["status"] == "complete"
+                whole = last.attrs["status"] == "complete"
+        except NoSystem:  # of the points beside a border of what is a system
+            if last is None:
+                raise
+            arrays["status"][wanted] = NO_SYSTEM
+            run |= wanted
+        except KeyboardInterrupt:  # before a block of this level was done
+            if last is None:
+                raise
+            whole = False
         if step == 1 or not whole:
             break
         step //= 2
         wanted = _halved(arrays, step)
     known = {name: (name, column, {"units": unit(system, name)}) for name, column in zip(grid, values, strict=True)}
-    data = {name: (tuple(grid), array, found[name].attrs) for name, array in arrays.items()}
-    attributes = {**found.attrs, "status": "complete" if whole else f"interrupted: {run.sum()} points were run"}
+    data = {name: (tuple(grid), array, last[name].attrs) for name, array in arrays.items()}
+    attributes = {**last.attrs, "status": "complete" if whole else f"interrupted: {run.sum()} points were run"}
     return required("xarray").Dataset({**data, "run": (tuple(grid), run)}, coords=known, attrs=attributes)
+
+
+def _require_borders(system: System, grid: Mapping[str, Sequence[float]], measure: str, halvings: int) -> None:
+    """Refuse what has no borders, or none that halving finds."""
+    if not (isinstance(halvings, int | np.integer) and 1 <= halvings <= 20):
+        raise ModelError(f"halvings = {halvings}", "an interval is halved 1 to 20 times", "correct it")
+    if measure not in COUNTS:
+        raise ModelError(
+            f"measure = '{measure}'",
+            f"borders are of what counts: {', '.join(COUNTS)}",
+            "choose one of them, or sweep() the whole grid",
+        )
+    for axis in read_grid(system, grid):
+        if len(axis.names) != 1 or len(axis.values) < 2 or f"{START}mode" in axis.names:
+            raise ModelError(
+                f"{axis.dim} has {len(axis.values)} values",
+                "between two there is something to halve",
+                "give two numbers at least along each parameter",
+            )
 
 
 def _finer(column: NDArray[np.float64], step: int) -> NDArray[np.float64]:

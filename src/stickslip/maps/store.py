@@ -52,10 +52,15 @@ class Store(AbstractContextManager["Store"]):
             self._new = not self.path.exists() and self._lay_out(layout)
             lock = locked(self.path) if self.path.is_dir() else None
         if lock is None:
-            raise self._not_ours() if not self.path.is_dir() else SolveError(
-                f"{self.path} is being written by another process", "a map has one writer",
-                "wait for it, or name another path",
-            )  # fmt: skip
+            raise (
+                self._not_ours()
+                if not self.path.is_dir()
+                else SolveError(
+                    f"{self.path} is being written by another process",
+                    "a map has one writer",
+                    "wait for it, or name another path",
+                )
+            )
         with lock as held:
             if not self._new:
                 self._require_own()
@@ -128,8 +133,9 @@ class Store(AbstractContextManager["Store"]):
         if LOG in self.plan.measures and self.events.exists():
             raise ModelError(
                 f"{self.events} is there, but its map {self.path} is not",
-                "events lie beside the map that they are of", "move that folder away, or name another path",
-            )  # fmt: skip
+                "events lie beside the map that they are of",
+                "move that folder away, or name another path",
+            )
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with workshop(self.path) as place:
             for name, contents in layout.items():
@@ -150,9 +156,15 @@ class Store(AbstractContextManager["Store"]):
 
         packed = () if name == DONE else (codecs.ZstdCodec(), codecs.Crc32cCodec())
         return group.create_array(
-            name, shape=shape, chunks=chunks, dtype=dtype, fill_value=fill, dimension_names=dims,
-            compressors=packed, config={"write_empty_chunks": True},
-        )  # fmt: skip
+            name,
+            shape=shape,
+            chunks=chunks,
+            dtype=dtype,
+            fill_value=fill,
+            dimension_names=dims,
+            compressors=packed,
+            config={"write_empty_chunks": True},
+        )
 
     def _require_own(self) -> None:
         """Refuse the map of another plan: a block that stands under this one's seal shows that it is this one's."""
@@ -174,8 +186,9 @@ class Store(AbstractContextManager["Store"]):
     def _not_ours(self) -> ModelError:
         return ModelError(
             f"{self.path} is not a map of ours, or its {ROOT} is damaged and no block is finished",
-            "a store is a folder that sweep() has made", "name another path",
-        )  # fmt: skip
+            "a store is a folder that sweep() has made",
+            "name another path",
+        )
 
     def _mend(self, layout: Mapping[str, bytes]) -> None:
         """Remove what a kill has left half written, and write again what is not as the plan has it."""

@@ -231,8 +231,9 @@ def _require(points: int, kept: Mapping[str, Variable], where: str, room: float)
     if need > room:
         raise ModelError(
             f"{points} points take {need / 1e9:.3g} GB, and the {where} has {room / 1e9:.3g} GB",
-            "a map fits where it is kept", "ask for fewer points or measures",
-        )  # fmt: skip
+            "a map fits where it is kept",
+            "ask for fewer points or measures",
+        )
 
 
 def _memory() -> float:

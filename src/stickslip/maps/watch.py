@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.maps.measures import AT_REST, CLOSE, FAILED, MOVING, ORDERS
 from stickslip.maps.tally import ABNORMAL, ENTRIES, HELD, NORMAL, REACH, SHORT, SLIP, WORK, note
-from stickslip.solve.batch import LAP, TIRELESS, model_of, past_of
+from stickslip.solve.cells import Linear
 from stickslip.solve.glide import Clock, Model, Past, Pieces
 from stickslip.solve.kernel import DONE, FULL, advance, begin, follow, march, set_tones
+from stickslip.solve.phasors import Phasors
 from stickslip.solve.tables import Array
 from stickslip.solve.tangent import carry_tangents
 
+TIRELESS = 2**62  # cells: a march of many motions is not interrupted
+LAP = 64  # pieces remembered of a motion, a power of two; a lap of the drive with more has no fast path
 ROOM = 16  # pieces written before they are counted
 BUDGET = 10_000  # events in a period; more is taken for chatter
 PARTS = 256  # steps of a run, a lap each where it is short: what moves less than STILL in a step or more is steady,
@@ -110,6 +113,34 @@ class Motion(NamedTuple):
 
 
 @compiled(**OPTIONS)
+def model_of(models, j):
+    """One of many systems, as :func:`stickslip.solve.kernel.march` reads it."""
+    linear, fast = models.linear, models.fast
+    nodes = fast.nodes[fast.span[j, 0] : fast.span[j, 1]]
+    return Model(
+        Linear(
+            linear.flow[j],
+            linear.cell[j],
+            linear.hop[j],
+            linear.series[j],
+            linear.target,
+            linear.crossing,
+            linear.reset[j],
+            linear.first,
+            linear.tones[j],
+        ),
+        Phasors(fast.drive[j], fast.mode[j], fast.level[j], fast.exit[j], fast.rest[j], nodes, fast.span[j]),
+        models.period[j],
+    )
+
+
+@compiled(**OPTIONS)
+def past_of(pasts, i):
+    """The ring of one motion."""
+    return Past(pasts.modes[i], pasts.exits[i], pasts.times[i], pasts.parts[i], pasts.places[i])
+
+
+@compiled(**OPTIONS)
 def watch_one(i, s, given, out, rooms):
     """March motion i with scratch s, and leave its status, what is counted, and its last states at phase zero."""
     n, physical, wants = given.states.shape[1], out.sections.shape[2], given.wants
@@ -192,9 +223,16 @@ def _carry(i, count, motion, mode, leaps, tangents):
     for p in range(count):
         set_tones(linear.tones, pieces.states[p], pieces.offsets[p])
     carry_tangents(
-        linear, leaps[i], pieces.modes[:count], pieces.states[:count], pieces.durations[:count], pieces.exits[:count],
-        mode, tangents, motion.work[7:16, : motion.state.shape[0]],
-    )  # fmt: skip
+        linear,
+        leaps[i],
+        pieces.modes[:count],
+        pieces.states[:count],
+        pieces.durations[:count],
+        pieces.exits[:count],
+        mode,
+        tangents,
+        motion.work[7:16, : motion.state.shape[0]],
+    )
 
 
 @compiled(**OPTIONS)
@@ -280,8 +318,12 @@ def _read(row, state, tones, time):
 def _count(i, count, motion, clock, settled, given, sums):
     """Count the pieces just written."""
     linear, period, state, unit, pieces = (
-        motion.model.linear, motion.model.period, motion.state, motion.unit, motion.pieces,
-    )  # fmt: skip
+        motion.model.linear,
+        motion.model.period,
+        motion.state,
+        motion.unit,
+        motion.pieces,
+    )
     look, paths, one = given.look, given.wants[PATHS] == 1, given.wants[ONE]
     n, tones = state.shape[0], linear.tones
     held = motion.work[6, :n]

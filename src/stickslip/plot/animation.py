@@ -97,9 +97,10 @@ def animate(run: Trajectory, path: str | Path, *, tell: Callable[[int, int], Non
             (_write_gif if path.suffix == ".gif" else _write_mp4)(images, draft)
     except OSError as error:
         raise RecordError(
-            f"{path.name} can not be written ({error.strerror or error})", "the folder may be written to",
+            f"{path.name} can not be written ({error.strerror or error})",
+            "the folder may be written to",
             "choose another place",
-        ) from error  # fmt: skip
+        ) from error
     return path
 
 
@@ -144,8 +145,11 @@ def _stage(run: Trajectory, times: Array) -> tuple[Any, list[_Scene], list[Any]]
     canvas = FigureCanvasAgg(figure)
     grid = figure.add_gridspec(shown + 1, 2, height_ratios=(*[1] * shown, 1.6), width_ratios=(1.5, 1))
     scenes = [_Scene(figure.add_subplot(grid[c, :]), run, c, times) for c in range(shown)]
-    dots = [dot for place, across in ((grid[-1, 0], "time"), (grid[-1, 1], "x"))
-            for dot in _background(figure.add_subplot(place), run, across, times)]  # fmt: skip
+    dots = [
+        dot
+        for place, across in ((grid[-1, 0], "time"), (grid[-1, 1], "x"))
+        for dot in _background(figure.add_subplot(place), run, across, times)
+    ]
     canvas.draw()  # type: ignore[no-untyped-call]
     return canvas, scenes, dots
 
@@ -267,9 +271,28 @@ def _write_mp4(images: Iterable[Image], path: Path) -> None:
     pictures = iter(images)
     opening = next(pictures)
     height, width = (size - size % 2 for size in opening.shape[:2])
-    command = ["ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-               "-r", str(RATE), "-i", "-", "-an", "-pix_fmt", "yuv420p", "-movflags", "+faststart",
-               str(path)]  # fmt: skip
+    command = [
+        "ffmpeg",
+        "-loglevel",
+        "error",
+        "-y",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{width}x{height}",
+        "-r",
+        str(RATE),
+        "-i",
+        "-",
+        "-an",
+        "-pix_fmt",
+        "yuv420p",
+        "-movflags",
+        "+faststart",
+        str(path),
+    ]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
         assert ffmpeg.stdin is not None
         assert ffmpeg.stderr is not None

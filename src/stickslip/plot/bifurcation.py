@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.consistent.sliding_balance import Slider
 from stickslip.maps.attractor import Attractor
 from stickslip.maps.basins import Basins
 from stickslip.maps.bifurcation import Bifurcation
@@ -96,8 +97,15 @@ def _follow(top: Axes, bottom: Axes, found: Bifurcation, factor: float, *, dot: 
         places = np.repeat(found.values, [len(each.points) for each in way])
         heights = factor * np.concatenate([each.points[:, 0] for each in way])
         style: dict[str, Any] = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
-        top.plot(places, heights, markersize=size if dot is None else dot, markeredgewidth=0.7,
-                 label=f"followed {name}", zorder=3 if name == "up" else 2, **style)  # fmt: skip
+        top.plot(
+            places,
+            heights,
+            markersize=size if dot is None else dot,
+            markeredgewidth=0.7,
+            label=f"followed {name}",
+            zorder=3 if name == "up" else 2,
+            **style,
+        )
         bottom.plot(found.values, [_largest(each) for each in way], markersize=size, markeredgewidth=0.7, **style)
 
 
@@ -105,13 +113,25 @@ def _beside(top: Axes, found: Bifurcation, factor: float) -> None:
     """Motions from other starts, and branches that lose their stability."""
     others = [(float(v), each) for v, others in zip(found.values, found.beside, strict=True) for each in others]
     for number, (value, each) in enumerate(others):
-        top.plot([value] * len(each.points), factor * each.points[:, 0], "x", color=GREEN, markersize=5,
-                 label="beside, from another start" if not number else None)  # fmt: skip
+        top.plot(
+            [value] * len(each.points),
+            factor * each.points[:, 0],
+            "x",
+            color=GREEN,
+            markersize=5,
+            label="beside, from another start" if not number else None,
+        )
     for number, branch in enumerate(found.branches):
         unstable = np.array([orbit.status == "unstable" for orbit in branch.orbits])
         heights = factor * np.array([orbit.orbit.states[0, 0] for orbit in branch.orbits])
-        top.plot(branch.values, np.where(unstable, heights, np.nan), "--", color=INK, linewidth=1.0,
-                 label="unstable" if not number else None)  # fmt: skip
+        top.plot(
+            branch.values,
+            np.where(unstable, heights, np.nan),
+            "--",
+            color=INK,
+            linewidth=1.0,
+            label="unstable" if not number else None,
+        )
 
 
 def _largest(attractor: Attractor) -> float:
@@ -132,8 +152,16 @@ def _name_regimes(ax: Axes, found: Bifurcation) -> None:
                 continue
             text = getattr(found, direction)[inside[len(inside) // 2]].regime
             if end - begin > 0.012 * len(text) * (last - first):
-                ax.text((begin + end) / 2, 0.985 - 0.075 * row, text, color=colour, fontsize=7, ha="center", va="top",
-                        transform=ax.get_xaxis_transform())  # fmt: skip
+                ax.text(
+                    (begin + end) / 2,
+                    0.985 - 0.075 * row,
+                    text,
+                    color=colour,
+                    fontsize=7,
+                    ha="center",
+                    va="top",
+                    transform=ax.get_xaxis_transform(),
+                )
 
 
 def _named(system: System, parameter: str) -> str:
@@ -175,9 +203,17 @@ def plot_basins(found: Basins, *, ax: Axes | None = None) -> Axes:
     colours = [COLOURS[j % len(COLOURS)] for j in range(count)]
     known = np.ma.masked_less(found.which.T, 0)
     ax.pcolormesh(
-        across_factor * rows, down_factor * columns, known, cmap=ListedColormap(colours), vmin=-0.5,
-        vmax=count - 0.5, alpha=0.55, shading="nearest", rasterized=True, linewidth=0,
-    )  # fmt: skip
+        across_factor * rows,
+        down_factor * columns,
+        known,
+        cmap=ListedColormap(colours),
+        vmin=-0.5,
+        vmax=count - 0.5,
+        alpha=0.55,
+        shading="nearest",
+        rasterized=True,
+        linewidth=0,
+    )
     ax.grid(visible=False)
     handles = []
     for j, (each, share) in enumerate(zip(found.attractors, found.shares, strict=True)):
@@ -185,8 +221,11 @@ def plot_basins(found: Basins, *, ax: Axes | None = None) -> Axes:
         if set(found.names) <= set(table.names) and each.status != "rest":
             places = [table.names.index(name) for name in found.names]
             points = each.points[:, places] * (across_factor, down_factor)
-            inside = np.all((points >= _ends(found, 0, across_factor, down_factor))
-                            & (points <= _ends(found, -1, across_factor, down_factor)), axis=1)  # fmt: skip
+            inside = np.all(
+                (points >= _ends(found, 0, across_factor, down_factor))
+                & (points <= _ends(found, -1, across_factor, down_factor)),
+                axis=1,
+            )
             ax.plot(*points[inside].T, "+", color=INK, markersize=8, markeredgewidth=1.4)
         low, high = share.interval
         words = f"{each.regime}: {100 * share.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
@@ -230,8 +269,6 @@ def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
     >>> plot_boundary(found).get_lines()[1].get_label()
     'Den Hartog (1931)'
     """
-    from stickslip.consistent.sliding_balance import Slider
-
     ax = axes_of(ax)
     system = next(each for each in found.low if each is not None).orbit.orbit.system
     free = np.array([each is not None and each.status == "not unique" for each in found.low])
@@ -240,8 +277,16 @@ def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
         (free, "none", "of a family, from one start"),
     ):
         if np.any(chosen & np.isfinite(found.values)):
-            ax.plot(found.places[chosen], found.values[chosen], "o", color=BLUE, markerfacecolor=face, markersize=4,
-                    label=words, zorder=3)  # fmt: skip
+            ax.plot(
+                found.places[chosen],
+                found.values[chosen],
+                "o",
+                color=BLUE,
+                markerfacecolor=face,
+                markersize=4,
+                label=words,
+                zorder=3,
+            )
     if is_den_hartog(system, found):
         assert isinstance(system, Oscillator)
         fine = np.linspace(found.places[0], found.places[-1], 400)
@@ -317,8 +362,12 @@ def plot_dither(found: Dither) -> Figure:
     for axis in (top.xaxis, top.yaxis):
         plain_decades(axis)
     top.axhline(1.0, color=INK, linewidth=0.8)
-    top.axvline(factor * found.amplitude.value, color=ORANGE, linestyle="--",
-                label=f"smallest that does it: {factor * found.amplitude.value:.3g} {spelled(unit)}")  # fmt: skip
+    top.axvline(
+        factor * found.amplitude.value,
+        color=ORANGE,
+        linestyle="--",
+        label=f"smallest that does it: {factor * found.amplitude.value:.3g} {spelled(unit)}",
+    )
     if np.any(sticks == 0):
         top.text(0.99, 0.04, "lowest row: no stick at all", transform=top.transAxes, ha="right", fontsize=7)
     top.set_xlabel(axis_label(f"dither of {found.frequency:.4g} Hz on the {found.on}", unit))

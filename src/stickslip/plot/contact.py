@@ -80,8 +80,13 @@ def plot_velocity_loop(findings: Findings | SqueakFindings, *, ax: Axes | None =
         x_factor * curve.velocity,
         y_factor * curve.friction,
         yerr=y_factor * np.abs(np.array([curve.friction - curve.low, curve.high - curve.friction])),
-        fmt="o", color=INK, markersize=3.2, linewidth=1.0, label="mean in velocity bins, 95 %", zorder=4,
-    )  # fmt: skip
+        fmt="o",
+        color=INK,
+        markersize=3.2,
+        linewidth=1.0,
+        label="mean in velocity bins, 95 %",
+        zorder=4,
+    )
     for value in (loops.forward.value, -loops.back.value):
         ax.axhline(y_factor * value, color=INK, linewidth=0.9, linestyle=":", zorder=1)
     _legend_above(ax)
@@ -297,9 +302,15 @@ def plot_breakaway(findings: Findings, *, ax: Axes | None = None) -> Axes:
             if each is not None:
                 ends = np.abs(np.array([[each.value - each.interval[0]], [each.interval[1] - each.value]]))
                 ax.errorbar(
-                    [factor * each.value], [place + shift], xerr=factor * ends, fmt=marker, color=colour, markersize=5,
-                    capsize=3, label=label if each is (back or forward) else None,
-                )  # fmt: skip
+                    [factor * each.value],
+                    [place + shift],
+                    xerr=factor * ends,
+                    fmt=marker,
+                    color=colour,
+                    markersize=5,
+                    capsize=3,
+                    label=label if each is (back or forward) else None,
+                )
     ax.set(yticks=[0, 1], yticklabels=["back", "forward"], ylim=(-0.5, 1.5), xlabel=axis_label("friction", unit))
     _legend_above(ax)
     return ax

@@ -141,9 +141,16 @@ def plot_differences(found: Decrement, *, ax: Axes | None = None) -> Axes:
         label = f"exponential of the damping ratio {zeta:.3g}" if side == 1 else None
         ax.plot(along, side * factor * scale * np.exp(-math.pi * beta * along), color=BLUE, linestyle="--", label=label)
     ax.errorbar(
-        number, factor * found.differences, yerr=1.96 * factor * spread, fmt="o", color=INK, markersize=3.5,
-        linewidth=0.9, label=f"amplitude {'differences' if apart == 2 else 'sums'}, 95 %", zorder=3,
-    )  # fmt: skip
+        number,
+        factor * found.differences,
+        yerr=1.96 * factor * spread,
+        fmt="o",
+        color=INK,
+        markersize=3.5,
+        linewidth=0.9,
+        label=f"amplitude {'differences' if apart == 2 else 'sums'}, 95 %",
+        zorder=3,
+    )
     ax.axhline(0, color=FAINT, linewidth=0.8)
     ax.set(
         xlabel="number i of the extreme", ylabel=axis_label("X(i+1) - X(i-1)" if apart == 2 else "X(i-1) + X(i)", unit)
@@ -226,9 +233,15 @@ def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio"
         ax.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0, label="all records, 95 %")
         ax.axvline(factor * shared.value, color=ORANGE, linewidth=1.0)
     ax.errorbar(
-        factor * values, places, xerr=factor * np.abs(ends - values[:, None]).T, fmt="o", color=BLUE, capsize=3,
-        markersize=4.5, label="each record, 95 %",
-    )  # fmt: skip
+        factor * values,
+        places,
+        xerr=factor * np.abs(ends - values[:, None]).T,
+        fmt="o",
+        color=BLUE,
+        capsize=3,
+        markersize=4.5,
+        label="each record, 95 %",
+    )
     ax.set_yticks(places, names)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.set_xlabel(axis_label(each[0].name, unit))
@@ -261,16 +274,17 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
         "one; together they are faster than either. "
     ) * ring.isochronous
     grey = "Grey: at rest before the release or after." if ring.held or ring.stopped else ""
-    plates = [
-        plate("decay", partial(plot_decay, findings), "How it dies away",
-              f"{envelopes}{grey}{many}")
-    ]  # fmt: skip
+    plates = [plate("decay", partial(plot_decay, findings), "How it dies away", f"{envelopes}{grey}{many}")]
     if findings.waveform is not None or (ring.order == 0 and findings.best in (findings.motion, thesis)):
         plates.append(
-            plate("identified", partial(plot_identified, findings), "Recorded and identified",
-                  "Top: the motion that the identified friction gives, over the recorded one. Bottom: what is left "
-                  "between them; a pattern there is friction of another kind.")
-        )  # fmt: skip
+            plate(
+                "identified",
+                partial(plot_identified, findings),
+                "Recorded and identified",
+                "Top: the motion that the identified friction gives, over the recorded one. Bottom: what is left "
+                "between them; a pattern there is friction of another kind.",
+            )
+        )
     for release in range(1, several):
         words = f"Release {release + 1} of {several}"
         fitted = 0 if findings.waveform is None else len(findings.waveform.time)
@@ -282,16 +296,24 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
             plates.append(plate(f"identified-{release + 1}", drawn, words, "Recorded, identified and what is left."))
     if thesis is not None:
         plates.append(
-            plate("differences", partial(plot_differences, thesis), "Amplitude differences",
-                  "Differences of every other extreme know nothing of dry friction. On the exponential, the rest of "
-                  "the damping is viscous; beside it, the friction is of another kind, or an extreme was misread.")
-        )  # fmt: skip
+            plate(
+                "differences",
+                partial(plot_differences, thesis),
+                "Amplitude differences",
+                "Differences of every other extreme know nothing of dry friction. On the exponential, the rest of "
+                "the damping is viscous; beside it, the friction is of another kind, or an extreme was misread.",
+            )
+        )
         if len(thesis.bounds.m) > 2:
             plates.append(
-                plate("bounds", partial(plot_bounds, thesis), "How far errors of the extremes can reach",
-                      f"If no extreme is off by more than {_length(thesis)}, the truth lies in the band: over few half "
-                      "cycles the differences change little, over many they become small. Dotted: the best choice.")
-            )  # fmt: skip
+                plate(
+                    "bounds",
+                    partial(plot_bounds, thesis),
+                    "How far errors of the extremes can reach",
+                    f"If no extreme is off by more than {_length(thesis)}, the truth lies in the band: over few half "
+                    "cycles the differences change little, over many they become small. Dotted: the best choice.",
+                )
+            )
     return plates
 
 
@@ -341,7 +363,10 @@ def _identified(findings: DecayFindings, release: int = 0) -> tuple[Array, Array
     rows = _shown(ring)
     time, rest = ring.time[rows], found.bias.value
     fitted = rest + ex.motion(
-        time - float(found.time[0]), float(found.extremes[0]) - rest, damping_ratio=found.damping_ratio.value,
-        dry_displacement=found.dry_displacement.value, frequency=found.frequency.value,
-    )  # fmt: skip
+        time - float(found.time[0]),
+        float(found.extremes[0]) - rest,
+        damping_ratio=found.damping_ratio.value,
+        dry_displacement=found.dry_displacement.value,
+        frequency=found.frequency.value,
+    )
     return time, ring.samples[rows], fitted, "identified by the decrements"

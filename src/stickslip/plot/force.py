@@ -104,9 +104,15 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     within = f"within {100 * tolerance:g} %"
     ax.axhspan(1 - tolerance, 1 + tolerance, color=SHADE, alpha=0.5, linewidth=0, label=within)
     ax.errorbar(
-        frequency[heard], gain[heard], yerr=2 * sd[heard], fmt="o-", color=INK, markersize=3, linewidth=1.0,
+        frequency[heard],
+        gain[heard],
+        yerr=2 * sd[heard],
+        fmt="o-",
+        color=INK,
+        markersize=3,
+        linewidth=1.0,
         label="computed over felt",
-    )  # fmt: skip
+    )
     coherence = [band.coherence for band in comparison.bands]
     ax.plot(frequency, coherence, color=GREEN, linewidth=1.0, label="coherence")
     ax.plot(frequency, [b.significant for b in comparison.bands], ":", color=GREEN, linewidth=1.0, label="by chance")
@@ -117,9 +123,13 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     for number, each in enumerate(comparison.resonances):
         ax.axvline(each.frequency.value, color=FAINT, linewidth=1.0, linestyle="--")
         ax.annotate(
-            f" {each.name}\n {each.frequency.value:.0f} Hz", (each.frequency.value, 0.97 - 0.25 * number),
-            ha="left", va="top", xycoords=("data", "axes fraction"), fontsize=7,
-        )  # fmt: skip
+            f" {each.name}\n {each.frequency.value:.0f} Hz",
+            (each.frequency.value, 0.97 - 0.25 * number),
+            ha="left",
+            va="top",
+            xycoords=("data", "axes fraction"),
+            fontsize=7,
+        )
     top = max(2.0, 1.1 * float(gain[heard].max(initial=0.0)))
     ax.set(xscale="log", ylim=(0, min(top, 10.0)), xlabel="frequency [Hz]", ylabel="ratio, coherence")
     ax.xaxis.set_major_formatter("{x:g}")

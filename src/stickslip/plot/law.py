@@ -103,8 +103,13 @@ def plot_fit(found: LawComparison | LawFit, *, record: int = 0) -> Figure:
         words, unit = WORDS.get(name, (name, ""))
         factor, unit = prefixed(measured[near] - measured[near].mean(), unit)
         ax.plot(*envelope(time[near], factor * measured[near]), color=INK, linewidth=1.4, label="measured")
-        ax.plot(*envelope(time[near], factor * fitted[near]), color=ORANGE, linewidth=1.0, linestyle="--",
-                label=f"fitted: {name_of_law}")  # fmt: skip
+        ax.plot(
+            *envelope(time[near], factor * fitted[near]),
+            color=ORANGE,
+            linewidth=1.0,
+            linestyle="--",
+            label=f"fitted: {name_of_law}",
+        )
         ax.set_ylabel(axis_label(words, unit, "\n"))
         left = (measured - fitted)[near] / fit.noise[name]
         below.plot(*envelope(time[near], left), color=colour, linewidth=0.8, label=words)

@@ -21,7 +21,7 @@ from stickslip.plot.style import (
     new_figure,
     prefixed,
     styled,
-)  # fmt: skip
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -145,8 +145,18 @@ def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = No
     known = list(COLOURS)
     places = np.vectorize(known.index)(stability.mechanism.values)
     y, x = (stability[name].values for name in names)
-    axes.pcolormesh(x, y, places, cmap=ListedColormap(list(COLOURS.values())), vmin=-0.5, vmax=len(known) - 0.5,
-                    alpha=FILLED, shading="nearest", linewidth=0, rasterized=True)  # fmt: skip
+    axes.pcolormesh(
+        x,
+        y,
+        places,
+        cmap=ListedColormap(list(COLOURS.values())),
+        vmin=-0.5,
+        vmax=len(known) - 0.5,
+        alpha=FILLED,
+        shading="nearest",
+        linewidth=0,
+        rasterized=True,
+    )
     growth = stability.growth.values
     if growth.min() < 0 < growth.max():
         axes.contour(x, y, growth, levels=[0.0], colors=INK, linewidths=1.2)

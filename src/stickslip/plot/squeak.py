@@ -98,9 +98,14 @@ def plot_squeaks(found: Squeaks) -> Figure:
         if numbered:
             middle = (burst.start + burst.end) / 2
             above.annotate(
-                f"{number + 1}", (middle, 1), xycoords=("data", "axes fraction"), xytext=(0, 1), ha="center",
-                textcoords="offset points", fontsize=7,
-            )  # fmt: skip
+                f"{number + 1}",
+                (middle, 1),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, 1),
+                ha="center",
+                textcoords="offset points",
+                fontsize=7,
+            )
         _frame(below, burst)
     kinds = dict.fromkeys(burst.kind for burst in found.bursts)
     if kinds:
@@ -212,9 +217,11 @@ def plot_forcing_cycle(found: Squeaks) -> Figure:
     place = np.clip(np.digitize(motion.phase, bins) - 1, 0, PHASES - 1)
     middle = [float(np.median(motion.velocity[place == each])) for each in np.unique(place)]
     above.plot(
-        (bins[1:] + bins[:-1])[np.unique(place)] / 2, factor * np.array(middle), color=INK,
+        (bins[1:] + bins[:-1])[np.unique(place)] / 2,
+        factor * np.array(middle),
+        color=INK,
         label="sliding velocity, median of the cycles",
-    )  # fmt: skip
+    )
     above.axhline(0, color=FAINT, linewidth=0.8)
     thick = max(1.0, min(5.0, 100 / len(found.bursts)))
     for number, burst in enumerate(found.bursts):
@@ -345,46 +352,67 @@ def plates_of(found: SqueakFindings) -> list[Plate]:
     """The figures of one record."""
     squeaks = found.squeaks
     plates = [
-        plate("spectrogram", partial(plot_squeaks, squeaks), "When it sounds, and how high",
-              "Above: the signal, its bursts shaded and numbered. Below: how strong each frequency is at each time; "
-              "bright is strong, and a white line is a burst's dominant frequency.")
-    ]  # fmt: skip
+        plate(
+            "spectrogram",
+            partial(plot_squeaks, squeaks),
+            "When it sounds, and how high",
+            "Above: the signal, its bursts shaded and numbered. Below: how strong each frequency is at each time; "
+            "bright is strong, and a white line is a burst's dominant frequency.",
+        )
+    ]
     loudest = found.loudest
     if loudest is None:
         return plates
     if found.spectra is not None:
         plates.append(
-            plate("spectra", partial(plot_burst_spectra, found.spectra, channel=squeaks.channel, record=found.record),
-                  "What sounds in the bursts",
-                  f"Power spectra of each channel in {found.spectra.compared}; a peak that stands above the other line "
-                  "belongs to the bursts.")
-        )  # fmt: skip
+            plate(
+                "spectra",
+                partial(plot_burst_spectra, found.spectra, channel=squeaks.channel, record=found.record),
+                "What sounds in the bursts",
+                f"Power spectra of each channel in {found.spectra.compared}; a peak that stands above the other line "
+                "belongs to the bursts.",
+            )
+        )
         if found.spectra.coherence:
             plates.append(
-                plate("coherence", partial(plot_coherence, found.spectra, channel=squeaks.channel, record=found.record),
-                      f"Which frequencies the motions share with the {_words(found.record, squeaks.channel)}",
-                      "Coherence is 1 where two channels move together and 0 where they have nothing to do with each "
-                      "other; what is below the dotted line may be chance.")
-            )  # fmt: skip
+                plate(
+                    "coherence",
+                    partial(plot_coherence, found.spectra, channel=squeaks.channel, record=found.record),
+                    f"Which frequencies the motions share with the {_words(found.record, squeaks.channel)}",
+                    "Coherence is 1 where two channels move together and 0 where they have nothing to do with each "
+                    "other; what is below the dotted line may be chance.",
+                )
+            )
     if not math.isnan(squeaks.forcing):
         plates.append(
-            plate("forcing-cycle", partial(plot_forcing_cycle, squeaks), "Where in the cycle it sounds",
-                  "Above: the sliding velocity over the forcing cycle; a mark is the loudest moment of a burst. Below: "
-                  "each burst from its beginning to its end, thick where it is within ten decibel of its loudest "
-                  "moment.")
-        )  # fmt: skip
+            plate(
+                "forcing-cycle",
+                partial(plot_forcing_cycle, squeaks),
+                "Where in the cycle it sounds",
+                "Above: the sliding velocity over the forcing cycle; a mark is the loudest moment of a burst. Below: "
+                "each burst from its beginning to its end, thick where it is within ten decibel of its loudest "
+                "moment.",
+            )
+        )
     if len(found.record) > 1:
         plates.append(
-            plate("burst", partial(plot_burst, found, burst=loudest),
-                  f"Burst {squeaks.bursts.index(loudest) + 1}, the loudest",
-                  "Every channel about it; shaded from its beginning to its end.")
-        )  # fmt: skip
+            plate(
+                "burst",
+                partial(plot_burst, found, burst=loudest),
+                f"Burst {squeaks.bursts.index(loudest) + 1}, the loudest",
+                "Every channel about it; shaded from its beginning to its end.",
+            )
+        )
     if found.loops is not None:
         plates.append(
-            plate("friction-velocity", partial(plot_velocity_loop, found), "Friction against velocity",
-                  "Friction that falls away from zero velocity feeds a vibration, one that rises damps it. Dotted: the "
-                  "sliding friction to either side.")
-        )  # fmt: skip
+            plate(
+                "friction-velocity",
+                partial(plot_velocity_loop, found),
+                "Friction against velocity",
+                "Friction that falls away from zero velocity feeds a vibration, one that rises damps it. Dotted: the "
+                "sliding friction to either side.",
+            )
+        )
     return plates
 
 
@@ -393,13 +421,21 @@ def plates_together(comparison: SqueakComparison) -> list[Plate]:
     if all(each.loops is None for each in comparison.findings):
         return []
     return [
-        plate("conditions", partial(plot_conditions, comparison), "Friction, and how it changes with speed",
-              "Left: sliding friction, over the load where all loads are known. Right: its slope against speed; left "
-              "of zero it falls with speed."),
-        plate("loops", partial(plot_condition_loops, comparison), "Friction against displacement and velocity",
-              "Each condition in a row, each row with a scale of its own. Grey: cycles; orange: their mean; dots: the "
-              "mean at each velocity. The number is the slope against speed with its 95 % interval."),
-    ]  # fmt: skip
+        plate(
+            "conditions",
+            partial(plot_conditions, comparison),
+            "Friction, and how it changes with speed",
+            "Left: sliding friction, over the load where all loads are known. Right: its slope against speed; left "
+            "of zero it falls with speed.",
+        ),
+        plate(
+            "loops",
+            partial(plot_condition_loops, comparison),
+            "Friction against displacement and velocity",
+            "Each condition in a row, each row with a scale of its own. Grey: cycles; orange: their mean; dots: the "
+            "mean at each velocity. The number is the slope against speed with its 95 % interval.",
+        ),
+    ]
 
 
 def _panels(count: int) -> tuple[Figure, Any]:
@@ -433,9 +469,15 @@ def _spectrogram(ax: Axes, found: Squeaks) -> Any:
     level = 10 * np.log10(np.maximum(shown / max(float(shown.max()), np.finfo(float).tiny), 1e-30))
     ax.grid(visible=False)
     return ax.pcolormesh(
-        record.start + times, frequencies[inside][:last], np.maximum(level, -SPAN), cmap="cividis", vmin=-SPAN, vmax=0,
-        shading="nearest", rasterized=True,
-    )  # fmt: skip
+        record.start + times,
+        frequencies[inside][:last],
+        np.maximum(level, -SPAN),
+        cmap="cividis",
+        vmin=-SPAN,
+        vmax=0,
+        shading="nearest",
+        rasterized=True,
+    )
 
 
 def _frame(ax: Axes, burst: Squeak) -> None:

@@ -116,11 +116,14 @@ def sampled(run: Trajectory, wanted: Sequence[str | Quantity], times: Array) -> 
     values, _ = run.sample(times, tuple(names))
     counts = [len(run.labels(name)) for name in names]
     rows = dict(zip(names, np.split(values, np.cumsum(counts)[:-1]), strict=True))
-    return np.array([
-        run.system.tangents[row] @ rows["x"] if name == "way" and isinstance(run.system, Structure)
-        else rows["x" if name == "way" else name][row]
-        for name, row in pairs
-    ])  # fmt: skip
+    return np.array(
+        [
+            run.system.tangents[row] @ rows["x"]
+            if name == "way" and isinstance(run.system, Structure)
+            else rows["x" if name == "way" else name][row]
+            for name, row in pairs
+        ]
+    )
 
 
 def curve(run: Trajectory, wanted: Sequence[str | Quantity], *, first: float, last: float) -> tuple[Array, list[Array]]:
@@ -312,9 +315,13 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
         )
     words = "As long as it moves" if run.status == "at rest" else "The last cycles"
     plates.append(
-        plate("motion", partial(plot_motion, run, first=first, last=last), words,
-              f"Exact between events; friction jumps where a slip begins, ends or turns.{shaded}")
-    )  # fmt: skip
+        plate(
+            "motion",
+            partial(plot_motion, run, first=first, last=last),
+            words,
+            f"Exact between events; friction jumps where a slip begins, ends or turns.{shaded}",
+        )
+    )
     several = contacts_of(run) > 1
     for c in range(min(contacts_of(run), MOST_DRAWN)):
         plates += _of_contact(run, c, f"-{c + 1}" if several else "", f", contact {c + 1}" if several else "")
@@ -323,31 +330,44 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
         name, which = (f"-x{j + 1}", f" of x{j + 1}") if masses > 1 else ("", "")
         holds = "" if several or not contacts_of(run) else " Marked: where the contact holds."
         plates.append(
-            plate(f"phase-portrait{name}", partial(plot_phase, run, mass=j), f"Phase portrait{which}",
-                  f"Velocity against displacement, run through clockwise.{holds}")
-        )  # fmt: skip
+            plate(
+                f"phase-portrait{name}",
+                partial(plot_phase, run, mass=j),
+                f"Phase portrait{which}",
+                f"Velocity against displacement, run through clockwise.{holds}",
+            )
+        )
     return tuple(plates)
 
 
 def _of_contact(run: Trajectory, contact: int, name: str, which: str) -> list[Plate]:
     """Loops of one contact; `name` and `which` tell it from others."""
     plates = [
-        plate(f"friction-displacement{name}", partial(plot_loop, run, contact=contact),
-              f"Friction against displacement{which}",
-              "The area of a loop is the work that friction takes in a cycle. Flat top and bottom: sliding. Sides: the "
-              "contact holds, upright where it is rigid, sloping where it gives way."),
-        plate(f"friction-velocity{name}", partial(plot_loop, run, against="slip", contact=contact),
-              f"Friction against sliding velocity{which}",
-              "The law as the motion passes through it. A contact that holds bears whatever the other forces ask for: "
-              "the upright at zero."),
-    ]  # fmt: skip
+        plate(
+            f"friction-displacement{name}",
+            partial(plot_loop, run, contact=contact),
+            f"Friction against displacement{which}",
+            "The area of a loop is the work that friction takes in a cycle. Flat top and bottom: sliding. Sides: the "
+            "contact holds, upright where it is rigid, sloping where it gives way.",
+        ),
+        plate(
+            f"friction-velocity{name}",
+            partial(plot_loop, run, against="slip", contact=contact),
+            f"Friction against sliding velocity{which}",
+            "The law as the motion passes through it. A contact that holds bears whatever the other forces ask for: "
+            "the upright at zero.",
+        ),
+    ]
     if pressed(run, contact):
         plates.append(
-            plate(f"friction-load{name}", partial(plot_loop, run, against="load", contact=contact),
-                  f"Friction against normal load{which}",
-                  "Sliding lies on the two edges of a wedge, whose slope is the coefficient of friction; holding lies "
-                  "between them; at its tip the contact lifts off.")
-        )  # fmt: skip
+            plate(
+                f"friction-load{name}",
+                partial(plot_loop, run, against="load", contact=contact),
+                f"Friction against normal load{which}",
+                "Sliding lies on the two edges of a wedge, whose slope is the coefficient of friction; holding lies "
+                "between them; at its tip the contact lifts off.",
+            )
+        )
     return plates
 
 

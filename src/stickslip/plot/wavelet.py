@@ -211,9 +211,15 @@ def _grid(axes: Axes, wavelets: xr.DataArray, steps: Array, style: str) -> Any:
     if style == "lines":
         return axes.contour(times, frequencies[shown], level[shown], steps[1:-1], cmap=RISING, linewidths=0.7)
     drawn = axes.pcolormesh(
-        times, frequencies[shown], np.ma.masked_less_equal(level[shown], steps[0]), cmap=_stepped(len(steps) - 1),
-        vmin=steps[0], vmax=0, shading="nearest", rasterized=True,
-    )  # fmt: skip
+        times,
+        frequencies[shown],
+        np.ma.masked_less_equal(level[shown], steps[0]),
+        cmap=_stepped(len(steps) - 1),
+        vmin=steps[0],
+        vmax=0,
+        shading="nearest",
+        rasterized=True,
+    )
     axes.grid(visible=False)
     return drawn
 
@@ -236,9 +242,15 @@ def _cone(axes: Axes, wavelets: xr.DataArray) -> None:
     frequencies, cone = wavelets.frequency.values, np.minimum(wavelets.cone.values, (last - first) / 2)
     for edge, sign in ((first, 1.0), (last, -1.0)):
         axes.fill_betweenx(
-            frequencies, edge, edge + sign * cone, facecolor="white", alpha=0.45, hatch="////", edgecolor=INK,
+            frequencies,
+            edge,
+            edge + sign * cone,
+            facecolor="white",
+            alpha=0.45,
+            hatch="////",
+            edgecolor=INK,
             linewidth=0.0,
-        )  # fmt: skip
+        )
         axes.plot(edge + sign * cone, frequencies, color=INK, linewidth=0.8)
     if len(frequencies) > 1:
         axes.set_ylim(frequencies[0], frequencies[-1])

@@ -306,15 +306,22 @@ def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> _Matc
     fit = least_squares(design, data)
     gain, residual = float(fit.coefficients[0]), fit.residual
     found = Estimate.normal(
-        "clock offset", offset, sd=float(fit.sd[2]) / abs(gain), quantile=student(float(fit.freedom[2])), unit="s",
+        "clock offset",
+        offset,
+        sd=float(fit.sd[2]) / abs(gain),
+        quantile=student(float(fit.freedom[2])),
+        unit="s",
         method="least squares between the smoothed motions",
-    )  # fmt: skip
+    )
     stretch = least_squares(np.column_stack([design, design[:, 2] * along]), data)
     rate = Estimate.normal(
-        "clock rate ratio", 1 + float(stretch.coefficients[3]) / gain, sd=float(stretch.sd[3]) / abs(gain), unit="1",
+        "clock rate ratio",
+        1 + float(stretch.coefficients[3]) / gain,
+        sd=float(stretch.sd[3]) / abs(gain),
+        unit="1",
         quantile=student(float(stretch.freedom[3])),
         method="least squares of the stretch between the smoothed motions",
-    )  # fmt: skip
+    )
     rest = float(np.std(residual) / np.std(data))
     return _Match(_judged(found, gain, rest, rate, len(data) * a.step, others), rate)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,7 @@ Array = NDArray[np.float64]
 ROUNDING = 1e-12  # share of a variance before the readings that is left of it at least
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(NamedTuple):
     """A linear motion in steps, :math:`s' = T s + u + r w`, and what is read of it, :math:`y = H s + e`.
 
     Attributes
@@ -46,8 +45,7 @@ class Motion:
     drift: Array | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Smoothed:
+class Smoothed(NamedTuple):
     """What all readings together say of the motion.
 
     Attributes
@@ -69,8 +67,7 @@ class Smoothed:
     likelihood: float
 
 
-@dataclass(frozen=True, eq=False)
-class Seen:
+class Seen(NamedTuple):
     """What was read of a motion, and what drove it.
 
     Attributes
@@ -86,6 +83,26 @@ class Seen:
     readings: Array
     inputs: Array
     regime: NDArray[np.intp]
+
+
+class Filtered(NamedTuple):
+    """What the way back needs of each sample: state and covariance before its readings, and of each reading its gains,
+    its surprise and that one's variance (0 where nothing was read)."""
+
+    ahead: Array
+    doubt: Array
+    gains: Array
+    surprises: Array
+    variances: Array
+
+
+class Work(NamedTuple):
+    """What a recursion carries, a vector and a matrix, and room for one of each."""
+
+    vector: Array
+    matrix: Array
+    line: Array
+    square: Array
 
 
 def smooth_motion(motion: Motion, seen: Seen, *, unknown: Array, forms: Array) -> Smoothed:
@@ -107,15 +124,14 @@ def smooth_motion(motion: Motion, seen: Seen, *, unknown: Array, forms: Array) -
     -------
     Smoothed
     """
-    kept, likelihood = _filtered(motion, seen, unknown)
+    motion, kept, likelihood = _filtered(motion, seen, unknown)
     count, size = len(unknown), len(motion.start)
-    values, variance = np.empty((len(forms), count)), np.empty((len(forms), count))
-    score, information = np.empty(count), np.empty(count)
-    _backward(
-        (motion.transition, motion.spread, motion.readings, seen.regime), kept, forms, values, variance, score,
-        information, np.zeros((size, size)), np.empty((size, size)), np.zeros(size), np.empty(size),
-    )  # fmt: skip
-    return Smoothed(values, variance, score, information, likelihood)
+    told = Smoothed(
+        np.empty((len(forms), count)), np.empty((len(forms), count)), np.empty(count), np.empty(count), likelihood
+    )
+    work = Work(np.zeros(size), np.zeros((size, size)), np.empty(size), np.empty((size, size)))
+    _backward(motion, seen, kept, forms, told, work)
+    return told
 
 
 def log_likelihood(motion: Motion, seen: Seen, *, unknown: Array) -> float:
@@ -133,7 +149,7 @@ def log_likelihood(motion: Motion, seen: Seen, *, unknown: Array) -> float:
     float
         Logarithm of the likelihood, from the filter's surprises.
     """
-    return _filtered(motion, seen, unknown)[1]
+    return _filtered(motion, seen, unknown)[2]
 
 
 def surprises(motion: Motion, seen: Seen, *, unknown: Array) -> Array:
@@ -151,148 +167,179 @@ def surprises(motion: Motion, seen: Seen, *, unknown: Array) -> Array:
     ndarray (N, m)
         Of mean square 1 where the motion is as stated; NaN where nothing was read.
     """
-    _, _, _, surprise, variance = _filtered(motion, seen, unknown)[0]
-    return surprise / np.sqrt(np.where(variance > 0, variance, np.nan))
+    kept = _filtered(motion, seen, unknown)[1]
+    return kept.surprises / np.sqrt(np.where(kept.variances > 0, kept.variances, np.nan))
 
 
-def _filtered(motion: Motion, seen: Seen, unknown: Array) -> tuple[tuple[Array, ...], float]:
+def _filtered(motion: Motion, seen: Seen, unknown: Array) -> tuple[Motion, Filtered, float]:
+    """The motion with its drift, what the filter leaves, and the log likelihood."""
     count, size, sensors = len(unknown), len(motion.start), seen.readings.shape[1]
-    kept = (
-        np.empty((count, size)), np.empty((count, size, size)), np.empty((count, sensors, size)),
-        np.zeros((count, sensors)), np.zeros((count, sensors)),
-    )  # fmt: skip
-    tables = (motion.transition, motion.spread, motion.readings, seen.regime)
-    drift = np.zeros(size) if motion.drift is None else motion.drift
-    likelihood = _forward(
-        tables, motion.noise, drift, seen.readings, seen.inputs, unknown, motion.start.copy(), np.diag(motion.doubt),
-        kept, np.empty((size, size)), np.empty(size),
-    )  # fmt: skip
-    return kept, float(likelihood)
+    motion = motion._replace(drift=np.zeros(size) if motion.drift is None else motion.drift)
+    kept = Filtered(
+        np.empty((count, size)),
+        np.empty((count, size, size)),
+        np.empty((count, sensors, size)),
+        np.zeros((count, sensors)),
+        np.zeros((count, sensors)),
+    )
+    work = Work(motion.start.copy(), np.diag(motion.doubt), np.empty(size), np.empty((size, size)))
+    return motion, kept, float(_forward(motion, seen, unknown, kept, work))
 
 
 @compiled(**FAST)
-def _forward(tables, noise, drift, readings, inputs, unknown, a, p, kept, square, line):
-    """The filter from state a and covariance p: the log likelihood; `kept` takes what the way back needs."""
-    transitions, spreads_, forms, regime = tables
-    ahead, doubts, gains, surprises, spreads = kept
-    count, sensors = readings.shape
+def _forward(motion, seen, unknown, kept, work):
+    """The filter from a state and its covariance: the log likelihood; `kept` takes what the way back needs."""
+    a, p = work.vector, work.matrix
+    n, total = a.shape[0], 0.0
+    for t in range(seen.readings.shape[0]):
+        for i in range(n):
+            kept.ahead[t, i] = a[i]
+            for j in range(n):
+                kept.doubt[t, i, j] = p[i, j]
+        for k in range(seen.readings.shape[1]):
+            if not math.isnan(seen.readings[t, k]):
+                total += _update(t, k, motion, seen, kept, work)
+        _predict(t, motion, seen, unknown, work)
+    return total
+
+
+@compiled(**FAST, forceinline=True)
+def _update(t, k, motion, seen, kept, work):
+    """Take reading k of sample t: its log likelihood."""
+    a, p, line, form = work.vector, work.matrix, work.line, motion.readings[k]
+    n, surprise, width = a.shape[0], seen.readings[t, k], motion.noise[k]
+    for i in range(n):
+        surprise -= form[i] * a[i]
+        total = 0.0
+        for j in range(n):
+            total += p[i, j] * form[j]
+        line[i] = total
+    for i in range(n):
+        width += form[i] * line[i]
+    kept.surprises[t, k], kept.variances[t, k] = surprise, width
+    for i in range(n):
+        gain = line[i] / width
+        kept.gains[t, k, i] = gain
+        a[i] += gain * surprise
+        for j in range(i + 1):
+            p[i, j] -= gain * line[j]
+            p[j, i] = p[i, j]
+    return -0.5 * (math.log(2 * math.pi * width) + surprise * surprise / width)
+
+
+@compiled(**FAST, forceinline=True)
+def _predict(t, motion, seen, unknown, work):
+    """Step to the next sample."""
+    a, p, line, square = work
+    transition, spread = motion.transition[seen.regime[t]], motion.spread[seen.regime[t]]
     n = a.shape[0]
-    total_likelihood = 0.0
-    for t in range(count):
-        for i in range(n):
-            ahead[t, i] = a[i]
-            for j in range(n):
-                doubts[t, i, j] = p[i, j]
-        for k in range(sensors):
-            surprise = readings[t, k]
-            if math.isnan(surprise):
-                continue
-            width = noise[k]
-            for i in range(n):
-                surprise -= forms[k, i] * a[i]
-                total = 0.0
-                for j in range(n):
-                    total += p[i, j] * forms[k, j]
-                line[i] = total
-            for i in range(n):
-                width += forms[k, i] * line[i]
-            surprises[t, k], spreads[t, k] = surprise, width
-            total_likelihood -= 0.5 * (math.log(2 * math.pi * width) + surprise * surprise / width)
-            for i in range(n):
-                gain = line[i] / width
-                gains[t, k, i] = gain
-                a[i] += gain * surprise
-                for j in range(i + 1):
-                    p[i, j] -= gain * line[j]
-                    p[j, i] = p[i, j]
-        transition, spread = transitions[regime[t]], spreads_[regime[t]]
-        for i in range(n):
-            total = inputs[t, i]
-            for j in range(n):
-                total += transition[i, j] * a[j]
-            line[i] = total
-        for i in range(n):
-            a[i] = line[i]
-            for j in range(n):
-                total = 0.0
-                for k in range(n):
-                    total += transition[i, k] * p[k, j]
-                square[i, j] = total
-        for i in range(n):
-            for j in range(i + 1):
-                total = spread[i] * unknown[t] * spread[j]
-                for k in range(n):
-                    total += square[i, k] * transition[j, k]
-                p[i, j] = total
-                p[j, i] = total
-            p[i, i] += drift[i]
-    return total_likelihood
+    for i in range(n):
+        total = seen.inputs[t, i]
+        for j in range(n):
+            total += transition[i, j] * a[j]
+        line[i] = total
+    for i in range(n):
+        a[i] = line[i]
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += transition[i, k] * p[k, j]
+            square[i, j] = total
+    for i in range(n):
+        for j in range(i + 1):
+            total = spread[i] * unknown[t] * spread[j]
+            for k in range(n):
+                total += square[i, k] * transition[j, k]
+            p[i, j] = total
+            p[j, i] = total
+        p[i, i] += motion.drift[i]
 
 
 @compiled(**FAST)
-def _backward(tables, kept, forms, values, variance, score, information, m, square, r, line):
-    """The way back: r and m are the slope and the curvature of the likelihood by the state."""
-    transitions, spreads_, readings, regime = tables
-    ahead, doubts, gains, surprises, spreads = kept
-    count, sensors = surprises.shape
+def _backward(motion, seen, kept, forms, told, work):
+    """The way back; what it carries are slope r and curvature m of the likelihood by the state."""
+    for t in range(seen.readings.shape[0] - 1, -1, -1):
+        _score(t, motion, seen, told, work)
+        _step_back(motion.transition[seen.regime[t]], work)
+        for k in range(seen.readings.shape[1] - 1, -1, -1):
+            if kept.variances[t, k] != 0.0:
+                _give_back(t, k, motion, kept, work)
+        _tell(t, kept, forms, told, work)
+
+
+@compiled(**FAST, forceinline=True)
+def _score(t, motion, seen, told, work):
+    """Slope and curvature by the unknown of a step."""
+    r, m, spread = work.vector, work.matrix, motion.spread[seen.regime[t]]
+    n, first, second = r.shape[0], 0.0, 0.0
+    for i in range(n):
+        first += spread[i] * r[i]
+        total = 0.0
+        for j in range(n):
+            total += m[i, j] * spread[j]
+        second += spread[i] * total
+    told.score[t], told.information[t] = first, second
+
+
+@compiled(**FAST, forceinline=True)
+def _step_back(transition, work):
+    """Slope and curvature by the state after a sample's readings."""
+    r, m, line, square = work
     n = r.shape[0]
-    for t in range(count - 1, -1, -1):
-        transition, spread = transitions[regime[t]], spreads_[regime[t]]
-        first, second = 0.0, 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += transition[j, i] * r[j]
+        line[i] = total
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += m[i, k] * transition[k, j]
+            square[i, j] = total
+    for i in range(n):
+        r[i] = line[i]
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(n):
+                total += transition[k, i] * square[k, j]
+            m[i, j] = total
+            m[j, i] = total
+
+
+@compiled(**FAST, forceinline=True)
+def _give_back(t, k, motion, kept, work):
+    """Slope and curvature by the state before reading k of sample t."""
+    r, m, line, form, gains = work.vector, work.matrix, work.line, motion.readings[k], kept.gains[t, k]
+    n, width = r.shape[0], kept.variances[t, k]
+    along, across = kept.surprises[t, k] / width, 1.0 / width
+    for i in range(n):
+        along -= gains[i] * r[i]
+        total = 0.0
+        for j in range(n):
+            total += m[i, j] * gains[j]
+        line[i] = total
+        across += gains[i] * total
+    for i in range(n):
+        r[i] += form[i] * along
+        for j in range(n):
+            m[i, j] += form[i] * form[j] * across - line[i] * form[j] - form[i] * line[j]
+
+
+@compiled(**FAST, forceinline=True)
+def _tell(t, kept, forms, told, work):
+    """The linear forms that are wanted, at a sample."""
+    r, m, line, n = work.vector, work.matrix, work.line, work.vector.shape[0]
+    for o in range(forms.shape[0]):
+        value, doubt = 0.0, 0.0
         for i in range(n):
-            first += spread[i] * r[i]
             total = 0.0
             for j in range(n):
-                total += m[i, j] * spread[j]
-            second += spread[i] * total
-        score[t], information[t] = first, second
-        for i in range(n):
-            total = 0.0
-            for j in range(n):
-                total += transition[j, i] * r[j]
+                total += kept.doubt[t, i, j] * forms[o, j]
             line[i] = total
-            for j in range(n):
-                total = 0.0
-                for k in range(n):
-                    total += m[i, k] * transition[k, j]
-                square[i, j] = total
+            value += forms[o, i] * kept.ahead[t, i] + total * r[i]
+            doubt += forms[o, i] * total
+        least = ROUNDING * doubt
         for i in range(n):
-            r[i] = line[i]
-            for j in range(i + 1):
-                total = 0.0
-                for k in range(n):
-                    total += transition[k, i] * square[k, j]
-                m[i, j] = total
-                m[j, i] = total
-        for k in range(sensors - 1, -1, -1):
-            width = spreads[t, k]
-            if width == 0.0:
-                continue
-            along, across = surprises[t, k] / width, 1.0 / width
-            for i in range(n):
-                along -= gains[t, k, i] * r[i]
-                total = 0.0
-                for j in range(n):
-                    total += m[i, j] * gains[t, k, j]
-                line[i] = total
-                across += gains[t, k, i] * total
-            for i in range(n):
-                r[i] += readings[k, i] * along
-                for j in range(n):
-                    m[i, j] += (
-                        readings[k, i] * readings[k, j] * across - line[i] * readings[k, j] - readings[k, i] * line[j]
-                    )
-        for o in range(forms.shape[0]):
-            value, doubt = 0.0, 0.0
-            for i in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += doubts[t, i, j] * forms[o, j]
-                line[i] = total
-                value += forms[o, i] * ahead[t, i] + total * r[i]
-                doubt += forms[o, i] * total
-            least = ROUNDING * doubt
-            for i in range(n):
-                for j in range(n):
-                    doubt -= line[i] * m[i, j] * line[j]
-            values[o, t], variance[o, t] = value, max(doubt, least)
+            for j in range(n):
+                doubt -= line[i] * m[i, j] * line[j]
+        told.values[o, t], told.variance[o, t] = value, max(doubt, least)

@@ -210,9 +210,10 @@ def _from_stamps(
         finite = np.isfinite(values)
         if finite.sum() < 4:
             raise RecordError(
-                f"channel {name} has {int(finite.sum())} numbers", "a channel is interpolated between four or more",
+                f"channel {name} has {int(finite.sum())} numbers",
+                "a channel is interpolated between four or more",
                 "leave it out",
-            )  # fmt: skip
+            )
         filled = Akima1DInterpolator(times[finite], values[finite], method="makima")(grid, extrapolate=False)
         beside = ~finite[nearest] | ~finite[nearest - 1]
         samples[name] = np.where(unknown | beside, np.nan, filled)

@@ -1,4 +1,4 @@
-"""What a linear sensor makes of a motion that is known at every instant."""
+"""What a linear sensor makes of a motion that is known at every instant: its poles' answer, by compiled quadrature."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from stickslip.compiled import FAST, compiled
 
 Array = NDArray[np.float64]
 
@@ -17,6 +20,7 @@ TURN = 1.5  # radians that no pole turns further in a stretch of the quadrature
 NODES = 6  # of Gauss in a stretch
 BLOCK = 1 << 16  # samples at a time
 CRITICAL = 1e-7  # a damping ratio as near to 1 is moved away from it: a double pole has no partial fractions
+ALIKE = 1e-9  # of its length: an interval that differs by less from the one before has the same factors
 
 
 @dataclass(frozen=True)
@@ -101,7 +105,6 @@ def respond(
     -------
     ndarray (n,)
     """
-    from stickslip.signals.quadrature import follow  # compiled: a response alone does without
 
     after = np.maximum(times, 0.0)
     if not response.poles or len(times) < 2:
@@ -136,3 +139,35 @@ def gauss(count: int) -> tuple[Array, Array]:
     """Nodes and weights of Gauss's quadrature from 0 to 1."""
     roots, weights = np.polynomial.legendre.leggauss(count)
     return (roots + 1) / 2, weights / 2
+
+
+@compiled(**FAST)
+def follow(filter_: Any, edges: Array, ends: Any, forced: Array, rule: Any, factors: Any, out: Array) -> None:
+    """Add to `out` what the poles answer at the edges numbered `ends`.
+
+    `filter_` holds poles, residues, and the poles' states at the first edge, which become those at the last end;
+    `forced` (K, n) the input in each interval between edges, at the nodes of the `rule`: shares of its length, and
+    weights. `factors` (n,) is scratch.
+    """
+    poles, residues, states = filter_
+    nodes, weights = rule
+    for p in range(len(poles)):
+        pole, residue, state = poles[p], residues[p], states[p]
+        if pole.imag < 0.0:
+            continue  # its conjugate speaks for both
+        if pole.imag > 0.0:
+            residue *= 2.0
+        known, decay, k = -1.0, state, 0
+        for e in range(len(ends)):
+            while k < ends[e]:
+                length = edges[k + 1] - edges[k]
+                if abs(length - known) > ALIKE * known:
+                    known, decay = length, cmath.exp(pole * length)
+                    for q in range(len(nodes)):
+                        factors[q] = weights[q] * length * cmath.exp(pole * (length * (1.0 - nodes[q])))
+                state *= decay
+                for q in range(len(nodes)):
+                    state += factors[q] * forced[k, q]
+                k += 1
+            out[e] += (residue * state).real
+        states[p] = state

@@ -201,18 +201,21 @@ def local_maxima(wavelets: xr.DataArray, *, prominence: float = 3.0, span: float
     kept = [n for n in range(len(rows)) if stands[n] >= prominence]
     found = [
         LocalMaximum(
-            float(times[columns[n]]), float(frequencies[rows[n]]), float(modulus[rows[n], columns[n]]),
-            float(stands[n]),
+            float(times[columns[n]]), float(frequencies[rows[n]]), float(modulus[rows[n], columns[n]]), float(stands[n])
         )
         for n in kept
-    ]  # fmt: skip
+    ]
     return tuple(sorted(found, key=lambda each: each.time))
 
 
 def find_spikes(
-    record: Record, channel: str, *, threshold: float = 12.0, frequencies: ArrayLike | None = None,
+    record: Record,
+    channel: str,
+    *,
+    threshold: float = 12.0,
+    frequencies: ArrayLike | None = None,
     within: float | None = None,
-) -> tuple[Spike, ...]:  # fmt: skip
+) -> tuple[Spike, ...]:
     """When does a signal jump or kink: at which instants do all high frequencies sound at once?
 
     The logarithm of each row of the map over its median, averaged over the frequencies, has its maximum where a jump, a
@@ -263,7 +266,7 @@ def find_spikes(
     peaks, _ = find_peaks(mean, height=threshold, distance=apart)
     broad = [
         row for row in peaks if (level[:, max(0, row - apart) : row + apart + 1].max(axis=1) > FLAT * mean[row]).all()
-    ]  # fmt: skip
+    ]
     times = record.start + np.array([_centre(mean, int(row), apart // 2) for row in broad]) / record.fs
     groups = _grouped(times, within)
     return tuple(Spike(float(t), float(mean[r]), int(g)) for t, r, g in zip(times, broad, groups, strict=True))
@@ -289,9 +292,10 @@ def _coarse(wavelets: xr.DataArray) -> tuple[Array, Array, Array]:
     """Modulus, times and frequencies of the map, at as many times as its shortest wavelet needs."""
     if "scale" not in getattr(wavelets, "coords", {}) or wavelets.ndim != 2 or wavelets.sizes["frequency"] < 3:
         raise RecordError(
-            "an array without scales, or of fewer than three frequencies", "lines and peaks belong to a wavelet map",
+            "an array without scales, or of fewer than three frequencies",
+            "lines and peaks belong to a wavelet map",
             "pass what wavelet_map gave",
-        )  # fmt: skip
+        )
     step = max(1, int(STEP * float(wavelets.scale.min()) * float(wavelets.attrs["fs"])))
     part: Any = wavelets[:, ::step]
     return np.abs(part.values).astype(float), part.time.values, part.frequency.values

@@ -55,9 +55,10 @@ def stft_map(record: Record, channel: str, *, nperseg: int | None = None, window
         nperseg = max(8, min(1 << round(math.log2(max(8, 0.1 * record.fs))), count // 8))
     if not 4 <= nperseg <= count:
         raise RecordError(
-            f"nperseg = {nperseg} of {count} samples", "a window has 4 samples at least, and fits into the record",
+            f"nperseg = {nperseg} of {count} samples",
+            "a window has 4 samples at least, and fits into the record",
             "choose it between",
-        )  # fmt: skip
+        )
     hop = max(1, nperseg // 8)
     short = ShortTimeFFT.from_window(
         window, record.fs, nperseg, nperseg - hop, scale_to="magnitude", phase_shift=None, fft_mode="onesided2X"
@@ -68,9 +69,17 @@ def stft_map(record: Record, channel: str, *, nperseg: int | None = None, window
     inside = (times >= record.start) & (times < record.start + record.duration)
     xarray = labelled_arrays("wavelet maps")
     result: xr.DataArray = xarray.DataArray(
-        values[:, inside], dims=("frequency", "time"),
+        values[:, inside],
+        dims=("frequency", "time"),
         coords={"frequency": ("frequency", short.f, {"units": "Hz"}), "time": ("time", times[inside], {"units": "s"})},
-        attrs={"units": record.channels[channel].unit, "channel": channel, "fs": record.fs, "nperseg": nperseg,
-               "window": window, "normalisation": "amplitude", "mean": mean},
-    )  # fmt: skip
+        attrs={
+            "units": record.channels[channel].unit,
+            "channel": channel,
+            "fs": record.fs,
+            "nperseg": nperseg,
+            "window": window,
+            "normalisation": "amplitude",
+            "mean": mean,
+        },
+    )
     return result

@@ -72,9 +72,15 @@ def upsampled(
     turn = np.exp(2j * np.pi * turns / (TILE * phases) * np.arange(values)).astype(out.dtype)
     room = np.empty((8, max(halves.shape[1:])), dtype=kind)
     _MANY[kind.itemsize](
-        samples[LEAD - first :], halves.astype(kind), (first, values // phases), swing,
-        np.array([turn.real, turn.imag]), room, np.empty_like(turn), out,
-    )  # fmt: skip
+        samples[LEAD - first :],
+        halves.astype(kind),
+        (first, values // phases),
+        swing,
+        np.array([turn.real, turn.imag]),
+        room,
+        np.empty_like(turn),
+        out,
+    )
 
 
 @lru_cache(maxsize=256)

@@ -108,9 +108,13 @@ def wavelet_map(
         )
     mean = float(record[channel].mean())
     values = transform(
-        record[channel] - mean, record.fs, grid.scales, centre=grid.centre, normalisation=normalisation,
+        record[channel] - mean,
+        record.fs,
+        grid.scales,
+        centre=grid.centre,
+        normalisation=normalisation,
         precision=precision,
-    )  # fmt: skip
+    )
     return labelled(values, record.time, grid, record, channel, mean)
 
 
@@ -219,9 +223,14 @@ def wavelet_overview(
     if columns < 2:
         raise RecordError(f"columns = {columns}", "an overview has two columns at least", "ask for more")
     blocks = wavelet_blocks(
-        source, channel, frequencies=frequencies, voices=voices, wavelet_frequency=wavelet_frequency,
-        normalisation=normalisation, corrected=corrected,
-    )  # fmt: skip
+        source,
+        channel,
+        frequencies=frequencies,
+        voices=voices,
+        wavelet_frequency=wavelet_frequency,
+        normalisation=normalisation,
+        corrected=corrected,
+    )
     first = last = next(blocks)
     width = 1 << max(0, math.ceil(math.log2(max(1, first.sizes["time"] / columns))))  # samples of a column
     shown = rest = np.empty((first.sizes["frequency"], 0))
@@ -379,9 +388,10 @@ def inverse_wavelet(wavelets: xr.DataArray) -> Array:
 
     if "scale" not in getattr(wavelets, "coords", {}) or wavelets.ndim != 2 or not np.iscomplexobj(wavelets.values):
         raise RecordError(
-            "an array without phases or scales", "a signal comes back from a complex wavelet map",
+            "an array without phases or scales",
+            "a signal comes back from a complex wavelet map",
             "pass what wavelet_map gave",
-        )  # fmt: skip
+        )
     count, fs = wavelets.sizes["time"], float(wavelets.attrs["fs"])
     size = 2 * count
     turn = 2 * np.pi * np.fft.rfftfreq(size, 1 / fs)
@@ -415,7 +425,7 @@ def _inner(values: Array, begin: int, count: int, fs: float, grid: Grid) -> NDAr
         some = slice(row, row + max(1, BLOCK_BYTES // 2 // (16 * (high - low))))
         around = transform(
             values[low:high], fs, grid.scales[some], centre=grid.centre, normalisation=grid.normalisation
-        )  # fmt: skip
+        )
         found[some] = around[:, begin - low : begin - low + count]
         row = some.stop
     return found

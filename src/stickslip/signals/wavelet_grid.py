@@ -44,9 +44,14 @@ class Grid:
 
 
 def grid_of(
-    frequencies: ArrayLike | None, voices: int, centre: float, normalisation: str, corrected: bool,
-    fs: float, duration: float,
-) -> Grid:  # fmt: skip
+    frequencies: ArrayLike | None,
+    voices: int,
+    centre: float,
+    normalisation: str,
+    corrected: bool,
+    fs: float,
+    duration: float,
+) -> Grid:
     """The frequencies asked for, checked against the rate and the length of the record."""
     check_centre(centre)
     if normalisation not in NORMALISATIONS:
@@ -118,9 +123,12 @@ def labelled(
         "cone": ("frequency", math.sqrt(2) * scales, {"units": "s"}),
     }
     result: xr.DataArray = xarray.DataArray(
-        values, dims=("frequency", "time"), coords=along, name=f"wavelets of {channel}",
+        values,
+        dims=("frequency", "time"),
+        coords=along,
+        name=f"wavelets of {channel}",
         attrs=attributes_of(grid, record, channel, mean),
-    )  # fmt: skip
+    )
     return result
 
 

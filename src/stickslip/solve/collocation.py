@@ -9,26 +9,66 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Legendre
-from numpy.typing import NDArray
 
 from stickslip.compiled import compiled
 from stickslip.solve.roots import NOISE, NONE, first_rise
-from stickslip.solve.taylor import advance, awake, set_tones, waking
+from stickslip.solve.taylor import EXACT, Array, Exits, Guards, Sums, advance, awake, coded, set_tones, waking
 
-EXACT = {"error_model": "numpy"}
 STAGES = 9
 WIDTH = STAGES + 1
 NEWTON = 12  # most iterations
 ROUNDING = 1e-11  # most that rounding may leave of Newton's method
 
 
-@cache
-def method() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+class Scheme(NamedTuple):
     """Radau's points in (0, 1], their matrix, and the fit of values at them by powers of w = 2 u - 1."""
+
+    points: Array
+    matrix: Array
+    fit: Array
+
+
+class Model(NamedTuple):
+    """A curved system as the march reads it: code by address (Taylor coefficients with their numbers, rates alone), the
+    leaps' method, what rounds, exits, what may sleep, the drive's tones and period [s], the counter-face's velocity,
+    entries that are no signals, the tolerance of a step and its order."""
+
+    series: int
+    numbers: Array
+    rates: int
+    scheme: Scheme
+    sums: Sums
+    exits: Exits
+    guards: Guards
+    tones: Array
+    period: float
+    face: Array
+    physical: int
+    tolerance: float
+    order: int
+
+
+class Stages(NamedTuple):
+    """Work arrays of a leap: its stages, their rates, slopes and nodes, the equations and their right side, nodes and
+    rates of one state, and a state."""
+
+    values: Array
+    rates: Array
+    slopes: Array
+    nodes: Array
+    matrix: Array
+    right: Array
+    one: Array
+    moved: Array
+
+
+@cache
+def method() -> Scheme:
+    """The collocation of `STAGES` points."""
     inner = (Legendre.basis(STAGES) - Legendre.basis(STAGES - 1)).roots()  # Radau's right points; the last is 1
     points = (np.sort(inner.real) + 1) / 2
     points[-1] = 1.0
@@ -37,17 +77,22 @@ def method() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float
     areas = np.column_stack([part.integ(lbnd=-1)(2 * points - 1) / 2 for part in basis])
     matrix = np.ascontiguousarray(np.linalg.solve(values.T, areas.T).T)
     fit = np.linalg.inv(np.vander(2 * np.concatenate([[0.0], points]) - 1, WIDTH, increasing=True))[:, 1:]
-    return points, matrix, np.ascontiguousarray(fit)
+    return Scheme(points, matrix, np.ascontiguousarray(fit))
 
 
-def room(nodes: int, size: int, physical: int) -> tuple[NDArray[Any], ...]:
-    """Work arrays: stages, their rates, slopes and nodes, the equations and their right side, nodes, a state."""
+def room(nodes: int, size: int, physical: int) -> Stages:
+    """Room for a leap of a system of so many nodes and entries."""
     unknown = STAGES * physical
-    return (
-        np.zeros((STAGES, size)), np.zeros((STAGES, physical)), np.zeros((STAGES, physical, physical)),
-        np.zeros((STAGES, nodes)), np.zeros((unknown, unknown)), np.zeros(unknown), np.zeros(2 * nodes),
-        np.zeros(size),
-    )  # fmt: skip
+    return Stages(
+        values=np.zeros((STAGES, size)),
+        rates=np.zeros((STAGES, physical)),
+        slopes=np.zeros((STAGES, physical, physical)),
+        nodes=np.zeros((STAGES, nodes)),
+        matrix=np.zeros((unknown, unknown)),
+        right=np.zeros(unknown),
+        one=np.zeros(2 * nodes),
+        moved=np.zeros(size),
+    )
 
 
 @compiled(**EXACT)
@@ -79,17 +124,20 @@ def solve(a, b):
 
 
 @compiled(**EXACT)
-def _slopes(rates, numbers, mode, stage, physical, face, big, value, slope, every, work, moved):
-    """Rates at a stage, their derivatives by differences, and the values of all nodes."""
+def _slopes(model, mode, i, big, stages):
+    """Rates at stage i, their derivatives by differences, and the values of all nodes."""
+    rates, numbers, physical = coded(model.rates), model.numbers, model.physical
+    stage, value, slope, every = stages.values[i], stages.rates[i], stages.slopes[i], stages.nodes[i]
+    work, moved = stages.one, stages.moved
     rates(numbers, mode, stage, 1.0, work)
     for j in range(physical):
         value[j] = work[2 * j + 1]
     for j in range(len(every)):
         every[j] = work[2 * j]
     speed = 0.0
-    for i in range(len(stage)):
-        moved[i] = stage[i]
-        speed += face[i] * stage[i]
+    for j in range(len(stage)):
+        moved[j] = stage[j]
+        speed += model.face[j] * stage[j]
     for d in range(physical):
         # friction may follow the logarithm of the velocity against the counter-face
         step = 1e-7 * abs(stage[1] - speed) + 1e-13 * big[1] if d == 1 else 1e-7 * abs(stage[d]) + 1e-10 * big[d]
@@ -104,32 +152,31 @@ def _slopes(rates, numbers, mode, stage, physical, face, big, value, slope, ever
 
 
 @compiled(**EXACT)
-def settle(rates, numbers, mode, state, h, scheme, physical, face, big, tolerance, work):
+def settle(model, mode, state, h, big, stages):
     """Newton's method for the stages, which hold the drive's signals and a guess: the last change, or infinity.
 
     Where rounding keeps it above the tolerance (a small velocity between large forces), the change tells by how much.
     """
-    _, matrix, _ = scheme
-    stages, value, slope, every, a, b, one, moved = work
-    change, before = math.inf, math.inf
+    matrix, physical, tolerance = model.scheme.matrix, model.physical, model.tolerance
+    a, b, change, before = stages.matrix, stages.right, math.inf, math.inf
     for iteration in range(NEWTON):
         for i in range(STAGES):
-            _slopes(rates, numbers, mode, stages[i], physical, face, big, value[i], slope[i], every[i], one, moved)
+            _slopes(model, mode, i, big, stages)
         for i in range(STAGES):
             for j in range(physical):
                 row, total = i * physical + j, 0.0
                 for m in range(STAGES):
-                    total += matrix[i, m] * value[m, j]
+                    total += matrix[i, m] * stages.rates[m, j]
                     for d in range(physical):
-                        a[row, m * physical + d] = -h * matrix[i, m] * slope[m, j, d]
+                        a[row, m * physical + d] = -h * matrix[i, m] * stages.slopes[m, j, d]
                 a[row, row] += 1.0
-                b[row] = stages[i, j] - state[j] - h * total
+                b[row] = stages.values[i, j] - state[j] - h * total
         if not solve(a, b):
             return math.inf
         change = 0.0
         for i in range(STAGES):
             for j in range(physical):
-                stages[i, j] -= b[i * physical + j]
+                stages.values[i, j] -= b[i * physical + j]
                 change = max(change, abs(b[i * physical + j]) / max(big[j], 1e-300))
         if change <= max(1e-2 * tolerance, 1e-15):
             return change
@@ -151,10 +198,10 @@ def fitted(values, column, start, fit, c):
 
 
 @compiled(**EXACT)
-def growth(c, size, big, tolerance):
+def growth(c, big, tolerance):
     """Step in units of this one at which the last two Chebyshev terms of every entry are its tolerance."""
     last, before = 0.0, 0.0
-    for i in range(size):
+    for i in range(len(big)):
         scale = max(big[i], abs(at(c[i], 1.0)))
         if scale > 0.0:
             last = max(last, abs(c[i, STAGES]) / scale)
@@ -180,56 +227,55 @@ def at(c, w):
 
 
 @compiled(**EXACT)
-def leap(
-    rates, numbers, scheme, tones, face, mode, time, state, h, unit, s, width, physical, big, tolerance, poly, work
-):
-    """A step of length h as polynomials of w, and the length of the next in units of h; 0 where it failed.
+def leap(model, mode, clock, state, big, h, poly, work):
+    """A step of length h [s] as polynomials of w, and the length of the next in units of h; 0 where it failed.
 
-    `s` is the Taylor series at the start in units of `unit`: the drive's signals are polynomials, or tones.
+    `clock` is the time [s] and the unit of the Taylor series there: the drive's signals are polynomials, or tones.
     """
-    points, _, fit = scheme
-    stages, size = work[0], len(state)
+    (time, unit), (step, stages), scheme = clock, work, model.scheme
     for i in range(STAGES):
-        advance(s, width, size, width - 1, points[i] * h / unit, stages[i])
-        set_tones(tones, time + points[i] * h, stages[i])
-        for j in range(physical):
-            stages[i, j] = state[j]
-    change = settle(rates, numbers, mode, state, h, scheme, physical, face, big, tolerance, work)
+        advance(step.s, step.order, scheme.points[i] * h / unit, stages.values[i])
+        set_tones(model.tones, time + scheme.points[i] * h, stages.values[i])
+        for j in range(model.physical):
+            stages.values[i, j] = state[j]
+    change = settle(model, mode, state, h, big, stages)
     if change == math.inf:
         return 0.0
-    for j in range(size):
-        fitted(stages, j, state[j], fit, poly[j])
-    return growth(poly, size, big, max(tolerance, 10.0 * change))
+    for j in range(len(state)):
+        fitted(stages.values, j, state[j], scheme.fit, poly[j])
+    return growth(poly, big, max(model.tolerance, 10.0 * change))
 
 
 @compiled(**EXACT)
-def _fitted_node(node, size, s, width, fit, work, c):
-    """Powers of w of any kept node."""
-    fitted(work[0] if node < size else work[3], node, s[node * width], fit, c)
+def _fitted_node(node, size, fit, work):
+    """Powers of w of any kept node, in the room for an exit."""
+    step, stages = work
+    fitted(stages.values if node < size else stages.nodes, node, step.s[node * (step.order + 1)], fit, step.c)
 
 
 @compiled(**EXACT)
-def landing(mode, exits, guards, scheme, s, width, size, big, asleep, work, c, noise):
+def landing(model, mode, big, work):
     """Where a leap ends, as w, and by which exit (-1 where by none): an exit, or a sleeping function that wakes."""
-    node, _, _, _, bound, _, scale = exits
-    kind, argument, mind = guards
-    fit, end, leaving = scheme[2], 1.0, -1
-    for g in range(mind[mode], mind[mode + 1]):
-        start = s[argument[g] * width]
-        if not awake(kind[g], start, asleep):
-            _fitted_node(argument[g], size, s, width, fit, work, c)
-            level, sign = waking(kind[g], start, asleep)
+    exits, guards, fit, step = model.exits, model.guards, model.scheme.fit, work[0]
+    c, noise, size, asleep = step.c, step.noise, len(big), 4.0 - math.log(model.tolerance)
+    end, leaving = 1.0, -1
+    for g in range(guards.first[mode], guards.first[mode + 1]):
+        start = step.s[guards.argument[g] * (step.order + 1)]
+        if not awake(guards.kind[g], start, asleep):
+            _fitted_node(guards.argument[g], size, fit, work)
+            level, sign = waking(guards.kind[g], start, asleep)
             for k in range(WIDTH):
                 c[k] *= sign
             c[0] += level
             noise[0] = 0.0
             w = first_rise(c, noise, WIDTH, 0, 1.0, -1.0, 1.0)
             end = end if w == NONE else min(end, w)
-    for e in range(bound[mode], bound[mode + 1]):
-        _fitted_node(node[e], size, s, width, fit, work, c)
-        most = big[node[e]] if node[e] < size else 0.0
+    for e in range(exits.first[mode], exits.first[mode + 1]):
+        node = exits.node[e]
+        _fitted_node(node, size, fit, work)
+        most = big[node] if node < size else 0.0
         for k in range(WIDTH):
-            c[k] *= scale[e]
+            c[k] *= exits.factor[e]
             most = max(most, abs(c[k]))
         noise[0] = NOISE * most
         if at(c, -1.0) >= -noise[0]:  # too near for a leap

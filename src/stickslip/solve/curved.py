@@ -16,21 +16,22 @@ from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.solve import collocation, march
-from stickslip.solve.interrupts import held_back
-from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
+from stickslip.solve import collocation, march, taylor
+from stickslip.solve.collocation import Model
+from stickslip.solve.march import LAPS, TIME, TRY, Dense, Shown, Steps, Work
+from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
 from stickslip.solve.series import expansion
 from stickslip.solve.tape import Tape
+from stickslip.solve.taylor import Array
 from stickslip.solve.trajectory import Trajectory
 
-Array = NDArray[np.float64]
-March = Callable[..., tuple[int, int, int, int]]  # of clock, state, mode, until, and what follows in `march.march`
+March = Callable[..., tuple[int, int, int, int]]  # of clock, state and what follows in `march.march`
 Stops = Iterable[tuple[tuple[float, float], tuple[Any, Any]]]
 
 LOW, HIGH = 14, 18  # orders: few, since each is compiled, and near the best for any tolerance
@@ -80,7 +81,7 @@ class CurvedTrajectory(Trajectory):
         table: Any = self.table
         last, leaving = self.states[0].copy(), int(self.exits[-1])
         last[: table.physical] = self.sample([self.duration], ("state",))[0][:, 0]
-        return last, int(self.modes[-1]) if leaving < 0 else int(table.exits[1][leaving])
+        return last, int(self.modes[-1]) if leaving < 0 else int(table.exits.target[leaving])
 
     @property
     def cells(self) -> tuple[Array, Array]:
@@ -100,12 +101,18 @@ class CurvedTrajectory(Trajectory):
         names = [n for name in outputs for n in (table.names[: table.physical] if name == "state" else (name,))]
         nodes = np.column_stack([table.places[name] for name in names])
         out, step = np.empty((len(names), len(times))), np.empty(len(times), dtype=np.int64)
-        count = int(np.max(np.diff(table.watched[8])))
-        march.sample(
-            *_viewed(table, self.order), self.order, self.step_starts, self.step_lengths, self.step_modes,
-            self.step_states, self.step_leaps, self.leaps, self.reach, times, nodes, out, step,
-            (np.empty(count * (self.order + 1)), np.empty(self.step_states.shape[1]), np.empty(count)),
-        )  # fmt: skip
+        count = table.watched.most
+        steps = Dense(
+            self.step_starts,
+            self.step_lengths,
+            self.step_modes,
+            self.step_states,
+            self.step_leaps,
+            self.leaps,
+            self.reach,
+        )
+        work = np.empty(count * (self.order + 1)), np.empty(self.step_states.shape[1]), np.empty(count)
+        march.sample(_shown(table, self.order), steps, times, nodes, out, step, work)
         piece = np.searchsorted(self.starts, self.step_starts[step], side="right") - 1
         return out, piece
 
@@ -121,38 +128,35 @@ def degree(rtol: float) -> int:
     return LOW if rtol > 1e-10 else HIGH
 
 
-class Code(NamedTuple):
-    """Code of a system, by address: Taylor coefficients with their numbers, rates alone; and the leaps' method."""
-
-    series: int
-    numbers: Array
-    rates: int
-    scheme: tuple[Array, Array, Array]
-
-
 @lru_cache(maxsize=32)
-def code(table: Tape, order: int) -> Code:
-    """The code that steps of an order need."""
+def _code(table: Tape, order: int) -> tuple[int, Array, int]:
+    """The code of steps of an order, with its numbers, and that of the rates."""
     rates, _ = expansion(table.nodes, table.kept, 1)
-    return Code(*expansion(table.nodes, table.kept, order), rates, collocation.method())
+    return *expansion(table.nodes, table.kept, order), rates
 
 
 @lru_cache(maxsize=32)
-def _viewed(table: Tape, order: int) -> tuple[int, Array, int, Array]:
-    """The code that values between the steps need, and that of the outputs."""
-    series, numbers, *_ = code(table, order)
-    return series, numbers, *expansion(table.watched, table.shown, 0)
+def _shown(table: Tape, order: int) -> Shown:
+    series, numbers, _ = _code(table, order)
+    return Shown(series, numbers, *expansion(table.watched, table.shown, 0), order)
 
 
-def _march(table: Tape, order: int) -> March:
-    own = code(table, order)
-
-    def follow(clock: Array, state: Array, mode: int, at: tuple[float, float], *rest: Any) -> tuple[int, int, int, int]:
-        return march.march(  # type: ignore[no-any-return]
-            *own, table.sums, table.exits, table.guards, table.tones, clock, state, mode, at, table.motion.period, *rest
-        )  # fmt: skip
-
-    return follow
+def model_of(table: Tape, rtol: float) -> Model:
+    """A system as the march reads it."""
+    order = degree(rtol)
+    return Model(
+        *_code(table, order),
+        collocation.method(),
+        table.sums,
+        table.exits,
+        table.guards,
+        table.tones,
+        table.motion.period,
+        table.outputs["face_rate"],
+        table.physical,
+        SHARE * rtol,
+        order,
+    )
 
 
 def run_curved(
@@ -168,118 +172,144 @@ def run_curved(
 ) -> CurvedTrajectory:
     """March from a state at time 0 to the end of the course's time (laps, offset), in chunks."""
     (laps, offset), stops = course
-    order = degree(rtol)
-    follow = follow or _march(table, order)
-    system, size, period = table.system, len(table.names), table.motion.period
-    count = int(np.max(np.diff(table.nodes[8])))
-    work = (np.zeros(count * (order + 1)), np.zeros(order + 1), np.zeros(order + 1))
-    long_work = collocation.room(count, size, table.physical)
-    total = offset + (laps * period if math.isfinite(period) else 0.0)
-    scale = min(period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total, total)
-    clock = np.array([0.0, 0.0, 1e-6 * scale, 0.0, 0.0, march.PATIENCE])
-    state, big = state.copy(), np.abs(state)
-    kept: list[tuple[NDArray[Any], ...]] = []
-    leaps: list[tuple[Array, Array]] = []
+    run = _Run(table, state, mode, total=offset + _lasting(laps, table.motion.period), budget=budget, rtol=rtol)
     status = "complete"
     try:
-        for at, (signals, values) in stops:
-            state[signals] = values
-            clock[2] = min(clock[2], scale)  # at rest steps would grow for ever
-            outcome = march.FULL
-            while outcome == march.FULL:
-                room, (polys, reach) = room_for(CHUNK, size), _room_of_leaps(size)
-                before = clock.copy()
-                with held_back() if kept else nullcontext():  # the first call may compile for long
-                    outcome, written, leapt, mode = follow(
-                        clock, state, mode, at, table.physical, SHARE * rtol, order, big, room, polys, reach, work,
-                        long_work,
-                    )  # fmt: skip
-                if written:
-                    room[6][:written][room[6][:written] >= 0] += sum(len(part[1]) for part in leaps)
-                    kept.append(tuple(column[:written] for column in room))
-                    leaps.append((polys[:leapt].copy(), reach[:leapt].copy()))
-                passed = clock[1] - before[1] + ((clock[0] - before[0]) * period if clock[0] != before[0] else 0.0)
-                ahead = total - clock[1] - (clock[0] * period if clock[0] else 0.0)
-                _refuse(outcome, table, state, clock, passed, ahead, CHUNK * len(kept))
-                require_budget(
-                    int(np.sum(room[5][:written] >= 0)), passed=passed, scale=scale, budget=budget,
-                    state=named(table.names[: table.physical], state),
-                )  # fmt: skip
-                tell(1.0 - ahead / total)
+        for until, (signals, values) in stops:
+            run.state[signals] = values
+            run.clock[TRY] = min(run.clock[TRY], run.scale)  # at rest steps would grow for ever
+            while run.chunk(until, follow or run.march) == march.FULL:
+                tell(run.share)
+            tell(run.share)
     except KeyboardInterrupt:
-        if not kept:
+        if not run.kept:
             raise
-        status = "interrupted"
-        lap, offset, length = (float(column[-1]) for column in kept[-1][:3])
-        total = offset + length + (lap * period if math.isfinite(period) else 0.0)
+        status, last = "interrupted", run.kept[-1]
+        run.total = last.offsets[-1] + last.lengths[-1] + _lasting(last.laps[-1], table.motion.period)
     if status == "complete":
         tell(1.0)
-        own = code(table, order)
-        status = "at rest" if march.rests(own.series, own.numbers, mode, state, order, work[0]) else status
-    return _assembled(table, kept, leaps, total, status, order)
+        status = "at rest" if march.rests(run.model, run.mode, run.state, run.work.step.s) else status
+    return _assembled(table, run.kept, float(run.total), status, run.model.order)
 
 
-def room_for(count: int, size: int) -> tuple[NDArray[Any], ...]:
-    """Columns of steps: laps, offset, length, mode, state, exit, number among the leaps."""
-    return (np.empty(count), np.empty(count), np.empty(count), np.empty(count, np.int64), np.empty((count, size)),
-            np.empty(count, np.int16), np.empty(count, np.int64))  # fmt: skip
+def _lasting(laps: float, period: float) -> float:
+    """Time of whole laps [s], of which a motion without period has none."""
+    return laps * period if math.isfinite(period) else 0.0
 
 
-def _room_of_leaps(size: int) -> tuple[Array, Array]:
-    return np.empty((LEAPS, size, collocation.WIDTH)), np.empty(LEAPS)
+class _Run:
+    """A motion under way. Lives for one run."""
+
+    def __init__(self, table: Tape, state: Array, mode: int, *, total: float, budget: int, rtol: float) -> None:
+        system, size, period, count = table.system, len(table.names), table.motion.period, table.nodes.most
+        self.table, self.mode, self.total, self.budget = table, mode, total, budget
+        self.model = model_of(table, rtol)
+        longest = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total
+        self.scale = min(longest, total)
+        self.clock = np.array([0.0, 0.0, 1e-6 * self.scale, 0.0, 0.0, march.PATIENCE])
+        self.state, self.big = state.copy(), np.abs(state)
+        self.work = Work(taylor.room(count, self.model.order), collocation.room(count, size, table.physical))
+        self.kept: list[Steps] = []
+
+    @property
+    def ahead(self) -> float:
+        """Time that is left [s]."""
+        laps = self.clock[LAPS]
+        return float(self.total - self.clock[TIME] - (laps * self.model.period if laps else 0.0))
+
+    @property
+    def share(self) -> float:
+        """Of the time that is over."""
+        return 1.0 - self.ahead / self.total
+
+    def march(self, *rest: Any) -> tuple[int, int, int, int]:
+        """The march of this system."""
+        return march.march(self.model, *rest)  # type: ignore[no-any-return]
+
+    def chunk(self, until: tuple[float, float], follow: March) -> int:
+        """March for so many steps at the most, keep them, and say why it ended; refuse what gets nowhere."""
+        steps, before = room_for(CHUNK, len(self.state)), self.clock.copy()
+        with held_back() if self.kept else nullcontext():  # the first call may compile for long
+            outcome, written, leapt, self.mode = follow(
+                self.clock, self.state, self.big, self.mode, until, steps, self.work
+            )
+        if written:
+            steps.leaps[:written][steps.leaps[:written] >= 0] += sum(len(part.reach) for part in self.kept)
+            columns = (column[:written] for column in steps[:-2])
+            self.kept.append(Steps._make([*columns, steps.polys[:leapt].copy(), steps.reach[:leapt].copy()]))
+        laps = self.clock[LAPS] - before[LAPS]
+        passed = self.clock[TIME] - before[TIME] + (laps * self.model.period if laps else 0.0)
+        self._refuse(outcome, passed)
+        require_budget(
+            int(np.sum(steps.ends[:written] >= 0)),
+            passed=passed,
+            scale=self.scale,
+            budget=self.budget,
+            state=named(self.table.names[: self.table.physical], self.state),
+        )
+        return outcome
+
+    def _refuse(self, outcome: int, passed: float) -> None:
+        laps, time = self.clock[LAPS], self.clock[TIME]
+        place = f"lap {laps:g}, {time:g} s, at {named(self.table.names[: self.table.physical], self.state)}"
+        if outcome == march.CHATTER:
+            raise chatter(place)
+        if outcome == march.UNPROVED:
+            raise unproved(place)
+        if outcome == march.STALL:
+            raise SolveError(
+                f"a step of no length, {place}",
+                "friction and its rates are finite and smooth within a mode",
+                "check the law there (a logarithm or a power of nothing)",
+            )
+        long = CHUNK * len(self.kept) >= PATIENCE and passed * STEPS < CHUNK * self.ahead
+        if outcome == march.FULL and long:
+            raise SolveError(
+                f"steps of {passed / CHUNK:.1e} s with {self.ahead:g} s ahead, {place}",
+                f"a run takes at most {STEPS:g} steps; the contact is far faster here than the motion",
+                "take a larger mass, a larger rtol=, or a shorter time",
+            )
+        require_numbers(self.state, place)
 
 
-def _assembled(
-    table: Tape,
-    kept: list[tuple[NDArray[Any], ...]],
-    leaps: list[tuple[Array, Array]],
-    total: float,
-    status: str,
-    order: int,
-) -> CurvedTrajectory:
+def room_for(count: int, size: int) -> Steps:
+    """Room for steps, and for the leaps of a chunk among them."""
+    return Steps(
+        laps=np.empty(count),
+        offsets=np.empty(count),
+        lengths=np.empty(count),
+        modes=np.empty(count, np.int64),
+        states=np.empty((count, size)),
+        ends=np.empty(count, np.int16),
+        leaps=np.empty(count, np.int64),
+        polys=np.empty((LEAPS, size, collocation.WIDTH)),
+        reach=np.empty(LEAPS),
+    )
+
+
+def _assembled(table: Tape, kept: list[Steps], total: float, status: str, order: int) -> CurvedTrajectory:
     """Steps gathered, and pieces from event to event."""
-    laps, offsets, lengths, modes, states, ends, which = (np.concatenate(column) for column in zip(*kept, strict=True))
-    first = np.flatnonzero(np.concatenate([[True], ends[:-1] >= 0]))
-    last = np.append(first[1:], len(ends)) - 1
+    steps = Steps._make(map(np.concatenate, zip(*kept, strict=True)))
+    first = np.flatnonzero(np.concatenate([[True], steps.ends[:-1] >= 0]))
+    last = np.append(first[1:], len(steps.ends)) - 1
     period = table.motion.period
     return CurvedTrajectory(
         system=table.system,
         table=table,  # type: ignore[arg-type]
-        laps=laps[first].astype(np.int32),
-        offsets=offsets[first],
-        modes=modes[first].astype(np.int16),
-        durations=np.add.reduceat(lengths, first),
-        kept=states[first],
-        exits=ends[last],
+        laps=steps.laps[first].astype(np.int32),
+        offsets=steps.offsets[first],
+        modes=steps.modes[first].astype(np.int16),
+        durations=np.add.reduceat(steps.lengths, first),
+        kept=steps.states[first],
+        exits=steps.ends[last],
         duration=total,
         status=status,
-        step_starts=offsets + (laps * period if math.isfinite(period) else 0.0),
-        step_lengths=lengths,
-        step_modes=modes,
-        step_states=states,
-        step_leaps=which,
-        leaps=np.concatenate([part[0] for part in leaps]),
-        reach=np.concatenate([part[1] for part in leaps]),
+        step_starts=steps.offsets + (steps.laps * period if math.isfinite(period) else 0.0),
+        step_lengths=steps.lengths,
+        step_modes=steps.modes,
+        step_states=steps.states,
+        step_leaps=steps.leaps,
+        leaps=steps.polys,
+        reach=steps.reach,
         order=order,
     )
-
-
-def _refuse(outcome: int, table: Tape, state: Array, clock: Array, passed: float, ahead: float, done: int) -> None:
-    place = f"lap {clock[0]:g}, {clock[1]:g} s, at {named(table.names[: table.physical], state)}"
-    if outcome == march.CHATTER:
-        raise chatter(place)
-    if outcome == march.UNPROVED:
-        raise unproved(place)
-    if outcome == march.STALL:
-        raise SolveError(
-            f"a step of no length, {place}",
-            "friction and its rates are finite and smooth within a mode",
-            "check the law there (a logarithm or a power of nothing)",
-        )
-    if outcome == march.FULL and done >= PATIENCE and passed * STEPS < CHUNK * ahead:
-        raise SolveError(
-            f"steps of {passed / CHUNK:.1e} s with {ahead:g} s ahead, {place}",
-            f"a run takes at most {STEPS:g} steps; the contact is far faster here than the motion",
-            "take a larger mass, a larger rtol=, or a shorter time",
-        )
-    require_numbers(state, place)

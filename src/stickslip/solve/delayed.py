@@ -15,7 +15,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,27 @@ from stickslip.laws.base import Rigid, Row
 from stickslip.laws.curved import CurvedMode, lifted, symbol
 from stickslip.laws.time_delay import DELAYED, TimeDelay
 from stickslip.oscillator import Oscillator
-from stickslip.solve import march, taylor
-from stickslip.solve.curved import CHUNK, STEPS, Array, CurvedTrajectory, Stops, code, degree, room_for, run_curved
+from stickslip.solve.curved import CHUNK, STEPS, CurvedTrajectory, Stops, degree, model_of, room_for, run_curved
+from stickslip.solve.march import DONE, DUE, LAPS, TIME, TRY, Steps, Work, march
 from stickslip.solve.tape import Tape, tape
+from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, coded, length
 
 PAST = 2  # where the chain of the past stands in the state: behind x and v
 REACH = 4.0  # longest look ahead of a step of the past, in lags
+
+
+COLUMNS = 7  # of the steps, beside the leaps' own
+
+
+class Recalled(NamedTuple):
+    """What is known of the past: lag [s], sliding speed as a linear form, side of each mode; where the piece recalled
+    ends (laps, time); the step that comes next, and whether it is due."""
+
+    lag: float
+    slip: Array
+    sides: Array
+    edge: Array
+    cursor: Index
 
 
 @dataclass(frozen=True)
@@ -80,46 +95,47 @@ def run_delayed(
             f"a step is no longer than the lag, and a run takes at most {STEPS:g} steps",
             "take a longer lag=, a shorter time, or the law without its lag",
         )
-    past = _Past(table, law, degree(rtol))
+    past = _Past(table, law, rtol)
     return run_curved(table, state, past.opening(state, mode), course=course, rtol=rtol, follow=past, **rest)
 
 
 class _Past:
     """The march of a system with a time lag; remembers the steps of the last lag. Lives for one run."""
 
-    def __init__(self, table: Tape, law: TimeDelay, order: int) -> None:
-        self.lag, self.table, self.code = law.lag, table, code(table, order)
-        self.slip = table.outputs["slip"]
-        self.sides = np.array([mode.side for mode in table.modes], dtype=np.float64)
-        self.lows = [low for low, _ in law.law.branches()]
-        self.columns, self.known = room_for(2 * CHUNK, len(table.names)), 0
+    def __init__(self, table: Tape, law: TimeDelay, rtol: float) -> None:
         period = table.motion.period
-        self.edge = np.array(divmod(law.lag, period) if math.isfinite(period) else (0.0, law.lag))
-        self.cursor = np.array([0, 0])  # the step of the past that comes next, and whether it is due
+        self.recalled = Recalled(
+            law.lag,
+            table.outputs["slip"],
+            np.array([mode.side for mode in table.modes], dtype=np.float64),
+            np.array(divmod(law.lag, period) if math.isfinite(period) else (0.0, law.lag)),
+            np.array([0, 0]),
+        )
+        self.order, self.lows = degree(rtol), [low for low, _ in law.law.branches()]
+        self.columns: tuple[NDArray[Any], ...] = room_for(2 * CHUNK, len(table.names))[:COLUMNS]
+        self.known = 0
+        self.model = model_of(table, rtol)
 
     def opening(self, state: Array, mode: int) -> int:
         """Set the delayed speed to that at the start; the mode, on that speed's branch."""
-        state[PAST] = abs(float(self.slip @ state))
+        state[PAST] = abs(float(self.recalled.slip @ state))
         return mode % 3 + 3 * (int(np.searchsorted(self.lows, state[PAST], side="right")) - 1)
 
     def __call__(
-        self, clock: Array, state: Array, mode: int, at: tuple[float, float], physical: int, tolerance: float,
-        order: int, big: Array, room: tuple[NDArray[Any], ...], *work: Any,
-    ) -> tuple[int, int, int, int]:  # fmt: skip
-        """As :func:`march.march`; without leaps, whose polynomials are no Taylor steps."""
-        table = self.table
-        clock[5] = math.inf
-        big[PAST + 1 : PAST + order + 1] = np.inf  # a polynomial's own chain is exact at any step
-        self._forget(len(room[0]))
+        self, clock: Array, state: Array, big: Array, mode: int, until: tuple[float, float], steps: Steps, work: Work
+    ) -> tuple[int, int, int, int]:
+        """As :func:`march`; without leaps, whose polynomials are no Taylor steps."""
+        clock[DUE] = math.inf
+        big[PAST + 1 : PAST + self.order + 1] = np.inf  # a polynomial's own chain is exact at any step
+        count = len(steps.laps)
+        self._forget(count)
         before = self.known
+        known = Steps._make([*(column[: before + count] for column in self.columns), steps.polys, steps.reach])
         outcome, self.known, mode = _march(
-            *self.code, table.sums, table.exits, table.guards, table.tones, clock, state, mode, np.array(at),
-            table.motion.period, physical, tolerance, order, big,
-            tuple(column[: before + len(room[0])] for column in self.columns), *work,
-            self.lag, self.slip, self.sides, self.edge, self.cursor, before,
-        )  # fmt: skip
+            self.model, self.recalled, clock, state, big, mode, np.array(until), known, before, work
+        )
         written = self.known - before
-        for column, own in zip(room, self.columns, strict=True):
+        for column, own in zip(steps[:COLUMNS], self.columns, strict=True):
             column[:written] = own[before : self.known]
         return outcome, written, 0, mode
 
@@ -127,22 +143,23 @@ class _Past:
         """Make room for steps: drop those before the lag, grow where the lag is longer than the room."""
         if self.known + count <= len(self.columns[0]):
             return
-        first, kept = int(self.cursor[0]), self.known - int(self.cursor[0])
-        grown = room_for(2 * (kept + count), self.columns[4].shape[1])
+        first = int(self.recalled.cursor[0])
+        kept = self.known - first
+        grown: tuple[NDArray[Any], ...] = room_for(2 * (kept + count), self.columns[4].shape[1])[:COLUMNS]
         for new, old in zip(grown, self.columns, strict=True):
             new[:kept] = old[first : self.known]
         self.columns, self.known = grown, kept
-        self.cursor[0] = 0
+        self.recalled.cursor[0] = 0
 
 
-@compiled(**taylor.EXACT)
+@compiled(**EXACT)
 def _apart(later, sooner, period):
     """Time between two instants (laps, offset)."""
     whole = (later[0] - sooner[0]) * period if later[0] != sooner[0] else 0.0
     return whole + (later[1] - sooner[1])
 
 
-@compiled(**taylor.EXACT)
+@compiled(**EXACT)
 def _along(row, state):
     total = 0.0
     for i in range(len(row)):
@@ -150,7 +167,7 @@ def _along(row, state):
     return total
 
 
-@compiled(**taylor.EXACT)
+@compiled(**EXACT)
 def _coefficient(row, s, width, k):
     """Coefficient k of a linear form of the state's entries."""
     total = 0.0
@@ -159,86 +176,92 @@ def _coefficient(row, s, width, k):
     return total
 
 
-@compiled(**taylor.EXACT)
-def _recall(
-    series, numbers, steps, count, clock, state, period, tolerance, order, big, s, lag, slip, sides, edge, cursor
-):
+@compiled(**EXACT)
+def _holds(model, past, steps, big, step):
+    """How long the series of the step at the cursor holds [s], and its unit; the series, in `step`."""
+    series, j = coded(model.series), past.cursor[0]
+    h, u = steps.lengths[j], 1.0
+    for _ in range(40):
+        series(model.numbers, steps.modes[j], steps.states[j], h, step.s)
+        u = length(step.s, step.order, big, model.tolerance)
+        if not (u >= GROWTH and h < REACH * past.lag):
+            break
+        h *= GROWTH
+    return u * h if u > 0.0 else 0.0, h
+
+
+@compiled(**EXACT)
+def _recall(model, past, steps, count, clock, state, big, step):
     """Set the chain of the past to the step at the cursor, and its edge to where that step's polynomial ends to hold.
 
     The polynomial of a step that was cut short may hold over the steps that follow it.
     """
-    series = taylor.coded(series)
-    laps, offsets, lengths, modes, states, _, _ = steps
-    width, size = order + 1, len(state)
-    j = cursor[0]
-    mode, h, u = modes[j], lengths[j], 1.0
-    side = sides[mode]
-    for _ in range(40):
-        series(numbers, mode, states[j], h, s)
-        u = taylor.length(s, width, order, size, tolerance, big)
-        if not (u >= taylor.GROWTH and h < REACH * lag):
-            break
-        h *= taylor.GROWTH
-    holds = u * h if u > 0.0 else 0.0
-    scale = tolerance * big[PAST]
+    s, width, period, slip = step.s, step.order + 1, model.period, past.slip
+    j = past.cursor[0]
+    side = past.sides[steps.modes[j]]
+    holds, h = _holds(model, past, steps, big, step)
+    scale = model.tolerance * big[PAST]
     e = j + 1
-    while e < count and sides[modes[e]] == side:
-        end = (laps[e + 1], offsets[e + 1]) if e + 1 < count else (clock[0], clock[1])
-        over = _apart(end, (laps[j], offsets[j]), period)
+    while e < count and past.sides[steps.modes[e]] == side:
+        end = (steps.laps[e + 1], steps.offsets[e + 1]) if e + 1 < count else (clock[LAPS], clock[TIME])
+        over = _apart(end, (steps.laps[j], steps.offsets[j]), period)
         if over > holds:
             break
         total = 0.0
-        for k in range(order, -1, -1):
+        for k in range(step.order, -1, -1):
             total = total * (over / h) + _coefficient(slip, s, width, k)
-        if not abs(total - _along(slip, states[e + 1] if e + 1 < count else state)) <= scale:
+        if not abs(total - _along(slip, steps.states[e + 1] if e + 1 < count else state)) <= scale:
             break
         e += 1
+    edge = past.edge
     if e < count:
-        edge[0], edge[1] = laps[e], offsets[e] + lag
+        edge[0], edge[1] = steps.laps[e], steps.offsets[e] + past.lag
     else:
-        edge[0], edge[1] = clock[0], clock[1] + lag
+        edge[0], edge[1] = clock[LAPS], clock[TIME] + past.lag
     while edge[1] >= period:
         edge[0] += 1.0
         edge[1] -= period
-    cursor[0] = e
+    past.cursor[0] = e
     power = 1.0
-    for k in range(order + 1):
+    for k in range(step.order + 1):
         state[PAST + k] = side * _coefficient(slip, s, width, k) * power
-        power *= lag / h
+        power *= past.lag / h
     big[PAST] = max(big[PAST], abs(state[PAST]))
 
 
-@compiled(**taylor.EXACT)
-def _march(
-    series, numbers, rates, scheme, sums, exits, guards, tones, clock, state, mode, until, period, physical, tolerance,
-    order, big, steps, polys, reach, work, long_work, lag, slip, sides, edge, cursor, count,
-):  # fmt: skip
-    """As `march.march`, from edge to edge of the past; `count` steps are known, and new ones are put behind them."""
-    laps, offsets, lengths, modes, states, ends, leaps = steps
-    _, target, _, _, bound, _, _ = exits
+@compiled(**EXACT)
+def _march(model, past, clock, state, big, mode, until, steps, count, work):
+    """As `march`, from edge to edge of the past; `count` steps are known, and new ones are put behind them."""
+    edge, cursor, exits, modes, ends = past.edge, past.cursor, model.exits, steps.modes, steps.ends
     while True:
         if cursor[1]:
-            _recall(series, numbers, steps, count, clock, state, period, tolerance, order, big, work[0], lag, slip,
-                    sides, edge, cursor)  # fmt: skip
+            _recall(model, past, steps, count, clock, state, big, work.step)
             cursor[1] = 0
-        first = _apart((edge[0], edge[1]), (until[0], until[1]), period) <= 0.0
+        first = _apart((edge[0], edge[1]), (until[0], until[1]), model.period) <= 0.0
         aim = (edge[0], edge[1]) if first else (until[0], until[1])
-        clock[2] = min(clock[2], lag)  # at rest steps would grow for ever
-        free = (laps[count:], offsets[count:], lengths[count:], modes[count:], states[count:], ends[count:],
-                leaps[count:])  # fmt: skip
-        outcome, written, _, mode = march.march(
-            series, numbers, rates, scheme, sums, exits, guards, tones, clock, state, mode, aim, period, physical,
-            tolerance, order, big, free, polys, reach, work, long_work,
-        )  # fmt: skip
+        clock[TRY] = min(clock[TRY], past.lag)  # at rest steps would grow for ever
+        free = Steps(
+            steps.laps[count:],
+            steps.offsets[count:],
+            steps.lengths[count:],
+            modes[count:],
+            steps.states[count:],
+            ends[count:],
+            steps.leaps[count:],
+            steps.polys,
+            steps.reach,
+        )
+        outcome, written, _, mode = march(model, clock, state, big, mode, aim, free, work)
         if count > 0 and written > 0 and modes[count] != modes[count - 1] and ends[count - 1] < 0:
-            for e in range(bound[modes[count - 1]], bound[modes[count - 1] + 1]):  # an exit due at the edge itself
-                if target[e] == modes[count] or ends[count - 1] < 0:
+            before = modes[count - 1]
+            for e in range(exits.first[before], exits.first[before + 1]):  # an exit due at the edge itself
+                if exits.target[e] == modes[count] or ends[count - 1] < 0:
                     ends[count - 1] = e
         count += written
-        if outcome != march.DONE:
+        if outcome != DONE:
             return outcome, count, mode
         if first:
-            clock[0], clock[1] = edge[0], edge[1]
+            clock[LAPS], clock[TIME] = edge[0], edge[1]
             cursor[1] = 1
-        if not first or _apart((edge[0], edge[1]), (until[0], until[1]), period) >= 0.0:
+        if not first or _apart((edge[0], edge[1]), (until[0], until[1]), model.period) >= 0.0:
             return outcome, count, mode

@@ -87,8 +87,15 @@ def lyapunov(
         difference = carried(orbit, mode, difference)
         length = float(np.linalg.norm(difference * weights))
         if length == 0.0:
-            return Estimate("Lyapunov exponent", -math.inf, (-math.inf, -math.inf), 0.0, "1/s", how,
-                            checks=(f"every difference was forgotten in lap {number}",))  # fmt: skip
+            return Estimate(
+                "Lyapunov exponent",
+                -math.inf,
+                (-math.inf, -math.inf),
+                0.0,
+                "1/s",
+                how,
+                checks=(f"every difference was forgotten in lap {number}",),
+            )
         difference /= length
         if number >= transient:
             growth.append(math.log(length) / period)

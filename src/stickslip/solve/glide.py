@@ -84,8 +84,14 @@ class Pieces(NamedTuple):
 
     def part(self, begin: int, end: int) -> Pieces:
         """Some of them."""
-        return Pieces(self.laps[begin:end], self.offsets[begin:end], self.modes[begin:end], self.durations[begin:end],
-                      self.states[begin:end], self.exits[begin:end])  # fmt: skip
+        return Pieces(
+            self.laps[begin:end],
+            self.offsets[begin:end],
+            self.modes[begin:end],
+            self.durations[begin:end],
+            self.states[begin:end],
+            self.exits[begin:end],
+        )
 
 
 class Here(NamedTuple):

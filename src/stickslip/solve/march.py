@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from stickslip.compiled import compiled
-from stickslip.solve.collocation import at, landing, leap
+from stickslip.solve.collocation import Stages, at, landing, leap
 from stickslip.solve.roots import NOISE
 from stickslip.solve.taylor import (
     EXACT,
+    Array,
+    Index,
+    Step,
     advance,
     awake,
     coded,
@@ -18,58 +25,105 @@ from stickslip.solve.taylor import (
     set_tones,
     surely_below,
     woken,
-)  # fmt: skip
+)
 
 DONE, FULL, CHATTER, STALL, UNPROVED = range(5)
 CHAIN = 16  # most transitions without time between them
 LEAP = 40.0  # Taylor steps that a leap replaces, at least half of them: it costs as much as about 40
 PATIENCE = 256.0  # Taylor steps without event after which a leap is tried
 
+# The clock: laps, time within the lap [s], the Taylor step to try [s], the leap to try [s] (0: none), the steps since
+# the last event or failed leap, and how many of them call for the next leap.
+LAPS, TIME, TRY, REACH, STEADY, DUE = range(6)
+
+
+class Steps(NamedTuple):
+    """Steps as they are written: start, length [s], mode, state at the start, exit (-1: none), number among the leaps
+    (-1: a Taylor step); and of each leap its polynomials and the time that they span [s]."""
+
+    laps: Array
+    offsets: Array
+    lengths: Array
+    modes: Index
+    states: Array
+    ends: NDArray[np.int16]
+    leaps: Index
+    polys: Array
+    reach: Array
+
+
+class Work(NamedTuple):
+    """What a march writes on: the series of a step, and the stages of a leap."""
+
+    step: Step
+    stages: Stages
+
+
+class Dense(NamedTuple):
+    """Steps as the state between them is read: where each begins [s], and what else :class:`Steps` says of it."""
+
+    starts: Array
+    lengths: Array
+    modes: Index
+    states: Array
+    leaps: Index
+    polys: Array
+    reach: Array
+
+
+class Shown(NamedTuple):
+    """What values between the steps need: code of the series with its numbers, and of the outputs with theirs."""
+
+    series: int
+    numbers: Array
+    outputs: int
+    others: Array
+    order: int
+
 
 @compiled(**EXACT)
-def _polish(series, numbers, node, tones, mode, h, time, state, order, s):
+def _polish(model, node, mode, h, time, state, step):
     """Newton's step onto the zero of an exit that holds the drive: the delay [s], and the state at it.
 
     The step's series has the drive to the tolerance only; what follows a release must not hang on that.
     """
-    total, width = 0.0, order + 1
+    series, s, total, width = coded(model.series), step.s, 0.0, step.order + 1
     for _ in range(2):
-        set_tones(tones, time + total, state)
-        series(numbers, mode, state, h, s)
+        set_tones(model.tones, time + total, state)
+        series(model.numbers, mode, state, h, s)
         at, slope = s[width * node], s[width * node + 1]
         if not abs(at) <= 1e-2 * abs(slope):
             return total
         delay = -at / slope
-        advance(s, width, len(state), order, delay, state)
+        advance(s, step.order, delay, state)
         total += delay * h
     return total
 
 
 @compiled(**EXACT, forceinline=True)
-def _explicit(sums, exits, guards, mode, size, h, u, order, big, tolerance, s, c, noise):
+def _explicit(model, mode, h, u, big, step):
     """The Taylor step, shortened to where a function wakes or an exit ends the mode, and that exit (-1: none).
 
     A negative length: a root could neither be found nor excluded.
     """
-    width, asleep, safe = order + 1, 4.0 - math.log(tolerance), max(NOISE, 1e3 * tolerance)
-    node, _, crossing, _, bound, _, scale = exits
-    kind, argument, mind = guards
-    rows, leaving = len(sums[3]) - len(node), -1
-    for g in range(mind[mode], mind[mode + 1]):
-        a = argument[g] * width
-        if not awake(kind[g], s[a], asleep):
-            u = woken(kind[g], s, a, order, u, asleep, c, noise)
+    exits, guards, s, order, size = model.exits, model.guards, step.s, step.order, len(big)
+    width, asleep, safe = order + 1, 4.0 - math.log(model.tolerance), max(NOISE, 1e3 * model.tolerance)
+    leaving = -1
+    for g in range(guards.first[mode], guards.first[mode + 1]):
+        a = guards.argument[g] * width
+        if not awake(guards.kind[g], s[a], asleep):
+            u = woken(guards.kind[g], a, u, asleep, step)
             if u < 0.0:
                 return u, leaving
-    for e in range(bound[mode], bound[mode + 1]):
-        i = node[e]
-        far = i < size and scale[e] * s[i * width] < -abs(scale[e]) * safe * big[i]
-        if far and surely_below(s, i * width, order, scale[e], 0.0, u):
+    for e in range(exits.first[mode], exits.first[mode + 1]):
+        i, factor = exits.node[e], exits.factor[e]
+        far = i < size and factor * s[i * width] < -abs(factor) * safe * big[i]
+        if far and surely_below(s, i * width, order, factor, 0.0, u):
             continue
         top = order if i < size else order - 1
         clear = resolved(s, i * width, top, NOISE * (big[i] if i < size else abs(s[i * width])), u)
         leaving, u = leaving if clear == u else -1, clear
-        when = rise(sums, rows + e, mode * size, crossing[e], i, scale[e], size, h, u, order, width, big, s, c, noise)
+        when = rise(model.sums, exits, e, mode, h, u, big, step)
         if when < u or (when == u and leaving < 0):
             leaving, u = e, when
             if u <= 0.0:
@@ -78,185 +132,163 @@ def _explicit(sums, exits, guards, mode, size, h, u, order, big, tolerance, s, c
 
 
 @compiled(**EXACT)
-def _arrived(clock, until, period, remaining, step, leaving):
-    """The clock after a step; whole periods count as laps."""
-    if leaving < 0 and step >= remaining:
-        clock[0], clock[1] = until[0], until[1]
-    else:
-        clock[1] += step
-    while clock[1] >= period:
-        clock[0] += 1.0
-        clock[1] -= period
+def _attempt(model, clock, state, big, mode, full, remaining, poly, work):
+    """Try a leap: how far its polynomials reach [s], how far they are followed (0: it failed), and to which exit.
+
+    `full` is the Taylor step that it replaces, in units of the clock's. The clock takes what to try next, and when.
+    """
+    h = clock[TRY]
+    clock[REACH] = LEAP * full * h if clock[REACH] == 0.0 else clock[REACH]
+    reach, ahead, leaving = min(clock[REACH], remaining), 0.0, -1
+    grow = leap(model, mode, (clock[TIME], h), state, big, reach, poly, work)
+    if grow >= 0.9:
+        w, leaving = landing(model, mode, big, work)
+        ahead = 0.5 * (w + 1.0) * reach
+        if ahead > 0.0:
+            clock[DUE] = PATIENCE
+    if grow < 0.9 or reach == clock[REACH]:
+        clock[REACH] = reach * max(grow, 0.2)
+    if ahead == 0.0 and (grow >= 0.9 or clock[REACH] < 0.5 * LEAP * full * h):
+        clock[REACH], clock[STEADY], clock[DUE] = 0.0, 0.0, min(2.0 * clock[DUE], 64.0 * PATIENCE)
+    return reach, ahead, leaving
 
 
 @compiled(**EXACT)
-def march(
-    series,
-    numbers,
-    rates,
-    scheme,
-    sums,
-    exits,
-    guards,
-    tones,
-    clock,
-    state,
-    mode,
-    until,
-    period,
-    physical,
-    tolerance,
-    order,
-    big,
-    steps,
-    polys,
-    reach,
-    work,
-    long_work,
-):
-    """Steps from `clock` to `until` (laps, offset): the outcome, the steps written, the leaps among them, the mode.
+def _remaining(clock, until, period):
+    """Time [s] to an end (laps, time)."""
+    remaining = until[1] - clock[TIME]
+    if until[0] != clock[LAPS]:
+        remaining += (until[0] - clock[LAPS]) * period
+    return remaining
 
-    `clock` holds laps, offset [s], the length of the Taylor step to try [s], that of the leap to try [s] (0: none), the
-    steps since the last event or failed leap, and how many of them call for the next.
-    """
-    laps, offsets, lengths, modes, states, ends, leaps = steps
-    series, rates = coded(series), coded(rates)
-    s, c, noise = work
-    node, target, _, held, _, face, _ = exits
-    size, room, written, chain, leapt, width = len(state), len(laps), 0, 0, 0, order + 1
+
+@compiled(**EXACT)
+def _arrived(clock, until, period, remaining, ahead, leaving):
+    """The clock after a step; whole periods count as laps."""
+    if leaving < 0 and ahead >= remaining:
+        clock[LAPS], clock[TIME] = until[0], until[1]
+    else:
+        clock[TIME] += ahead
+    while clock[TIME] >= period:
+        clock[LAPS] += 1.0
+        clock[TIME] -= period
+
+
+@compiled(**EXACT)
+def _write(steps, row, clock, state, mode, ahead, leaving, which):
+    """Put a step down."""
+    steps.laps[row], steps.offsets[row], steps.lengths[row] = clock[LAPS], clock[TIME], ahead
+    steps.modes[row], steps.ends[row], steps.leaps[row] = mode, leaving, which
+    for i in range(len(state)):
+        steps.states[row, i] = state[i]
+
+
+@compiled(**EXACT)
+def _hold(model, clock, state):
+    """The state on the counter-face, which it does not leave until the contact gives way."""
+    set_tones(model.tones, clock[TIME], state)
+    speed = 0.0
+    for i in range(len(state)):
+        speed += model.face[i] * state[i]
+    state[1] = speed
+
+
+@compiled(**EXACT)
+def march(model, clock, state, big, mode, until, steps, work):
+    """Steps from `clock` to `until` (laps, time): the outcome, the steps written, the leaps among them, the mode."""
+    series, exits, step = coded(model.series), model.exits, work.step
+    size, written, leapt, chain = len(state), 0, 0, 0
     while True:
-        remaining = until[1] - clock[1]
-        if until[0] != clock[0]:
-            remaining += (until[0] - clock[0]) * period
-        if remaining <= 4e-16 * (clock[1] + clock[2]):
+        # Due: what is left, the series of a step, and how far it holds.
+        remaining = _remaining(clock, until, model.period)
+        if remaining <= 4e-16 * (clock[TIME] + clock[TRY]):
             return DONE, written, leapt, mode
-        set_tones(tones, clock[1], state)
-        h = clock[2]
-        series(numbers, mode, state, h, s)
-        full = length(s, width, order, size, tolerance, big)
-        if not (full * h > 1e-15 * (clock[1] + 1e-300)) or full <= 0.0:
+        set_tones(model.tones, clock[TIME], state)
+        h = clock[TRY]
+        series(model.numbers, mode, state, h, step.s)
+        full = length(step.s, step.order, big, model.tolerance)
+        if not (full * h > 1e-15 * (clock[TIME] + 1e-300)) or full <= 0.0:
             return STALL, written, leapt, mode
-        if written == room or leapt == len(polys):
+        if written == len(steps.laps) or leapt == len(steps.polys):
             return FULL, written, leapt, mode
-        step, leaving, which = 0.0, -1, -1
-        if clock[4] >= clock[5]:
-            clock[3] = LEAP * full * h if clock[3] == 0.0 else clock[3]
-            attempt = min(clock[3], remaining)
-            poly = polys[leapt]
-            grow = leap(
-                rates, numbers, scheme, tones, face, mode, clock[1], state, attempt, h, s, width, physical, big,
-                tolerance, poly, long_work,
-            )  # fmt: skip
-            if grow >= 0.9:
-                asleep = 4.0 - math.log(tolerance)
-                w, leaving = landing(mode, exits, guards, scheme, s, width, size, big, asleep, long_work, c, noise)
-                step = 0.5 * (w + 1.0) * attempt
-                if step > 0.0:
-                    which = leapt
-                    leapt += 1
-                    clock[5] = PATIENCE
-            if grow < 0.9 or attempt == clock[3]:
-                clock[3] = attempt * max(grow, 0.2)
-            if step == 0.0 and (grow >= 0.9 or clock[3] < 0.5 * LEAP * full * h):
-                clock[3], clock[4], clock[5] = 0.0, 0.0, min(2.0 * clock[5], 64.0 * PATIENCE)
-            if step == 0.0:
+        # Certify: a leap after many steps without event, else the Taylor step, to the first exit at the most.
+        which, reach = -1, 0.0
+        if clock[STEADY] >= clock[DUE]:
+            reach, ahead, leaving = _attempt(model, clock, state, big, mode, full, remaining, steps.polys[leapt], work)
+            if ahead == 0.0:
                 continue
+            which, leapt = leapt, leapt + 1
         else:
-            u, leaving = _explicit(
-                sums, exits, guards, mode, size, h, min(full, remaining / h), order, big, tolerance, s, c, noise
-            )
+            u, leaving = _explicit(model, mode, h, min(full, remaining / h), big, step)
             if u < 0.0:
                 return UNPROVED, written, leapt, mode
-            step = u * h
-            clock[4] += 1.0
-        if step > 0.0:
+            ahead = u * h
+            clock[STEADY] += 1.0
+        # Step: write it down and carry the state on.
+        if ahead > 0.0:
             chain = 0
-            laps[written], offsets[written], lengths[written] = clock[0], clock[1], step
-            modes[written], ends[written], leaps[written] = mode, leaving, which
-            for i in range(size):
-                states[written, i] = state[i]
+            _write(steps, written, clock, state, mode, ahead, leaving, which)
             written += 1
             if which < 0:
-                advance(s, width, size, order, step / h, state)
+                advance(step.s, step.order, ahead / h, state)
             else:
                 for i in range(size):
-                    state[i] = at(polys[which, i], 2.0 * step / attempt - 1.0)
-                reach[which] = attempt
+                    state[i] = at(steps.polys[which, i], 2.0 * ahead / reach - 1.0)
+                steps.reach[which] = reach
             for i in range(size):
                 big[i] = max(big[i], abs(state[i]))
-            clock[2] = full * h
-            _arrived(clock, until, period, remaining, step, leaving)
+            clock[TRY] = full * h
+            _arrived(clock, until, model.period, remaining, ahead, leaving)
         else:
-            if written > 0 and ends[written - 1] < 0:
-                ends[written - 1] = leaving
+            if written > 0 and steps.ends[written - 1] < 0:
+                steps.ends[written - 1] = leaving
             chain += 1
             if chain > CHAIN:
                 return CHATTER, written, leapt, mode
+        # Leave the mode.
         if leaving >= 0:
-            if step > 0.0 and not held[leaving]:
-                delay = _polish(series, numbers, node[leaving], tones, mode, h, clock[1], state, order, s)
-                lengths[written - 1] += delay
-                clock[1] += delay
-            if held[leaving]:
-                set_tones(tones, clock[1], state)
-                speed = 0.0
-                for i in range(size):
-                    speed += face[i] * state[i]
-                state[1] = speed
-            mode = target[leaving]
-            clock[3], clock[4] = 0.0, 0.0
+            if exits.held[leaving]:
+                _hold(model, clock, state)
+            elif ahead > 0.0:
+                delay = _polish(model, exits.node[leaving], mode, h, clock[TIME], state, step)
+                steps.lengths[written - 1] += delay
+                clock[TIME] += delay
+            mode = exits.target[leaving]
+            clock[REACH], clock[STEADY] = 0.0, 0.0
 
 
 @compiled(**EXACT)
-def rests(series, numbers, mode, state, order, s):
+def rests(model, mode, state, s):
     """Whether nothing moves."""
-    series = coded(series)
-    series(numbers, mode, state, 1.0, s)
+    series = coded(model.series)
+    series(model.numbers, mode, state, 1.0, s)
     most = 0.0
     for i in range(len(state)):
-        most = max(most, abs(s[i * (order + 1) + 1]))
+        most = max(most, abs(s[i * (model.order + 1) + 1]))
     return most == 0.0
 
 
 @compiled(**EXACT)
-def sample(
-    series,
-    numbers,
-    outputs,
-    others,
-    order,
-    starts,
-    lengths,
-    modes,
-    states,
-    leaps,
-    polys,
-    reach,
-    times,
-    nodes,
-    out,
-    step,
-    work,
-):
-    """Values of nodes (by mode) at increasing times, from the step each one falls in."""
-    series, outputs = coded(series), coded(outputs)
+def sample(shown, steps, times, nodes, out, row, work):
+    """Values of nodes (by mode) at increasing times, and the step each one falls in."""
+    series, outputs = coded(shown.series), coded(shown.outputs)
     s, state, values = work
-    j, known, width = 0, -1, order + 1
+    j, known = 0, -1
     for t in range(len(times)):
-        while j + 1 < len(starts) and starts[j + 1] <= times[t]:
+        while j + 1 < len(steps.starts) and steps.starts[j + 1] <= times[t]:
             j += 1
-        step[t] = j
-        h, mode = lengths[j], modes[j]
-        passed = max(0.0, times[t] - starts[j])
-        if leaps[j] >= 0:
-            poly, whole = polys[leaps[j]], reach[leaps[j]]
+        row[t] = j
+        h, mode = steps.lengths[j], steps.modes[j]
+        passed = max(0.0, times[t] - steps.starts[j])
+        if steps.leaps[j] >= 0:
+            poly, whole = steps.polys[steps.leaps[j]], steps.reach[steps.leaps[j]]
             for i in range(len(state)):
                 state[i] = at(poly[i], 2.0 * min(h, passed) / whole - 1.0)
         else:
             if known != j:
-                series(numbers, mode, states[j], h, s)
+                series(shown.numbers, mode, steps.states[j], h, s)
                 known = j
-            advance(s, width, len(state), order, min(1.0, passed / h), state)
-        outputs(others, mode, state, 1.0, values)
+            advance(s, shown.order, min(1.0, passed / h), state)
+        outputs(shown.others, mode, state, 1.0, values)
         for r in range(nodes.shape[1]):
             out[r, t] = values[nodes[mode, r]]

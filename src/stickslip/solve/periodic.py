@@ -75,8 +75,11 @@ def steady_state(
     """
     counts = {"transient": transient, "orders": orders, "patience": patience}
     if not all(isinstance(count, int | np.integer) and count >= 1 for count in counts.values()):
-        raise ModelError(f"{', '.join(f'{name} = {count}' for name, count in counts.items())}",
-                         "they are whole numbers of periods, at least 1", "correct them")  # fmt: skip
+        raise ModelError(
+            f"{', '.join(f'{name} = {count}' for name, count in counts.items())}",
+            "they are whole numbers of periods, at least 1",
+            "correct them",
+        )
     table = tables(system)
     if not math.isfinite(table.motion.period):
         return self_excited(system, table, start or {}, transient)

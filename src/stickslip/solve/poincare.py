@@ -82,9 +82,16 @@ def derivative(orbit: Trajectory, after: int) -> tuple[Array, float]:
     size = len(table.names)
     tangents = np.eye(size)[:physical].copy()
     slowest = carry_tangents(
-        table.linear, table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
+        table.linear,
+        table.leap,
+        orbit.modes,
+        orbit.states,
+        orbit.durations,
+        orbit.exits,
+        after,
+        tangents,
         np.empty((9, size)),
-    )  # fmt: skip
+    )
     return tangents[:, :physical].T, slowest
 
 
@@ -98,9 +105,16 @@ def carried(orbit: Trajectory, after: int, difference: Array) -> Array:
     tangents = np.zeros((1, size))
     tangents[0, : len(difference)] = difference
     carry_tangents(
-        orbit.table.linear, orbit.table.leap, orbit.modes, orbit.states, orbit.durations, orbit.exits, after, tangents,
+        orbit.table.linear,
+        orbit.table.leap,
+        orbit.modes,
+        orbit.states,
+        orbit.durations,
+        orbit.exits,
+        after,
+        tangents,
         np.empty((9, size)),
-    )  # fmt: skip
+    )
     return tangents[0, : len(difference)]
 
 

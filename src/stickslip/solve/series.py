@@ -11,7 +11,7 @@ import itertools
 import re
 from collections.abc import Callable, Iterable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,28 @@ def series(q, mode, y, h, s):
 MOST = 32
 
 
+class Nodes(NamedTuple):
+    """A tape: of each node its operation, operands, exponent, first weight and constant; the weights and their nodes;
+    the first node of each mode; and node and factor of each state entry's rate, by mode."""
+
+    kinds: NDArray[np.int64]
+    left: NDArray[np.int64]
+    right: NDArray[np.int64]
+    power: NDArray[np.float64]
+    low: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    terms: NDArray[np.int64]
+    constant: NDArray[np.float64]
+    first: NDArray[np.int64]
+    rate: NDArray[np.int64]
+    factor: NDArray[np.float64]
+
+    @property
+    def most(self) -> int:
+        """Nodes of the mode that has most."""
+        return int(np.max(np.diff(self.first)))
+
+
 class Structure(NamedTuple):
     """A tape without its numbers, and the nodes whose coefficients are kept, by mode."""
 
@@ -51,7 +73,7 @@ class Structure(NamedTuple):
     kept: tuple[Number, ...]
 
 
-def expansion(nodes: tuple[NDArray[Any], ...], kept: tuple[Number, ...], order: int) -> tuple[int, NDArray[np.float64]]:
+def expansion(nodes: Nodes, kept: tuple[Number, ...], order: int) -> tuple[int, NDArray[np.float64]]:
     """Address of compiled code that fills a work array with coefficients 0 .. `order`, and its numbers.
 
     Raises a ModelError where the law has so many curved nodes that compiling would not end soon.
@@ -65,22 +87,23 @@ def expansion(nodes: tuple[NDArray[Any], ...], kept: tuple[Number, ...], order: 
             f"each is compiled as a series; more than {MOST} would take minutes",
             "write the curve with fewer, or as a table of points (Tabulated)",
         )
-    kinds, left, right, power, low, weight, index, constant, first, rate, factor = nodes
+    low = nodes.low
     parts = [
-        np.concatenate([weight[low[a] : low[b]], constant[a:b], power[a:b], factor[mode]])
-        for mode, (a, b) in enumerate(itertools.pairwise(first))
+        np.concatenate([nodes.weights[low[a] : low[b]], nodes.constant[a:b], nodes.power[a:b], nodes.factor[mode]])
+        for mode, (a, b) in enumerate(itertools.pairwise(nodes.first))
     ]
     numbers = np.zeros((len(parts), max(map(len, parts))))
     for row, part in zip(numbers, parts, strict=True):
         row[: len(part)] = part
-    columns = [tuple(column.tolist()) for column in (kinds, left, right, low, index, first)]
-    structure = Structure._make([*columns, tuple(map(tuple, rate.tolist())), kept])
+    columns = (nodes.kinds, nodes.left, nodes.right, low, nodes.terms, nodes.first)
+    rate = tuple(map(tuple, nodes.rate.tolist()))
+    structure = Structure._make([*(tuple(column.tolist()) for column in columns), rate, kept])
     return _compiled(structure, order, numbers.shape[1]), numbers.ravel()
 
 
-def curved_nodes(nodes: tuple[NDArray[Any], ...]) -> int:
+def curved_nodes(nodes: Nodes) -> int:
     """How many nodes of a tape are more than a weighted sum."""
-    return int(np.count_nonzero(nodes[0] != LINEAR))
+    return int(np.count_nonzero(nodes.kinds != LINEAR))
 
 
 @cache

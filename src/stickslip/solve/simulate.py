@@ -16,11 +16,13 @@ from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.solve import kernel
+from stickslip.solve.curved import degree, run_curved
+from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
-from stickslip.solve.interrupts import held_back
 from stickslip.solve.phasors import fast_tables
-from stickslip.solve.refusal import chatter, named, require_budget, require_numbers, unproved
+from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
 from stickslip.solve.tables import Array, System, Tables, table_of
+from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -107,10 +109,6 @@ def _simulate_curved(
     rtol: float,
     progress: Callable[[float], object] | None,
 ) -> Trajectory:
-    from stickslip.solve.curved import degree, run_curved
-    from stickslip.solve.delayed import delayed_tape, run_delayed
-    from stickslip.solve.tape import tape
-
     lags = isinstance(system.law, TimeDelay)
     table: Any = delayed_tape(system, degree(rtol)) if lags else tape(system)
     span = _end(system, table, *time_)
@@ -235,9 +233,12 @@ def run(
                 pieces.keep(count, passed, total)
                 _refuse(outcome, table, state, clock)
                 require_budget(
-                    count - (outcome == kernel.DONE), passed=passed, scale=scale, budget=budget,
+                    count - (outcome == kernel.DONE),
+                    passed=passed,
+                    scale=scale,
+                    budget=budget,
                     state=named(table.names[: table.physical], state),
-                )  # fmt: skip
+                )
                 if tell:
                     tell(pieces.passed / total)
     except KeyboardInterrupt:
@@ -285,17 +286,24 @@ class _Log:
 
 def _columns(room: int, size: int) -> Pieces:
     return Pieces(
-        np.empty(room, np.int32), np.empty(room), np.empty(room, np.int16), np.empty(room), np.empty((room, size)),
+        np.empty(room, np.int32),
+        np.empty(room),
         np.empty(room, np.int16),
-    )  # fmt: skip
+        np.empty(room),
+        np.empty((room, size)),
+        np.empty(room, np.int16),
+    )
 
 
 def stops_of(table: Tables | Tape, laps: float, offset: float) -> Any:
     """The times to which the march goes in turn, with the signals that take new values at each start."""
     knots, end = table.motion.knots, table.motion.end
     if offset > end * (1 + 1e-12):
-        raise ModelError(f"{offset:g} s of a drive recorded for {end:g} s", "a run ends where its drive is known last",
-                         f"simulate {end:g} s at most, or record longer")  # fmt: skip
+        raise ModelError(
+            f"{offset:g} s of a drive recorded for {end:g} s",
+            "a run ends where its drive is known last",
+            f"simulate {end:g} s at most, or record longer",
+        )
     if knots is None:
         yield (laps, offset), ([], [])
         return

@@ -231,9 +231,14 @@ def systems_of(systems: Sequence[Oscillator]) -> Systems:
 
 
 def oscillators(
-    laws: Sequence[Law], law: Index, drives: Sequence[Drive], drive: Index, *, numbers: Array,
+    laws: Sequence[Law],
+    law: Index,
+    drives: Sequence[Drive],
+    drive: Index,
+    *,
+    numbers: Array,
     on_base: NDArray[np.bool_],
-) -> Systems:  # fmt: skip
+) -> Systems:
     """Oscillators as systems of one mass: the different laws and drives, which of them each has (B,), its mass,
     stiffness and damping (3, B), and whether its damper is fixed to the base (B,)."""
     tables = [one.modes() for one in laws]
@@ -248,15 +253,31 @@ def _structure(system: Structure) -> Systems:
     """A structure as a batch of one."""
     none = np.zeros(1, np.int64)
     contacts = tuple(
-        Rubbing([c.law], [c.modes()], none, np.asarray(c.tangent), None if c.normal is None else np.asarray(c.normal),
-                c.stiffness, c.preload, c.carried)
+        Rubbing(
+            [c.law],
+            [c.modes()],
+            none,
+            np.asarray(c.tangent),
+            None if c.normal is None else np.asarray(c.normal),
+            c.stiffness,
+            c.preload,
+            c.carried,
+        )
         for c in system.contacts
-    )  # fmt: skip
+    )
     mass, stiffness, damping = (np.asarray(part)[None] for part in (system.mass, system.stiffness, system.damping))
     return Systems(
-        contacts, (system.drive,), none, mass, stiffness, damping, np.array([system.damper == "base"]),
-        np.asarray(system.acts_on), (tuple(contact.entry for contact in system.contacts),), joint=True,
-    )  # fmt: skip
+        contacts,
+        (system.drive,),
+        none,
+        mass,
+        stiffness,
+        damping,
+        np.array([system.damper == "base"]),
+        np.asarray(system.acts_on),
+        (tuple(contact.entry for contact in system.contacts),),
+        joint=True,
+    )
 
 
 def kind_of_law(law: Any) -> Any:
@@ -544,16 +565,30 @@ class _Builder:
             derive(flows, first, series, np.empty((2, size**2), np.int64), np.empty(size**2))
         cell, hop = cells_of(flows, self.physical)
         return Tables(
-            names=self.names, modes=self._modes(), flow=flows, cell=cell, hop=hop, series=series,
+            names=self.names,
+            modes=self._modes(),
+            flow=flows,
+            cell=cell,
+            hop=hop,
+            series=series,
             target=np.array([target for joint in joints for target in joint.targets], dtype=np.int64),
-            crossing=np.array([
-                self.parts[j][c].exits[e].crossing for j, joint in enumerate(joints) for c, e in joint.exits
-            ], dtype=np.bool_),
-            reset=reset, first=first, tones=self._tones(), friction=frictions, outputs=self._outputs(),
+            crossing=np.array(
+                [self.parts[j][c].exits[e].crossing for j, joint in enumerate(joints) for c, e in joint.exits],
+                dtype=np.bool_,
+            ),
+            reset=reset,
+            first=first,
+            tones=self._tones(),
+            friction=frictions,
+            outputs=self._outputs(),
             motions=tuple(self.motions[k] for k in self.systems.drive),
-            period=np.array([m.period for m in self.motions])[self.systems.drive], begin=self._begin(),
-            opening=self._opening(), physical=self.physical, degrees=self.degrees, entry=self._entry(),
-        )  # fmt: skip
+            period=np.array([m.period for m in self.motions])[self.systems.drive],
+            begin=self._begin(),
+            opening=self._opening(),
+            physical=self.physical,
+            degrees=self.degrees,
+            entry=self._entry(),
+        )
 
     def _rows(self, j: int, c: int, known: Rows) -> tuple[Rows, Rows]:
         """The quantities of the exits of contact c in a mode, and what they reset, as rows over the state."""

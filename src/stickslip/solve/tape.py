@@ -17,9 +17,10 @@ from stickslip.errors import ModelError
 from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
 from stickslip.oscillator import Oscillator
 from stickslip.solve import taylor
+from stickslip.solve.series import Nodes
 from stickslip.solve.tables import by_value
+from stickslip.solve.taylor import Array, Exits, Guards, Sums
 
-Array = NDArray[np.float64]
 Form = tuple[dict[int, float], float]  # weights of nodes, and a constant
 Scaled = tuple[int, float]  # a node and a factor
 
@@ -50,19 +51,18 @@ class Tape:
         Index of cosine, index of sine, angular frequency, phase.
     outputs : mapping of str to ndarray (N,)
         Linear forms of the state.
-    nodes : tuple of ndarray
-        Operation, left, right, exponent, first weight, weights, their nodes, constant, first node of each mode, and
-        node and factor of each state entry's rate, for the march.
+    nodes : Nodes
+        The operations, for the march.
     kept : tuple of tuple of int
         Nodes of each mode whose series the march looks at.
-    sums : tuple of ndarray
-        What rounds each rate and each exit: first weight, sizes of the weights, their nodes, and of the constant.
-    watched : tuple of ndarray
+    sums : Sums
+        What rounds each rate and each exit.
+    watched : Nodes
         As `nodes`, with the nodes of all outputs as well.
-    exits : tuple of ndarray
-        Node, target, crossing, held, first exit of each mode, the counter-face's velocity, and the node's factor.
-    guards : tuple of ndarray
-        Functions that fall asleep (exponentials, powers near 0), their arguments' nodes, and the first of each mode.
+    exits : Exits
+        How each mode may end.
+    guards : Guards
+        Functions that fall asleep.
     places : mapping of str to ndarray (M,)
         Node of each output in each mode of `watched`.
     """
@@ -76,12 +76,12 @@ class Tape:
     opening: Array
     tones: Array
     outputs: Mapping[str, Array]
-    nodes: tuple[NDArray[Any], ...]
+    nodes: Nodes
     kept: tuple[tuple[int, ...], ...]
-    sums: tuple[NDArray[Any], ...]
-    watched: tuple[NDArray[Any], ...]
-    exits: tuple[NDArray[Any], ...]
-    guards: tuple[NDArray[Any], ...]
+    sums: Sums
+    watched: Nodes
+    exits: Exits
+    guards: Guards
     places: Mapping[str, NDArray[np.int64]]
 
     @property
@@ -94,7 +94,7 @@ class Tape:
     @property
     def first(self) -> NDArray[np.int64]:
         """Exits of mode j are ``first[j]`` to ``first[j + 1]``."""
-        return np.asarray(self.exits[4])
+        return self.exits.first
 
     def index(self, mode: str) -> int:
         """Number of the mode of that name."""
@@ -104,7 +104,7 @@ class Tape:
         return names.index(mode)
 
 
-class _Nodes:
+class _Operations:
     """Nodes of one mode's tape; equal formulas share a node."""
 
     def __init__(self, size: int, symbols: Mapping[str, Form]) -> None:
@@ -274,10 +274,10 @@ class _Builder:
         row[self.one] += form[1]
         return row
 
-    def mode(self, mode: CurvedMode) -> tuple[_Nodes, _Nodes, list[Scaled], list[Scaled], dict[str, int]]:
+    def mode(self, mode: CurvedMode) -> tuple[_Operations, _Operations, list[Scaled], list[Scaled], dict[str, int]]:
         """Nodes for the march and with outputs, rates of the entries, nodes of the exits and of the outputs."""
         symbols = self.symbols()
-        moving = _Nodes(self.size, symbols)
+        moving = _Operations(self.size, symbols)
         if mode.friction is None:
             friction = combined([(1.0, self.push), (-self.system.mass, self.face[2])])
             rates = {0: self.face[1], 1: self.face[2]}
@@ -295,7 +295,7 @@ class _Builder:
             moving.scaled(combined((value, known[name]) for name, value in exit_.quantity.items()))
             for exit_ in mode.exits
         ]
-        watched = _Nodes(self.size, symbols)
+        watched = _Operations(self.size, symbols)
         watched.rows, watched.known = list(moving.rows), dict(moving.known)
         outputs = {
             "a": rates[1], "friction": friction, "z": self.base, "slip": symbols["v"], "force": self.force,
@@ -310,16 +310,15 @@ class _Builder:
         leaving = [exit_ for mode in self.modes for exit_ in mode.exits]
         # an exit at zero velocity leaves exactly none: rounding must not decide what follows
         held = [set(e.quantity) == {"v"} or self.modes[order[e.to]].friction is None for e in leaving]
-        exits = (
-            np.array([node for part in parts for node, _ in part[3]], dtype=np.int64),
-            np.array([order[e.to] for e in leaving], dtype=np.int64),
-            np.array([e.crossing for e in leaving], dtype=np.bool_),
-            np.array(held, dtype=np.bool_),
-            np.cumsum([0, *(len(mode.exits) for mode in self.modes)]),
-            self.row(self.face[1]),
-            np.array([factor for part in parts for _, factor in part[3]]),
+        exits = Exits(
+            node=np.array([node for part in parts for node, _ in part[3]], dtype=np.int64),
+            factor=np.array([factor for part in parts for _, factor in part[3]], dtype=np.float64),
+            target=np.array([order[e.to] for e in leaving], dtype=np.int64),
+            crossing=np.array([e.crossing for e in leaving], dtype=np.bool_),
+            held=np.array(held, dtype=np.bool_),
+            first=np.cumsum([0, *(len(mode.exits) for mode in self.modes)]),
         )
-        nodes = (*_flat([part[0] for part in parts]), *rate)
+        nodes = Nodes(*_flat([part[0] for part in parts]), *rate)
         guards = _guards([part[0] for part in parts])
         sums = _sums([part[0] for part in parts], [part[2] for part in parts], [part[3] for part in parts])
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
@@ -331,27 +330,29 @@ class _Builder:
             motion=self.motion,
             physical=self.one,
             entry=(order[entry[0]], order[entry[1]], order[entry[2]]),
-            opening=np.array([
-                np.zeros(self.size),
-                self.row(self.face[1]),
-                *(
-                    self.row(combined((value, self.symbols()[name]) for name, value in row.items()))
-                    for row in self.law.memory.values()
-                ),
-            ]),
+            opening=np.array(
+                [
+                    np.zeros(self.size),
+                    self.row(self.face[1]),
+                    *(
+                        self.row(combined((value, self.symbols()[name]) for name, value in row.items()))
+                        for row in self.law.memory.values()
+                    ),
+                ]
+            ),
             tones=np.array(tones, dtype=np.float64).reshape(len(tones), 4),
             outputs={"face_rate": self.row(self.face[1]), "slip": self.row(self.symbols()["v"])},
             nodes=nodes,
             kept=_kept(self.size, sums, exits, guards),
             sums=sums,
-            watched=(*_flat([part[1] for part in parts]), *rate),
+            watched=Nodes(*_flat([part[1] for part in parts]), *rate),
             exits=exits,
             guards=guards,
             places={name: np.array([part[4][name] for part in parts], dtype=np.int64) for name in parts[0][4]},
-        )  # fmt: skip
+        )
 
 
-def _flat(modes: list[_Nodes]) -> tuple[NDArray[Any], ...]:
+def _flat(modes: list[_Operations]) -> tuple[NDArray[Any], ...]:
     """The nodes of all modes, one after the other."""
     blank: tuple[int, int, int, float, Form] = (taylor.LINEAR, 0, 0, 0.0, ({}, 0.0))
     kinds, left, right, power, forms = zip(*(row for m in modes for row in [blank] * m.size + m.rows), strict=True)
@@ -365,15 +366,15 @@ def _flat(modes: list[_Nodes]) -> tuple[NDArray[Any], ...]:
     return kinds_, left_, right_, np.array(power), low_, weights, index_, constant, first_
 
 
-def _guards(modes: list[_Nodes]) -> tuple[NDArray[Any], ...]:
+def _guards(modes: list[_Operations]) -> Guards:
     """The nodes whose series may know nothing of what is ahead: what they are, and of what; and the first by mode."""
     kinds = (taylor.EXP, taylor.TANH, taylor.POWER)
     found = [[row[:2] for row in mode.rows if row[0] in kinds] for mode in modes]
     pairs = np.array([row for rows in found for row in rows], dtype=np.int64).reshape(-1, 2)
-    return pairs[:, 0].copy(), pairs[:, 1].copy(), np.cumsum([0, *map(len, found)])
+    return Guards(pairs[:, 0].copy(), pairs[:, 1].copy(), np.cumsum([0, *map(len, found)]))
 
 
-def _sums(modes: list[_Nodes], rates: Any, exits: Any) -> tuple[NDArray[Any], ...]:
+def _sums(modes: list[_Operations], rates: Any, exits: Any) -> Sums:
     """What rounds each rate (by mode and entry) and each exit: sizes of the weights of a sum, and their nodes."""
     low, weights, constant = [0], list[float](), list[float]()
     index: list[int] = []
@@ -386,17 +387,17 @@ def _sums(modes: list[_Nodes], rates: Any, exits: Any) -> tuple[NDArray[Any], ..
                 index.extend(form[0])
                 low.append(len(weights))
                 constant.append(abs(factor * form[1]))
-    return np.array(low), np.array(weights), np.array(index, dtype=np.int64), np.array(constant)
+    return Sums(np.array(low), np.array(weights), np.array(index, dtype=np.int64), np.array(constant))
 
 
-def _kept(size: int, sums: Any, exits: Any, guards: Any) -> tuple[tuple[int, ...], ...]:
+def _kept(size: int, sums: Sums, exits: Exits, guards: Guards) -> tuple[tuple[int, ...], ...]:
     """Nodes of each mode that are exits, are guarded, or make up a rate or an exit."""
-    (low, _, index, _), (nodes, *_, first, _, _), (_, arguments, mind) = sums, exits, guards
-    count, kept = len(first) - 1, []
+    count, kept, low, first = len(exits.first) - 1, [], sums.first, exits.first
     for mode in range(count):
-        rates = index[low[mode * size] : low[(mode + 1) * size]]
-        terms = index[low[count * size + first[mode]] : low[count * size + first[mode + 1]]]
-        leaving = nodes[first[mode] : first[mode + 1]]
-        looked = {*rates.tolist(), *terms.tolist(), *leaving.tolist(), *arguments[mind[mode] : mind[mode + 1]].tolist()}
+        rates = sums.node[low[mode * size] : low[(mode + 1) * size]]
+        terms = sums.node[low[count * size + first[mode]] : low[count * size + first[mode + 1]]]
+        leaving = exits.node[first[mode] : first[mode + 1]]
+        asleep = guards.argument[guards.first[mode] : guards.first[mode + 1]]
+        looked = {*rates.tolist(), *terms.tolist(), *leaving.tolist(), *asleep.tolist()}
         kept.append(tuple(sorted(node for node in looked if node >= size)))
     return tuple(kept)

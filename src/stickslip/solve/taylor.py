@@ -10,17 +10,23 @@ two crossings within one step are two.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from stickslip.compiled import compiled
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise
 
-OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}
-EXACT = {"error_model": "numpy"}
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+# No references are counted: each named array would cost two atomic operations a call.
+OPTIONS = {"error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
+EXACT = {"error_model": "numpy", "_nrt": False}
 
 LINEAR, PRODUCT, SQUARE, QUOTIENT, POWER, EXP, TANH, SLOPE, LOG, ASINH = range(10)
 GROWTH = 6.0  # longest step in units of the one before
@@ -44,6 +50,51 @@ def coded(_context: Any, address: Any) -> Any:
     return kind(address), made
 
 
+class Sums(NamedTuple):
+    """What rounds each rate (by mode and entry) and each exit: sizes of the weights of a sum of nodes, from `first` on,
+    and of its constant."""
+
+    first: Index
+    weight: Array
+    node: Index
+    constant: Array
+
+
+class Exits(NamedTuple):
+    """Node of each exit and its factor, the mode behind it, whether it is crossed, whether the contact holds then; the
+    first exit of each mode."""
+
+    node: Index
+    factor: Array
+    target: Index
+    crossing: NDArray[np.bool_]
+    held: NDArray[np.bool_]
+    first: Index
+
+
+class Guards(NamedTuple):
+    """Functions that fall asleep (exponentials, powers near 0), their arguments' nodes, and the first of each mode."""
+
+    kind: Index
+    argument: Index
+    first: Index
+
+
+class Step(NamedTuple):
+    """The series of a Taylor step: coefficient k of node j stands at j (order + 1) + k of `s`; and room for the
+    polynomial of an exit with the noise of each coefficient."""
+
+    s: Array
+    c: Array
+    noise: Array
+    order: int
+
+
+def room(nodes: int, order: int) -> Step:
+    """Room for the series of so many nodes."""
+    return Step(np.zeros(nodes * (order + 1)), np.zeros(order + 1), np.zeros(order + 1), order)
+
+
 @compiled(**OPTIONS)
 def value(kind, at, power):
     """A function's value: the coefficient of order 0."""
@@ -62,27 +113,27 @@ def value(kind, at, power):
 
 
 @compiled(**EXACT)
-def _rate_noise(sums, row, k, h, width, s):
+def _rate_noise(sums, row, k, h, step):
     """Noise of coefficient k > 0 of a state entry: what rounds the sum that is its rate."""
-    low, weight, index, constant = sums
-    total = constant[row] if k == 1 else 0.0
-    for t in range(low[row], low[row + 1]):
-        total += weight[t] * abs(s[index[t] * width + k - 1])
+    s, width = step.s, step.order + 1
+    total = sums.constant[row] if k == 1 else 0.0
+    for t in range(sums.first[row], sums.first[row + 1]):
+        total += sums.weight[t] * abs(s[sums.node[t] * width + k - 1])
     return NOISE * total * h / k
 
 
 @compiled(**EXACT)
-def _exit_noise(sums, row, rates, k, size, h, width, big, s):
+def _exit_noise(sums, row, rates, k, h, big, step):
     """Noise of coefficient k of an exit; the rates' sums of its mode begin at row `rates`."""
-    low, weight, index, constant = sums
-    total = NOISE * 1e-2 * constant[row] if k == 0 else 0.0
-    for t in range(low[row], low[row + 1]):
-        i = index[t]
-        if i >= size:
+    s, width = step.s, step.order + 1
+    total = NOISE * 1e-2 * sums.constant[row] if k == 0 else 0.0
+    for t in range(sums.first[row], sums.first[row + 1]):
+        i = sums.node[t]
+        if i >= len(big):
             noise = NOISE * abs(s[i * width + k])
         else:
-            noise = NOISE * 1e-2 * big[i] if k == 0 else _rate_noise(sums, rates + i, k, h, width, s)
-        total += weight[t] * noise
+            noise = NOISE * 1e-2 * big[i] if k == 0 else _rate_noise(sums, rates + i, k, h, step)
+        total += sums.weight[t] * noise
     return total
 
 
@@ -97,10 +148,11 @@ def surely_below(s, start, top, sign, level, u):
 
 
 @compiled(**EXACT)
-def length(s, width, order, size, tolerance, big):
+def length(s, order, big, tolerance):
     """Step in units of h at which the last two terms of every entry are its tolerance."""
+    width = order + 1
     last, before = 0.0, 0.0
-    for i in range(size):
+    for i in range(len(big)):
         j = i * width
         scale = max(big[i], 1e-3 * (abs(s[j + 1]) + abs(s[j + 2])))
         if scale > 0.0:
@@ -138,8 +190,9 @@ def waking(kind, at, asleep):
 
 
 @compiled(**EXACT)
-def woken(kind, s, a, order, u, asleep, c, noise):
+def woken(kind, a, u, asleep, step):
     """The step, shortened to where a sleeping function wakes: its series does not know of it until then; -1: unsure."""
+    s, c, noise, order = step
     level, sign = waking(kind, s[a], asleep)
     if surely_below(s, a, order - 1, sign, -level, u):
         return u
@@ -155,10 +208,10 @@ def woken(kind, s, a, order, u, asleep, c, noise):
 
 
 @compiled(**OPTIONS)
-def advance(s, width, size, order, u, state):
+def advance(s, order, u, state):
     """The state at u by Horner's rule."""
-    for i in range(size):
-        j = i * width
+    for i in range(len(state)):
+        j = i * (order + 1)
         total = s[j + order]
         for k in range(order - 1, -1, -1):
             total = total * u + s[j + k]
@@ -182,20 +235,23 @@ def resolved(s, start, top, floor, u):
 
 
 @compiled(**EXACT)
-def rise(sums, row, rates, crossing, node, scale, size, h, u, order, width, big, s, c, noise):
+def rise(sums, exits, e, mode, h, u, big, step):
     """When an exit ends the mode, in units of h, up to u; infinite where it does not, -1 where nothing is proved."""
-    j, low = node * width, 0
+    s, c, noise, order = step
+    node, scale, size = exits.node[e], exits.factor[e], len(big)
+    row, rates = len(sums.constant) - len(exits.node) + e, mode * size
+    j, low = node * (order + 1), 0
     top = order if node < size else order - 1
-    floor = _exit_noise(sums, row, rates, 0, size, h, width, big, s)
+    floor = _exit_noise(sums, row, rates, 0, h, big, step)
     if scale * s[j] < -floor and surely_below(s, j, top, scale, 0.0, u):
         return math.inf
     while abs(scale * s[j + low]) <= floor:
         low += 1
         if low > top:
             return math.inf
-        floor = _exit_noise(sums, row, rates, low, size, h, width, big, s)
+        floor = _exit_noise(sums, row, rates, low, h, big, step)
     if scale * s[j + low] > 0.0:
-        return math.inf if crossing else 0.0
+        return math.inf if exits.crossing[e] else 0.0
     power = 1.0
     for k in range(top + 1):
         c[k] = scale * s[j + k] * power

@@ -175,11 +175,15 @@ class Squeaks:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return {
-            "channel": self.channel, "kind": self.kind, "squeaking": self.squeaking, "reference": self.reference,
+            "channel": self.channel,
+            "kind": self.kind,
+            "squeaking": self.squeaking,
+            "reference": self.reference,
             "forcing": None if math.isnan(self.forcing) else self.forcing,
-            "bursts": [burst.to_dict() for burst in self.bursts], "notes": list(self.notes),
+            "bursts": [burst.to_dict() for burst in self.bursts],
+            "notes": list(self.notes),
             "history": [str(step) for step in self.record.history],
-        }  # fmt: skip
+        }
 
     def __repr__(self) -> str:
         rows = [

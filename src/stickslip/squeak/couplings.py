@@ -88,12 +88,19 @@ class Pair:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return {
-            "first": self.first, "second": self.second, "inside": self.inside,
-            "outside": None if math.isnan(self.outside) else self.outside, "significant": self.significant,
-            "coupled": self.coupled, "adds": self.adds, "tied": self.tied, "leads": self.leads,
-            "added": None if self.added is None else self.added.to_dict(), "phase": self.phase.to_dict(),
+            "first": self.first,
+            "second": self.second,
+            "inside": self.inside,
+            "outside": None if math.isnan(self.outside) else self.outside,
+            "significant": self.significant,
+            "coupled": self.coupled,
+            "adds": self.adds,
+            "tied": self.tied,
+            "leads": self.leads,
+            "added": None if self.added is None else self.added.to_dict(),
+            "phase": self.phase.to_dict(),
             "delay": None if self.delay is None else self.delay.to_dict(),
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
@@ -262,10 +269,14 @@ def _pair(
     coherence, angle = _coherence(inside[one], inside[other])
     sd, chance = math.sqrt(max(1 - coherence, 1e-12) / (2 * count * max(coherence, 1e-12))), coherence_by_chance(count)
     phase = Estimate.normal(
-        f"phase of {other} behind {one}", angle, sd=sd, unit="rad",
-        method=f"cross spectrum of {count} segments", quantile=student(count - 1),
+        f"phase of {other} behind {one}",
+        angle,
+        sd=sd,
+        unit="rad",
+        method=f"cross spectrum of {count} segments",
+        quantile=student(count - 1),
         status="ok" if coherence > chance else "no coherence beyond chance: the phase means nothing",
-    )  # fmt: skip
+    )
     delay = phase.scaled(1 / (2 * math.pi * frequency), "s", f"delay of {other} behind {one}")
     opposed = max(map(abs, phase.interval)) >= math.pi or abs(angle) > math.pi - OPPOSED
     beyond, added = math.nan, None
@@ -282,8 +293,9 @@ def _added(one: str, other: str, inside: tuple[float, int], outside: tuple[float
     (low, high), (least, most) = (_coherence_interval(*each) for each in (inside, outside))
     value = inside[0] - outside[0]
     ends = (
-        value - math.hypot(inside[0] - low, most - outside[0]), value + math.hypot(high - inside[0], outside[0] - least)
-    )  # fmt: skip
+        value - math.hypot(inside[0] - low, most - outside[0]),
+        value + math.hypot(high - inside[0], outside[0] - least),
+    )
     return Estimate(
         f"coherence that the squeak adds to {one} and {other}",
         value,
@@ -361,8 +373,13 @@ def _mean(name: str, values: list[float]) -> Estimate:
     status = Status(*([Doubt.few(count, "burst")] if count <= 2 else []))
     sd = float(np.std(values, ddof=1) / math.sqrt(count)) if count > 1 else math.inf
     found = Estimate.normal(
-        name, float(np.mean(values)), sd=sd, unit="J", method=f"mean of {count} bursts",
-        quantile=student(max(1, count - 1)), status=status,
-    )  # fmt: skip
+        name,
+        float(np.mean(values)),
+        sd=sd,
+        unit="J",
+        method=f"mean of {count} bursts",
+        quantile=student(max(1, count - 1)),
+        status=status,
+    )
     unsure = count > 2 and found.includes(0.0)
     return replace(found, status=UNSURE) if unsure else found

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
 from stickslip.parameters import finite
-from stickslip.solve.autonomous import settled_cycle
 from stickslip.solve.energies import EnergyFlow, energy_flow
 from stickslip.solve.poincare import Table, stretch, tables
+from stickslip.solve.self_excited import settled_cycle
 from stickslip.solve.simulate import opening
 from stickslip.solve.trajectory import Trajectory
 from stickslip.squeak.sliding import System
@@ -86,8 +86,9 @@ class LimitCycle:
         if not self.vibrates:
             return f"LimitCycle: {self.status}"
         named = {"sticks": self.stick_share, "lifted": self.separation_share}
-        shares = [f"{name} {', '.join(f'{one:.3g}' for one in each)} of the time"
-                  for name, each in named.items() if any(each)]  # fmt: skip
+        shares = [
+            f"{name} {', '.join(f'{one:.3g}' for one in each)} of the time" for name, each in named.items() if any(each)
+        ]
         head = f"LimitCycle: {self.status}, {self.frequency:.5g} Hz, contacts slide {self.amplitude:.4g} m to and fro"
         return "\n  ".join([head, *shares])
 

@@ -54,9 +54,13 @@ class Clip:
 
 
 def write_sound(
-    record: Record, path: str | Path, *, channel: str | None = None, full_scale: float | None = None,
+    record: Record,
+    path: str | Path,
+    *,
+    channel: str | None = None,
+    full_scale: float | None = None,
     overwrite: bool = False,
-) -> float:  # fmt: skip
+) -> float:
     """Write a channel as a WAV file of 16 bit, to listen to it or to give it to a program for sound.
 
     The file appears whole or not at all. A WAV file states no calibration: to read it back, state the full scale, as in
@@ -111,8 +115,9 @@ def write_sound(
     if not (math.isfinite(scale) and scale > 0) or peak > scale * (1 + 1e-9):
         raise RecordError(
             f"{name} reaches {peak:g} {record.channels[name].unit} of a full scale of {scale:g}",
-            "a sound is written between zero and its full scale", "choose another channel= or a larger full_scale=",
-        )  # fmt: skip
+            "a sound is written between zero and its full scale",
+            "choose another channel= or a larger full_scale=",
+        )
     with whole(path, replace=overwrite) as part:
         part.write_bytes(wav_bytes(record[name], record.fs, scale))
     return scale
@@ -153,11 +158,14 @@ def burst_clips(found: Squeaks, *, most: int | None = None) -> tuple[Clip, ...]:
         Clip(
             f"{number + 1}-{burst.kind}-{burst.frequency:.0f}-Hz",
             f"Burst {number + 1}, {burst.kind}, {burst.start:.3f} to {burst.end:.3f} s",
-            scale, unit, float(np.mean(pieces[number] ** 2)), wav_bytes(pieces[number], record.fs, scale),
+            scale,
+            unit,
+            float(np.mean(pieces[number] ** 2)),
+            wav_bytes(pieces[number], record.fs, scale),
         )
         for number, burst in enumerate(found.bursts)
         if number in kept
-    )  # fmt: skip
+    )
 
 
 def wav_bytes(values: Array, fs: float, full_scale: float) -> bytes:

@@ -225,9 +225,10 @@ def impulsiveness(record: Record, *, channel: str | None = None) -> Impulsivenes
 def _require_peaks(record: Record, channel: str) -> None:
     if clipped_rows(record, channel):
         raise RecordError(
-            f"channel {channel} is clipped", "loudness and pulses are told by what was cut off",
+            f"channel {channel} is clipped",
+            "loudness and pulses are told by what was cut off",
             "record it at a lower gain",
-        )  # fmt: skip
+        )
 
 
 def _at_needed_rate(values: Array, fs: float) -> Array:

@@ -27,9 +27,13 @@ A_POLES = (20.598997, 107.65265, 737.86223, 12194.217)  # Hz, IEC 61672-1
 
 
 def sound_pressure(
-    run: Trajectory | Record, *, fs: float | None = None, area: float = TIP, distance: float = MICROPHONE,
+    run: Trajectory | Record,
+    *,
+    fs: float | None = None,
+    area: float = TIP,
+    distance: float = MICROPHONE,
     normal: ArrayLike | str | None = None,
-) -> Record:  # fmt: skip
+) -> Record:
     r"""How loud is a vibrating surface at a distance?
 
     A small surface in a free field is a point source (Morse and Ingard, "Theoretical Acoustics", 1968, section 7.1):
@@ -98,9 +102,14 @@ def sound_pressure(
 
 
 def squeak_record(
-    run: Trajectory, *, fs: float = 10_000.0, snr: float = math.inf,
-    rng: int | np.random.Generator | None = None, area: float = TIP, distance: float = MICROPHONE,
-) -> Record:  # fmt: skip
+    run: Trajectory,
+    *,
+    fs: float = 10_000.0,
+    snr: float = math.inf,
+    rng: int | np.random.Generator | None = None,
+    area: float = TIP,
+    distance: float = MICROPHONE,
+) -> Record:
     """What the sensors of a squeak rig would have written of a run of :func:`squeak_rig`.
 
     The channels of the thesis's section 7.2 (2): displacement, velocity and acceleration of the mass, the base,

@@ -1,4 +1,4 @@
-"""Many oscillators at once, one to a thread of a GPU or one after another on the CPU: the same compiled march."""
+"""The compiled march of many oscillators, piece by piece: on the CPU, or one to a thread of a GPU."""
 
 from __future__ import annotations
 
@@ -10,17 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import OPTIONS, compiled
-from stickslip.errors import ModelError, SolveError
+from stickslip.errors import ModelError
+from stickslip.maps.crowd import pasts
+from stickslip.maps.watch import TIRELESS, model_of, past_of
 from stickslip.oscillator import Oscillator
-from stickslip.solve.cells import Linear
 from stickslip.solve.glide import Clock, Model, Past, Pieces
 from stickslip.solve.kernel import CHATTER, begin, march, scratch
-from stickslip.solve.phasors import Phasors, phasors_of
+from stickslip.solve.phasors import phasors_of
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, kind_of_drive, kind_of_law, opened, systems_of, tables_of
-
-TIRELESS = 2**62  # cells: a batch is not interrupted
-LAP = 64  # pieces remembered of each oscillator, a power of two; a lap of the drive with more has no fast path
 
 
 class Batch(NamedTuple):
@@ -84,16 +82,6 @@ def simulate_batch(
     ------
     ModelError
         The systems do not have one kind of law, or their number does not fit the starts.
-    SolveError
-        The GPU is wanted and not there.
-
-    Examples
-    --------
-    >>> from stickslip.laws.coulomb import Coulomb
-    >>> slider = Oscillator(mass=1, stiffness=4, law=Coulomb(1.0))
-    >>> batch = simulate_batch([slider], cycles=2, starts=[{"x": 1.25}, {"x": 0.9}])
-    >>> batch.counts, batch.final[:, 0].round(12)
-    (array([3, 3]), array([ 0.25, -0.1 ]))
     """
     starts = list(starts) if starts is not None else [{}] * len(systems)
     if len(systems) not in (1, len(starts)):
@@ -126,7 +114,11 @@ def simulate_batch(
         np.empty((count, room, size)), np.empty((count, room), np.int16), np.empty((count, size)),
     )  # fmt: skip
     works = np.zeros((count, *scratch(size).shape))
-    (_on_gpu if gpu else _on_cpu)(given, out, Rooms(works, pasts(count)))
+    if gpu:
+        from batches_gpu import march_all  # where numba-cuda is
+    else:
+        march_all = _on_cpu
+    march_all(given, out, Rooms(works, pasts(count)))
     return out
 
 
@@ -146,32 +138,6 @@ class Rooms(NamedTuple):
 
     works: Array
     pasts: Past
-
-
-def pasts(count: int) -> Past:
-    """The rings of motions before their first pieces."""
-    none = np.full((2, count, LAP), -1, np.int64)
-    return Past(none[0], none[1], np.zeros((count, LAP)), np.ones((count, LAP), np.int64),
-                np.zeros((count, 3), np.int64))  # fmt: skip
-
-
-@compiled(**OPTIONS)
-def model_of(models, j):
-    """One of many systems, as :func:`stickslip.solve.kernel.march` reads it."""
-    linear, fast = models.linear, models.fast
-    nodes = fast.nodes[fast.span[j, 0] : fast.span[j, 1]]
-    return Model(
-        Linear(linear.flow[j], linear.cell[j], linear.hop[j], linear.series[j], linear.target, linear.crossing,
-               linear.reset[j], linear.first, linear.tones[j]),
-        Phasors(fast.drive[j], fast.mode[j], fast.level[j], fast.exit[j], fast.rest[j], nodes, fast.span[j]),
-        models.period[j],
-    )  # fmt: skip
-
-
-@compiled(**OPTIONS)
-def past_of(pasts, i):
-    """The ring of one motion."""
-    return Past(pasts.modes[i], pasts.exits[i], pasts.times[i], pasts.parts[i], pasts.places[i])
 
 
 @compiled(**OPTIONS)
@@ -195,13 +161,3 @@ def march_one(i, given, out, rooms):
 def _on_cpu(given, out, rooms):
     for i in range(given.which.shape[0]):
         march_one(i, given, out, rooms)
-
-
-def _on_gpu(given: Given, out: Batch, rooms: Rooms) -> None:
-    try:
-        from stickslip.solve.gpu import march_all
-    except ImportError as absent:
-        raise SolveError(
-            "numba-cuda is not installed", "a GPU is driven by numba-cuda", 'pip install ".[gpu]" in the checkout'
-        ) from absent
-    march_all(given, out, rooms)
