@@ -236,25 +236,8 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
     spread[1] = math.hypot(spread[1], found[1] * _scale_sd(ring_down, frequency))
     scatter = _scatter(upright, ex.rate(upright, i=i, m=m, form=form), form, *motion)
     of_rate, of_dry = EQUATIONS[form]
-    damping_ratio = Estimate.normal(
-        "damping ratio",
-        found[0],
-        sd=spread[0],
-        unit="1",
-        status=status,
-        checks=_quoted(scatter.damping_ratio),
-        method=f"equation {of_rate} over {m} half cycles",
-    )
-    _require_loss(damping_ratio)
-    dry_displacement = Estimate.normal(
-        "dry friction displacement",
-        found[1],
-        sd=spread[1],
-        unit="rad" if ring_down.unit.startswith("rad") else "m",
-        status=status,
-        checks=_quoted(scatter.dry_displacement),
-        method=f"equation {of_dry}, mean of the last {last}",
-    ).within(0.0)
+    methods = f"equation {of_rate} over {m} half cycles", f"equation {of_dry}, mean of the last {last}"
+    damping_ratio, dry_displacement = _frictions(ring_down, found, spread, scatter, status, methods)
     natural = frequency.scaled(1 / math.sqrt(1 - found[0] ** 2), "Hz", "natural frequency")
     bias = _bias(ring_down, form, centre + side * found[2], spread[2], status)
     return Decrement(
@@ -273,6 +256,32 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
         (),
         status,
     )
+
+
+def _frictions(
+    ring_down: RingDown, values: Array, spread: Array, scatter: Scatter, status: str, methods: tuple[str, str]
+) -> tuple[Estimate, Estimate]:
+    """Damping ratio and dry friction; a decay that gains energy is refused."""
+    damping_ratio = Estimate.normal(
+        "damping ratio",
+        values[0],
+        sd=spread[0],
+        unit="1",
+        status=status,
+        checks=_quoted(scatter.damping_ratio),
+        method=methods[0],
+    )
+    _require_loss(damping_ratio)
+    dry_displacement = Estimate.normal(
+        "dry friction displacement",
+        values[1],
+        sd=spread[1],
+        unit="rad" if ring_down.unit.startswith("rad") else "m",
+        status=status,
+        checks=_quoted(scatter.dry_displacement),
+        method=methods[1],
+    ).within(0.0)
+    return damping_ratio, dry_displacement
 
 
 def _require_loss(damping_ratio: Estimate) -> None:

@@ -222,17 +222,15 @@ def _carry(i, count, motion, mode, leaps, tangents):
     linear, pieces = motion.model.linear, motion.pieces
     for p in range(count):
         set_tones(linear.tones, pieces.states[p], pieces.offsets[p])
-    carry_tangents(
-        linear,
-        leaps[i],
+    written = Pieces(
+        pieces.laps[:count],
+        pieces.offsets[:count],
         pieces.modes[:count],
-        pieces.states[:count],
         pieces.durations[:count],
+        pieces.states[:count],
         pieces.exits[:count],
-        mode,
-        tangents,
-        motion.work[7:16, : motion.state.shape[0]],
     )
+    carry_tangents(linear, leaps[i], written, mode, tangents, motion.work[7:16, : motion.state.shape[0]])
 
 
 @compiled(**OPTIONS)

@@ -360,9 +360,12 @@ def plates_of(found: SqueakFindings) -> list[Plate]:
             "bright is strong, and a white line is a burst's dominant frequency.",
         )
     ]
-    loudest = found.loudest
-    if loudest is None:
-        return plates
+    return plates if found.loudest is None else [*plates, *_of_spectra(found), *_of_bursts(found, found.loudest)]
+
+
+def _of_spectra(found: SqueakFindings) -> list[Plate]:
+    """What sounds in the bursts, and which frequencies the motions share."""
+    squeaks, plates = found.squeaks, []
     if found.spectra is not None:
         plates.append(
             plate(
@@ -383,6 +386,12 @@ def plates_of(found: SqueakFindings) -> list[Plate]:
                     "other; what is below the dotted line may be chance.",
                 )
             )
+    return plates
+
+
+def _of_bursts(found: SqueakFindings, loudest: Squeak) -> list[Plate]:
+    """Where in the cycle it sounds, the loudest burst, and the friction that feeds it."""
+    squeaks, plates = found.squeaks, []
     if not math.isnan(squeaks.forcing):
         plates.append(
             plate(

@@ -16,6 +16,7 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.curved import CurvedTrajectory, run_curved
+from stickslip.solve.glide import Pieces
 from stickslip.solve.simulate import run, stops_of
 from stickslip.solve.tables import Array, System, Tables, table_of
 from stickslip.solve.tangent import carry_tangents
@@ -84,15 +85,16 @@ def derivative(orbit: Trajectory, after: int) -> tuple[Array, float]:
     slowest = carry_tangents(
         table.linear,
         table.leap,
-        orbit.modes,
-        orbit.states,
-        orbit.durations,
-        orbit.exits,
+        _pieces(orbit),
         after,
         tangents,
         np.empty((9, size)),
     )
     return tangents[:, :physical].T, slowest
+
+
+def _pieces(orbit: Trajectory) -> Pieces:
+    return Pieces(orbit.laps, orbit.offsets, orbit.modes, orbit.durations, orbit.states, orbit.exits)
 
 
 def carried(orbit: Trajectory, after: int, difference: Array) -> Array:
@@ -107,10 +109,7 @@ def carried(orbit: Trajectory, after: int, difference: Array) -> Array:
     carry_tangents(
         orbit.table.linear,
         orbit.table.leap,
-        orbit.modes,
-        orbit.states,
-        orbit.durations,
-        orbit.exits,
+        _pieces(orbit),
         after,
         tangents,
         np.empty((9, size)),

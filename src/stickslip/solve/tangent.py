@@ -7,7 +7,7 @@ from stickslip.solve.kernel import follow, multiply
 
 
 @compiled(**OPTIONS)
-def carry_tangents(linear, leap, modes, states, durations, exits, after, tangents, work):
+def carry_tangents(linear, leap, pieces, after, tangents, work):
     """Carry small differences of the state through pieces and the events between them.
 
     At an event the difference jumps by the saltation matrix R + (f' - R f) q / (q f), where f = A S before and
@@ -18,8 +18,7 @@ def carry_tangents(linear, leap, modes, states, durations, exits, after, tangent
     linear : Linear
     leap : ndarray (M, M, N, N)
         Of :class:`stickslip.solve.tables.Tables`.
-    modes, states, durations, exits : ndarray
-        The pieces.
+    pieces : Pieces
     after : int
         Mode that follows the last piece.
     tangents : ndarray (K, N)
@@ -34,6 +33,7 @@ def carry_tangents(linear, leap, modes, states, durations, exits, after, tangent
         means nothing.
     """
     flow, series, target, reset = linear.flow, linear.series, linear.target, linear.reset
+    modes, states, durations, exits = pieces.modes, pieces.states, pieces.durations, pieces.exits
     n = states.shape[1]
     least = 1.0
     scratch, end, begin, before, carried, fresh = work[:3], work[3], work[4], work[5], work[6], work[7]
