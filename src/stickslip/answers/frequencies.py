@@ -213,9 +213,10 @@ def _spikes_and_sticks(
     if record.channels[name].unit != "m/s^2":
         notes.append(f"Channel {name} is no acceleration: what the sticks tell was not asked.")
         return found, notes
-    ringing = asked("Sticks", lambda: find_ringing(record, name, question=QUESTION, mass=mass, stiffness=stiffness))
-    if ringing is None:
-        found["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=notes.pop().partition(": ")[2])
+    try:
+        ringing = find_ringing(record, name, question=QUESTION, mass=mass, stiffness=stiffness)
+    except EstimateError as error:
+        found["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=str(error))
         return found, notes
     found["ringing"] = ringing
     found["mechanism"] = mechanism_of(ringing)

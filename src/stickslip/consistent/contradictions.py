@@ -144,7 +144,7 @@ def consistency(
     record = without_delays(record, *names, question=QUESTION)
     seen = Seen.of(record, names, rig, tolerance, QUESTION)
     checks = (
-        *silence_checks(unheard),
+        *silence_checks(record, unheard),
         *range_checks(record, names),
         *(check(seen) for check in FORCED),
         sampling_check(record, seen),

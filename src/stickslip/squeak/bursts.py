@@ -128,6 +128,8 @@ class Squeaks:
         Where they were found.
     notes : tuple of str
         What could not be told, and why.
+    cautions : tuple of str
+        Those of the notes that all of the numbers rest on.
     band : tuple of float
         Lowest and highest frequency that were listened to [Hz].
     """
@@ -139,6 +141,7 @@ class Squeaks:
     record: Record
     notes: tuple[str, ...] = ()
     band: tuple[float, float] = (0.0, math.inf)
+    cautions: tuple[str, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -261,9 +264,9 @@ def find_squeaks(
     unit = record.channels[name].unit
     listener = _Listener(record, name, hearing, motion, clipped_rows(record, name))
     bursts = sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start)
-    return Squeaks(
-        tuple(bursts), name, _reference(unit), motion.frequency, record, tuple(listener.notes(unit)), (low, high)
-    )
+    cautions = tuple(listener.cautions(unit))
+    notes = (*cautions, *listener.notes(unit))
+    return Squeaks(tuple(bursts), name, _reference(unit), motion.frequency, record, notes, (low, high), cautions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -459,16 +462,21 @@ class _Listener:
         told += ["clipped: its level and harmonics can not be told"] if spoilt else []
         return Status(*told)
 
-    def notes(self, unit: str) -> list[str]:
+    def cautions(self, unit: str) -> list[str]:
+        """What every level and every burst rests on."""
         told = []
-        if unit not in ("1", *REFERENCES):
-            told.append(f"Levels of channel {self.name} are re 1 {unit}: it is neither a sound nor a vibration.")
         if unit == "1":
             told.append(
                 f"Channel {self.name} is not calibrated: its levels are relative to 1, and no sound pressure level is "
                 f'told; state its sensitivity when reading, as in channels={{"sound": "{self.name} * 2.5 [Pa]"}}.'
             )
-        told += self._unheard(unit)
+        return [*told, *self._unheard(unit)]
+
+    def notes(self, unit: str) -> list[str]:
+        """What could not be told, beside the cautions."""
+        told = []
+        if unit not in ("1", *REFERENCES):
+            told.append(f"Levels of channel {self.name} are re 1 {unit}: it is neither a sound nor a vibration.")
         if self.motion.velocity is None:
             told.append("No forced motion is recorded beside it: phase and sliding speed can not be told.")
         return told

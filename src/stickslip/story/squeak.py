@@ -157,7 +157,7 @@ def _counted(bursts: Sequence[Squeak]) -> str:
 
 def _cautions(found: SqueakFindings) -> list[str]:
     """What should keep the reader from trusting it."""
-    told = [note for note in found.squeaks.notes if "calibrated" in note or "alone; the record has" in note]
+    told = list(found.squeaks.cautions)
     if any(fault.kind == "spike" for fault in found.faults):
         told.append(
             "What stands off as a spike may be a contact that sticks, lifts or lands: look before it is replaced."
