@@ -56,14 +56,14 @@ class Contact:
     tangent: ArrayLike = parameter(
         "1",
         "direction of sliding",
-        array=True,
+        size="array",
         note="w_t (n,): the contact slides by :math:`w_t q` less the counter-face's motion",
     )
     normal: ArrayLike | None = parameter(
         "1",
         "direction that presses the contact",
         default=None,
-        array=True,
+        size="array",
         note="w_n (n,); that of `tangent` where one motion slides and presses, as a sprag does",
     )
     stiffness: float = parameter(
@@ -189,11 +189,11 @@ class Structure:
     """
 
     mass: ArrayLike = parameter(
-        "kg", "mass matrix", array=True, note="M (n, n), positive definite; a number for one degree of freedom"
+        "kg", "mass matrix", size="array", note="M (n, n), positive definite; a number for one degree of freedom"
     )
-    damping: ArrayLike = parameter("N s/m", "damping matrix", array=True, note="C (n, n)")
+    damping: ArrayLike = parameter("N s/m", "damping matrix", size="array", note="C (n, n)")
     stiffness: ArrayLike = parameter(
-        "N/m", "stiffness matrix", array=True, note="K (n, n), symmetric, without the contacts'"
+        "N/m", "stiffness matrix", size="array", note="K (n, n), symmetric, without the contacts'"
     )
     contacts: Sequence[Contact] = parameter("", "where it rubs", default=())
     drive: Drive = parameter("", "what moves", default=Release(), note="nothing where left out")
@@ -201,7 +201,7 @@ class Structure:
         "1",
         "share of the drive",
         default=None,
-        array=True,
+        size="array",
         note="r (n,): of its force on every degree of freedom, or of the base's motion in it; 1 for all where left out",
     )
     damper: str = parameter("", "what the dampers are fixed to", default="ground", choices=("ground", "base"))

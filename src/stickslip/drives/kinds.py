@@ -277,7 +277,7 @@ class RecordedBase:
     label = "Recorded base motion"
 
     samples: ArrayLike = parameter(
-        "m", "displacement of the spring's end", array=True, note="two values at least, four for cubic pieces"
+        "m", "displacement of the spring's end", size="array", note="two values at least, four for cubic pieces"
     )
     fs: float = parameter("Hz", "sampling rate", positive=True, note="the first sample is at time 0")
     order: int = parameter(
@@ -349,8 +349,8 @@ class SpeedProfile:
 
     label = "Profile of speeds"
 
-    times: Sequence[float] = parameter("s", "instants", array=True, note="increasing from 0")
-    speeds: Sequence[float] = parameter("m/s", "speeds", array=True, note="one at every instant")
+    times: Sequence[float] = parameter("s", "instants", size="array", note="increasing from 0")
+    speeds: Sequence[float] = parameter("m/s", "speeds", size="array", note="one at every instant")
     on: str = parameter(
         "", "what moves", default="base", choices=("base", "face"), note="the spring's end or the counter-face"
     )

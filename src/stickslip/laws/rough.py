@@ -60,7 +60,7 @@ class RoughSurface:
         "1",
         "profile",
         default=None,
-        array=True,
+        size="array",
         note="1 + r itself, at equal distances of `length` around x = 0, where it is known",
     )
 
