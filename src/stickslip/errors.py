@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 
 class StickslipError(Exception):
     """Base of every error that stickslip raises on purpose.
@@ -48,6 +50,12 @@ class ModelError(StickslipError):
     """A parameter of a rig or model has no meaning (a negative mass, a typo in a settings file)."""
 
     exit_code = 2
+    parameter = ""  # its name, where the error is of one
+
+    def of(self, parameter: str) -> Self:
+        """The error, said of a parameter: whoever reads it from a file names its line."""
+        self.parameter = parameter
+        return self
 
 
 class SolveError(StickslipError):

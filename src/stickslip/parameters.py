@@ -47,7 +47,7 @@ class Parameter:
         if self.choices and value not in self.choices:
             raise ModelError(
                 f"{name} = {value!r}", f"{self.name}: {' or '.join(map(repr, self.choices))}", f"choose one as {name}="
-            )
+            ).of(name)
         if self.unit and self.size != "array":
             for number in value if self.size == "row" else [value]:
                 finite(name, number, unit=self.unit, positive=self.positive, signed=self.signed)
@@ -173,13 +173,13 @@ def finite(name: str, value: float, *, unit: str, positive: bool = False, signed
     try:
         known, number = math.isfinite(value), float(value)
     except (TypeError, ValueError):
-        raise ModelError(f"{name} = {value!r}", f"{name} is a number [{unit}]", f"correct {name}=") from None
+        raise ModelError(f"{name} = {value!r}", f"{name} is a number [{unit}]", f"correct {name}=").of(name) from None
     if not known or (number < 0 and not signed) or (number == 0 and positive):
         rule = (
             "is a finite number" if signed else "is finite and positive" if positive else "is finite and not negative"
         )
         shown = value if unit in ("", "1") else f"{value} {unit}"
-        raise ModelError(f"{name} = {shown}", f"{name} {rule}", f"correct {name}=")
+        raise ModelError(f"{name} = {shown}", f"{name} {rule}", f"correct {name}=").of(name)
     return number
 
 

@@ -95,7 +95,7 @@ class Contact:
                     f"stiffness = {self.stiffness} N/m without normal",
                     "a load follows the motion in a direction",
                     "give normal=, or leave out stiffness=",
-                )
+                ).of("stiffness")
             if self.preload != 1:
                 self._require("preload", "under a preload")
             return
@@ -219,7 +219,9 @@ class Structure:
         _require_mass(np.asarray(self.mass))
         _require_symmetric(np.asarray(self.stiffness))
         if isinstance(self.contacts, Contact) or not all(isinstance(contact, Contact) for contact in self.contacts):
-            raise ModelError(f"contacts = {self.contacts!r}", "contacts are a list of Contact", "give contacts=[...]")
+            raise ModelError(
+                f"contacts = {self.contacts!r}", "contacts are a list of Contact", "give contacts=[...]"
+            ).of("contacts")
         object.__setattr__(self, "contacts", tuple(self.contacts))
         require_drive(self.drive)
         _require_directions(self.contacts, size)
@@ -306,7 +308,7 @@ def _angles(rotations: Sequence[int], size: int) -> tuple[int, ...]:
             f"rotations = {rotations!r}",
             f"they are numbers of degrees of freedom, from 1 to {size}",
             "correct rotations=",
-        )
+        ).of("rotations")
     return tuple(angles)
 
 
@@ -316,7 +318,7 @@ def _require_mass(mass: Array) -> None:
             f"mass = {mass.tolist()} kg",
             "a mass matrix is symmetric and positive definite",
             "correct mass=: every degree of freedom needs a mass",
-        )
+        ).of("mass")
 
 
 def _require_symmetric(stiffness: Array) -> None:
@@ -343,13 +345,17 @@ def _numbers(name: str, values: ArrayLike) -> Array:
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as reason:
-        raise ModelError(f"{name} = {values!r}", f"{name} is numbers in rows of equal length", "correct it") from reason
+        raise ModelError(f"{name} = {values!r}", f"{name} is numbers in rows of equal length", "correct it").of(
+            name
+        ) from reason
 
 
 def _direction(name: str, values: ArrayLike) -> Array:
     row = np.atleast_1d(_numbers(name, values))
     if row.ndim != 1 or not np.all(np.isfinite(row)) or not np.any(row):
-        raise ModelError(f"{name} = {row.tolist()}", f"{name} is a row of finite numbers, not all zero", "correct it")
+        raise ModelError(
+            f"{name} = {row.tolist()}", f"{name} is a row of finite numbers, not all zero", "correct it"
+        ).of(name)
     row.flags.writeable = False
     return row
 
