@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 
 class StickslipError(Exception):
     """Base of every error that stickslip raises on purpose.
@@ -52,7 +50,7 @@ class ModelError(StickslipError):
     exit_code = 2
     parameter = ""  # its name, where the error is of one
 
-    def of(self, parameter: str) -> Self:
+    def of(self, parameter: str) -> ModelError:
         """The error, said of a parameter: whoever reads it from a file names its line."""
         self.parameter = parameter
         return self
