@@ -91,6 +91,9 @@ def test_its_parameters_are_checked_and_told() -> None:
     assert "back : float\n    Sliding friction back [N]; against motion to negative x." in (
         AsymmetricCoulomb.__doc__ or ""
     )
+    with pytest.raises(ss.errors.ModelError, match="forward is a number"):
+        AsymmetricCoulomb([1.0, 2.0], back=1.0)
+    assert AsymmetricCoulomb(np.array(1.2), back=0.8) == LAW
     assert unit(slider(), "law.back") == "N"
 
 

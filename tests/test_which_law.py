@@ -16,11 +16,11 @@ import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.law.choice import CERTAIN, Evidence, Misfit, standings
 from stickslip.law.guess import Seen
-from stickslip.law.hypotheses import hypotheses
 from stickslip.law.search import Knob, Problem
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
 from stickslip.law.surety import _end
+from stickslip.laws.register import hypotheses
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Step
 

@@ -52,6 +52,12 @@ class ModelError(StickslipError):
     """A parameter of a rig or model has no meaning (a negative mass, a typo in a settings file)."""
 
     exit_code = 2
+    parameter = ""  # its name, where the error is of one
+
+    def of(self, parameter: str) -> ModelError:
+        """The error, said of a parameter: whoever reads it from a file names its line."""
+        self.parameter = parameter
+        return self
 
 
 class SolveError(StickslipError):

@@ -38,7 +38,9 @@ class Oscillator:
 
     def __post_init__(self) -> None:
         if isinstance(self.law, type) or not (hasattr(self.law, "modes") or hasattr(self.law, "rates")):
-            raise ModelError(f"law = {self.law!r}", "a mass rubs under a friction law", "give one, as law=Coulomb(1.1)")
+            raise ModelError(
+                f"law = {self.law!r}", "a mass rubs under a friction law", "give one, as law=Coulomb(1.1)"
+            ).of("law")
         require_drive(self.drive)
 
     @property

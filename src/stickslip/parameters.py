@@ -10,7 +10,7 @@ import inspect
 import math
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar, dataclass_transform, overload
 
@@ -33,7 +33,7 @@ class Parameter:
     positive: bool = False
     signed: bool = False
     choices: tuple[str, ...] = ()
-    array: bool = False
+    size: str = "number"
 
     @property
     def described(self) -> str:
@@ -43,13 +43,13 @@ class Parameter:
         return f"{self.name[:1].upper()}{self.name[1:]}{unit}{note}."
 
     def check(self, name: str, value: Any) -> None:
-        """Refuse a value that the parameter can not have; the numbers of an array are its class's to check."""
+        """Refuse a value that the parameter can not have; an array is its class's to check."""
         if self.choices and value not in self.choices:
             raise ModelError(
                 f"{name} = {value!r}", f"{self.name}: {' or '.join(map(repr, self.choices))}", f"choose one as {name}="
-            )
-        if self.unit and not self.array:
-            for number in value if isinstance(value, Iterable) and not isinstance(value, str) else [value]:
+            ).of(name)
+        if self.unit and self.size != "array":
+            for number in value if self.size == "row" else [value]:
                 finite(name, number, unit=self.unit, positive=self.positive, signed=self.signed)
 
 
@@ -62,7 +62,7 @@ def parameter(
     positive: bool = False,
     signed: bool = False,
     choices: tuple[str, ...] = (),
-    array: bool = False,
+    size: str = "number",
 ) -> Any:
     """A field of a law, a drive or a system: finite and not negative where nothing else is said.
 
@@ -80,8 +80,8 @@ def parameter(
         Zero is refused; a negative number is not.
     choices : tuple of str
         The words that it may be.
-    array : bool
-        An array or matrix, which its class checks as a whole.
+    size : {"number", "row", "array"}
+        One number; a row of which every number has these bounds; an array or matrix, which its class checks as a whole.
 
     Returns
     -------
@@ -96,8 +96,8 @@ def parameter(
     >>> declared(Viscous, "slope").described
     'Damping [N s/m].'
     """
-    told = Parameter(unit, name, note, positive, signed, choices, array)
-    return field(default=default, metadata={"parameter": told})
+    declared = Parameter(unit, name, note, positive, signed, choices, size)
+    return field(default=default, metadata={"parameter": declared})
 
 
 @overload
@@ -119,31 +119,32 @@ def parametric(part: Any = None, *, eq: bool = True) -> Any:
     """
     if part is None:
         return lambda part: parametric(part, eq=eq)
-    own = getattr(part, "__post_init__", None)
+    beyond = getattr(part, "__post_init__", None)
 
-    def check_all(self: Any) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if not (value is None and each.default is None):  # left out
-                declaration(each).check(each.name, value)
-        if own is not None:
-            own(self)
+    def check(self: Any) -> None:
+        for name, default, declared in known:
+            value = getattr(self, name)
+            if not (value is None and default is None):  # left out
+                declared.check(name, value)
+        if beyond is not None:
+            beyond(self)
 
-    part.__post_init__ = check_all
+    part.__post_init__ = check
     made = dataclass(frozen=True, eq=eq)(part)
     made.__doc__ = _documented(made)
+    known = [(own.name, own.default, declaration(own)) for own in fields(made)]
     return made
 
 
 def declaration(of: Field[Any]) -> Parameter:
     """What a field declares; nothing, where it is a plain one."""
-    told = of.metadata.get("parameter")
-    return told if isinstance(told, Parameter) else Parameter()
+    declared = of.metadata.get("parameter")
+    return declared if isinstance(declared, Parameter) else Parameter()
 
 
 def declared(part: type, name: str) -> Parameter:
     """What the class of a part declares of the parameter `name`."""
-    return next(declaration(each) for each in fields(part) if each.name == name)
+    return next(declaration(own) for own in fields(part) if own.name == name)
 
 
 def _documented(part: Any) -> str | None:
@@ -154,17 +155,17 @@ def _documented(part: Any) -> str | None:
     text = inspect.cleandoc(written)
     first = SECTION.search(text)
     place = first.start() if first else len(text)
-    lines = [line for each in fields(part) for line in _entry(each)]
+    lines = [line for own in fields(part) for line in _entry(own)]
     before, after = text[:place].rstrip(), text[place:]
     return "\n".join([before, "", "Attributes", "----------", *lines, "", after]).rstrip() + "\n"
 
 
 def _entry(of: Field[Any]) -> Iterator[str]:
-    told = declaration(of)
-    kind = "{" + ", ".join(f'"{choice}"' for choice in told.choices) + "}" if told.choices else str(of.type)
+    declared = declaration(of)
+    kind = "{" + ", ".join(f'"{choice}"' for choice in declared.choices) + "}" if declared.choices else str(of.type)
     default = "" if of.default is MISSING or of.default is None else f", default {of.default!r}"
     yield f"{of.name} : {kind.replace(' | ', ' or ')}{default}"
-    yield from textwrap.wrap(told.described, 112, initial_indent="    ", subsequent_indent="    ")
+    yield from textwrap.wrap(declared.described, 112, initial_indent="    ", subsequent_indent="    ")
 
 
 def finite(name: str, value: float, *, unit: str, positive: bool = False, signed: bool = False) -> float:
@@ -172,13 +173,13 @@ def finite(name: str, value: float, *, unit: str, positive: bool = False, signed
     try:
         known, number = math.isfinite(value), float(value)
     except (TypeError, ValueError):
-        raise ModelError(f"{name} = {value!r}", f"{name} is a number [{unit}]", f"correct {name}=") from None
+        raise ModelError(f"{name} = {value!r}", f"{name} is a number [{unit}]", f"correct {name}=").of(name) from None
     if not known or (number < 0 and not signed) or (number == 0 and positive):
         rule = (
             "is a finite number" if signed else "is finite and positive" if positive else "is finite and not negative"
         )
-        told = value if unit in ("", "1") else f"{value} {unit}"
-        raise ModelError(f"{name} = {told}", f"{name} {rule}", f"correct {name}=")
+        shown = value if unit in ("", "1") else f"{value} {unit}"
+        raise ModelError(f"{name} = {shown}", f"{name} {rule}", f"correct {name}=").of(name)
     return number
 
 

@@ -56,14 +56,14 @@ class Contact:
     tangent: ArrayLike = parameter(
         "1",
         "direction of sliding",
-        array=True,
+        size="array",
         note="w_t (n,): the contact slides by :math:`w_t q` less the counter-face's motion",
     )
     normal: ArrayLike | None = parameter(
         "1",
         "direction that presses the contact",
         default=None,
-        array=True,
+        size="array",
         note="w_n (n,); that of `tangent` where one motion slides and presses, as a sprag does",
     )
     stiffness: float = parameter(
@@ -95,7 +95,7 @@ class Contact:
                     f"stiffness = {self.stiffness} N/m without normal",
                     "a load follows the motion in a direction",
                     "give normal=, or leave out stiffness=",
-                )
+                ).of("stiffness")
             if self.preload != 1:
                 self._require("preload", "under a preload")
             return
@@ -189,11 +189,11 @@ class Structure:
     """
 
     mass: ArrayLike = parameter(
-        "kg", "mass matrix", array=True, note="M (n, n), positive definite; a number for one degree of freedom"
+        "kg", "mass matrix", size="array", note="M (n, n), positive definite; a number for one degree of freedom"
     )
-    damping: ArrayLike = parameter("N s/m", "damping matrix", array=True, note="C (n, n)")
+    damping: ArrayLike = parameter("N s/m", "damping matrix", size="array", note="C (n, n)")
     stiffness: ArrayLike = parameter(
-        "N/m", "stiffness matrix", array=True, note="K (n, n), symmetric, without the contacts'"
+        "N/m", "stiffness matrix", size="array", note="K (n, n), symmetric, without the contacts'"
     )
     contacts: Sequence[Contact] = parameter("", "where it rubs", default=())
     drive: Drive = parameter("", "what moves", default=Release(), note="nothing where left out")
@@ -201,7 +201,7 @@ class Structure:
         "1",
         "share of the drive",
         default=None,
-        array=True,
+        size="array",
         note="r (n,): of its force on every degree of freedom, or of the base's motion in it; 1 for all where left out",
     )
     damper: str = parameter("", "what the dampers are fixed to", default="ground", choices=("ground", "base"))
@@ -219,7 +219,9 @@ class Structure:
         _require_mass(np.asarray(self.mass))
         _require_symmetric(np.asarray(self.stiffness))
         if isinstance(self.contacts, Contact) or not all(isinstance(contact, Contact) for contact in self.contacts):
-            raise ModelError(f"contacts = {self.contacts!r}", "contacts are a list of Contact", "give contacts=[...]")
+            raise ModelError(
+                f"contacts = {self.contacts!r}", "contacts are a list of Contact", "give contacts=[...]"
+            ).of("contacts")
         object.__setattr__(self, "contacts", tuple(self.contacts))
         require_drive(self.drive)
         _require_directions(self.contacts, size)
@@ -306,7 +308,7 @@ def _angles(rotations: Sequence[int], size: int) -> tuple[int, ...]:
             f"rotations = {rotations!r}",
             f"they are numbers of degrees of freedom, from 1 to {size}",
             "correct rotations=",
-        )
+        ).of("rotations")
     return tuple(angles)
 
 
@@ -316,7 +318,7 @@ def _require_mass(mass: Array) -> None:
             f"mass = {mass.tolist()} kg",
             "a mass matrix is symmetric and positive definite",
             "correct mass=: every degree of freedom needs a mass",
-        )
+        ).of("mass")
 
 
 def _require_symmetric(stiffness: Array) -> None:
@@ -343,13 +345,17 @@ def _numbers(name: str, values: ArrayLike) -> Array:
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as reason:
-        raise ModelError(f"{name} = {values!r}", f"{name} is numbers in rows of equal length", "correct it") from reason
+        raise ModelError(f"{name} = {values!r}", f"{name} is numbers in rows of equal length", "correct it").of(
+            name
+        ) from reason
 
 
 def _direction(name: str, values: ArrayLike) -> Array:
     row = np.atleast_1d(_numbers(name, values))
     if row.ndim != 1 or not np.all(np.isfinite(row)) or not np.any(row):
-        raise ModelError(f"{name} = {row.tolist()}", f"{name} is a row of finite numbers, not all zero", "correct it")
+        raise ModelError(
+            f"{name} = {row.tolist()}", f"{name} is a row of finite numbers, not all zero", "correct it"
+        ).of(name)
     row.flags.writeable = False
     return row
 

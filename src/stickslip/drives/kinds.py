@@ -60,16 +60,16 @@ class Drive(Protocol):
         """The drive as signals with linear rates."""
 
 
-def _require(condition: bool, value: str, rule: str, next_step: str) -> None:
+def _require(condition: bool, value: str, rule: str, next_step: str, *, of: str = "") -> None:
     if not condition:
-        raise ModelError(value, rule, next_step)
+        raise ModelError(value, rule, next_step).of(of)
 
 
 def require_drive(drive: object) -> None:
     """Refuse what does not drive."""
     _require(
         hasattr(drive, "motion") and not isinstance(drive, type), f"drive = {drive!r}", "a drive says what moves",
-        "give one, as drive=HarmonicBase(1e-3, frequency=2.5), or leave it out",
+        "give one, as drive=HarmonicBase(1e-3, frequency=2.5), or leave it out", of="drive",
     )  # fmt: skip
 
 
@@ -79,11 +79,12 @@ def _check_frequency(frequency: float) -> None:
         f"frequency = {frequency} Hz",
         f"a drive repeats between 0 and {LARGEST_FREQUENCY:g} times a second",
         "give frequency= in Hz",
+        of="frequency",
     )
 
 
 def _check_speed(speed: float, *, rule: str) -> None:
-    _require(speed != 0, "speed = 0 m/s", rule, "give its speed=, or use Release() for a mass at rest")
+    _require(speed != 0, "speed = 0 m/s", rule, "give its speed=, or use Release() for a mass at rest", of="speed")
 
 
 def _tones(tones: Sequence[tuple[float, float, float]]) -> tuple[Motion, Row]:
@@ -207,6 +208,7 @@ class MultiTone:
             f"tones = {self.tones}",
             "a tone is its amplitude, frequency [Hz] and phase [rad]",
             "give three numbers for each",
+            of="tones",
         )
         self.motion()
 
@@ -277,7 +279,7 @@ class RecordedBase:
     label = "Recorded base motion"
 
     samples: ArrayLike = parameter(
-        "m", "displacement of the spring's end", array=True, note="two values at least, four for cubic pieces"
+        "m", "displacement of the spring's end", size="array", note="two values at least, four for cubic pieces"
     )
     fs: float = parameter("Hz", "sampling rate", positive=True, note="the first sample is at time 0")
     order: int = parameter(
@@ -290,7 +292,13 @@ class RecordedBase:
     contact: str = parameter("", "what the mass rubs on", default="ground", choices=("ground", "base"))
 
     def __post_init__(self) -> None:
-        _require(self.order in (1, 3), f"order = {self.order}", "pieces are linear (1) or cubic (3)", "choose one")
+        _require(
+            self.order in (1, 3),
+            f"order = {self.order}",
+            "pieces are linear (1) or cubic (3)",
+            "choose one",
+            of="order",
+        )
         _require(
             self.order == 3 or self.contact == "ground",
             "linear pieces under a contact on the base",
@@ -349,8 +357,8 @@ class SpeedProfile:
 
     label = "Profile of speeds"
 
-    times: Sequence[float] = parameter("s", "instants", array=True, note="increasing from 0")
-    speeds: Sequence[float] = parameter("m/s", "speeds", array=True, note="one at every instant")
+    times: Sequence[float] = parameter("s", "instants", size="array", note="increasing from 0")
+    speeds: Sequence[float] = parameter("m/s", "speeds", size="array", note="one at every instant")
     on: str = parameter(
         "", "what moves", default="base", choices=("base", "face"), note="the spring's end or the counter-face"
     )

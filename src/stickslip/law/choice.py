@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.law.hypotheses import family_of
+from stickslip.laws.register import family_of
 from stickslip.statistics import correlation_time
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What records say of sliding and friction before any law, and which laws are tried on them."""
+"""What records say of sliding and friction before any law is tried on them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stickslip.drives.kinds import Release
 from stickslip.errors import EstimateError
 from stickslip.law.drive import as_driven, face_of
 from stickslip.law.releases import Rests
-from stickslip.laws.guessing import LEAST_EXCESS
+from stickslip.laws.guessing import LEAST_EXCESS, Observed
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
 
@@ -25,33 +25,16 @@ EDGE = 24  # samples at either end that a smoother knows less of
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """Sliding and friction of all records, end to end.
+class Seen(Observed):
+    """Sliding and friction of all records, and how friction stands around rest.
 
     Attributes
     ----------
-    slip, speed, friction : ndarray (n,)
-        Way [m] from one sample to the next, velocity [m/s] and friction [N] at the contact.
-    step : ndarray (n,)
-        Time [s] to the next sample.
-    level : float
-        Friction of fast sliding [N].
-    frequency : float
-        Angular frequency [rad/s] of the motion: speed over displacement.
     rests : Rests
         Friction around rest.
-    mass : float
-        What slides [kg].
     """
 
-    slip: Array
-    speed: Array
-    friction: Array
-    step: Array
-    level: float
-    frequency: float
     rests: Rests
-    mass: float
 
     @classmethod
     def of(cls, records: Sequence[Record], oscillator: Oscillator) -> Seen:
@@ -80,28 +63,20 @@ class Seen:
                 "friction (fit_curve, --curve)" if still
                 else "correct the signs of the channels, or mass= and stiffness=",
             )  # fmt: skip
-        way = float(np.std(np.concatenate(ways)))
-        return cls(np.concatenate(slips), speed, friction, np.concatenate(steps), level, float(np.std(speed)) / way,
-                   Rests.together(rests), oscillator.mass)  # fmt: skip
+        way, around = float(np.std(np.concatenate(ways))), Rests.together(rests)
+        return cls(
+            np.concatenate(slips), speed, friction, np.concatenate(steps), level,
+            _excess(speed, friction, level, around), float(np.std(speed)) / way, oscillator.mass, around,
+        )  # fmt: skip
 
-    @property
-    def fastest(self) -> float:
-        """The largest speed [m/s]."""
-        return float(np.abs(self.speed).max())
 
-    @property
-    def excess(self) -> float:
-        """By what part friction exceeds the level at a release, or at rest where there is none."""
-        fall = self.rests.fall
-        if fall is not None:
-            return max(LEAST_EXCESS, fall.value)
-        slow = np.abs(self.speed) < SLOW * self.fastest
-        reached = float(np.quantile(np.abs(self.friction[slow]), 0.9)) if slow.sum() > EDGE else self.level
-        return max(LEAST_EXCESS, min(1.0, reached / self.level - 1))
-
-    def left(self, modelled: Array) -> float:
-        """Mean square of what a modelled friction leaves [N^2]."""
-        return float(np.mean((self.friction - modelled) ** 2))
+def _excess(speed: Array, friction: Array, level: float, rests: Rests) -> float:
+    """By what part friction exceeds the level at a release, or at rest where there is none."""
+    if rests.fall is not None:
+        return max(LEAST_EXCESS, rests.fall.value)
+    slow = np.abs(speed) < SLOW * float(np.abs(speed).max())
+    reached = float(np.quantile(np.abs(friction[slow]), 0.9)) if slow.sum() > EDGE else level
+    return max(LEAST_EXCESS, min(1.0, reached / level - 1))
 
 
 def _rests(told: Record, speed: Array, friction: Array, way: Array) -> Rests:

@@ -14,7 +14,6 @@ from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Estimate, Result, Status
 from stickslip.law.choice import CALIBRATIONS, Misfit, Standing, standings, times, undescribed
 from stickslip.law.guess import Seen
-from stickslip.law.hypotheses import family_of, hypotheses
 from stickslip.law.law import LawFit, answered
 from stickslip.law.search import descend
 from stickslip.law.start import Shown, require_apart, too_few
@@ -34,6 +33,7 @@ from stickslip.law.trials import (
     weighed,
     with_static,
 )
+from stickslip.laws.register import family_of, hypotheses
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, Step
 

@@ -119,5 +119,5 @@ def static_level(static: float | None, kinetic: float) -> float:
             f"static = {level:.6g} N below kinetic = {kinetic:.6g} N",
             "static friction is at least the kinetic friction",
             "raise static=, or leave it out to make both equal",
-        )
+        ).of("static")
     return level

@@ -27,8 +27,10 @@ class ElastoSlip:
     formula = "f = sum of elements, each a spring of its stiffness that slips at its force"
     loads = ("preload",)  # of a contact: its levels are proportional to a steady load
 
-    stiffnesses: Sequence[float] = parameter("N/m", "stiffnesses", positive=True, note="the spring of every element")
-    forces: Sequence[float] = parameter("N", "yield forces", positive=True, note="one of every element")
+    stiffnesses: Sequence[float] = parameter(
+        "N/m", "stiffnesses", size="row", positive=True, note="the spring of every element"
+    )
+    forces: Sequence[float] = parameter("N", "yield forces", size="row", positive=True, note="one of every element")
 
     def __post_init__(self) -> None:
         if len(self.stiffnesses) != len(self.forces) or len(self.forces) == 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -19,47 +20,43 @@ STIFF = 1e-2  # of the smallest stroke, by which a contact gives way that counts
 STIFFEST = 1e-4  # of the stroke: what a contact that is next to rigid gives way
 
 
-class Observed(Protocol):
-    """Sliding and friction of all records, end to end, as the sensors tell them without any law."""
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Sliding and friction of all records, end to end, as the sensors tell them without any law.
 
-    @property
-    def slip(self) -> Array:
-        """Way from one sample to the next [m]."""
+    Attributes
+    ----------
+    slip, speed, friction : ndarray (n,)
+        Way [m] from one sample to the next, velocity [m/s] and friction [N] at the contact.
+    step : ndarray (n,)
+        Time [s] to the next sample.
+    level : float
+        Friction of fast sliding [N].
+    excess : float
+        By what part friction exceeds the level at a release, or at rest where there is none.
+    frequency : float
+        Angular frequency [rad/s] of the motion: speed over displacement.
+    mass : float
+        What slides [kg].
+    """
 
-    @property
-    def speed(self) -> Array:
-        """Velocity at the contact [m/s]."""
-
-    @property
-    def friction(self) -> Array:
-        """Friction [N]."""
-
-    @property
-    def step(self) -> Array:
-        """Time to the next sample [s]."""
-
-    @property
-    def level(self) -> float:
-        """Friction of fast sliding [N]."""
-
-    @property
-    def excess(self) -> float:
-        """By what part friction exceeds the level at a release, or at rest."""
+    slip: Array
+    speed: Array
+    friction: Array
+    step: Array
+    level: float
+    excess: float
+    frequency: float
+    mass: float
 
     @property
     def fastest(self) -> float:
         """The largest speed [m/s]."""
-
-    @property
-    def frequency(self) -> float:
-        """Angular frequency of the motion [rad/s]."""
-
-    @property
-    def mass(self) -> float:
-        """What slides [kg]."""
+        return float(np.abs(self.speed).max())
 
     def left(self, modelled: Array) -> float:
         """Mean square of what a modelled friction leaves [N^2]."""
+        return float(np.mean((self.friction - modelled) ** 2))
 
 
 class Searched(Protocol):

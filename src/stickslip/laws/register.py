@@ -1,4 +1,4 @@
-"""The laws that every room knows by name: those that the room's stub lists and that carry a formula."""
+"""The laws that every room knows by name: those of the room's stub that carry a formula."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from stickslip import laws
+from stickslip.laws.guessing import RIGID, Family, Hypothesis
 
 
 @functools.cache
@@ -26,3 +27,15 @@ def registered() -> dict[str, type[Any]]:
 def required(law: type[Any]) -> int:
     """How many parameters of a law must be given."""
     return sum(field.default is MISSING for field in fields(law))
+
+
+def hypotheses() -> dict[str, Hypothesis]:
+    """What records are asked to choose from, by name: rigid contacts, then others, the simplest of both first."""
+    known = [each for law in registered().values() if hasattr(law, "hypotheses") for each in law.hypotheses()]
+    return {each.name: each for each in sorted(known, key=lambda each: each.family is not RIGID)}
+
+
+def family_of(name: str) -> Family:
+    """The family of a law by its name; one that is no hypothesis is its own."""
+    known = hypotheses().get(name)
+    return known.family if known else Family(name, name)

@@ -60,7 +60,7 @@ class RoughSurface:
         "1",
         "profile",
         default=None,
-        array=True,
+        size="array",
         note="1 + r itself, at equal distances of `length` around x = 0, where it is known",
     )
 
@@ -77,13 +77,13 @@ class RoughSurface:
         if self.values is not None and not (len(self.values) >= 2 and np.all(np.isfinite(self.values))):
             raise ModelError(
                 f"values = {self.values}", "a profile has two finite values or more", "correct them, or leave them out"
-            )
+            ).of("values")
         if self.share > 0.3 or self.span / self.length > CELLS:
             raise ModelError(
                 f"share = {self.share}, span = {self.span} m of {self.length} m each",
                 f"the fluctuation is 0.3 at most, and the span has at most {CELLS} lengths",
                 "make the surface smoother, shorter, or of longer waves",
-            )
+            ).of("share")
 
     @cached_property
     def knots(self) -> NDArray[np.float64]:

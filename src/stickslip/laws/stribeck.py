@@ -46,7 +46,7 @@ def require_static_above(law: Stribeck | LuGre) -> None:
             f"static = {law.static:.6g} N below kinetic = {law.kinetic:.6g} N",
             "static friction is at least the kinetic friction",
             "raise static=",
-        )
+        ).of("static")
 
 
 @parametric
@@ -176,14 +176,14 @@ class FrictionCurve(Rigid):
                 "a curve is a function that makes an Expression of the sliding speed, by + - * / ** and the functions"
                 " of stickslip.laws.curved",
                 "give one, as lambda v: 1 + 0.2 / (1 + v); for friction without speed take Coulomb",
-            )
+            ).of("curve")
         rest = finite("curve at rest", self.friction(0.0), unit="N")
         if self.static is not None and finite("static", self.static, unit="N") < rest:
             raise ModelError(
                 f"static = {self.static} N below the curve's {rest:g} N at rest",
                 "static friction is at least the friction of the slowest slip",
                 "raise static=, or leave it out to take the curve's own",
-            )
+            ).of("static")
 
     def friction(self, speed: float) -> float:
         """Friction force while sliding at a speed.
@@ -199,7 +199,7 @@ class FrictionCurve(Rigid):
             Force [N].
         """
         if not math.isfinite(speed):
-            raise ModelError(f"speed = {speed} m/s", "a speed is finite", "correct it")
+            raise ModelError(f"speed = {speed} m/s", "a speed is finite", "correct it").of("speed")
         return self.curve(symbol("v")).at(v=speed)
 
     @property

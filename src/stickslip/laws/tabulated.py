@@ -35,8 +35,10 @@ class Tabulated(Rigid):
     loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     chosen = ("error",)  # not fitted where nothing else is said
 
-    speeds: Sequence[float] = parameter("m/s", "sliding speeds", signed=True, note="increasing, the first one 0")
-    forces: Sequence[float] = parameter("N", "friction forces", note="one at each speed")
+    speeds: Sequence[float] = parameter(
+        "m/s", "sliding speeds", size="row", signed=True, note="increasing, the first one 0"
+    )
+    forces: Sequence[float] = parameter("N", "friction forces", size="row", note="one at each speed")
     static: float | None = parameter("N", "static friction", default=None, note="None: the force at speed 0")
     error: float = parameter(
         "N",

@@ -79,7 +79,7 @@ class TimeDelay(Rigid):
                 f"law = {type(self.law).__name__}",
                 "a time lag is that of a law whose friction follows the speed alone",
                 "give a Stribeck, FrictionCurve, LinearSlope or Tabulated",
-            )
+            ).of("law")
 
     @property
     def entry(self) -> tuple[str, str, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import re
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -350,7 +349,7 @@ def _check_run(case: Case) -> None:
     if case.duration > end * (1 + 1e-9):
         raise ModelError(
             f"duration = {case.duration:g} s", f"the recorded base motion ends at {end:g} s", "run it no longer"
-        )
+        ).of("duration")
 
 
 def _part(model: type[BaseModel], table: str, values: Mapping[str, Any], source: _Source) -> dict[str, Any]:
@@ -413,8 +412,7 @@ def _placed(table: str, source: _Source) -> Iterator[None]:
     try:
         yield
     except ModelError as error:
-        named = re.match(r"(\w+) = ", error.value)
-        where = line_of([*table.split("."), *([named[1]] if named else [])], source.lines)
+        where = line_of([*table.split("."), *filter(None, [error.parameter])], source.lines)
         raise ModelError(f"{source.name}{where} [{table}]: {error.value}", error.rule, error.next_step) from error
 
 
