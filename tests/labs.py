@@ -69,7 +69,7 @@ def running_lab(browser: Path | None = None) -> Iterator[Lab]:
     finally:
         process.send_signal(signal.SIGINT)
         try:
-            process.wait(300)
+            process.wait(600)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             raise

@@ -26,7 +26,7 @@ BYTES = 1_000_000_000
 ADDRESSES = 4 * BYTES  # what may be reserved: thread stacks and arenas are, and are never touched
 
 _FORKS = multiprocessing.get_context("forkserver")
-_FORKS.set_forkserver_preload(["stickslip.cli.program", "numpy", "pandas", "pint", "numba", "scipy.signal", "limits"])
+_FORKS.set_forkserver_preload(["warm", "limits"])
 
 
 @dataclass(frozen=True)

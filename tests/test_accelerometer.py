@@ -14,6 +14,7 @@ from stickslip.contact.mechanisms import UNTOLD
 RIG = {"mass": 2.42, "stiffness": 2310.0}
 TRUE = 45.0914  # Hz: sqrt((k + K)/m (1 - zeta^2)) / 2 pi
 PERFECT = ss.Rig.perfect()
+FEW = np.array([20.0, 40.0, 80.0])  # Hz: of the map, about which nothing is asked here
 
 
 @functools.cache
@@ -40,8 +41,9 @@ def measured(rig: ss.Rig, seed: int = 1) -> ss.Record:
 )
 def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
     record = rig.stated(measured(rig))
-    assert ss.contact.mechanism(record, **RIG).name == "double stick-slip"
-    slips, mode = ss.contact.find_microslips(record, **RIG), ss.contact.transition(record, **RIG)
+    found = ss.answers.time_frequency(record, frequencies=FEW, **RIG)
+    assert found.mechanism.name == "double stick-slip"
+    slips, mode = found.microslips, found.transition
     assert mode.status == "ok"
     assert (slips.status == "ok") == (record.channels["load"].mount is not None if "load" in record else False)
     assert slips.per_stick.value == pytest.approx(2, abs=0.3)
@@ -69,7 +71,7 @@ def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
     ids=["mount of 125 Hz", "mount of 1000 Hz", "noise", "the thesis's"],
 )
 def test_what_is_not_stated_is_named_and_nothing_told_surely(rig: ss.Rig, told: dict[str, float], why: str) -> None:
-    found = ss.answers.time_frequency(measured(rig), frequencies=np.array([20.0, 40.0, 80.0]), **told)
+    found = ss.answers.time_frequency(measured(rig), frequencies=FEW, **told)
     assert found.mechanism is not None
     assert found.mechanism.name == UNTOLD
     assert np.isnan(found.mechanism.probability)
@@ -103,11 +105,9 @@ def test_a_clean_record_from_rest_on_has_no_mount_and_no_offset() -> None:
     contact = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
     drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.1196, law=contact, drive=drive)
-    clean = ss.simulate(slider, duration=6).record(fs=4000)
-    mode = ss.contact.transition(clean, **RIG).frequency
-    assert ss.contact.mechanism(clean).name == "double stick-slip"
-    assert mode.status == "ok"
-    assert mode.value == pytest.approx(TRUE, rel=1e-4)
-    assert ss.contact.find_microslips(clean).per_stick.value == pytest.approx(2, abs=0.1), (
-        "its start from rest is no offset"
-    )
+    clean = ss.simulate(slider, duration=4).record(fs=4000)
+    found = ss.answers.time_frequency(clean, frequencies=FEW)
+    assert found.mechanism.name == "double stick-slip"
+    assert found.transition.frequency.status == "ok"
+    assert found.transition.frequency.value == pytest.approx(TRUE, rel=1e-4)
+    assert found.microslips.per_stick.value == pytest.approx(2, abs=0.1), "its start from rest is no offset"

@@ -18,6 +18,17 @@ def settled(frequency: float = 8.7) -> ss.Record:
     return told(measured(frequency, seconds=3.0)[0])
 
 
+@cache
+def with_a_wrong_mass() -> ss.answers.Findings:
+    return ss.analyze(settled(), **{**RIG, "mass": 2.9})
+
+
+@cache
+def of_the_demo() -> ss.answers.Findings:
+    demo = ss.datasets.demo()
+    return ss.analyze(demo, **{name: demo.truth[name] for name in ("mass", "stiffness", "damping")})
+
+
 def of(*names: str, stated: bool = False, **instead: np.ndarray) -> ss.Record:
     """Some of the channels; of the sensors' mounts nothing known unless `stated`."""
     whole = settled()
@@ -87,7 +98,7 @@ def test_sensors_that_are_not_there_or_left_out_are_not_missed() -> None:
 
 
 def test_a_mass_that_contradicts_the_record_is_told_in_the_headline() -> None:
-    found = ss.analyze(settled(), **{**RIG, "mass": 2.9})
+    found = with_a_wrong_mass()
     assert found.level is not None
     assert re.search(r"a mass of 2\.4\d* kg", found.level.status)
     assert "not to be trusted" in " ".join(ss.summary(found).headline)
@@ -122,14 +133,13 @@ def test_a_mass_found_in_the_record_is_told_beside_the_contact() -> None:
 
 
 def test_advice_holds_on_the_page_too() -> None:
-    found = ss.analyze(settled(), **{**RIG, "mass": 2.9})
+    found = with_a_wrong_mass()
     assert "record.with_details(" not in words(found)
     assert "[sensors]" in words(found)
 
 
 def test_a_sound_record_of_sensors_that_are_not_described_is_trusted_with_a_caution() -> None:
-    demo = ss.datasets.demo()
-    found = ss.analyze(demo, **{name: demo.truth[name] for name in ("mass", "stiffness", "damping")})
+    found = of_the_demo()
     told = ss.summary(found)
     assert "not to be trusted" not in " ".join(told.headline)
     assert "which the interval leaves out" in " ".join(told.cautions)
@@ -138,7 +148,6 @@ def test_a_sound_record_of_sensors_that_are_not_described_is_trusted_with_a_caut
 
 
 def test_how_far_a_contact_gives_is_told_in_readable_units() -> None:
-    demo = ss.datasets.demo()
-    found = ss.analyze(demo, **{name: demo.truth[name] for name in ("mass", "stiffness", "damping")})
+    found = of_the_demo()
     assert re.search(r"up to 1\.1\d* N it moves -?\d+(\.\d+)? [µn]?m forward", words(found))
     assert "e-0" not in words(found).split("it moves", 1)[1].split("would be felt", 1)[0]

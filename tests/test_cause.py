@@ -25,10 +25,15 @@ def seen(frequency: float, soft: bool, late: bool) -> ss.Record:
     return record.with_details("a", mount=(125.0, 0.1))
 
 
+@cache
+def answered(frequency: float, soft: bool, late: bool) -> ss.contact.Cause:
+    return ss.contact.lag_or_compliance(seen(frequency, soft, late))
+
+
 @pytest.mark.parametrize("late", [False, True])
 @pytest.mark.parametrize(("frequency", "soft"), [(2.5, True), (5.61, True), (8.7, True), (8.7, False), (11.1, False)])
 def test_each_cause_is_told_from_the_others(frequency: float, soft: bool, late: bool) -> None:
-    found = ss.contact.lag_or_compliance(seen(frequency, soft, late))
+    found = answered(frequency, soft, late)
     names = {(True, True): "both", (True, False): "contact compliance", (False, True): "sensor lag"}
     assert found.cause == names.get((soft, late), found.cause)
     if not soft and not late:
@@ -41,7 +46,7 @@ def test_each_cause_is_told_from_the_others(frequency: float, soft: bool, late: 
 
 
 def test_a_lag_would_pass_for_a_third_of_the_transition_speed() -> None:
-    found = ss.contact.lag_or_compliance(seen(8.7, True, True))
+    found = answered(8.7, True, True)
     assert 0.22 < found.mimicked < 0.4
     assert "would pass for" in found.reason
 
@@ -82,7 +87,7 @@ def test_stiffness_and_give_hold_the_truth(frequency: float) -> None:
 
 
 def test_the_answer_is_printed() -> None:
-    found = ss.contact.lag_or_compliance(seen(8.7, True, False))
+    found = answered(8.7, True, False)
     assert str(found).startswith(f"{found.cause}: {found.reason}")
 
 
@@ -94,7 +99,7 @@ def test_of_a_long_record_the_middle_is_looked_at(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_rigid_contact_that_sticks_tells_nothing() -> None:
-    assert ss.contact.lag_or_compliance(seen(2.5, False, True)).cause == "cannot be told"
+    assert answered(2.5, False, True).cause == "cannot be told"
 
 
 def test_what_it_needs() -> None:

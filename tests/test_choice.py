@@ -53,15 +53,16 @@ def test_the_motion_is_found(name: str) -> None:
         assert not (contained and each.kept)
 
 
-def test_a_true_motion_is_rejected_once_in_twenty() -> None:
+@pytest.mark.parametrize(("trials", "most"), [(20, 4), pytest.param(60, 8, marks=pytest.mark.soak)])
+def test_a_true_motion_is_rejected_once_in_twenty(trials: int, most: int) -> None:
     rejected = 0
-    for seed in range(60):
+    for seed in range(trials):
         values = np.array([W, 0.02, 0.02, 0.01, 1, 0.27, 0, 0, 0, 0, 0.5, 0])
         times = np.arange(320) / FS
         x = free_decay(times, values)[0] + 1e-3 * np.random.default_rng(seed).standard_normal(times.size)
         found = choose(times, x, fs=FS, start=values[:6], candidates=("both",))
         rejected += not found.candidate("both").kept
-    assert rejected <= 8  # of 60: more comes of chance once in 500
+    assert rejected <= most  # more comes of chance once in 400 or 500
 
 
 def test_where_the_record_can_not_tell_the_interval_grows() -> None:

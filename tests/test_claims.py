@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from pathlib import Path
@@ -19,6 +20,7 @@ from stickslip.law.choice import Evidence, Misfit, standings
 MASS, SPRING, FS, STEPS = 2.0, 3000.0, 2000, 20
 
 
+@functools.cache
 def rig(
     *, elastic: float = math.inf, level: float = 0.0, damping: float = 0.0, amplitude: float = 1e-3,
     frequency: float = 2.0, duration: float = 6.0,
@@ -310,12 +312,11 @@ def test_an_accelerometer_s_noise_is_no_swing_of_the_friction(noise: float, seed
 def test_a_swing_that_is_there_is_told_through_the_noise(share: float, seed: int) -> None:
     made = rig(elastic=3e5, level=1.2, damping=60.0, amplitude=2e-3, duration=14.0)
     time = np.arange(len(made["x"])) / FS
-    made["friction"] = made["friction"] - 60.0 * made["v"]
     rng = np.random.default_rng(seed)
     tones, phases = rng.uniform(60, 110, 24), rng.uniform(0, 2 * np.pi, 24)
     vibration = np.sin(2 * np.pi * np.outer(time, tones) + phases).sum(axis=1) / math.sqrt(12)
-    made["friction"] += share * 1.2 * vibration
-    found = ss.cycle.breakaway(seen(made, "x", "friction", seed=seed, x=2e-7, friction=0.05))
+    friction = made["friction"] - 60.0 * made["v"] + share * 1.2 * vibration
+    found = ss.cycle.breakaway(seen({**made, "friction": friction}, "x", "friction", seed=seed, x=2e-7, friction=0.05))
     for swing in (found.swing_forward, found.swing_back):
         assert swing is not None
         assert swing.interval[0] > 0
@@ -328,14 +329,13 @@ def test_a_swing_that_is_there_is_told_through_the_noise(share: float, seed: int
 def felt(*, noise: float, seed: int, mount: tuple[float, float] | None = None, gain: float = 1.0) -> ss.Record:
     """x, z, a and a load cell of that noise, ideal or on a mount of which nothing is stated."""
     made = rig(elastic=3e5, level=1.2, damping=20.0, amplitude=2e-3, duration=5.0)
-    load = made["friction"] - 20.0 * made["v"]
-    made["true"] = load
+    true = load = made["friction"] - 20.0 * made["v"]
     if mount is not None:
         turn = 2 * math.pi * mount[0]
         system = ([turn**2], [1.0, 2 * mount[1] * turn, turn**2])
         load = lsim(system, load, np.arange(len(load)) / FS)[1]
-    record = seen({**made, "load": gain * load}, "x", "z", "a", "load", "true", seed=seed, x=2e-6, a=0.2, load=noise)
-    return record
+    made = {**made, "true": true, "load": gain * load}
+    return seen(made, "x", "z", "a", "load", "true", seed=seed, x=2e-6, a=0.2, load=noise)
 
 
 def method_of(record: ss.Record) -> tuple[str, float]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import ast
 import dataclasses
 import re
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import stickslip as ss
+from stickslip.cli.program import main
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -118,6 +119,6 @@ def test_the_tutorial_on_the_command_line(tmp_path: Path, monkeypatch: pytest.Mo
     Path("bench.toml").write_text(rig, encoding="utf-8")
     command = re.search(r"`stickslip (analyze [^`]+)`", page.read_text("utf-8"))
     assert command
-    run = subprocess.run([sys.executable, "-m", "stickslip", *command[1].split()], capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
+    run = CliRunner().invoke(main, command[1].split())
+    assert run.exit_code == 0, run.output
     assert (tmp_path / "findings" / "report.html").is_file()

@@ -526,8 +526,9 @@ def test_an_analysis_that_can_not_be_written_down_is_refused_and_leaves_nothing(
 # The store of a map
 
 
+@pytest.mark.parametrize("stride", [4, pytest.param(1, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("kill", [False, True])
-def test_a_map_goes_on_after_a_fault_at_any_step(steps: Steps, tmp_path: Path, kill: bool) -> None:
+def test_a_map_goes_on_after_a_fault_at_any_step(steps: Steps, tmp_path: Path, kill: bool, stride: int) -> None:
     pytest.importorskip("zarr")
     pytest.importorskip("pyarrow")
     slider = ss.scenarios.forced(0.8, 0.5)
@@ -542,7 +543,7 @@ def test_a_map_goes_on_after_a_fault_at_any_step(steps: Steps, tmp_path: Path, k
     whole_ = contents(calm)
     last, through = 0, False
     while not through:
-        last += 1
+        last += stride
         folder = tmp_path / str(last)
         folder.mkdir()
         (folder / "notes.txt").write_text("mine")

@@ -298,7 +298,7 @@ def test_a_socket_bears_whatever_comes(lab: Lab, client: httpx.Client, path: str
 
 
 def raw(lab: Lab, contents: bytes) -> None:
-    with socket.create_connection(("127.0.0.1", lab.port), timeout=5) as door:
+    with socket.create_connection(("127.0.0.1", lab.port), timeout=600) as door:
         door.sendall(contents)
         door.settimeout(0.2)
         with suppress(TimeoutError, ConnectionError):

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from stickslip import datasets
+from stickslip.cli.program import main
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text("utf-8")
@@ -24,14 +24,12 @@ def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
+def typed(page: Path) -> list[str]:
+    """What a page tells a reader to type in a shell, line by line."""
+    return [line for block in blocks(page.read_text("utf-8"), "sh") for line in block.splitlines() if line.strip()]
+
+
 PYTHON = blocks(README, "python")
-SHELL = [
-    line
-    for page in [README, *(page.read_text("utf-8") for page in PAGES)]
-    for block in blocks(page, "sh")
-    for line in block.splitlines()
-    if line.strip()
-]
 TARGETS = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text("utf-8"), flags=re.MULTILINE))
 
 
@@ -58,7 +56,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_readme_has_what_it_promises() -> None:
-    assert {"make demo", "make test"} <= {line.partition("#")[0].strip() for line in SHELL}
+    assert {"make demo", "make test"} <= {line.partition("#")[0].strip() for line in typed(ROOT / "README.md")}
     pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README)
     assert len(pictures) == 1
     assert (ROOT / pictures[0]).is_file()
@@ -67,7 +65,9 @@ def test_the_readme_has_what_it_promises() -> None:
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.name)
 def test_the_python_blocks_run(folder: Path, page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where the extra `sound` is not installed: its loudness takes five seconds at each second of a squeak."""
     monkeypatch.chdir(folder)
+    monkeypatch.setitem(sys.modules, "mosqito", None)
     names: dict[str, object] = {"__name__": "__main__"}
     for code in blocks(page.read_text("utf-8"), "python"):
         exec(compile(code, page.name, "exec", dont_inherit=True), names)
@@ -79,34 +79,45 @@ def test_the_first_use_leaves_a_report(folder: Path, monkeypatch: pytest.MonkeyP
     assert (folder / "report.html").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("line", SHELL)
-def test_the_commands_run(folder: Path, line: str) -> None:
+@pytest.mark.parametrize(
+    "page", [page for page in (ROOT / "README.md", *PAGES) if typed(page)], ids=lambda page: page.name
+)
+def test_the_commands_run(folder: Path, page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One page after the other, for its lines build on each other; `make smoke` types such in a shell."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setitem(sys.modules, "mosqito", None)
+    for line in typed(page):
+        run(line)
+
+
+def run(line: str) -> None:
+    """A line ends well, and says and leaves what its page promises."""
     command = shlex.split(line, comments=True)
     if command[0] == "make":
         assert set(command[1:]) <= TARGETS
         return
-    if command[0] == "stickslip":
-        program = [sys.executable, "-m", "stickslip", *command[1:]]
-        run = subprocess.run(program, cwd=folder, capture_output=True, text=True, env=os.environ)
-        assert run.returncode == 0, run.stderr
-        if command[1] == "check":
-            assert "samples" in run.stdout
-            assert "nothing wrong was found" in run.stdout
-        elif command[1:] == ["simulate", "--list"]:
-            assert "FD-4" in run.stdout
-        elif command[1] == "simulate":
-            assert (folder / run.stdout.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
-        elif command[1] in ("decay", "squeak"):
-            assert {"decay": "damping ratio", "squeak": "It squeaks"}[command[1]] in run.stdout
-            assert (folder / run.stdout.split()[-1]).stat().st_size > 10_000, "the report that it names is there"
-        elif command[1] == "rig":
-            assert ("Root-mean-square errors" if "--plan" in command else "what is true") in run.stdout
-            assert (folder / run.stdout.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
-        elif command[1] == "wavelet":
-            assert "jumps or kinks" in run.stdout
-        else:
-            assert command[1] == "analyze", f"a command whose answer no test looks at: {line}"
-            assert "sliding friction" in run.stdout
-            assert (folder / run.stdout.split()[-1]).stat().st_size > 10_000, "the report that it names is there"
+    if command[0] != "stickslip":
+        assert command[:3] == ["pip", "install", ".[io]"], f"a command that no test runs: {line}"
         return
-    assert command[:3] == ["pip", "install", ".[io]"], f"a command that no test runs: {line}"
+    result = CliRunner().invoke(main, command[1:])
+    assert result.exit_code == 0, result.output
+    told = result.stdout
+    if command[1] == "check":
+        assert "samples" in told
+        assert "nothing wrong was found" in told
+    elif command[1:] == ["simulate", "--list"]:
+        assert "FD-4" in told
+    elif command[1] == "simulate":
+        assert Path(told.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
+    elif command[1] in ("decay", "squeak"):
+        assert {"decay": "damping ratio", "squeak": "It squeaks"}[command[1]] in told
+        assert Path(told.split()[-1]).stat().st_size > 10_000, "the report that it names is there"
+    elif command[1] == "rig":
+        assert ("Root-mean-square errors" if "--plan" in command else "what is true") in told
+        assert Path(told.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
+    elif command[1] == "wavelet":
+        assert "jumps or kinks" in told
+    else:
+        assert command[1] == "analyze", f"a command whose answer no test looks at: {line}"
+        assert "sliding friction" in told
+        assert Path(told.split()[-1]).stat().st_size > 10_000, "the report that it names is there"

@@ -44,13 +44,14 @@ def test_truth_without_noise():
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(("trials", "least"), [(15, 0.78), pytest.param(40, 0.85, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("rho", [0.0, 0.9, 0.99])
-def test_intervals_hold_the_truth(rho):
-    trials, held = 40, []
+def test_intervals_hold_the_truth(rho, trials, least):
+    held = []
     for seed in range(trials):
         found = regress_friction(record_of(rho=rho, seed=seed))
         held.append([getattr(found, name).includes(value) for name, value in TRUTH.items()])
-    assert np.all(np.mean(held, axis=0) >= 0.85)  # 3 binomial standard deviations below 0.95
+    assert np.all(np.mean(held, axis=0) >= least)  # 3 binomial standard deviations below 0.95
 
 
 def test_a_stated_delay_is_taken_out():

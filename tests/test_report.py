@@ -74,8 +74,9 @@ def slid(friction: float, normal: float, name: str = "run.csv") -> Findings:
 
 @pytest.fixture(scope="module")
 def light(demo: Findings) -> Findings:
-    """Findings of one figure, quick to draw."""
-    return replace(demo, loops=None, sticks=None, settings={})
+    """Findings of one figure of one line, quick to draw."""
+    record = ss.Record.of({"x": demo.record["x"][:500]}, fs=demo.record.fs)
+    return replace(demo, record=record, loops=None, sticks=None, settings={})
 
 
 def everything(folder: Path) -> set[str]:

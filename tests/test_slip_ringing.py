@@ -50,14 +50,16 @@ def test_frequency_damping_and_difference_of_closed_forms() -> None:
     assert found.verdict == "higher back"
 
 
-def test_intervals_hold_the_truth() -> None:
+@pytest.mark.parametrize(("trials", "least"), [(12, 0.82), pytest.param(40, 0.88, marks=pytest.mark.soak)])
+def test_intervals_hold_the_truth(trials: int, least: float) -> None:
+    """Three intervals of a record; fewer of the short form's 36 hold by chance once in 500."""
     held = []
-    for seed in range(40):
+    for seed in range(trials):
         found = ss.cycle.slip_ringing(rung(noise=0.05, seed=seed))
         for estimate, true in ((found.forward, FORWARD), (found.back, BACK), (found.difference, FORWARD - BACK)):
             assert estimate is not None
             held.append(estimate.interval[0] <= true <= estimate.interval[1])
-    assert np.mean(held) > 0.88
+    assert np.mean(held) > least
 
 
 def test_neither_unit_nor_rate_matters() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -21,6 +22,12 @@ from stickslip.cli.words import spoken
 CONDITIONS = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
 SLOPES = {"dry": 2.3, "wet": -0.26}  # s/m, of the rig's laws
 FS = 10_000.0
+
+
+@pytest.fixture(autouse=True)
+def without_loudness(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where the extra `sound` is not installed: it works for five seconds at each second of a sound."""
+    monkeypatch.setitem(sys.modules, "mosqito", None)
 
 
 @cache
@@ -245,6 +252,15 @@ def test_where_the_energy_is_not_told_the_lever_is_asked_for() -> None:
 
 
 # ---- sounds
+
+
+def test_a_calibrated_squeak_is_told_in_sone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "mosqito")
+    pytest.importorskip("mosqito", reason="the extra sound is not installed")
+    found = ss.analyze_squeaks(measured("wet", 6.13).between(0.4, 0.8))
+    assert found.quality is not None
+    rows = [row for table in ss.summary(found).tables for row in table.rows]
+    assert ["loudness N5", f"{found.quality.loudness:.3g} sone"] in [row[:2] for row in rows]
 
 
 def test_a_sound_comes_back_as_it_was(tmp_path: Path) -> None:

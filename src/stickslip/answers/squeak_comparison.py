@@ -148,8 +148,8 @@ def compare_squeaks(findings: Sequence[SqueakFindings]) -> SqueakComparison:
     >>> import stickslip as ss
     >>> found = []
     >>> for load in (1.23, 6.13):
-    ...     run = ss.simulate(ss.squeak.squeak_rig("wet", load), duration=2.0)
-    ...     record = ss.squeak.squeak_record(run, snr=30, rng=1).between(0.4, 2.0)
+    ...     run = ss.simulate(ss.squeak.squeak_rig("wet", load), duration=0.8)
+    ...     record = ss.squeak.squeak_record(run, snr=30, rng=1)
     ...     found.append(ss.analyze_squeaks(record, name=f"wet, {load} N", normal=load))
     >>> compared = compare_squeaks(found)
     >>> compared.squeaking, compared.conditions[0].trend

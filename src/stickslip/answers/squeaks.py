@@ -189,7 +189,7 @@ def analyze_squeaks(
     Examples
     --------
     >>> import stickslip as ss
-    >>> run = ss.simulate(ss.squeak.squeak_rig("wet", load=6.13), duration=2.4)
+    >>> run = ss.simulate(ss.squeak.squeak_rig("wet", load=6.13), duration=0.8)
     >>> found = analyze_squeaks(ss.squeak.squeak_record(run, snr=30, rng=1), normal=6.13)
     >>> found.squeaks.kind, bool(475 < found.frequency.value < 500), found.coefficient.includes(8 / 6.13)
     ('squeak', True, True)

@@ -273,12 +273,11 @@ def _mode(swings: Sequence[Array], start: Array, fs: float, degree: int = SLOW) 
     """The one pole whose rings leave least of all strokes."""
     from scipy.optimize import least_squares
 
+    counts = set(map(len, swings))  # most strokes are as long as their neighbours
+
     def left(parameters: Array) -> Array:
-        rests = []
-        for each in swings:
-            basis = np.linalg.qr(_waves(parameters, len(each), fs, degree))[0]
-            rests.append(each - basis @ (basis.T @ each))
-        return np.concatenate(rests)
+        bases = {count: np.linalg.qr(_waves(parameters, count, fs, degree))[0] for count in counts}
+        return np.concatenate([each - (basis := bases[len(each)]) @ (basis.T @ each) for each in swings])
 
     return least_squares(left, start, x_scale=[start[1], start[1]], method="lm", max_nfev=60)
 
