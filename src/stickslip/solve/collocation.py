@@ -126,7 +126,8 @@ def solve(a, b):
 @compiled(**EXACT)
 def _slopes(model, mode, i, big, stages):
     """Rates at stage i, their derivatives by differences, and the values of all nodes."""
-    rates, numbers, physical = coded(model.rates), model.numbers, model.physical
+    rates = coded(model.rates)
+    numbers, physical = model.numbers, model.physical
     stage, value, slope, every = stages.values[i], stages.rates[i], stages.slopes[i], stages.nodes[i]
     work, moved = stages.one, stages.moved
     rates(numbers, mode, stage, 1.0, work)

@@ -179,7 +179,8 @@ def _coefficient(row, s, width, k):
 @compiled(**EXACT)
 def _holds(model, past, steps, big, step):
     """How long the series of the step at the cursor holds [s], and its unit; the series, in `step`."""
-    series, j = coded(model.series), past.cursor[0]
+    series = coded(model.series)
+    j = past.cursor[0]
     h, u = steps.lengths[j], 1.0
     for _ in range(40):
         series(model.numbers, steps.modes[j], steps.states[j], h, step.s)

@@ -87,7 +87,8 @@ def _polish(model, node, mode, h, time, state, step):
 
     The step's series has the drive to the tolerance only; what follows a release must not hang on that.
     """
-    series, s, total, width = coded(model.series), step.s, 0.0, step.order + 1
+    series = coded(model.series)  # by itself: numba makes a type of functions of a tuple that holds one
+    s, total, width = step.s, 0.0, step.order + 1
     for _ in range(2):
         set_tones(model.tones, time + total, state)
         series(model.numbers, mode, state, h, s)
@@ -196,7 +197,8 @@ def _hold(model, clock, state):
 @compiled(**EXACT)
 def march(model, clock, state, big, mode, until, steps, work):
     """Steps from `clock` to `until` (laps, time): the outcome, the steps written, the leaps among them, the mode."""
-    series, exits, step = coded(model.series), model.exits, work.step
+    series = coded(model.series)
+    exits, step = model.exits, work.step
     size, written, leapt, chain = len(state), 0, 0, 0
     while True:
         # Due: what is left, the series of a step, and how far it holds.
@@ -271,7 +273,8 @@ def rests(model, mode, state, s):
 @compiled(**EXACT)
 def sample(shown, steps, times, nodes, out, row, work):
     """Values of nodes (by mode) at increasing times, and the step each one falls in."""
-    series, outputs = coded(shown.series), coded(shown.outputs)
+    series = coded(shown.series)
+    outputs = coded(shown.outputs)
     s, state, values = work
     j, known = 0, -1
     for t in range(len(times)):
