@@ -55,7 +55,8 @@ def test_a_map_on_disk_is_the_one_in_memory(whole: Path) -> None:
     assert kept.attrs["checksum"] == asked.attrs["checksum"]
 
 
-def test_killed_at_random_it_goes_on_and_ends_with_the_same_bytes(whole: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kills", [1, pytest.param(3, marks=pytest.mark.soak)])
+def test_killed_at_random_it_goes_on_and_ends_with_the_same_bytes(whole: Path, tmp_path: Path, kills: int) -> None:
     path = tmp_path / "map.zarr"
     script = tmp_path / "run.py"
     script.write_text(
@@ -75,7 +76,7 @@ def test_killed_at_random_it_goes_on_and_ends_with_the_same_bytes(whole: Path, t
     """)
     )
     chance = np.random.default_rng(7)
-    for _ in range(3):
+    for _ in range(kills):
         run = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
         assert run.stdout is not None
         assert run.stdout.readline() == "kept\n"
