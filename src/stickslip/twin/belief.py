@@ -89,6 +89,12 @@ class Belief:
         oscillator = self.oscillator.having(law=LinearSlope(kinetic, slope=slope, static=static))
         return replace(self, oscillator=oscillator, start=(x, v))
 
+    @property
+    def sliding_speed(self) -> float:
+        """The mean speed at which it slides [m/s]."""
+        speed = np.abs(self.record["v"])
+        return float(speed[speed > SLIDES * speed.max()].mean())
+
     def moved(self) -> Array:
         """The displacement x that its sensor would read without noise [m]."""
         return np.asarray(self.quiet().twin(np.random.default_rng(0))["x"])

@@ -157,9 +157,11 @@ def try_on_twins(
     progress(1.0)
     strays = _strays(belief, [twin.record for twin in twins])
     tried = {}
+    falls = belief.law.slope < 0  # as a line, where a real one is a curve
     for name in TRIED:
         if name in answers and answers[name].known:
-            tried[name] = _tried(answers[name], [(t.answers.get(name), t.truth[name]) for t in twins], strays)
+            pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
+            tried[name] = _tried(answers[name], pairs, strays, both=falls or UNSTATED in kinds(answers[name].status))
     if static is not None and (unstated or not static.claimed):
         tried |= {name: _not_felt(answers[name], static, count) for name in STATIC if name in answers}
     return Trial(count, belief, tried, static, yields, strays)
@@ -204,7 +206,8 @@ def _truth(belief: Belief, record: Record) -> dict[str, float]:
     cycles = math.floor(record.duration * frequency)
     stops = sum(kind == "stick" and time * frequency < cycles for time, kind in record.truth["events"])
     return {
-        **dict.fromkeys(LEVELS, law.kinetic),
+        # a slope that rises is a damper's and no dry friction; one that falls is the friction's own
+        **dict.fromkeys(LEVELS, law.kinetic + min(0.0, law.slope) * belief.sliding_speed),
         **dict.fromkeys(STATIC, static),
         RATIO: static / law.kinetic if law.kinetic else math.nan,
         SLOPE: law.slope,
@@ -229,8 +232,8 @@ def _beyond(shown: float, null: Array) -> Power:
     return Power(shown, float(null.mean()), float(null.mean()) + reach)
 
 
-def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], strays: float) -> Estimate:
-    """The answer less its bias, with the interval that held on the twins."""
+def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], strays: float, *, both: bool) -> Estimate:
+    """The answer less its bias, with the interval that held on the twins; with `both` that of the quick one in it."""
     errors = np.array([e.value - true for e, true in pairs if e is not None and e.known and math.isfinite(true)])
     if len(errors) < max(8, ANSWERED * len(pairs)):
         words = f"{len(errors)} of {len(pairs)} twins could answer it, so that it is not tried on them"
@@ -240,7 +243,7 @@ def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], strays: 
     half = student(len(errors) - 1) * float(errors.std(ddof=1)) * math.sqrt(1 + 1 / len(errors)) * max(1.0, strays)
     value = quick.value - bias
     interval, doubts = (value - half, value + half), [d for d in doubts_of(quick.status) if d.kind != FEW]
-    if strays > UNLIKE or UNSTATED in kinds(quick.status):  # the twins share what is not so, or was not stated
+    if strays > UNLIKE or both:  # the twins share what is not so, or was not stated
         low, high = quick.interval
         interval = (min(low, interval[0], quick.value), max(high, interval[1], quick.value))
     if strays > UNLIKE:
