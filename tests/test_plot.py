@@ -19,7 +19,7 @@ from stickslip.plot.contact import plot_velocity_loop
 from stickslip.plot.friction import plot_load_dependence
 from stickslip.plot.plate import Plate
 from stickslip.plot.style import COLUMNS, STYLE, envelope, prefixed, thinned
-from stickslip.plot.traces import close_up, plot_force_balance, plot_traces
+from stickslip.plot.traces import close_up, force_balance, plot_force_balance, plot_traces
 from stickslip.story.story import figures
 
 FS = 500.0
@@ -143,6 +143,18 @@ def test_each_term_of_the_balance_is_drawn_as_itself(damper: str) -> None:
     assert list(drawn)[:5] == list(expected)
     for name, values in expected.items():
         assert drawn[name] == pytest.approx(envelope(balanced.time, values)[1], abs=0.005), name
+
+
+def test_a_balance_by_all_sensors_with_the_damper_on_the_base_is_drawn() -> None:
+    slider = ss.Oscillator(
+        mass=2.0, stiffness=800, damping=4.0, damper="base", law=ss.laws.Coulomb(1.0),
+        drive=ss.drives.HarmonicBase(4e-3, frequency=2.0),
+    )  # fmt: skip
+    rig = ss.Rig.perfect("x", "z", "a").having("x", white=1e-6)
+    record = rig.measure(ss.simulate(slider, duration=3), fs=1000, rng=1)
+    constants = {"mass": 2.0, "stiffness": 800, "damping": 4.0, "damper": "base"}
+    record = ss.friction_force(record, method="fusion", **constants)  # type: ignore[arg-type]
+    assert set(force_balance(record) or ()) == {"spring", "inertia", "damper", "friction"}
 
 
 def test_a_friction_that_was_measured_has_no_balance_to_draw() -> None:
