@@ -25,9 +25,12 @@ UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 
 def of_findings(findings: Findings) -> Story:
     """One record."""
+    headed = () if findings.contradiction else (findings.breakaway, findings.presliding)
+    said = [estimate for answer in headed if answer is not None for estimate in answer.estimates]
     return Story.of_record(
         findings.name, findings.record, headline=[*leading(findings.faults), *_headline(findings)],
-        cautions=cautions(findings), lines=[Line.of(each, findings.true_value(each)) for each in findings.estimates],
+        cautions=cautions(findings, said),
+        lines=[Line.of(each, findings.true_value(each)) for each in findings.estimates],
         faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
         draw=lambda: plates_of(findings), data=findings.to_dict,
     )  # fmt: skip

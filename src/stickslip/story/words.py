@@ -68,9 +68,10 @@ def interval_of(estimate: Estimate) -> str:
     return between if between == UNKNOWN else f"{between}{text}"
 
 
-def cautions(findings: Findings | DecayFindings) -> list[str]:
-    """What should keep the reader from trusting a number."""
-    flagged = _flags(findings.estimates)
+def cautions(findings: Findings | DecayFindings, said: Iterable[Estimate] = ()) -> list[str]:
+    """What should keep the reader from trusting a number, but what the headline has `said` of those without a value."""
+    untold = {estimate.name for estimate in said if not estimate.known}
+    flagged = _flags([estimate for estimate in findings.estimates if estimate.name not in untold])
     wholes = getattr(findings, "doubts", ())
     flagged += [sentence(f"{name}: {status}.") for name, status in wholes if not _only_few(status)]
     flagged += _of_few([estimate.status for estimate in findings.estimates])
