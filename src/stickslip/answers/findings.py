@@ -153,7 +153,7 @@ class Findings(Result):
             "estimates": [estimate.to_dict() for estimate in self.estimates],
             "regression_residual": None if self.regression is None else self.regression.residual,
             "truth": dict(self.record.truth),
-            "twins": None if self.trial is None else self.trial.to_dict(),
+            **({} if self.trial is None else {"twins": self.trial.to_dict()}),
             "notes": list(self.notes),
             "history": [step.to_dict() for step in self.record.history],
         }
