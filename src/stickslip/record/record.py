@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
-from stickslip.record.channels import Channel, checked_name, described
+from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
 from stickslip.units import parse_unit
 
 if TYPE_CHECKING:
@@ -209,8 +209,6 @@ class Record:
         truth : mapping, optional
             True values, for a simulated record.
         """
-        from stickslip.record.channels import VOCABULARY
-
         units, arrays, channels = dict(units or {}), {}, {}
         for name, values in samples.items():
             usual = VOCABULARY[name].units[0] if name in VOCABULARY else "1"
