@@ -211,7 +211,7 @@ def test_a_tone_on_top_of_any_drive() -> None:
     assert run.sample([1.0], ("slip",))[0][0, 0] == pytest.approx(
         run.state(1.0)["v"] - 0.5 + 0.01 * TURN * 10 * math.sin(TURN * 10), abs=1e-12
     )
-    with pytest.raises(ss.errors.ModelError, match="three"):
+    with pytest.raises(ss.errors.ModelError, match="base"):
         ss.drives.Dithered(drive, *tone, on="roof")
 
 

@@ -74,7 +74,7 @@ def _parameter(field: dataclasses.Field[Any]) -> dict[str, Any]:
         "name": field.name,
         "label": declared.name,
         "unit": "" if declared.unit == "1" else declared.unit,
-        "words": _plain(declared.described),
+        "words": _plain(declared.note),  # what the name and the unit beside it do not say
         "default": default if isinstance(default, int | float | str | None) else None,
         "optional": field.default is not dataclasses.MISSING,
         "choices": list(declared.choices),

@@ -12,6 +12,7 @@ from stickslip.errors import ModelError
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.parameters import finite
 from stickslip.structure import Contact, Structure
+from stickslip.units import parse_constant
 
 MASS, STIFFNESS, BEARING = 1.92, 2310.0, 0.0177  # kg, N/m and damping ratio of the linear bearing (sections 2.2, 6.5)
 FORCING = 5.0  # Hz
@@ -41,7 +42,7 @@ SURFACES = {
 }  # 20 and 8 N (section 7.2); slopes chosen
 
 
-def squeak_rig(surface: str = "wet", load: float = HEAVY, *, amplitude: float = 8e-3) -> Structure:
+def squeak_rig(surface: str = "wet", load: float | str = HEAVY, *, amplitude: float = 8e-3) -> Structure:
     r"""A rig that squeaks where it is wet and heavily loaded, and only there.
 
     A mass on a linear bearing is driven by its base at 5 Hz and rubs on two rubber hemispheres at the tip of a
@@ -56,7 +57,7 @@ def squeak_rig(surface: str = "wet", load: float = HEAVY, *, amplitude: float = 
     ----------
     surface : {"wet", "dry"}
         Friction of 8 or 20 N under the heavy load, falling or rising with speed.
-    load : float
+    load : float or str
         Normal load on both contacts together [N]; the thesis has 6.13 and 1.23.
     amplitude : float
         Of the mass's motion [m], roughly: the base moves as far as that takes against the friction (the thesis drove
@@ -84,7 +85,7 @@ def squeak_rig(surface: str = "wet", load: float = HEAVY, *, amplitude: float = 
     """
     if surface not in tuple(SURFACES):
         raise ModelError(f"surface = '{surface}'", f"it is {' or '.join(SURFACES)}", "choose one of them")
-    load = finite("load", load, unit="N", positive=True)
+    load = parse_constant("load", load, "N")
     amplitude = finite("amplitude", amplitude, unit="m", positive=True)
     rubber, turn = SURFACES[surface], 2 * math.pi
     bends, twists = BEAM * (turn * BENDING) ** 2, INERTIA * (turn * TORSION) ** 2

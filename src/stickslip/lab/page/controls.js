@@ -103,7 +103,7 @@ export class Controls {
     const knob = box.appendChild(document.createElement("div")), id = [...path, each.name].join("-");
     knob.className = "knob";
     const label = knob.appendChild(document.createElement("label"));
-    Object.assign(label, { htmlFor: id, textContent: each.label ?? WORDS[kind]?.[each.name] ?? each.name.replaceAll("_", " "), title: each.words });
+    Object.assign(label, { htmlFor: id, textContent: each.label ?? WORDS[kind]?.[each.name] ?? each.name.replaceAll("_", " "), title: each.words ?? "" });
     this.knobs.set([...path, each.name].join("."), knob);
     return [knob, id, label.textContent];
   }
