@@ -190,7 +190,9 @@ def _nearest(belief: Belief) -> Belief:
         told = {2: law.kinetic > 0, 3: law.slope != 0, 4: law.static is not None and law.breakaway > law.kinetic}
         kept = [0, 1, *(part for part, there in told.items() if there)]
         covariance[:] = 0.0
-        jacobian = np.column_stack([_slope_of(best, part) for part in kept] + [np.ones(len(measured))])
+        slopes = {part: _slope_of(best, part) for part in kept}
+        kept = [part for part, slope in slopes.items() if slope.any()]  # what moves nothing can not be told
+        jacobian = np.column_stack([*(slopes[part] for part in kept), np.ones(len(measured))])
         fit = least_squares(jacobian, measured - best.moved())
         covariance[np.ix_(kept, kept)] = _covariance(jacobian, fit.residual, fit.independent)[:-1, :-1]
         step = np.zeros(5)
