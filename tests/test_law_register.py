@@ -163,7 +163,7 @@ def test_the_lab_has_a_form_for_it() -> None:
     )
     assert form["parameters"][1] == {
         "name": "back", "label": "sliding friction back", "unit": "N",
-        "words": "Sliding friction back [N]; against motion to negative x.",
+        "words": "against motion to negative x",
     }  # fmt: skip
 
 
