@@ -137,6 +137,8 @@ def sentences_read(source: Source) -> list[int]:
     for node in ast.walk(source.tree):
         if isinstance(node, ast.Compare) and any(isinstance(op, ast.In | ast.NotIn) for op in node.ops):
             read = any(is_sentence(side) for side in node.comparators)
+            words = isinstance(node.left, ast.Constant) and isinstance(node.left.value, str)
+            read = read or (words and any(getattr(side, "attr", "") == "value" for side in node.comparators))
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
             searches = node.func.attr in (
                 "startswith",

@@ -19,6 +19,7 @@ from stickslip.errors import ModelError, RecordError
 GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
 POUND_FORCE = 4.4482216152605  # N
 INCH = 0.0254  # m
+MISMATCH = "another quantity"  # the kind of error where a unit is one of something else
 NOTHING = 1e-12  # what is smaller is rounding, in every unit that has prefixes
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _PREFIXED = ("m", "m/s", "m/N", "N", "N m", "N s/m", "s", "Pa", "J", "V")
@@ -162,6 +163,7 @@ def parse_unit(text: str, expect: str | None = None) -> Unit:
             f"unit '{text}' is measured in {si}",
             f"this quantity is measured in {expect}",
             "correct the unit or the channel's name",
+            kind=MISMATCH,
         )
     return Unit(text, scale, si)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from stickslip.errors import RecordError
 from stickslip.record.channels import VOCABULARY
-from stickslip.units import Unit, parse_unit
+from stickslip.units import MISMATCH, Unit, parse_unit
 
 ACCELERATION = re.compile(r"(^|_)acc(\d|_|[xyz]|$)|accel|beschl", re.IGNORECASE)  # names whose "g" is gravity
 LONGEST = 500  # characters; a linear combination needs fewer, and the parser's recursion stays shallow
@@ -136,7 +136,7 @@ def channel_unit(text: str, channel: str) -> Unit:
             refusals.append(error)
     first = refusals[0]
     step = first.next_step
-    if channel == "friction" and "measured in 1" in first.value:
+    if channel == "friction" and first.kind == MISMATCH and parse_unit(text).si == "1":
         step = "a coefficient of friction is the channel coefficient, as in coefficient=COLUMN [1]"
     raise RecordError(f"channel {channel}: {first.value}", first.rule, step) from first
 
