@@ -151,9 +151,9 @@ def try_on_twins(
         shown_by = [1 / twin.answers[GIVES].value if GIVES in twin.answers else 0.0 for twin in twins]
         yields = _beyond(1 / answers[GIVES].value, np.array(shown_by))
     unstated = RATIO in answers and UNSTATED in kinds(answers[RATIO].status)  # twins share what was not stated
-    if static is not None and static.claimed and not unstated:
-        shown = belief.bearing(1 + static.shown - static.null)
-        twins = _asked(shown, ask, count, rng, lambda share: progress((1 + share) / 2))
+    if static is not None and static.claimed:
+        belief = belief.bearing(1 + static.shown - static.null)
+        twins = _asked(belief, ask, count, rng, lambda share: progress((1 + share) / 2))
     progress(1.0)
     strays = _strays(belief, [twin.record for twin in twins])
     tried = {}
