@@ -34,7 +34,7 @@ def plot_twin(trial: Trial, *, record: Record | None = None) -> Figure:
     Figure
     """
     whole = trial.belief.record
-    moved = trial.belief.moved()
+    moved = trial.belief.moved
     left = whole["x"] - moved
     left = left - left.mean()
     follows = 100 * (1 - float(np.linalg.norm(left) / np.linalg.norm(whole["x"] - whole["x"].mean())))
