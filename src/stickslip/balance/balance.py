@@ -155,7 +155,8 @@ def with_motion(record: Record, derive: Filter) -> Record:
 
 def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, words: Sequence[str]) -> Record:
     """The record with the friction, its standard deviation at each sample, and how it was found."""
-    arguments = {name: value for name, value in asdict(rig).items() if name != "lost"}
+    arguments = {name: value for name, value in asdict(rig).items() if name not in ("lost", "sd")}
+    arguments |= {"sd": dict(rig.sd)} if rig.sd else {}
     step = Step("friction_force", arguments, "; ".join(words))
     made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
     noise = float(np.median(sd))

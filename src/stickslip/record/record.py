@@ -32,6 +32,7 @@ DETAILS = (
     "mount",
     "inertia",
     "discharge",
+    "gain_sd",
 )  # of a channel, that a user may know better than the file
 
 
@@ -94,6 +95,8 @@ class StatedRig:
         Of the smoother [Hz].
     lost : tuple of str
         What a sensor could not tell, in words.
+    sd : mapping of str to float
+        Standard deviation of mass, stiffness and damping, in their units, where one was stated; the others are exact.
     """
 
     method: str
@@ -104,6 +107,16 @@ class StatedRig:
     damper: str = "ground"
     bandwidth: float | None = None
     lost: tuple[str, ...] = ()
+    sd: Mapping[str, float] = field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        for name, sd in self.sd.items():
+            if name not in ("mass", "stiffness", "damping") or not 0 <= sd < math.inf:
+                raise RecordError(
+                    f"sd = {sd!r} of {name}",
+                    "of mass, stiffness and damping the standard deviation is finite and not negative",
+                    "correct it",
+                )
 
     @property
     def constants(self) -> dict[str, Any]:
