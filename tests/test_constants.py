@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
 import stickslip as ss
+from stickslip.cli.program import main
 from stickslip.errors import ModelError, RecordError
 from stickslip.estimate import Estimate
 from stickslip.units import parse_uncertain
@@ -231,3 +234,23 @@ def test_a_minus_behind_a_plus_is_arithmetic(tmp_path):
 def test_a_gain_that_is_not_sure_by_a_part_of_it_is_one_sentence(tmp_path, text):
     with pytest.raises(RecordError, match=r"standard deviation, from 0 to 100 % of it; write it like"):
         measured(tmp_path, a=text)
+
+
+def test_the_command_line_takes_it_and_the_results_tell_it(tmp_path):
+    ss.write_record(slider(), tmp_path / "run.csv")
+    constants = ["--mass", "2.42 ± 0.02 kg", "--stiffness", "2310 +- 5 N/m"]
+    channels = ["--channels", "x=x [m] ± 1 %", "--channels", "z=z [m]", "--time", "time"]
+    run = CliRunner().invoke(main, ["analyze", str(tmp_path / "run.csv"), "--json", *constants, *channels])
+    assert json.loads(run.stdout)["settings"]["sd"] == SD
+    wrong = CliRunner().invoke(main, ["analyze", str(tmp_path / "run.csv"), "--mass", "2.42 ± -0.02 kg"])
+    assert wrong.exit_code == 2
+    assert "finite and not negative" in wrong.output
+
+
+def test_a_trial_says_once_that_constants_were_taken_as_exact():
+    record, words = slider(), "with your constants exact"
+    told = {}
+    for name, constants in {"exact": {"mass": 2.42, "stiffness": 2310}, "unsure": RIG}.items():
+        quick = ss.analyze(record, **constants)
+        told[name] = [sum(words in note for note in ss.summary(f).notes) for f in (quick, ss.tried(quick, twins=8))]
+    assert told == {"exact": [0, 1], "unsure": [0, 0]}
