@@ -13,6 +13,7 @@ from stickslip.consistent.checks import HOLDS, UNTOLD, Check, compared, untold
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Constant, Estimate
+from stickslip.units import parse_uncertain
 
 UNITS = {
     "mass": "kg",
@@ -54,12 +55,13 @@ def stated_checks(stated: Stated, tolerance: float) -> list[Check]:
 def _number(name: str, value: Constant, tolerance: float) -> _Number:
     """Value and deviation: as stated, or the rounding of a text's last digit and the tolerance of what is measured."""
     unit = UNITS[name]
-    known = Estimate.stated(name, value, unit)
-    if known.sd or isinstance(value, Estimate | tuple):
-        return _checked(name, known.value, known.sd)
-    number, rounding = known.value, 0.0
+    if isinstance(value, Estimate):
+        return _checked(name, value.value, value.sd)
+    (number, sd), rounding = parse_uncertain(value, unit), 0.0
+    if sd or isinstance(value, tuple):
+        return _checked(name, number, sd)
     if isinstance(value, str) and (digits := re.match(r"\s*[-+]?\d*\.?(\d*)", value)):
-        scale = Estimate.stated(name, re.sub(r"^\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?", "1", value), unit).value
+        scale, _ = parse_uncertain(re.sub(r"^\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?", "1", value), unit)
         exponent = re.match(r"\s*[-+]?[\d.]+[eE]([-+]?\d+)", value)
         rounding = scale * 10.0 ** (-len(digits[1]) + int(exponent[1] if exponent else 0)) / math.sqrt(12)
     measured = 0.0 if name in EXACT else tolerance * abs(number)
