@@ -133,7 +133,7 @@ def test_beside_a_constant_that_is_found_stands_how_sure_the_stated_one_is(metho
 @pytest.mark.parametrize(
     ("constants", "told"),
     [
-        ({"mass": "2.42 ± -0.02 kg"}, "mass = 2.42 ± -0.02 kg.*finite and not negative.*correct the mass"),
+        ({"mass": "2.42 ± -0.02 kg"}, "mass: '2.42 ± -0.02 kg'; .*finite and not negative.*correct the mass"),
         ({"mass": "2.42 kg ± 3 N"}, "measured in N; this quantity is measured in kg"),
         ({"mass": (2.42, float("nan"))}, "not a finite number"),
         ({"mass": "-2.42 ± 0.02 kg"}, "a mass is positive"),

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from stickslip.errors import EstimateError, ModelError, RecordError
-from stickslip.units import LONGEST_VALUE, parse_uncertain, prefixed
+from stickslip.units import parse_uncertain, prefixed
 
 NORMAL_95 = 1.959963984540054  # two-sided 95 % quantile of the normal distribution
 MOST_DECIMALS = 6  # printed in the plain unit
@@ -182,17 +182,14 @@ class Estimate:
         >>> mass.value, mass.sd, Estimate.stated("stiffness", 2310, "N/m").sd
         (2.42, 0.02, 0.0)
         """
-        shown, step = (
-            f"{name} = {str(constant)[:LONGEST_VALUE]}",
-            f"correct the {name}, written like '2.5 ± 0.1 {unit}'",
-        )
+        step = f"correct the {name}, written like '2.5 ± 0.1 {unit}'"
         if isinstance(constant, Estimate) and constant.unit != unit:
-            raise ModelError(shown, f"a {name} is measured in {unit}", step)
+            raise ModelError(f"{name} = {constant}", f"a {name} is measured in {unit}", step)
         try:
             pair = (constant.value, constant.sd) if isinstance(constant, Estimate) else constant
             value, sd = parse_uncertain(pair, unit)
         except RecordError as error:
-            raise ModelError(shown, f"{error.value}; {error.rule}", step) from error
+            raise ModelError(f"{name}: {error.value}", error.rule, step) from error
         return cls.normal(name, value, sd=sd, unit=unit, method="stated")
 
     def scaled(self, factor: float, unit: str, name: str | None = None) -> Estimate:

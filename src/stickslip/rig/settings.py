@@ -45,7 +45,7 @@ def _constant(name: str, *, positive: bool = False) -> PlainValidator:
         try:
             constant = Estimate.stated(name, value, RIG_UNITS[name])
         except ModelError as error:
-            raise ValueError(printable(error.rule)) from error
+            raise ValueError(printable(f"{error.value}; {error.rule}")) from error
         if constant.value < 0 or (positive and constant.value == 0):
             raise ValueError(f"it should be greater than {'' if positive else 'or equal to '}0")
         return constant if constant.sd else constant.value
