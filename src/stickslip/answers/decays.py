@@ -21,7 +21,7 @@ from stickslip.decay.release import Releases, find_releases
 from stickslip.decay.swings import SEEN
 from stickslip.decay.which_motion import DecayMotion, choose_motion
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
 from stickslip.units import parse_constant
 
@@ -242,8 +242,8 @@ def analyze_decay(
     *,
     method: str = "all",
     channel: str | None = None,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
     restoring: Restoring = "linear",
 ) -> DecayFindings:
     """How much viscous and how much dry friction does a free decay show, by every way of asking?
@@ -260,7 +260,7 @@ def analyze_decay(
         Which questions are asked: all, those of the whole waveform, or the decrements alone.
     channel : str, optional
         Which channel; the first of these when left out.
-    mass, stiffness : float or str, optional
+    mass, stiffness : float, str, tuple or Estimate, optional
         Mass [kg] or stiffness [N/m] (of an angle: kg m^2, N m/rad), for the dry friction as a force.
     restoring : {"linear", "pendulum"}
         The spring's law: x, or sin x of a pendulum's angle. The decrements hold for x alone: a pendulum's extremes are
@@ -320,10 +320,11 @@ def analyze_decay(
     )  # fmt: skip
 
 
-def _constants(channel: str, **stated: float | str | None) -> dict[str, Any]:
+def _constants(channel: str, **stated: Constant | None) -> dict[str, Any]:
     """Mass and stiffness where stated, in SI."""
     units = rig_units(channel)
-    return {name: parse_constant(name, value, units[name]) for name, value in stated.items() if value is not None}
+    known = {name: Estimate.stated(name, value, units[name]) for name, value in stated.items() if value is not None}
+    return {name: parse_constant(name, float(constant), units[name]) for name, constant in known.items()}
 
 
 def _by_waveform(

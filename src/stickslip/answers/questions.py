@@ -34,7 +34,7 @@ from stickslip.cycle.onset import breakaway
 from stickslip.cycle.regression import regress_friction
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Status
+from stickslip.estimate import Constant, Status
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record
 from stickslip.rig.settings import RigSettings
@@ -46,9 +46,9 @@ def analyze(
     record: Record,
     *,
     rig: RigSettings | None = None,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
-    damping: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
+    damping: Constant | None = None,
     damper: str | None = None,
     contact: str | None = None,
     method: str = "auto",
@@ -69,7 +69,7 @@ def analyze(
         applied ``force`` [N].
     rig : RigSettings, optional
         The rig's constants, as :func:`read_rig` returns them; the arguments below go before it.
-    mass, stiffness, damping : float or str, optional
+    mass, stiffness, damping : float, str, tuple or Estimate, optional
         Oscillating mass [kg], spring [N/m], viscous damping [N s/m]; or text with a unit ("250 g").
     damper, contact : {"ground", "base"}, optional
         What the damper ends on, and what the mass slides on; the ground unless stated.
@@ -262,7 +262,8 @@ def _told(record: Record) -> dict[str, Any]:
         return {}
     if Balance.of(record.rig) is None:
         return {}
-    return {key.replace("method", "differentiation"): getattr(record.rig, key) for key in (*CONSTANTS, "method")}
+    told = {key.replace("method", "differentiation"): getattr(record.rig, key) for key in (*CONSTANTS, "method")}
+    return told | ({"sd": dict(record.rig.sd)} if record.rig is not None and record.rig.sd else {})
 
 
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:

@@ -13,11 +13,11 @@ from stickslip.balance.fusion import fuse
 from stickslip.balance.lag import SensorDelay, sensor_delay
 from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError
+from stickslip.estimate import Constant
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import LEAST
 from stickslip.signals.noise import noise_level
-from stickslip.units import parse_value
 
 LOUD = 0.09  # of the acceleration's standard deviation: noise that hides micro-slips
 ROUNDED = 0.04  # of the same: by so much the smoother rounds the kinks off
@@ -42,7 +42,7 @@ class Acceleration:
 
 
 def acceleration_of_mass(
-    record: Record, channel: str, *, mass: float | str | None, stiffness: float | str | None, question: str
+    record: Record, channel: str, *, mass: Constant | None, stiffness: Constant | None, question: str
 ) -> Acceleration:
     """The acceleration as read; from all sensors together where it is noisy or its mount stated, if the rig is known.
 
@@ -63,10 +63,7 @@ def acceleration_of_mass(
 
 def _fused(record: Record, rig: dict[str, Any], question: str) -> Acceleration:
     """What all sensors together say of the acceleration, with the noise that this counts as."""
-    balance = Balance(
-        parse_value(rig["mass"], "kg"), parse_value(rig["stiffness"], "N/m"),
-        parse_value(rig.get("damping", 0.0), "N s/m"), rig.get("damper", "ground"),
-    )  # fmt: skip
+    balance = Balance(rig["mass"], rig["stiffness"], rig.get("damping", 0.0), rig.get("damper", "ground"))
     load = ["load"] if is_measured(record, "load") and record.channels["load"].mount is not None else []
     sensors = ["x", *(["v"] if is_measured(record, "v") else []), "a", *load]
     used = [*sensors, "z", *(["force"] if "force" in record else [])]

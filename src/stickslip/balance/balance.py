@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from stickslip.balance.motion import is_measured
 from stickslip.errors import ModelError
-from stickslip.record.record import Record, StatedRig, Step
+from stickslip.estimate import Estimate
+from stickslip.record.record import RIG_UNITS, Record, StatedRig, Step
 from stickslip.signals.derivatives import Filter, differentiate, noise_along
-from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
@@ -50,26 +50,27 @@ class Balance:
 
 @dataclass(frozen=True)
 class Rig(Balance):
-    """A balance of forces, and what the mass slides on."""
+    """A balance of forces, what the mass slides on, and how sure the constants are, where that is stated."""
 
     contact: str
+    sd: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @classmethod
     def stated(cls, constants: Mapping[str, Any], damper: str, contact: str) -> Rig:
         """The constants with their units read; refused where they have no meaning."""
-        units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
-        values = {name: parse_value(constants[name], unit) for name, unit in units.items()}
-        for name, value in values.items():
-            if value < 0 or (name == "mass" and value == 0):
+        known = {name: Estimate.stated(name, constants[name], unit) for name, unit in RIG_UNITS.items()}
+        for name, constant in known.items():
+            if constant.value < 0 or (name == "mass" and constant.value == 0):
                 raise ModelError(
                     f"{name} = {constants[name]}",
                     "a mass is positive, a stiffness or damping not negative",
-                    f"state the rig's {name} in {units[name]}",
+                    f"state the rig's {name} in {RIG_UNITS[name]}",
                 )
         for word, end in (("damper", damper), ("contact", contact)):
             if end not in ENDS:
                 raise ModelError(f"{word} = '{end}'", f"a {word} goes to the {' or the '.join(ENDS)}", "choose one")
-        return cls(damper=damper, contact=contact, **values)
+        sd = {name: constant.sd for name, constant in known.items() if constant.sd}
+        return cls(damper=damper, contact=contact, sd=sd, **{name: float(constant) for name, constant in known.items()})
 
     def terms(self, record: Record) -> dict[str, dict[int, float]]:
         """Per channel, the coefficient of each order of its derivative in the friction force."""
@@ -107,9 +108,11 @@ class Rig(Balance):
 
 
 def known_constants(record: Record, **given: Any) -> dict[str, Any]:
-    """The rig's constants for :func:`friction_force`: as given, or as the friction was found with."""
+    """The rig's constants as numbers, and its damper: as given, or as the friction was found with."""
     stated = {} if record.rig is None else record.rig.constants
-    return {**stated, **{name: value for name, value in given.items() if value is not None}}
+    told = {name: value for name, value in given.items() if value is not None}
+    numbers = {name: Estimate.stated(name, told[name], unit).value for name, unit in RIG_UNITS.items() if name in told}
+    return {**stated, **told, **numbers}
 
 
 def paths(

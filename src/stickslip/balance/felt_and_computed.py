@@ -14,7 +14,7 @@ from stickslip.balance.force import friction_force
 from stickslip.balance.lines import Complex, Lines, find_lines
 from stickslip.balance.mounts import Resonance, find_mounts
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result, Status
+from stickslip.estimate import NORMAL_95, Constant, Estimate, Result, Status
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
@@ -126,9 +126,9 @@ class ForceComparison(Result):
 def compare_force(
     record: Record,
     *,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
-    damping: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
+    damping: Constant | None = None,
     damper: str | None = None,
     tolerance: float = 0.1,
 ) -> ForceComparison:
@@ -151,7 +151,7 @@ def compare_force(
     record : Record
         With ``load`` and ``x``, and z, a, force where measured; the rig as :func:`~stickslip.friction_force` was told,
         where not given here.
-    mass, stiffness, damping : float or str, optional
+    mass, stiffness, damping : float, str, tuple or Estimate, optional
         Of the rig [kg], [N/m], [N s/m].
     damper : {"ground", "base"}, optional
         Where the damper's other end is fixed.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +24,7 @@ from stickslip.balance.load_cell import felt
 from stickslip.balance.mass import mass_and_stiffness, stiffness_per_mass
 from stickslip.balance.motion import require_change, require_fit
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Constant, Estimate
 from stickslip.record.record import Record, StatedRig, Step
 from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import (
@@ -55,9 +54,9 @@ LOST = {
 def friction_force(
     record: Record,
     *,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
-    damping: float | str = 0.0,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
+    damping: Constant = 0.0,
     damper: str = "ground",
     method: str = "smoother",
     contact: str = "ground",
@@ -85,11 +84,13 @@ def friction_force(
     record : Record
         With ``x`` [m], and z, v, a, force [N] where measured. What an earlier call derived is derived afresh. Delays
         stated for these channels are taken out first, see :func:`~stickslip.signals.delay.without_delays`.
-    mass : float or str
-        Moving mass m [kg], or with its unit: ``"250 g"``.
-    stiffness : float or str
+    mass : float, str, tuple or Estimate
+        Moving mass m [kg]; or with its unit, ``"250 g"``, and with its standard uncertainty, ``"2.42 ± 0.02 kg"`` or
+        ``(2.42, 0.02)``, which the friction does not feel: ``record.rig`` keeps it for the twins of a record. So may
+        the next two.
+    stiffness : float, str, tuple or Estimate
         Of the spring between mass and base, k [N/m].
-    damping : float or str
+    damping : float, str, tuple or Estimate
         Viscous damping c [N s/m].
     damper : {"ground", "base"}
         Where the damper's other end is fixed.
@@ -156,6 +157,11 @@ def friction_force(
         return _weighed(record, rig)
     if unknown:
         return _completed(record, rig, unknown, method, bandwidth)
+    return _known(record, rig, method, asked, bandwidth)
+
+
+def _known(record: Record, rig: Rig, method: str, asked: str, bandwidth: float | str | None) -> Record:
+    """The friction force on a mass whose rig is known, by the method; another was `asked` where a channel lacks."""
     if method in FUSIONS:
         return _fused(record, rig, method, asked)
     if method in THESIS:
@@ -221,11 +227,8 @@ def _lacking(record: Record, asked: str, wanted: Sequence[str]) -> list[str]:
 
 def _weighed(record: Record, rig: Rig) -> Record:
     """The friction force by all sensors, with mass and stiffness from what the load cell feels."""
-    ends = {"damper": rig.damper, "contact": rig.contact}
-    mass, stiffness = mass_and_stiffness(record, damping=rig.damping, **ends)
-    made = friction_force(
-        record, mass=mass.value, stiffness=stiffness.value, damping=rig.damping, method="fusion", **ends
-    )
+    mass, stiffness = mass_and_stiffness(record, damping=rig.damping, damper=rig.damper, contact=rig.contact)
+    made = _fused(record, replace(rig, mass=mass.value, stiffness=stiffness.value), "fusion", "fusion")
     sd = np.sqrt(made["friction_sd"] ** 2 + (mass.sd * made["a"]) ** 2 + (stiffness.sd * stretch(made)) ** 2)
     words = f"m = {mass.value:.5g} kg and k = {stiffness.value:.5g} N/m from what the load cell feels"
     return _less_sure(made, sd, words)
@@ -268,23 +271,19 @@ def _completed(record: Record, rig: Rig, unknown: Sequence[str], method: str, ba
             "a spring pulls back: no mass or stiffness can be found with a sensor of the wrong sign",
             "correct the signs of x, z and a, or give mass and stiffness",
         )
-    ends = {"damper": rig.damper, "contact": rig.contact}
     if len(unknown) == 2:
-        return _per_mass(record, found, method=method, bandwidth=bandwidth, **ends)
+        return _per_mass(record, rig, found, method, bandwidth)
     moving = rig.stiffness / found.value if "mass" in unknown else rig.mass
-    made = friction_force(
-        record, mass=moving, stiffness=found.value * moving, damping=rig.damping, method=method, bandwidth=bandwidth,
-        **ends,
-    )  # fmt: skip
+    made = _known(record, replace(rig, mass=moving, stiffness=found.value * moving), method, method, bandwidth)
     unsure = made["a"] if "mass" in unknown else found.value * stretch(made)
     sd = np.hypot(made["friction_sd"], moving * found.sd / found.value * np.abs(unsure))
     return _less_sure(made, sd, _ratio(found))
 
 
-def _per_mass(record: Record, found: Estimate, *, method: str, **rig: Any) -> Record:
+def _per_mass(record: Record, rig: Rig, found: Estimate, method: str, bandwidth: float | str | None) -> Record:
     """The friction per mass, where neither mass nor stiffness is known."""
     method = "motion" if method in FUSIONS else method  # a force says nothing of a motion whose mass is not known
-    made = friction_force(record, mass=1.0, stiffness=found.value, method=method, **rig)
+    made = _known(record, replace(rig, stiffness=found.value), method, method, bandwidth)  # of a mass of 1 kg
     last = made.history[-1]
     words = "neither mass nor stiffness is known: the friction per mass is all that can be said"
     step = Step(

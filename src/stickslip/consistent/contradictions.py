@@ -23,7 +23,7 @@ from stickslip.consistent.mixups import ONE_SLIP, mixups
 from stickslip.consistent.sensor_checks import cycle_checks, range_checks, sampling_check, silence_checks, silent
 from stickslip.consistent.stated import Stated, stated_checks, what_fails
 from stickslip.errors import EstimateError
-from stickslip.estimate import Result
+from stickslip.estimate import Constant, Result
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 
@@ -76,9 +76,9 @@ class Consistency(Result):
 def consistency(
     record: Record | Stated,
     *,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
-    damping: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
+    damping: Constant | None = None,
     damper: str | None = None,
     tolerance: float = 0.01,
 ) -> Consistency:
@@ -103,7 +103,7 @@ def consistency(
         out. Or "mass", "stiffness", "damping", "forcing frequency", "base amplitude", "amplitude", "sliding friction",
         "contact stiffness", "transition speed", each a number in SI, a text with its unit, an Estimate, or (value,
         standard deviation).
-    mass, stiffness, damping : float or str, optional
+    mass, stiffness, damping : float, str, tuple or Estimate, optional
         Of the rig; as :func:`~stickslip.friction_force` was told, where not given. For a record only.
     damper : {"ground", "base"}, optional
         Where the damper's other end is fixed.

@@ -15,13 +15,11 @@ from stickslip.consistent.checks import APART, HOLDS, UNTOLD, Check, compared, j
 from stickslip.consistent.mixups import Amplitudes
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.record.channels import Channel
-from stickslip.record.record import Record
+from stickslip.record.record import RIG_UNITS, Record
 from stickslip.statistics import mean_uncertainty
-from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
-UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 RATES = ("x_rate", "x_rate_rate")  # the displacement's derivatives
 ENERGY, STOPPING = "energy of whole cycles", "sliding without stops"
 MOST_ORDERS, PLACES = 40, 2000  # harmonics, and places in a cycle, of which the mean cycle is drawn
@@ -52,7 +50,7 @@ class Seen:
             rates = dict(zip(RATES, _rates(record["x"], record.fs), strict=True))
             whole = replace(record, samples={**record.samples, **rates}, channels={**record.channels, **_plain(RATES)})
             lines = find_lines(whole, [*names, *RATES], contact=contact, question=question)
-        known = {name: parse_value(rig[name], unit) for name, unit in UNITS.items() if name in rig}
+        known = {name: rig[name] for name in RIG_UNITS if name in rig}
         told = {name: record.channels[name] for name in names}
         made = {name: lines.amplitudes[name] / response_of(told[name]).at(lines.frequency) for name in names}
         if "load" in made and told["load"].inertia:

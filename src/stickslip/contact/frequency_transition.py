@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stickslip.contact.mechanisms import not_one_mode
 from stickslip.contact.ringing import Ringing, Window, checked_mass, find_ringing
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result, Status
+from stickslip.estimate import Constant, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.morlet import ridge_centre
 from stickslip.signals.wavelet import wavelet_map
@@ -91,7 +91,7 @@ class Transition(Result):
 
 
 def transition(
-    record: Record, *, channel: str = "a", mass: float | str | None = None, stiffness: float | str | None = None
+    record: Record, *, channel: str = "a", mass: Constant | None = None, stiffness: Constant | None = None
 ) -> Transition:
     """At which frequency does the contact ring while the mass sticks, how is it damped, how stiff is the contact?
 
@@ -111,9 +111,9 @@ def transition(
         acceleration's integral.
     channel : str
         The acceleration.
-    mass : float or str, optional
+    mass : float, str, tuple or Estimate, optional
         Oscillating mass [kg], for the contact's stiffness.
-    stiffness : float or str, optional
+    stiffness : float, str, tuple or Estimate, optional
         Spring [N/m], for the same.
 
     Returns
@@ -140,7 +140,7 @@ def transition(
     return transition_of(ringing, mass, stiffness)
 
 
-def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float | str | None) -> Transition:
+def transition_of(ringing: Ringing, mass: Constant | None, stiffness: Constant | None) -> Transition:
     """The transition of sticks that are cut into pieces already."""
     record, channel = ringing.record, ringing.channel
     pooled = heard_mode(ringing)
@@ -359,7 +359,7 @@ def _agreement(frequency: Estimate, wavelet: Estimate) -> str:
     return f"the mode and the wavelet differ: {reads}, {why}"
 
 
-def _stiffness(mode: Mode, mass: float | str | None, spring: float | str | None) -> Estimate | None:
+def _stiffness(mode: Mode, mass: Constant | None, spring: Constant | None) -> Estimate | None:
     kilograms, k = checked_mass(mass, spring)
     if kilograms is None:
         return None

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from stickslip.contact.ringing import MISFIT, Ringing, checked_mass, find_ringing
 from stickslip.errors import EstimateError
+from stickslip.estimate import Constant
 from stickslip.record.record import Record
 
 QUESTION = "the mechanism"
@@ -79,7 +80,7 @@ class Mechanism:
 
 
 def mechanism(
-    record: Record, *, channel: str = "a", mass: float | str | None = None, stiffness: float | str | None = None
+    record: Record, *, channel: str = "a", mass: Constant | None = None, stiffness: Constant | None = None
 ) -> Mechanism:
     """Do the sticks show a rigid contact, a compliant one with or without micro-slips, or friction with a memory?
 
@@ -94,7 +95,7 @@ def mechanism(
         With an acceleration; see :func:`transition`.
     channel : str
         The acceleration.
-    mass, stiffness : float or str, optional
+    mass, stiffness : float, str, tuple or Estimate, optional
         Oscillating mass [kg] and spring [N/m]: with ``x`` and ``z``, to take a stated mount out of the acceleration.
 
     Returns

@@ -13,7 +13,7 @@ from stickslip.contact.frequency_transition import heard_mode
 from stickslip.contact.mechanisms import UNTOLD, not_one_mode, too_fast
 from stickslip.contact.ringing import Ringing, Window, find_ringing
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result, Status
+from stickslip.estimate import Constant, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.pieces import Piece
 from stickslip.statistics import mean_of_cycles
@@ -71,7 +71,7 @@ class MicroSlips(Result):
 
 
 def find_microslips(
-    record: Record, *, channel: str = "a", mass: float | str | None = None, stiffness: float | str | None = None
+    record: Record, *, channel: str = "a", mass: Constant | None = None, stiffness: Constant | None = None
 ) -> MicroSlips:
     """How many times does the contact slip by a little within each stick, when, and for how long?
 
@@ -88,7 +88,7 @@ def find_microslips(
         With an acceleration; see :func:`transition`.
     channel : str
         The acceleration.
-    mass, stiffness : float or str, optional
+    mass, stiffness : float, str, tuple or Estimate, optional
         Oscillating mass [kg] and spring [N/m]: with ``x`` and ``z``, to take a stated mount out of the acceleration.
 
     Returns

@@ -13,11 +13,10 @@ from stickslip.balance.accelerometer import acceleration_of_mass
 from stickslip.balance.motion import forcing_frequency
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import EstimateError
-from stickslip.estimate import Status
+from stickslip.estimate import Constant, Estimate, Status
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
 from stickslip.signals.pieces import GLIDE, RING, Piece, Splitter
-from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
@@ -137,8 +136,8 @@ def find_ringing(
     channel: str,
     *,
     question: str,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
 ) -> Ringing:
     """Cut the acceleration around each stick into glides and rings of one mode.
 
@@ -179,10 +178,10 @@ def find_ringing(
     return Ringing(cut, pole, noise, left / count, rest / count, sticks, record, channel, doubt, seen.blurred)
 
 
-def checked_mass(mass: float | str | None, stiffness: float | str | None) -> tuple[float | None, float]:
+def checked_mass(mass: Constant | None, stiffness: Constant | None) -> tuple[float | None, float]:
     """Mass [kg] and spring [N/m] as numbers, 0 for no spring; refused where they are none of a mass and a spring."""
-    kilograms = parse_value(mass, "kg") if mass is not None else None
-    spring = parse_value(stiffness, "N/m") if stiffness is not None else 0.0
+    kilograms = Estimate.stated("mass", mass, "kg").value if mass is not None else None
+    spring = Estimate.stated("stiffness", stiffness, "N/m").value if stiffness is not None else 0.0
     if not (kilograms is None or 0 < kilograms < math.inf) or not 0 <= spring < math.inf:
         raise EstimateError(
             f"mass = {mass}, stiffness = {stiffness}", "a mass is positive, a spring not negative",

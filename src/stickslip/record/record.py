@@ -34,8 +34,7 @@ DETAILS = (
     "discharge",
     "gain_sd",
 )  # of a channel, that a user may know better than the file
-
-
+RIG_UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 MEASURABLE = 1e60  # in SI, as its inverse: beyond, the fourth power of a reading is no number any more
 
 
@@ -111,10 +110,10 @@ class StatedRig:
 
     def __post_init__(self) -> None:
         for name, sd in self.sd.items():
-            if name not in ("mass", "stiffness", "damping") or not 0 <= sd < math.inf:
+            if name not in RIG_UNITS or not 0 <= sd < math.inf:
                 raise RecordError(
                     f"sd = {sd!r} of {name}",
-                    "of mass, stiffness and damping the standard deviation is finite and not negative",
+                    f"of {', '.join(RIG_UNITS)} the standard deviation is finite and not negative",
                     "correct it",
                 )
 

@@ -12,6 +12,7 @@ from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
 from stickslip.estimate import Estimate, stands
 from stickslip.plot.friction import plates_of, plates_together
+from stickslip.record.record import RIG_UNITS
 from stickslip.story.story import Line, Story
 from stickslip.story.words import cautions, interval_of, leading, number, sentence, value_of
 
@@ -20,7 +21,6 @@ RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
 TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
-UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 
 
 def of_findings(findings: Findings) -> Story:
@@ -31,8 +31,8 @@ def of_findings(findings: Findings) -> Story:
         findings.name, findings.record, headline=[*leading(findings.faults), *_headline(findings)],
         cautions=cautions(findings, said),
         lines=[Line.of(each, findings.true_value(each)) for each in findings.estimates],
-        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
-        draw=lambda: plates_of(findings), data=findings.to_dict,
+        faults=[str(fault) for fault in findings.faults], notes=[*findings.notes, *_exact(findings)],
+        settings=_settings(findings), draw=lambda: plates_of(findings), data=findings.to_dict,
     )  # fmt: skip
 
 
@@ -51,13 +51,29 @@ def of_comparison(comparison: Comparison) -> Story:
 
 
 def _settings(findings: Findings) -> dict[str, str]:
-    told = {
-        key: number(value, 0.0, UNITS[key]) if key in UNITS else str(value) for key, value in findings.settings.items()
-    }
+    told = {key: str(value) for key, value in findings.settings.items() if key != "sd"}
+    sd = findings.settings.get("sd", {})
+    for key in told.keys() & RIG_UNITS.keys():
+        told[key] = _constant(findings.settings[key], sd.get(key, 0.0), RIG_UNITS[key])
     if findings.normal is not None:
         told["normal load"] = number(findings.normal, 0.0, "N")
     record = findings.record
     return {**told, "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}
+
+
+def _constant(value: float, sd: float, unit: str) -> str:
+    return number(value, sd, unit) + (f", standard uncertainty {number(sd, sd, unit)}" if sd else "")
+
+
+def _exact(findings: Findings) -> Iterator[str]:
+    """Of a trial, that its intervals leave out how sure constants and gains are, where nobody stated that."""
+    record = findings.record
+    stated = bool(record.rig and record.rig.sd) or any(channel.gain_sd for channel in record.channels.values())
+    if findings.trial is not None and not stated:
+        yield (
+            "The intervals hold with your constants exact, and with the sensors' gains: how sure they are is not "
+            'stated. Write it as in "2.42 ± 0.02 kg", and of a channel as in "COLUMN [g] ± 1 %".'
+        )
 
 
 def _headline(findings: Findings) -> Iterator[str]:
