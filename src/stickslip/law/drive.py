@@ -184,10 +184,10 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
 
 
 def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, float]:
-    angles = 2 * np.pi * frequency * np.outer(time, np.arange(1, count + 1))
+    waves = np.cumprod(np.tile(np.exp(2j * np.pi * frequency * time)[:, None], count), axis=1)
     columns = np.ones((len(time), 2 * count + 1))
-    columns[:, 1::2], columns[:, 2::2] = np.cos(angles), np.sin(angles)
-    found, *_ = np.linalg.lstsq(columns, values, rcond=None)
+    columns[:, 1::2], columns[:, 2::2] = waves.real, waves.imag
+    found = np.linalg.solve(columns.T @ columns, columns.T @ values)
     return np.asarray(found), float(np.sqrt(np.mean((values - columns @ found) ** 2)))
 
 

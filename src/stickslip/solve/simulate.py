@@ -225,20 +225,21 @@ def run(
                 before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
                 # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just then;
                 # the first call may compile for long, and is left to it
-                with held_back() if getattr(kernel.march, "signatures", True) else nullcontext():
+                with held_back() if getattr(kernel.march, "overloads", True) else nullcontext():
                     outcome, count, mode, clock = kernel.march(
                         model, before, state, mode, goal, past, pieces.room(), work, CELLS
                     )
                 passed = until(before, clock, period)
                 pieces.keep(count, passed, total)
                 _refuse(outcome, table, state, clock)
-                require_budget(
-                    count - (outcome == kernel.DONE),
-                    passed=passed,
-                    scale=scale,
-                    budget=budget,
-                    state=named(table.names[: table.physical], state),
-                )
+                if count > budget:
+                    require_budget(
+                        count - (outcome == kernel.DONE),
+                        passed=passed,
+                        scale=scale,
+                        budget=budget,
+                        state=named(table.names[: table.physical], state),
+                    )
                 if tell:
                     tell(pieces.passed / total)
     except KeyboardInterrupt:
@@ -319,6 +320,8 @@ def _at_rest(table: Tables, state: Array, mode: int) -> bool:
 
 
 def _refuse(outcome: int, table: Tables, state: Array, clock: Clock) -> None:
+    if outcome in (kernel.DONE, kernel.FULL) and np.all(np.isfinite(state)):
+        return
     place = f"lap {clock.laps:g}, {clock.time:g} s, at {named(table.names[: table.physical], state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
         raise chatter(place)
