@@ -55,7 +55,7 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=20, help="of each kind")
     parser.add_argument("--twins", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--off", type=float, default=0.0, help="standard deviation of the sensors' gains")
+    parser.add_argument("--off", type=float, default=0.0, help="by which gains and constants are off, as is stated")
     parser.add_argument("--kinds", default=",".join(stepped.KINDS))
     options = parser.parse_args()
     for kind in options.kinds.split(","):
@@ -65,11 +65,17 @@ def main() -> None:
             rng = np.random.default_rng(seed)
             rig = stepped.drawn(kind, rng)
             record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3), off=options.off)
+            stated: dict[str, float | tuple[float, float]] = dict(rig.stated)
+            if options.off:
+                record = record.with_details("x", gain_sd=options.off).with_details("z", gain_sd=options.off)
+                for name, value in rig.stated.items():
+                    written = value * (1 + options.off * rng.standard_normal())
+                    stated[name] = (written, options.off * written)
             begun = time.process_time()
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("error")
-                    quick = ss.analyze(record, **rig.stated)
+                    quick = ss.analyze(record, **stated)
                     spent[0] += time.process_time() - begun
                     begun = time.process_time()
                     tried = ss.tried(quick, twins=options.twins)

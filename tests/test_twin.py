@@ -31,7 +31,7 @@ def asked(rig: stepped.Rig) -> tuple[ss.answers.Findings, ss.answers.Findings]:
     """The quick answers and those tried on twins."""
     record = stepped.record(rig, np.random.default_rng(11))
     quick = ss.analyze(record, **rig.stated)
-    return quick, ss.tried(quick, twins=16)
+    return quick, ss.tried(quick, twins=10)
 
 
 def estimate(findings: ss.answers.Findings, name: str) -> ss.Estimate:

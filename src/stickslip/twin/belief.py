@@ -25,6 +25,7 @@ from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Mount, Noise, Sensor
 from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.solve.simulate import simulate
+from stickslip.solve.trajectory import Trajectory
 from stickslip.statistics import correlation_time, least_squares
 
 Array = NDArray[np.float64]
@@ -37,7 +38,9 @@ STARTS = (
 NEAR = 1.1  # times a sensor's noise, that a search may leave to have come to its end
 SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: below, sticks and smoothing are in it
 PASSES = 8  # of the descent: the first two do nearly all of it
+SEARCHED = 4000  # samples in which it is searched where a law's valley lies
 LOOK = 2  # passes of it, after which it is seen which of several starts leads nearer
+FALL = 0.02  # of friction, over the speeds at which it slides
 HALVINGS = 6  # of a step that leads away, before the descent ends
 SETTLED = 0.999  # of what is left, from which a further pass gains nothing
 TINY = 1e-9  # of the motion: noise below is rounding
@@ -136,6 +139,11 @@ class Belief:
         return self.values.get(KINETIC, 0.0) + min(0.0, self.slope) * self.sliding_speed
 
     @property
+    def falls(self) -> bool:
+        """Whether friction falls with speed by so much that a line and a curve would differ."""
+        return -self.slope * self.sliding_speed > FALL * self.kinetic
+
+    @property
     def static(self) -> float:
         """Friction that the contact bears before it slides [N]."""
         return self.values.get(KINETIC, 0.0) + self.values.get(EXCESS, 0.0)
@@ -229,8 +237,14 @@ class Belief:
 
     @cached_property
     def moved(self) -> Array:
-        """The displacement x that its sensor would read without noise [m]."""
-        return np.asarray(self.quiet().twin(np.random.default_rng(0))["x"])
+        """The displacement x that its sensor would read without noise and counts [m]."""
+        sensor, run = self.sensor, self._run()
+        if sensor.mount or math.isfinite(sensor.discharge):
+            quiet = replace(sensor, noise=Noise(), digitiser=Digitiser(limit=sensor.digitiser.limit), gain=self.gain)
+            return np.asarray(Rig((quiet,)).measure(run, fs=self.record.fs, rng=0)["x"])
+        times = np.clip(np.arange(len(self.record)) / self.record.fs - sensor.lag, 0.0, run.duration)
+        limit = sensor.digitiser.limit
+        return np.asarray(np.clip(self.gain * run.sample(times, ("x",))[0][0], -limit, limit))
 
     @cached_property
     def residual(self) -> Array:
@@ -239,26 +253,36 @@ class Belief:
         return np.asarray(left - left.mean())
 
     @property
+    def sensor(self) -> Sensor:
+        """The displacement's."""
+        return next(sensor for sensor in self.rig.sensors if sensor.channel == "x")
+
+    @property
+    def gain(self) -> float:
+        """Of that sensor."""
+        return math.exp(self.values.get(GAIN, 0.0))
+
+    @property
     def noise(self) -> float:
         """Standard deviation of the displacement's noise and counts [m]."""
-        sensor = next(sensor for sensor in self.rig.sensors if sensor.channel == "x")
-        return max(
-            math.hypot(sensor.noise.white, sensor.digitiser.step / 12**0.5), TINY * float(np.std(self.record["x"]))
-        )
+        noise = math.hypot(self.sensor.noise.white, self.sensor.digitiser.step / 12**0.5)
+        return max(noise, TINY * float(np.std(self.record["x"])))
 
     @property
     def like_noise(self) -> bool:
         """Whether it leaves no more of the displacement than its noise."""
         return float(np.std(self.residual)) < NEAR * self.noise
 
-    def quiet(self) -> Belief:
-        """The same rig with sensors of x alone that have no noise and count nothing."""
-        sensors = (
-            replace(s, noise=Noise(), digitiser=Digitiser(limit=s.digitiser.limit))
-            for s in self.rig.sensors
-            if s.channel == "x"
-        )
-        return replace(self, rig=Rig(tuple(sensors)))
+    def beginning(self) -> Belief:
+        """Of the record's beginning alone, that is long enough to search in."""
+        return replace(self, record=self.record.rows(0, SEARCHED))
+
+    def _run(self) -> Trajectory:
+        """The motion."""
+        last = (len(self.record) - 1) / self.record.fs
+        off = [self.values[name] for name in DRIVE if name in self.values]
+        moved = self.oscillator.having(drive=self.drive(0.0, last, off))
+        return simulate(moved, duration=last, start={"x": self.values["x"], "v": self.values["v"]})
 
     def twin(self, rng: np.random.Generator) -> Record:
         """What the rig writes: as long as the record, begun from its state, with what is known of its sensors.
@@ -268,16 +292,15 @@ class Belief:
         SolveError
             The rig's motion can not be followed.
         """
-        last = (len(self.record) - 1) / self.record.fs
-        off = [self.values[name] for name in DRIVE if name in self.values]
-        moved = self.oscillator.having(drive=self.drive(0.0, last, off))
-        run = simulate(moved, duration=last, start={"x": self.values["x"], "v": self.values["v"]})
-        rig = self.rig
-        if GAIN in self.values:
-            rig = rig.having("x", gain=math.exp(self.values[GAIN]))
-        written = rig.measure(run, fs=self.record.fs, rng=rng)
+        channels = self.record.channels
+        gains = {
+            name: 1 + channels[name].gain_sd * rng.standard_normal() for name in ("v", "a", "load") if name in channels
+        }
+        gains |= {"x": self.gain, "z": 1 / (1 + self.values.get(DRIVE[0], 0.0))}  # what z wrote, it writes again
+        rig = Rig(tuple(replace(s, gain=gains.get(s.channel, 1.0)) for s in self.rig.sensors))
+        written = rig.measure(self._run(), fs=self.record.fs, rng=rng)
         for name in written:
-            known = self.record.channels[name]
+            known = channels[name]
             details = {"delay": known.delay, "mount": known.mount, "inertia": known.inertia}
             written = written.with_details(name, **details, discharge=known.discharge, noise=known.noise)
         return written
@@ -404,26 +427,26 @@ def _stands_out(belief: Belief, part: str) -> bool:
 def _richer(simple: Belief) -> Belief:
     """With the parts that leave the least of the displacement, where that is less than chance would leave."""
     best, least = simple, CHANCE
-    for starts in _parts(simple):
-        richer = _best(starts)
+    for starts in _parts(simple.beginning()):
+        richer = _best(starts, simple.record)
         chance = _by_chance(simple, richer)
         if chance < least or (chance == least and _left(richer) < _left(best)):
             best, least = richer, chance
     if GIVE in best.values:  # a contact's own damping matters less than its stiffness: it is looked for last
-        damped = _best([best.at(**{LOSS: loss}) for loss in LOSSES])
+        damped = _best([best.beginning().at(**{LOSS: loss}) for loss in LOSSES], simple.record)
         best = damped if _by_chance(best, damped) < CHANCE else best
     return best
 
 
-def _best(starts: list[Belief]) -> Belief:
-    """The nearest of those that the nearest starts lead to."""
+def _best(starts: list[Belief], record: Record) -> Belief:
+    """The nearest to a record of those that the nearest starts lead to on its beginning."""
     starts = sorted(starts, key=_left)
     best = starts[0]
     for number, begun in enumerate(starts[: 3 * STARTS]):
         if number >= STARTS and best.like_noise:
             break
         best = min(best, _tried(begun, LOOK), key=_left)
-    return _tried(best, PASSES)
+    return _tried(replace(best, record=record), PASSES)
 
 
 def _tried(begun: Belief, passes: int) -> Belief:
@@ -573,10 +596,13 @@ def _sensors(record: Record) -> list[Sensor]:
             step = quantisation_step(values)
             limit = float(np.max(np.abs(values))) if saturated(values).any() else np.inf
             mount = None if channel.mount is None else Mount(*channel.mount, mass=channel.inertia)
-            noise = Noise(channel.noise if channel.noise is not None else noise_level(values, record.fs))
+            level = noise_level(values, record.fs)  # counts are in what is measured, and not in what is stated
+            white = math.sqrt(max(level**2 - step**2 / 12, 0.0)) if channel.noise is None else channel.noise
             discharge = np.inf if channel.discharge is None else channel.discharge
             digitiser = Digitiser(step=step, limit=limit)
             sensors.append(
-                Sensor(name, lag=channel.delay, mount=mount, discharge=discharge, noise=noise, digitiser=digitiser)
+                Sensor(
+                    name, lag=channel.delay, mount=mount, discharge=discharge, noise=Noise(white), digitiser=digitiser
+                )
             )
     return sensors

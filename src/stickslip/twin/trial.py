@@ -161,7 +161,7 @@ def try_on_twins(
     for name in ASKED:
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
-            both = belief.slope < 0 or UNSTATED in kinds(answers[name].status)
+            both = belief.falls or UNSTATED in kinds(answers[name].status)
             tried[name] = _tried(answers[name], pairs, strays, both=both)
     if GIVE in belief.values:
         answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
@@ -271,7 +271,7 @@ def _fitted(
     errors = np.array([value(belief.told_by(twin.record)) - value(twin.rig) for twin in twins])
     least, (low, high) = _less_bias(value(belief), errors, strays)
     interval = (low - reach if part == SLOPE else low, high + reach)
-    if quick.known and (strays > UNLIKE or belief.slope < 0):  # a line, where a real one is a curve
+    if quick.known and (strays > UNLIKE or belief.falls):  # a line, where a real one is a curve
         interval = _hull(least, interval, quick)
     tried = _estimate(quick, least, interval, f"fit to x, {len(twins)} twins", [], strays)
     return tried if quick.name != RATIO else tried.within(1.0, math.inf)
