@@ -49,10 +49,10 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(main, ["squeak", *map(str, arguments)])
 
 
-def tone(duration: float = 0.4) -> np.ndarray:
-    t = np.arange(int(FS)) / FS
+def tone(duration: float = 0.4, *, frequency: float = 500.0, fs: float = FS) -> np.ndarray:
+    t = np.arange(int(fs)) / fs
     inside = np.exp(-((np.maximum(0, np.abs(t - 0.5) - duration / 2) / 0.01) ** 2))
-    wave = sum(np.sin(2 * np.pi * order * 500 * t) / order**2 for order in (1, 2, 3))
+    wave = sum(np.sin(2 * np.pi * order * frequency * t) / order**2 for order in (1, 2, 3))
     return inside * wave + 1e-3 * np.random.default_rng(0).standard_normal(len(t))
 
 
@@ -89,17 +89,17 @@ def test_a_condition_says_what_drove_it() -> None:
     assert each.to_dict()["trend"] == each.trend
 
 
-def of_sound(values: np.ndarray, name: str) -> ss.answers.SqueakFindings:
-    return ss.analyze_squeaks(ss.Record.of({"sound": values}, fs=FS), name=name)
+def of_sound(values: np.ndarray, name: str, fs: float = FS) -> ss.answers.SqueakFindings:
+    return ss.analyze_squeaks(ss.Record.of({"sound": values}, fs=fs), name=name)
 
 
 def test_what_creaks_or_whistles_is_not_called_silent() -> None:
     t = np.arange(int(FS)) / FS
-    creak = np.exp(-np.mod(t, 1 / 25) / 0.002) * np.random.default_rng(3).standard_normal(len(t))
+    since = np.mod(20 * t + 6 * t**2, 1) / (20 + 12 * t)  # 20 to 32 in a second
+    creak = np.exp(-since / 0.002) * np.random.default_rng(3).standard_normal(len(t))
     whistle = np.sin(2 * np.pi * 800 * t) * np.exp(-(((t - 0.5) / 0.2) ** 2)) + 1e-3 * creak
-    found = [
-        of_sound(*each) for each in ((tone(), "Chalk"), (creak * (t > 0.1) * (t < 0.9), "Door"), (whistle, "Pipe"))
-    ]
+    chalk = of_sound(tone(frequency=2500, fs=20_000), "Chalk", 20_000)
+    found = [chalk, of_sound(creak * (t > 0.1) * (t < 0.9), "Door"), of_sound(whistle, "Pipe")]
     together = ss.answers.compare_squeaks(found)
     assert [each.answer for each in together.conditions] == ["squeals", "creaks", "can not be told"]
     assert together.verdicts == ("Chalk squeals; Door creaks.", "Whether Pipe squeaks can not be told.")

@@ -33,6 +33,8 @@ EXTREMES = "extremes alone"
 LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
 PLAIN = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
 CLEAR = 1e-3  # p-value below which a motion's rejection is no chance of one true motion in twenty
+CHANCE = 0.01  # of a record without dry friction to be told to have some
+ONE_IN_100 = 2.33 / 1.96  # by which the lower end of 95 % lies farther off where one in a hundred lies beyond it
 METHODS = ("thesis", "waveform", "all")
 OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
     "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, EXTREMES: extreme_decay,
@@ -156,21 +158,64 @@ class DecayFindings(Result):
         return displacement.scaled(spring, unit, name.replace("force", word))
 
     @property
+    def rubs(self) -> bool:
+        """Whether there is dry friction: records without it would show as much in fewer than one of a hundred.
+
+        Every motion tried that has none is spoken against so clearly; where none was tried, the interval says it.
+        """
+        dry = self.best.dry_displacement
+        fits = self.waveform.motions if self.waveform is not None and self.waveform.motions else ()
+        tried = [each.choice for each in fits or ([] if self.motion is None else [self.motion])]
+        without = [
+            len(tried) * min(choice.candidate(each.name).p_value for choice in tried)
+            for each in (tried[0].candidates if tried else ())
+            if "dry_displacement" not in each.fitted.motion.terms
+        ]
+        if without:
+            return dry.interval[0] > 0 and max(without) < CHANCE
+        return dry.value - ONE_IN_100 * (dry.value - dry.interval[0]) > 0
+
+    @property
+    def denied(self) -> bool:
+        """Whether the record speaks against viscous and dry friction, and for none of the other motions."""
+        negative = self.best.dry_displacement.interval[1] < 0
+        return self.best is not self.motion and (self.against < CLEAR or negative)
+
+    @property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Every number found, the best answer first; the decrements' are named so where both methods answer."""
+        """Every number found: those that are quoted, then the same by other ways."""
+        return (*self.quoted, *self.beside)
+
+    @property
+    def quoted(self) -> tuple[Estimate, ...]:
+        """The best answer's numbers, with one damping ratio: that of whichever motion, where its own is denied."""
         force = self.dry_force
         found = [] if force is None else [force]
         if self.motion is not None and self.best is self.motion:
             found += [*self.motion.terms, self.motion.frequency, *self.whichever]
-        elif self.waveform is None and self.thesis is None:
+        elif self.waveform is None:
             found += self.best.estimates
-        elif self.waveform is not None:
+        else:
             found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
             found += [] if self.waveform.motions else self.whichever
-        if self.thesis is not None:
-            also = ", by decrements" if self.best is not self.thesis else ""
-            found += [replace(each, name=f"{each.name}{also}") for each in self.thesis.estimates]
-        return tuple(found)
+        other = self._other_ratio
+        return tuple(each for each in found if each is not other)
+
+    @property
+    def beside(self) -> tuple[Estimate, ...]:
+        """The other damping ratio, and what the decrements say where they are not the best answer."""
+        other, more = (
+            self._other_ratio,
+            () if self.thesis is None or self.best is self.thesis else self.thesis.estimates,
+        )
+        found = [replace(each, name=f"{each.name}, by decrements") for each in more]
+        return tuple(found) if other is None else (other, *found)
+
+    @property
+    def _other_ratio(self) -> Estimate | None:
+        """The damping ratio that is not quoted, where there are two: of the motion, and of whichever it was."""
+        either = self.whichever[0] if self.whichever and self.best is not self.thesis else None
+        return self.best.damping_ratio if either is not None and self.denied else either
 
     @property
     def comparisons(self) -> tuple[Estimate, ...]:
@@ -196,6 +241,7 @@ class DecayFindings(Result):
             "faults": [str(fault) for fault in self.faults],
             "settings": dict(self.settings),
             "model": self.best.model,
+            "dry_friction_shown": self.rubs,
             "status": self.best.status,
             "releases": [
                 {

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 
 HEARD_AT_ONCE = 5.0  # s
+OF_MEDIAN = math.sqrt(math.pi / 2)  # its standard deviation over that of the mean
 VIBRATING = (*HEARD, "torsion_velocity", "load")
 
 
@@ -87,12 +88,12 @@ class SqueakFindings(Result):
 
     @property
     def frequency(self) -> Estimate | None:
-        """Mean frequency of the squeaks and squeals [Hz], its interval from the scatter between them."""
+        """Median frequency of the squeaks and squeals [Hz], its interval from the scatter between them."""
         heard = [burst.frequency for burst in self.squeaks.of("squeak", "squeal")]
         if not heard:
             return None
-        found = mean_of_cycles("frequency of the squeaks", heard, unit="Hz", method="mean of the bursts")
-        return _of_bursts(found)
+        found = mean_of_cycles("frequency of the squeaks", heard, unit="Hz", method="median of the bursts")
+        return _of_bursts(found, float(np.median(heard)))
 
     @property
     def coefficient(self) -> Estimate | None:
@@ -268,8 +269,11 @@ def _normal(record: Record, stated: float | str | None) -> float | None:
     return measured or None
 
 
-def _of_bursts(found: Estimate) -> Estimate:
+def _of_bursts(mean: Estimate, median: float) -> Estimate:
+    """The median beside a mean: one burst that is told at a multiple of its pitch moves only the interval."""
+    reach = OF_MEDIAN * (mean.interval[1] - mean.value)
     return replace(
-        found, status=found.status.replace("cycle", "burst"),
-        checks=tuple(check.replace("cycle", "burst") for check in found.checks),
+        mean, value=median, interval=(median - reach, median + reach), sd=OF_MEDIAN * mean.sd,
+        status=mean.status.replace("cycle", "burst"),
+        checks=tuple(check.replace("cycle", "burst") for check in mean.checks),
     )  # fmt: skip

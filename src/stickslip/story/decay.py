@@ -16,7 +16,7 @@ from stickslip.decay.fit_decay import LEFT_OVER
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate, kinds
 from stickslip.plot.decay import plates_of, plates_together
-from stickslip.story.story import Line, Story, tried
+from stickslip.story.story import Line, Story, Table, tried
 from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, leading, number, value_of
 
 MOST = 0.5  # of the power of what is left over
@@ -34,11 +34,19 @@ def of_findings(findings: DecayFindings) -> Story:
     return Story.of_record(
         findings.name, findings.record, headline=[*leading(findings.faults), *headline(findings)],
         cautions=cautions(findings),
-        lines=[Line.of(each, findings.true_value(each)) for each in (*findings.estimates, *beside)],
+        lines=[Line.of(each, findings.true_value(each)) for each in findings.quoted],
         faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
-        tables=[tried("motion", motions)] if motions else [],
+        tables=[*_by_other_ways([*findings.beside, *beside]), *([tried("motion", motions)] if motions else [])],
         draw=lambda: plates_of(findings), data=findings.to_dict,
     )  # fmt: skip
+
+
+def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:
+    """What is not quoted, folded away."""
+    headings = ("quantity", "value", "95 % interval", "how sure")
+    rows = [(each.name, value_of(each), interval_of(each), each.status) for each in estimates]
+    if rows:
+        yield Table("The same by other ways", headings, rows, folded=True)
 
 
 def of_comparison(comparison: DecayComparison) -> Story:
@@ -80,9 +88,9 @@ def headline(findings: DecayFindings) -> Iterator[str]:
             yield f"It is read from its extremes alone, for of the whole waveform {note.removeprefix(WAVEFORM)}"
     force = findings.dry_force
     word = "torque" if findings.settings["channel"] == "theta" else "force"
-    if force is not None:
+    if force is not None and findings.rubs:
         yield f"That is a dry friction {word} of {value_of(force)} (95 % sure: {interval_of(force)})."
-    elif findings.best.dry_displacement.interval[0] > 0:
+    elif findings.rubs:
         yield f"The dry friction {word} is that displacement times the spring's stiffness; state stiffness= or mass=."
     yield from _motion(findings)
     yield from _chosen(findings)
@@ -107,19 +115,24 @@ def _frictions(findings: DecayFindings) -> Iterator[str]:
 def _dying(findings: DecayFindings) -> str:
     """By which frictions it dies away, and how large they are."""
     ratio, dry = findings.best.damping_ratio, findings.best.dry_displacement
-    viscous, rubs = ratio.interval[0] > 0, dry.interval[0] > 0
+    viscous, rubs = ratio.interval[0] > 0, findings.rubs
     shown = _both(ratio, dry)
     curved = findings.best is findings.thesis and not findings.releases.ring_downs[0].isochronous
     if findings.motion is not None and findings.best is findings.motion:
         words = findings.motion.choice.chosen.fitted.motion.words
         return f"The motion dies away by {words}: {_listed([_told(each) for each in findings.motion.terms])}."
-    if findings.against < CLEAR or dry.interval[1] < 0 or curved:
+    if findings.denied and findings.whichever:
+        ratio, dry = findings.whichever
+        reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
+        return f"Whichever motion it was, {reach}: read as viscous and dry friction, which the record speaks against."
+    if findings.denied or curved:
         return f"Read as viscous and dry friction, which the record speaks against, it shows {shown}."
     if viscous and rubs:
         model = findings.best.model
         return f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
     if viscous:
-        return f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(dry, 'dry friction')}"
+        widest = max((dry, *findings.whichever[1:]), key=lambda each: each.interval[1])
+        return f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(widest, 'dry friction')}"
     if rubs:
         return f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
     return "Neither viscous nor dry friction can be told from zero."
@@ -154,6 +167,8 @@ def _chosen(findings: DecayFindings) -> Iterator[str]:
     dry = findings.whichever[1]
     force = findings.as_force(dry, "")
     also = f", its {'torque' if force.unit == 'N m' else 'force'} {_reach(force)}" if force is not None else ""
+    if findings.denied:
+        return
     which = "Whichever of them it is" if kept else "By all that leave at most twice the least residual"
     yield f"{which}, the dry friction displacement is {_reach(dry)}{also}."
 
@@ -177,8 +192,9 @@ def _told(estimate: Estimate) -> str:
 
 
 def _hidden(estimate: Estimate, words: str) -> str:
+    """What is not told from zero, and up to how much of it would not be."""
     least = value_of(estimate, max(0.0, estimate.interval[1]))
-    return f"That there is {words} too can not be told: a {estimate.name} below {least} would not be seen."
+    return f"That there is {words} too can not be told: less than {least} of it would not be seen."
 
 
 def _left_over(findings: DecayFindings) -> Iterator[str]:

@@ -55,15 +55,18 @@ def _headline(found: SqueakFindings) -> Iterator[str]:
     where = "" if squeaks.channel == "sound" else f" in the channel {squeaks.channel}"
     if not squeaks.bursts:
         yield f"Nothing sounds{where}: no burst in {record.duration:.4g} s."
+        yield from _power(squeaks)
         return
     creaks = [f"{burst.rate:.3g}" for burst in squeaks.of("creak")]
     if not heard and creaks:
         yield f"It creaks{where}: stick-slip pulses, {' and '.join(creaks)} in a second."
     elif squeaks.answer == "can not be told":
         yield f"Whether it squeaks{where} can not be told: {_untold(squeaks)}."
+        yield from _power(squeaks)
     elif not heard:
         kinds = [(squeaks.of(kind), words) for kind, words in WORDS.items()]
         yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {words}' for of, words in kinds if of)}."
+        yield from _power(squeaks)
     elif found.frequency is not None:
         many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"
         tone = found.frequency.value
@@ -122,16 +125,22 @@ def _spoken_name(channel: str) -> str:
 
 
 def _untold(squeaks: Squeaks) -> str:
-    """Of how many bursts it can not be told whether friction makes them."""
-    every, asked = len(squeaks.of("tonal")), len(squeaks.untold)
+    """Of how many bursts it can not be told whether friction makes them: of tonal ones, where there are any."""
+    tonal = [burst for burst in squeaks.untold if burst.kind == "tonal"]
+    kind, asked = ("tonal", len(tonal)) if tonal else ("broad", len(squeaks.untold))
+    every = len(squeaks.of("tonal")) if tonal else asked
+    if every == asked == 1:
+        return f"one {kind} burst may be friction's, or not"
     if every == asked:
-        return (
-            "one tonal burst may be friction's, or not"
-            if every == 1
-            else (f"each of {every} tonal bursts may be friction's, or not")
-        )
+        return f"each of {every} {kind} bursts may be friction's, or not"
     rest = "the other one is not" if every - asked == 1 else f"the other {every - asked} are not"
-    return f"of {every} tonal bursts {asked} may be friction's, or not; {rest}"
+    return f"of {every} {kind} bursts {asked} may be friction's, or not; {rest}"
+
+
+def _power(squeaks: Squeaks) -> Iterator[str]:
+    """How loud a squeak would have been heard, where no tone may be one."""
+    if not math.isnan(squeaks.threshold) and not any(burst.kind == "tonal" for burst in squeaks.untold):
+        yield f"A squeak of {squeaks.threshold:.0f} dB re {squeaks.reference} or more would have been heard."
 
 
 def _of_one(burst: Squeak, squeaks: Squeaks) -> str:
@@ -212,7 +221,7 @@ def _channel_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]
     rows = []
     for squeaks in (found.squeaks, *found.beside):
         heard = squeaks.of("squeak", "squeal")
-        frequency = f"{np.mean([burst.frequency for burst in heard]):.1f}" if heard else NONE
+        frequency = f"{np.median([burst.frequency for burst in heard]):.1f}" if heard else NONE
         levels = [burst.level for burst in heard or squeaks.bursts if not math.isnan(burst.level)]
         level = f"{max(levels):.1f} re {squeaks.reference}" if levels else NONE
         rows.append([squeaks.channel, squeaks.kind, str(len(heard)), frequency, level])

@@ -81,12 +81,15 @@ class Table:
         Its cells.
     note : str
         How to read it.
+    folded : bool
+        Whether a page shows it when it is asked to, and a terminal says only that it is there.
     """
 
     title: str
     headings: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
+    folded: bool = False
 
 
 def tried(what: str, verdicts: Sequence[Sequence[str]]) -> Table:
