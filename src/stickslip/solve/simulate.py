@@ -215,33 +215,35 @@ def run(
     scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
     pieces = _Log(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
+    # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just then;
+    # the first call may compile for long, and is left to it
+    compiled = getattr(kernel.march, "overloads", True)
     try:
-        for at, (signals, values) in stops_of(table, laps, offset):
-            state[signals] = values
-            mode = kernel.begin(model.linear, mode, state, total, 1.0, work)
-            _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
-            outcome = kernel.FULL
-            while outcome == kernel.FULL:
-                before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
-                # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just then;
-                # the first call may compile for long, and is left to it
-                with held_back() if getattr(kernel.march, "overloads", True) else nullcontext():
+        with held_back() if compiled else nullcontext(lambda: None) as heed:
+            for at, (signals, values) in stops_of(table, laps, offset):
+                state[signals] = values
+                mode = kernel.begin(model.linear, mode, state, total, 1.0, work)
+                _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
+                outcome = kernel.FULL
+                while outcome == kernel.FULL:
+                    before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
                     outcome, count, mode, clock = kernel.march(
                         model, before, state, mode, goal, past, pieces.room(), work, CELLS
                     )
-                passed = until(before, clock, period)
-                pieces.keep(count, passed, total)
-                _refuse(outcome, table, state, clock)
-                if count > budget:
-                    require_budget(
-                        count - (outcome == kernel.DONE),
-                        passed=passed,
-                        scale=scale,
-                        budget=budget,
-                        state=named(table.names[: table.physical], state),
-                    )
-                if tell:
-                    tell(pieces.passed / total)
+                    heed()
+                    passed = until(before, clock, period)
+                    pieces.keep(count, passed, total)
+                    _refuse(outcome, table, state, clock)
+                    if count > budget:
+                        require_budget(
+                            count - (outcome == kernel.DONE),
+                            passed=passed,
+                            scale=scale,
+                            budget=budget,
+                            state=named(table.names[: table.physical], state),
+                        )
+                    if tell:
+                        tell(pieces.passed / total)
     except KeyboardInterrupt:
         if tell is None or not pieces.count:
             raise
@@ -320,7 +322,7 @@ def _at_rest(table: Tables, state: Array, mode: int) -> bool:
 
 
 def _refuse(outcome: int, table: Tables, state: Array, clock: Clock) -> None:
-    if outcome in (kernel.DONE, kernel.FULL) and np.all(np.isfinite(state)):
+    if outcome in (kernel.DONE, kernel.FULL) and math.isfinite(state.sum()):
         return
     place = f"lap {clock.laps:g}, {clock.time:g} s, at {named(table.names[: table.physical], state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
