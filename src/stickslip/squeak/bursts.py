@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Status
+from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.squeak.hearing import Hearing, Span, clipped_rows, filtered, pulse_train
 from stickslip.squeak.sound import REFERENCES, level
+from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]
 
@@ -111,7 +112,7 @@ class Squeak:
 
 
 @dataclass(frozen=True, eq=False)
-class Squeaks:
+class Squeaks(Result):
     """The bursts of a record.
 
     Attributes
@@ -167,6 +168,26 @@ class Squeaks:
         if self.of("creak"):
             return "creaks"
         return "can not be told" if self.untold else "does not squeak"
+
+    @property
+    def loudest(self) -> Squeak | None:
+        """The loudest of the squeaks and squeals, or of all bursts where there are none; if clipped, the longest."""
+        bursts = self.of("squeak", "squeal") or self.bursts
+        return max(bursts, key=lambda each: (np.nan_to_num(each.level, nan=-math.inf), each.duration), default=None)
+
+    @property
+    def frequency(self) -> Estimate | None:
+        """Mean frequency of the squeaks and squeals [Hz], its interval from the scatter between them."""
+        heard = [burst.frequency for burst in self.of("squeak", "squeal")]
+        method = "mean of the bursts"
+        return (
+            mean_of_cycles("frequency of the squeaks", heard, unit="Hz", method=method, of="burst") if heard else None
+        )
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """The mean frequency, where anything squeaks."""
+        return () if self.frequency is None else (self.frequency,)
 
     def of(self, *kinds: str) -> tuple[Squeak, ...]:
         """The bursts of some kinds."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
-from stickslip.answers.comparison import Comparison
-from stickslip.answers.findings import Findings
+from stickslip.answers.findings import Comparison, Findings
 from stickslip.balance.pull import Pull
 from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
 from stickslip.estimate import Estimate, stands
 from stickslip.plot.friction import plates_of, plates_together
 from stickslip.story.story import Line, Story
-from stickslip.story.words import cautions, interval_of, leading, number, sentence, value_of
+from stickslip.story.words import cautions, interval_of, number, sentence, value_of
 
 NEVER = "The contact never sticks."
 RARELY = 0.005  # of the time
@@ -27,12 +27,12 @@ def of_findings(findings: Findings) -> Story:
     """One record."""
     headed = () if findings.contradiction else (findings.breakaway, findings.presliding)
     said = [estimate for answer in headed if answer is not None for estimate in answer.estimates]
-    return Story.of_record(
-        findings.name, findings.record, headline=[*leading(findings.faults), *_headline(findings)],
-        cautions=cautions(findings, said),
-        lines=[Line.of(each, findings.true_value(each)) for each in findings.estimates],
-        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
-        draw=lambda: plates_of(findings), data=findings.to_dict,
+    settings = {
+        key: number(value, 0.0, UNITS[key]) if key in UNITS else str(value) for key, value in findings.settings.items()
+    }
+    return Story(
+        findings.name, list(_headline(findings)), cautions(findings, said), settings=settings,
+        draw=lambda: plates_of(findings), data=lambda: _data(findings),
     )  # fmt: skip
 
 
@@ -41,23 +41,19 @@ def of_comparison(comparison: Comparison) -> Story:
     levels = [(each, each.level) for each in comparison.findings if each.level is not None]
     return Story(
         f"{len(comparison.findings)} records compared", list(_together(comparison)),
-        lines=[
-            *map(Line.of, comparison.estimates),
-            *(Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels),
-        ],
-        notes=comparison.notes, parts=[of_findings(each) for each in comparison.findings],
-        draw=lambda: plates_together(comparison), data=comparison.to_dict,
+        lines=[Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels],
+        draw=lambda: plates_together(comparison),
     )  # fmt: skip
 
 
-def _settings(findings: Findings) -> dict[str, str]:
-    told = {
-        key: number(value, 0.0, UNITS[key]) if key in UNITS else str(value) for key, value in findings.settings.items()
+def _data(findings: Findings) -> dict[str, Any]:
+    regression, trial = findings.regression, findings.trial
+    return {
+        "contradiction": findings.contradiction,
+        "normal_load": findings.normal,
+        "regression_residual": None if regression is None else regression.residual,
+        **({} if trial is None else {"twins": trial.to_dict()}),
     }
-    if findings.normal is not None:
-        told["normal load"] = number(findings.normal, 0.0, "N")
-    record = findings.record
-    return {**told, "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}
 
 
 def _headline(findings: Findings) -> Iterator[str]:
