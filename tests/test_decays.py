@@ -157,7 +157,7 @@ def test_the_identified_motion_is_the_measured_one(release):
     from stickslip.plot.decay import _identified
 
     record = ss.read_record(release, channels={"x": "pos [mm]"})
-    _, measured, fitted, _ = _identified(ss.analyze_decay(record, method="thesis"))
+    _, measured, fitted, _ = _identified(ss.analyze_decay(record, method="thesis").decay)
     assert np.std(measured - fitted) < 2 * 5e-6
 
 
@@ -357,7 +357,6 @@ def test_what_no_repair_bridges_is_not_sent_to_a_repair():
 
 
 def test_the_release_is_told_by_one_number_everywhere():
-    from stickslip.story.decay import headline
     from stickslip.story.words import value_of
 
     values, fs, _ = free_decay(hold=1.0)
@@ -369,7 +368,7 @@ def test_the_release_is_told_by_one_number_everywhere():
     ):
         found = ss.analyze_decay(ss.Record.of({"x": motion}, fs=fs))
         begin, far = found.decay.waveform.release_time, found.decay.waveform.amplitude
-        sentence = next(each for each in headline(found) if "extremes from" in each)
+        sentence = next(each for each in ss.summary(found).headline if "extremes from" in each)
         assert words[0] in sentence
         assert begin.name == words[1]
         assert f"at {value_of(begin)}" in sentence
