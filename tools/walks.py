@@ -1,74 +1,60 @@
-"""The way of a record through the rooms of the house, as it is run: ``python tools/walks.py [--show]``.
+"""The ways through the rooms of the house, as they are run: ``python tools/walks.py`` names the rooms in order.
 
-A walk is the order in which functions are entered for the first time; a stay is a stretch of it in one room. A call goes
-upwards where the room that is called stands on a higher floor than the one that calls.
+A walk is the order in which functions are entered for the first time; a stay is a stretch of it in one room. What
+everybody holds in hand (a Record, an Estimate: the rooms on the floor of `record` and below) is no stay. A call goes
+upwards where the room called stands above the room that calls.
 """
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import sys
 import tempfile
-import tomllib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
 
 import stickslip as ss
 
-ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(Path(__file__).parent))
+
+from measure import floors
+
 PACKAGE = Path(str(ss.__file__)).parent
+HEIGHT = {room: -number for number, floor in enumerate(floors()) for room in floor}
 
 
-def floors() -> list[list[str]]:
-    """The rooms of each floor, from the top down, as the import-linter's contract has them."""
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
-    return [[room.strip() for room in layer.split("|")] for layer in layers]
+def walk(run: Callable[[], Any]) -> tuple[list[str], list[str]]:
+    """The rooms in which `run` stays, and its calls upwards."""
+    rooms: list[str] = []
+    upwards: list[str] = []
+    entered: set[CodeType] = set()
 
-
-class Walk:
-    """The rooms entered, in order, and the calls that go upwards."""
-
-    def __init__(self) -> None:
-        self.rooms: list[str] = []
-        self.upwards: dict[str, None] = {}
-        self._entered: set[CodeType] = set()
-        self._height = {room: -number for number, floor in enumerate(floors()) for room in floor}
-
-    @property
-    def stays(self) -> list[str]:
-        return [room for room, _ in itertools.groupby(self.rooms)]
-
-    @contextmanager
-    def followed(self) -> Iterator[None]:
-        """Follow what is called meanwhile."""
-        sys.setprofile(self._called)
-        try:
-            yield
-        finally:
-            sys.setprofile(None)
-
-    def _called(self, frame: FrameType, event: str, _: Any) -> None:
-        room = room_of(frame.f_code) if event == "call" else ""
-        if not room or frame.f_code in self._entered:
+    def called(frame: FrameType, event: str, _: Any) -> None:
+        room = room_of(frame.f_code) if event == "call" and frame.f_code not in entered else ""
+        if not room:
             return
-        self._entered.add(frame.f_code)
-        self.rooms.append(room)
-        caller = next(filter(None, map(room_of, callers(frame))), room)
-        if self._height.get(caller, 0) < self._height.get(room, 0):
-            self.upwards[f"{caller} -> {room} ({frame.f_code.co_qualname})"] = None
+        entered.add(frame.f_code)
+        caller = next((place for code in callers(frame) if (place := room_of(code))), room)
+        if HEIGHT[caller] < HEIGHT[room]:
+            upwards.append(f"{caller} -> {room}: {frame.f_code.co_qualname}")
+        if HEIGHT[room] > HEIGHT["record"]:
+            rooms.append(room)
+
+    run()  # once unseen, for what is imported, compiled and remembered at first
+    sys.setprofile(called)
+    try:
+        run()
+    finally:
+        sys.setprofile(None)
+    return [room for room, _ in itertools.groupby(rooms)], upwards
 
 
 def room_of(code: CodeType) -> str:
-    """The folder of the package, or the file beside them, that a function stands in; empty outside."""
+    """The folder of the package, or the file beside them, in which a function stands; empty outside."""
     path = Path(code.co_filename)
-    if not path.is_relative_to(PACKAGE) or code.co_name == "<module>":
-        return ""
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py") if path.is_relative_to(PACKAGE) else ""
 
 
 def callers(frame: FrameType) -> Iterator[CodeType]:
@@ -77,28 +63,19 @@ def callers(frame: FrameType) -> Iterator[CodeType]:
         yield frame.f_code
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--show", action="store_true", help="name the rooms, too")
-    show = parser.parse_args().show
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "demo.csv"
-        record = ss.datasets.demo()
-        rig = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
-        ss.write_record(record, file)
-        findings = ss.analyze(record, **rig)
-        walks: dict[str, Callable[[], Any]] = {
-            "file to friction loops": lambda: ss.friction_loops(ss.friction_force(ss.read_record(file), **rig)),
-            "findings to page": lambda: ss.report(findings, Path(folder) / "report.html"),
-        }
-        for name, run in walks.items():
-            run()  # once unseen, for what is imported and compiled at first
-            walk = Walk()
-            with walk.followed():
-                run()
-            print(f"{name}: {len(walk.stays)} stays in {len(set(walk.stays))} rooms, {len(walk.upwards)} calls upwards")
-            print(*walk.upwards, " > ".join(walk.stays), sep="\n") if show else None
+def walks(folder: Path) -> dict[str, tuple[list[str], list[str]]]:
+    """The two ways that every record goes, of the bundled one; what they write goes into a folder."""
+    record, file = ss.datasets.demo(), folder / "demo.csv"
+    rig = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
+    ss.write_record(record, file)
+    findings = ss.analyze(record, **rig)
+    return {
+        "file to friction loops": walk(lambda: ss.friction_loops(ss.friction_force(ss.read_record(file), **rig))),
+        "findings to page": walk(lambda: ss.report(findings, folder / "report.html")),
+    }
 
 
 if __name__ == "__main__":
-    main()
+    with tempfile.TemporaryDirectory() as scratch:
+        for title, (stays, up) in walks(Path(scratch)).items():
+            print(f"{title}, {len(stays)} stays, {len(up)} upwards:", " > ".join(stays), *up, sep="\n  ")
