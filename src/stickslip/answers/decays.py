@@ -20,7 +20,7 @@ from stickslip.decay.motions import Restoring
 from stickslip.decay.release import Releases, find_releases
 from stickslip.decay.swings import SEEN
 from stickslip.decay.which_motion import DecayMotion, choose_motion
-from stickslip.errors import EstimateError
+from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record
 from stickslip.units import parse_constant
@@ -72,6 +72,8 @@ class Decay(Result):
         What the older methods say, for comparison.
     mass, stiffness : float or None
         Of the oscillator, where stated.
+    refusal : StickslipError or None
+        Why it could not be read from the whole waveform, where that was asked in vain.
     """
 
     releases: Releases
@@ -81,6 +83,7 @@ class Decay(Result):
     older: Mapping[str, EnvelopeDecay] = field(default_factory=dict)
     mass: float | None = None
     stiffness: float | None = None
+    refusal: StickslipError | None = None
 
     @property
     def best(self) -> BothFrictions:
@@ -233,10 +236,10 @@ def analyze_decay(
     faults = tuple(each for each in record.check() if (each.kind, each.channel) != ("drift", used))  # a hold is none
     constants = _constants(used, mass=mass, stiffness=stiffness)
     asked = Asked(list(releases.notes))
-    waveform = thesis = motion = None
+    waveform = thesis = motion = refusal = None
     if method != "thesis":
         way: dict[str, Any] = {"channel": used, "restoring": restoring}
-        waveform, motion = _by_waveform(record, asked, way, constants, displaced=displaced)
+        waveform, motion, refusal = _by_waveform(record, asked, way, constants, displaced=displaced)
     if method != "waveform" and restoring == "linear":
         thesis = asked.ask("The decrements", partial(decrement, record, channel=used))
     last = asked.refusals[-1:]
@@ -248,7 +251,7 @@ def analyze_decay(
     }
     if waveform is None and thesis is None and motion is None and (restoring == "linear" or not older):
         raise last[0]
-    decay = Decay(releases, waveform, thesis, motion, older, **constants)
+    decay = Decay(releases, waveform, thesis, motion, older, refusal=refusal, **constants)
     settings = {"method": method, "channel": used, "restoring": restoring, **constants}
     notes = tuple(dict.fromkeys(asked.notes))
     return Findings(record_name(record), record, faults, notes=notes, settings=settings, results={"decay": decay})
@@ -262,17 +265,20 @@ def _constants(channel: str, **stated: float | str | None) -> dict[str, Any]:
 
 def _by_waveform(
     record: Record, asked: Asked, way: dict[str, Any], constants: dict[str, Any], *, displaced: bool
-) -> tuple[DecayFit | None, DecayMotion | None]:
+) -> tuple[DecayFit | None, DecayMotion | None, StickslipError | None]:
     """The whole waveform, and of a displacement which motion it was; the latter alone where nothing fits the former."""
     fit = partial(fit_decay, record, **way, **constants)
     waveform = asked.ask("Which motion", partial(fit, candidates="all")) if displaced else None
     waveform = waveform or asked.ask("The whole waveform", fit)
     if waveform is None:
-        return None, asked.ask("Which motion", partial(choose_motion, record, **way)) if displaced else None
+        refusal = asked.refusals[-1]
+        return None, asked.ask("Which motion", partial(choose_motion, record, **way)) if displaced else None, refusal
     motion = waveform.motions[0] if waveform.motions else None
     waveform = asked.ask("The whole waveform", partial(_followed, waveform, way["restoring"]))
+    if waveform is not None:
+        return waveform, motion, None
     unsure = motion is not None and motion.choice.status != "ok"
-    return waveform, None if waveform is None and unsure else motion
+    return None, None if unsure else motion, asked.refusals[-1]
 
 
 def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:

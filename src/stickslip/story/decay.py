@@ -24,7 +24,6 @@ from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, n
 MOST = 0.5  # of the power of what is left over
 OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
 LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
-WAVEFORM = "The whole waveform: "
 FAR = 0.2  # rad: a pendulum's swing that a straight spring does not follow
 METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
 
@@ -101,9 +100,8 @@ def _headline(findings: Findings) -> Iterator[str]:
     decay = findings.decay
     yield from _frictions(findings)
     yield from _left_over(decay)
-    for note in findings.notes:
-        if decay.waveform is None and decay.best is not decay.motion and note.startswith(WAVEFORM):
-            yield f"It is read from its extremes alone, for of the whole waveform {note.removeprefix(WAVEFORM)}"
+    if decay.refusal is not None and decay.best is not decay.motion:
+        yield f"It is read from its extremes alone, for of the whole waveform {decay.refusal}"
     force = decay.dry_force
     word = "torque" if findings.settings["channel"] == "theta" else "force"
     if force is not None:
