@@ -29,7 +29,7 @@ def of_findings(findings: Findings) -> Story:
         headline=[*leading(findings.faults), *own.headline],
         lines=[*(Line.of(each, findings.true_value(each)) for each in findings.estimates), *own.lines],
         faults=[str(fault) for fault in findings.faults],
-        notes=findings.notes,
+        notes=[*findings.notes, *own.notes],
         settings={**own.settings, **load, **length},
         channels=list(record.channels.values()),
         history=record.history,
