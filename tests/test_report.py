@@ -76,7 +76,7 @@ def slid(friction: float, normal: float, name: str = "run.csv") -> Findings:
 def light(demo: Findings) -> Findings:
     """Findings of one figure of one line, quick to draw."""
     record = ss.Record.of({"x": demo.record["x"][:500]}, fs=demo.record.fs)
-    return replace(demo, record=record, loops=None, sticks=None, settings={})
+    return replace(demo.having(loops=None, sticks=None), record=record, settings={})
 
 
 @pytest.fixture(scope="module")
@@ -190,10 +190,10 @@ def test_numbers_carry_the_digits_that_they_are_sure_of(estimate: Estimate, valu
 def test_the_headline_names_the_direction_of_a_slope(demo: Findings) -> None:
     assert demo.loops is not None
     falling = Estimate.normal("slope", -3.0, sd=0.1, unit="N s/m", method="")
-    sentences = " ".join(summary(replace(demo, loops=replace(demo.loops, slope=falling))).headline)
+    sentences = " ".join(summary(demo.having(loops=replace(demo.loops, slope=falling))).headline)
     assert "falls with speed" in sentences
     doubted = replace(falling, status="the sliding speed hardly varies")
-    assert "with speed" not in " ".join(summary(replace(demo, loops=replace(demo.loops, slope=doubted))).headline)
+    assert "with speed" not in " ".join(summary(demo.having(loops=replace(demo.loops, slope=doubted))).headline)
     assert "2 stops in each cycle" in sentences
 
 
@@ -201,7 +201,7 @@ def test_the_share_that_sticks_is_told_as_its_interval(demo: Findings) -> None:
     """Its value is the upper end: creep below the threshold counts as sticking."""
     assert demo.sticks is not None
     share = Estimate("stuck share of the time", 0.332, (0.26, 0.334), 0.02, "1", "")
-    told = " ".join(summary(replace(demo, sticks=replace(demo.sticks, share=share))).headline)
+    told = " ".join(summary(demo.having(sticks=replace(demo.sticks, share=share))).headline)
     assert "It sticks 26 to 33 % of the time" in told
 
 

@@ -70,15 +70,14 @@ def tried(
     belief = believe(findings.record)
     answers = {estimate.name: estimate for estimate in findings.estimates}
     trial = try_on_twins(belief, answers, partial(_ask, like=findings.record), count=twins, rng=rng, progress=progress)
-    return replace(
-        findings,
+    answered = findings.having(
         loops=_with(findings.loops, trial.estimates),
         sticks=_with(findings.sticks, trial.estimates),
         breakaway=_with(findings.breakaway, trial.estimates),
         presliding=_yields(findings.presliding, trial),
         trial=trial,
-        notes=(*findings.notes, _note(trial)),
     )
+    return replace(answered, notes=(*findings.notes, _note(trial)))
 
 
 def _note(trial: Trial) -> str:

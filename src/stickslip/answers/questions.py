@@ -117,11 +117,11 @@ def analyze(
     answers["loops"] = _late(answers.get("loops"), record, rig)
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
-    return Findings(
-        name, whole, faults, **answers, delay=made.delay, comparison=made.comparison,
-        normal=normal_load(record, rig, name, asked.notes), notes=tuple(asked.notes),
-        settings={**_told(whole), "contact": slid},
-    )  # fmt: skip
+    names = [question.key for question in QUESTIONS]
+    results = {**dict.fromkeys(names), **answers, "delay": made.delay, "comparison": made.comparison, "trial": None}
+    normal = normal_load(record, rig, name, asked.notes)
+    settings = {**_told(whole), "contact": slid}
+    return Findings(name, whole, faults, normal, tuple(asked.notes), settings, results=results)
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class Question:
     Attributes
     ----------
     key : str
-        The attribute of :class:`Findings` that holds the answer.
+        The name of its answer among the results.
     name : str
         In words.
     needs : tuple of tuple of str
@@ -177,6 +177,11 @@ def _answer(question: Question, whole: Record, fused: Callable[[], Record], slid
 FORCE = ("load", "force", "friction")
 QUESTIONS = (
     Question("loops", "Friction loops", (("friction",), MOTION), lambda r, on: friction_loops(r, contact=on)),
+    Question("regression", "Regression", (("force",), MOTION), lambda r, on: regress_friction(r)),
+    Question(
+        "asymmetric", "Regression of each direction", (("force",), MOTION),
+        lambda r, on: regress_friction(r, symmetric=False), follows="regression",
+    ),
     Question("sticks", "Sticks and slips", (MOTION,), lambda r, on: find_sticks(r, contact=on)),
     Question("breakaway", "Breakaway", (("friction",), MOTION), lambda r, on: breakaway(r, contact=on)),
     Question(
@@ -205,11 +210,6 @@ QUESTIONS = (
     Question(
         "presliding", "Presliding", (("friction",), MOTION), lambda r, on: presliding(r, contact=on),
         unless="stiffness",
-    ),
-    Question("regression", "Regression", (("force",), MOTION), lambda r, on: regress_friction(r)),
-    Question(
-        "asymmetric", "Regression of each direction", (("force",), MOTION),
-        lambda r, on: regress_friction(r, symmetric=False), follows="regression",
     ),
     Question(
         "pull", "Pulled slider", (FORCE,),

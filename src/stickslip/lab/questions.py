@@ -86,7 +86,7 @@ def decay(asked: Asked) -> dict[str, Any]:
 
 
 def _decay_curves(found: Any) -> Iterator[dict[str, Any]]:
-    fit = found.waveform
+    fit = found.decay.waveform
     if fit is None:
         return
     unit = found.record.channels[fit.channel].unit

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip.answers.findings import Findings
-    from stickslip.answers.squeaks import SqueakFindings
     from stickslip.contact.sliding_onset import TransitionSpeed
     from stickslip.record.record import Record
 
@@ -38,12 +37,12 @@ POINTS_A_CYCLE = 300
 
 
 @styled
-def plot_displacement_loop(findings: Findings | SqueakFindings, *, ax: Axes | None = None) -> Axes:
+def plot_displacement_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
     """Friction against displacement: the cycles thin, their mean with a band of one standard deviation.
 
     Parameters
     ----------
-    findings : Findings or SqueakFindings
+    findings : Findings
         With loops.
     ax : Axes, optional
         Where to draw.
@@ -56,12 +55,12 @@ def plot_displacement_loop(findings: Findings | SqueakFindings, *, ax: Axes | No
 
 
 @styled
-def plot_velocity_loop(findings: Findings | SqueakFindings, *, ax: Axes | None = None) -> Axes:
+def plot_velocity_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
     """Friction against velocity: the cycles thin, their mean, and the binned curve with 95 % intervals.
 
     Parameters
     ----------
-    findings : Findings or SqueakFindings
+    findings : Findings
         With loops.
     ax : Axes, optional
         Where to draw.
@@ -176,7 +175,7 @@ def plot_transition_speed(found: TransitionSpeed, *, ax: Axes | None = None) -> 
     return ax
 
 
-def _loop(findings: Findings | SqueakFindings, abscissa: str, ax: Axes) -> Axes:
+def _loop(findings: Findings, abscissa: str, ax: Axes) -> Axes:
     loops = findings.loops
     assert loops is not None
     unit = {"displacement": loops.unit, "velocity": f"{loops.unit}/s"}[abscissa]
@@ -204,7 +203,7 @@ def _legend_above(ax: Axes) -> None:
     legend_above(ax, columns=3)
 
 
-def _cycles(findings: Findings | SqueakFindings, abscissa: str) -> list[tuple[Array, Array]]:
+def _cycles(findings: Findings, abscissa: str) -> list[tuple[Array, Array]]:
     """Displacement (or velocity) across the contact and friction of at most thirty cycles, thinned."""
     record, loops, drawn = findings.record, findings.loops, []
     assert loops is not None
@@ -219,7 +218,7 @@ def _cycles(findings: Findings | SqueakFindings, abscissa: str) -> list[tuple[Ar
     return drawn
 
 
-def _across(findings: Findings | SqueakFindings, abscissa: str) -> Array:
+def _across(findings: Findings, abscissa: str) -> Array:
     """Displacement or velocity of the mass against what it slides on."""
     record, contact = findings.record, findings.settings.get("contact", "ground")
     name = {"displacement": "x", "velocity": "v"}[abscissa]

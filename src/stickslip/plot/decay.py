@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.answers.decay_comparison import DecayComparison
-    from stickslip.answers.decays import DecayFindings
+    from stickslip.answers.decays import Decay
+    from stickslip.answers.findings import Comparison
     from stickslip.decay.decrement import Decrement
     from stickslip.decay.release import RingDown
 
@@ -46,13 +46,13 @@ MOST_MARKS = 60  # extremes that are marked one by one
 
 
 @styled
-def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = None) -> Axes:
+def plot_decay(decay: Decay, *, release: int = 0, ax: Axes | None = None) -> Axes:
     """The response within the envelopes that either friction alone would give (thesis, Figure 6.1).
 
     Parameters
     ----------
-    findings : DecayFindings
-        What :func:`~stickslip.analyze_decay` returned.
+    decay : Decay
+        ``decay`` of what :func:`~stickslip.analyze_decay` returned.
     release : int
         Which of several releases, from 0.
     ax : Axes, optional
@@ -62,12 +62,12 @@ def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = N
     -------
     Axes
     """
-    ax, ring = axes_of(ax), findings.releases.ring_downs[release]
+    ax, ring = axes_of(ax), decay.releases.ring_downs[release]
     factor, unit = prefixed(ring.samples - ring.rest, ring.unit)
     rows = _shown(ring)
     ax.plot(*envelope(ring.time[rows], factor * ring.samples[rows]), color=INK, linewidth=1.0, label="recorded")
-    rest = findings.rest
-    time, viscous, dry = _envelopes(findings, ring)
+    rest = decay.rest
+    time, viscous, dry = _envelopes(decay, ring)
     alone = ((viscous, BLUE, "viscous friction alone"), (dry, ORANGE, "dry friction alone"))
     for curve, colour, words in alone if ring.isochronous else ():  # of a linear spring
         for side in (1, -1):
@@ -81,13 +81,13 @@ def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = N
 
 
 @styled
-def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
+def plot_identified(decay: Decay, *, release: int = 0) -> Figure:
     """Recorded and identified response over each other, and what is left between them (thesis, Figure 6.10).
 
     Parameters
     ----------
-    findings : DecayFindings
-        What :func:`~stickslip.analyze_decay` returned.
+    decay : Decay
+        ``decay`` of what :func:`~stickslip.analyze_decay` returned.
     release : int
         Which of several releases, from 0; beyond the first by the whole waveform alone.
 
@@ -95,9 +95,9 @@ def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
     -------
     Figure
     """
-    time, measured, fitted, words = _identified(findings, release)
-    ring = findings.releases.ring_downs[release]
-    factor, unit = prefixed(measured - findings.rest, ring.unit)
+    time, measured, fitted, words = _identified(decay, release)
+    ring = decay.releases.ring_downs[release]
+    factor, unit = prefixed(measured - decay.rest, ring.unit)
     figure, (above, below) = new_figure(2, height=4.6, heights=[2, 1])
     above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="recorded")
     above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=words)
@@ -205,12 +205,12 @@ def _within_reach(ax: Axes, value: Array, *errors: Array) -> None:
 
 
 @styled
-def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio", ax: Axes | None = None) -> Axes:
+def plot_records(comparison: Comparison, *, quantity: str = "damping_ratio", ax: Axes | None = None) -> Axes:
     """A quantity of each record with its 95 % interval, and the band that holds for all.
 
     Parameters
     ----------
-    comparison : DecayComparison
+    comparison : Comparison
         What :func:`~stickslip.answers.compare_decays` returned.
     quantity : {"damping_ratio", "dry_displacement", "frequency"}
         Which.
@@ -221,7 +221,7 @@ def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio"
     -------
     Axes
     """
-    each = [getattr(findings.best, quantity) for findings in comparison.findings]
+    each = [getattr(findings.decay.best, quantity) for findings in comparison.findings]
     names = [
         findings.name if len(findings.name) < 44 else f"{findings.name[:41]}..." for findings in comparison.findings
     ]
@@ -249,7 +249,7 @@ def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio"
     return ax
 
 
-def plates_together(comparison: DecayComparison) -> list[Plate]:
+def plates_together(comparison: Comparison) -> list[Plate]:
     """The figures of several decays."""
     words = (
         "The records differ by more than their own intervals allow: something changed between them that no single one "
@@ -264,22 +264,22 @@ def plates_together(comparison: DecayComparison) -> list[Plate]:
     ]
 
 
-def plates_of(findings: DecayFindings) -> list[Plate]:
+def plates_of(decay: Decay) -> list[Plate]:
     """The figures of a decay, in reading order."""
-    ring, thesis = findings.releases.ring_downs[0], findings.thesis
-    several = len(findings.releases.ring_downs)
+    ring, thesis = decay.releases.ring_downs[0], decay.thesis
+    several = len(decay.releases.ring_downs)
     many = f" The first of {several} releases; the others are below." if several > 1 else ""
     envelopes = (
         "Viscous friction alone would let it die away along the curved envelope, dry friction alone along the straight "
         "one; together they are faster than either. "
     ) * ring.isochronous
     grey = "Grey: at rest before the release or after." if ring.held or ring.stopped else ""
-    plates = [plate("decay", partial(plot_decay, findings), "How it dies away", f"{envelopes}{grey}{many}")]
-    if findings.waveform is not None or (ring.order == 0 and findings.best in (findings.motion, thesis)):
+    plates = [plate("decay", partial(plot_decay, decay), "How it dies away", f"{envelopes}{grey}{many}")]
+    if decay.waveform is not None or (ring.order == 0 and decay.best in (decay.motion, thesis)):
         plates.append(
             plate(
                 "identified",
-                partial(plot_identified, findings),
+                partial(plot_identified, decay),
                 "Recorded and identified",
                 "Top: the motion that the identified friction gives, over the recorded one. Bottom: what is left "
                 "between them; a pattern there is friction of another kind.",
@@ -287,12 +287,12 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
         )
     for release in range(1, several):
         words = f"Release {release + 1} of {several}"
-        fitted = 0 if findings.waveform is None else len(findings.waveform.time)
-        if release >= fitted or findings.best is findings.motion:
-            swings = partial(plot_decay, findings, release=release)
+        fitted = 0 if decay.waveform is None else len(decay.waveform.time)
+        if release >= fitted or decay.best is decay.motion:
+            swings = partial(plot_decay, decay, release=release)
             plates.append(plate(f"decay-{release + 1}", swings, words, envelopes.strip()))
         else:
-            drawn = partial(plot_identified, findings, release=release)
+            drawn = partial(plot_identified, decay, release=release)
             plates.append(plate(f"identified-{release + 1}", drawn, words, "Recorded, identified and what is left."))
     if thesis is not None:
         plates.append(
@@ -337,9 +337,9 @@ def _shade_rest(ax: Axes, ring: RingDown, rows: slice) -> None:
     ax.set_xlim(first, last)
 
 
-def _envelopes(findings: DecayFindings, ring: RingDown) -> tuple[Array, Array, Array]:
+def _envelopes(decay: Decay, ring: RingDown) -> tuple[Array, Array, Array]:
     """Times, and the envelopes of either friction alone, from the first amplitude."""
-    best = findings.best
+    best = decay.best
     time = np.linspace(ring.release, ring.stop, POINTS)
     since, w = time - ring.release, 2 * math.pi * best.frequency.value
     viscous = abs(ring.amplitude) * np.exp(-max(0.0, best.damping_ratio.value) * w * since)
@@ -347,18 +347,18 @@ def _envelopes(findings: DecayFindings, ring: RingDown) -> tuple[Array, Array, A
     return time, viscous, np.maximum(0.0, abs(ring.amplitude) - fall * since)
 
 
-def _identified(findings: DecayFindings, release: int = 0) -> tuple[Array, Array, Array, str]:
+def _identified(decay: Decay, release: int = 0) -> tuple[Array, Array, Array, str]:
     """Time, recorded, identified, and by which method."""
-    if findings.best is findings.motion and release == 0:
-        chosen = findings.motion.choice.chosen.fitted
+    if decay.best is decay.motion and release == 0:
+        chosen = decay.motion.choice.chosen.fitted
         fitted, _, _ = chosen.blocks.motion(chosen.parameters, half_cycles=chosen.half_cycles)
         return chosen.blocks.times, chosen.blocks.values, fitted, "identified by the whole waveform"
-    if findings.waveform is not None:
-        fit, ring = findings.waveform, findings.releases.ring_downs[release]
+    if decay.waveform is not None:
+        fit, ring = decay.waveform, decay.releases.ring_downs[release]
         shown, time = ring.time[_shown(ring)], fit.time[release]
         near = (time >= shown[0]) & (time <= shown[-1])
         return time[near], fit.measured[release][near], fit.fitted[release][near], "identified by the whole waveform"
-    found, ring = findings.thesis, findings.releases.ring_downs[0]
+    found, ring = decay.thesis, decay.releases.ring_downs[0]
     assert found is not None
     rows = _shown(ring)
     time, rest = ring.time[rows], found.bias.value

@@ -6,47 +6,15 @@ side.
 
 from __future__ import annotations
 
+import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.plot.style import BLUE, INK, ORANGE, axes_of, axis_label, prefixed, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from stickslip.answers.comparison import Comparison
-
-import math
-from typing import TYPE_CHECKING
-
-from stickslip.consistent.checks import APART
-from stickslip.plot.style import FAINT
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from stickslip.consistent.contradictions import Consistency
-
-from typing import TYPE_CHECKING
-
-from stickslip.plot.style import (
-    PURPLE,
-    envelope,
-    legend_above,
-    new_figure,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip.answers.findings import Findings
-
-from functools import partial
-
-from stickslip.answers.comparison import Comparison
-from stickslip.answers.findings import Findings
+from stickslip.answers.findings import Comparison, Findings
 from stickslip.balance.force import FUSIONS
+from stickslip.consistent.checks import APART
 from stickslip.estimate import UNSTATED, kinds
 from stickslip.plot.contact import (
     plot_breakaway,
@@ -58,8 +26,28 @@ from stickslip.plot.contact import (
 )
 from stickslip.plot.force import plot_force_comparison
 from stickslip.plot.plate import Plate, plate
+from stickslip.plot.style import (
+    BLUE,
+    FAINT,
+    INK,
+    ORANGE,
+    PURPLE,
+    axes_of,
+    axis_label,
+    envelope,
+    legend_above,
+    new_figure,
+    prefixed,
+    styled,
+)
 from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
 from stickslip.plot.twin import plot_twin
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from stickslip.consistent.contradictions import Consistency
 
 COLOURS = {"holds": BLUE, "fails": ORANGE, "can not be told": FAINT}
 

@@ -36,8 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.answers.squeak_comparison import SqueakComparison
-    from stickslip.answers.squeaks import SqueakFindings
+    from stickslip.answers.findings import Comparison, Findings
     from stickslip.record.record import Record
     from stickslip.squeak.bursts import Squeak, Squeaks
     from stickslip.squeak.spectra import BurstSpectra
@@ -243,12 +242,12 @@ def plot_forcing_cycle(found: Squeaks) -> Figure:
 
 
 @styled
-def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
+def plot_burst(found: Findings, *, burst: Squeak) -> Figure:
     """Every channel about one burst.
 
     Parameters
     ----------
-    found : SqueakFindings
+    found : Findings
         What :func:`~stickslip.analyze_squeaks` returned.
     burst : Squeak
         Which one.
@@ -270,14 +269,14 @@ def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
 
 
 @styled
-def plot_conditions(comparison: SqueakComparison) -> Figure:
+def plot_conditions(comparison: Comparison) -> Figure:
     """Friction and its slope against speed in each condition, with their 95 % intervals; where it squeaks is orange.
 
     Grey where that can not be told. Both over the load, where it is known in every condition.
 
     Parameters
     ----------
-    comparison : SqueakComparison
+    comparison : Comparison
         What :func:`~stickslip.answers.compare_squeaks` returned, friction in one condition at least.
 
     Returns
@@ -315,12 +314,12 @@ def plot_conditions(comparison: SqueakComparison) -> Figure:
 
 
 @styled
-def plot_condition_loops(comparison: SqueakComparison) -> Figure:
+def plot_condition_loops(comparison: Comparison) -> Figure:
     """Friction against displacement and velocity, a row for each condition, as the thesis's figures 7.3 and 7.6.
 
     Parameters
     ----------
-    comparison : SqueakComparison
+    comparison : Comparison
         With friction loops in one condition at least; the first six are drawn.
 
     Returns
@@ -348,7 +347,7 @@ def plot_condition_loops(comparison: SqueakComparison) -> Figure:
     return figure
 
 
-def plates_of(found: SqueakFindings) -> list[Plate]:
+def plates_of(found: Findings) -> list[Plate]:
     """The figures of one record."""
     squeaks = found.squeaks
     plates = [
@@ -360,10 +359,14 @@ def plates_of(found: SqueakFindings) -> list[Plate]:
             "bright is strong, and a white line is a burst's dominant frequency.",
         )
     ]
-    return plates if found.loudest is None else [*plates, *_of_spectra(found), *_of_bursts(found, found.loudest)]
+    return (
+        plates
+        if found.squeaks.loudest is None
+        else [*plates, *_of_spectra(found), *_of_bursts(found, found.squeaks.loudest)]
+    )
 
 
-def _of_spectra(found: SqueakFindings) -> list[Plate]:
+def _of_spectra(found: Findings) -> list[Plate]:
     """What sounds in the bursts, and which frequencies the motions share."""
     squeaks, plates = found.squeaks, []
     if found.spectra is not None:
@@ -389,7 +392,7 @@ def _of_spectra(found: SqueakFindings) -> list[Plate]:
     return plates
 
 
-def _of_bursts(found: SqueakFindings, loudest: Squeak) -> list[Plate]:
+def _of_bursts(found: Findings, loudest: Squeak) -> list[Plate]:
     """Where in the cycle it sounds, the loudest burst, and the friction that feeds it."""
     squeaks, plates = found.squeaks, []
     if not math.isnan(squeaks.forcing):
@@ -425,7 +428,7 @@ def _of_bursts(found: SqueakFindings, loudest: Squeak) -> list[Plate]:
     return plates
 
 
-def plates_together(comparison: SqueakComparison) -> list[Plate]:
+def plates_together(comparison: Comparison) -> list[Plate]:
     """The figures of several records side by side."""
     if all(each.loops is None for each in comparison.findings):
         return []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Status
+from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.squeak.hearing import LASTS, PARTIALS, Hearing, Span, clipped_rows, filtered
 from stickslip.squeak.sound import REFERENCES, level
+from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]
 
 HEARD = ("sound", "normal_acceleration", "a", "friction", "ch1")  # the first of these, unless told
 LOWEST = 50.0  # Hz
+OF_MEDIAN = math.sqrt(math.pi / 2)  # its standard deviation over that of the mean
 GROWN = 12.0  # cycles of growth to the peak: what is struck is there within fewer
 EVEN = 0.35  # of a burst's length at which half of its energy has come: a ring that dies away has it earlier
 SUSTAINED = 0.25  # s: a squeak is shorter
@@ -114,7 +116,7 @@ class Squeak:
 
 
 @dataclass(frozen=True, eq=False)
-class Squeaks:
+class Squeaks(Result):
     """The bursts of a record.
 
     Attributes
@@ -174,6 +176,30 @@ class Squeaks:
         if self.of("creak"):
             return "creaks"
         return "can not be told" if self.untold else "does not squeak"
+
+    @property
+    def loudest(self) -> Squeak | None:
+        """The loudest of the squeaks and squeals, or of all bursts where there are none; if clipped, the longest."""
+        bursts = self.of("squeak", "squeal") or self.bursts
+        return max(bursts, key=lambda each: (np.nan_to_num(each.level, nan=-math.inf), each.duration), default=None)
+
+    @property
+    def frequency(self) -> Estimate | None:
+        """Median frequency of the squeaks and squeals [Hz], its interval from the scatter between them.
+
+        One burst that is told at a multiple of its pitch moves only the interval.
+        """
+        heard = [burst.frequency for burst in self.of("squeak", "squeal")]
+        if not heard:
+            return None
+        mean = mean_of_cycles("frequency of the squeaks", heard, unit="Hz", method="median of the bursts", of="burst")
+        median, reach = float(np.median(heard)), OF_MEDIAN * (mean.interval[1] - mean.value)
+        return replace(mean, value=median, interval=(median - reach, median + reach), sd=OF_MEDIAN * mean.sd)
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """The median frequency, where anything squeaks."""
+        return () if self.frequency is None else (self.frequency,)
 
     def of(self, *kinds: str) -> tuple[Squeak, ...]:
         """The bursts of some kinds."""

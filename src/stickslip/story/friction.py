@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
-from stickslip.answers.comparison import Comparison
-from stickslip.answers.findings import Findings
+from stickslip.answers.findings import Comparison, Findings
 from stickslip.balance.pull import Pull
 from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
@@ -14,7 +14,7 @@ from stickslip.estimate import Estimate, stands
 from stickslip.plot.friction import plates_of, plates_together
 from stickslip.record.record import RIG_UNITS
 from stickslip.story.story import Line, Story
-from stickslip.story.words import cautions, interval_of, leading, number, sentence, value_of
+from stickslip.story.words import cautions, interval_of, number, sentence, value_of
 
 NEVER = "The contact never sticks."
 RARELY = 0.005  # of the time
@@ -27,12 +27,9 @@ def of_findings(findings: Findings) -> Story:
     """One record."""
     headed = () if findings.contradiction else (findings.breakaway, findings.presliding)
     said = [estimate for answer in headed if answer is not None for estimate in answer.estimates]
-    return Story.of_record(
-        findings.name, findings.record, headline=[*leading(findings.faults), *_headline(findings)],
-        cautions=cautions(findings, said),
-        lines=[Line.of(each, findings.true_value(each)) for each in findings.estimates],
-        faults=[str(fault) for fault in findings.faults], notes=[*findings.notes, *_exact(findings)],
-        settings=_settings(findings), draw=lambda: plates_of(findings), data=findings.to_dict,
+    return Story(
+        findings.name, list(_headline(findings)), cautions(findings, said), notes=list(_exact(findings)),
+        settings=_settings(findings), draw=lambda: plates_of(findings), data=lambda: _data(findings),
     )  # fmt: skip
 
 
@@ -41,12 +38,8 @@ def of_comparison(comparison: Comparison) -> Story:
     levels = [(each, each.level) for each in comparison.findings if each.level is not None]
     return Story(
         f"{len(comparison.findings)} records compared", list(_together(comparison)),
-        lines=[
-            *map(Line.of, comparison.estimates),
-            *(Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels),
-        ],
-        notes=comparison.notes, parts=[of_findings(each) for each in comparison.findings],
-        draw=lambda: plates_together(comparison), data=comparison.to_dict,
+        lines=[Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels],
+        draw=lambda: plates_together(comparison),
     )  # fmt: skip
 
 
@@ -55,10 +48,17 @@ def _settings(findings: Findings) -> dict[str, str]:
     sd = findings.settings.get("sd", {})
     for key in told.keys() & RIG_UNITS.keys():
         told[key] = _constant(findings.settings[key], sd.get(key, 0.0), RIG_UNITS[key])
-    if findings.normal is not None:
-        told["normal load"] = number(findings.normal, 0.0, "N")
-    record = findings.record
-    return {**told, "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}
+    return told
+
+
+def _data(findings: Findings) -> dict[str, Any]:
+    regression, trial = findings.regression, findings.trial
+    return {
+        "contradiction": findings.contradiction,
+        "normal_load": findings.normal,
+        "regression_residual": None if regression is None else regression.residual,
+        **({} if trial is None else {"twins": trial.to_dict()}),
+    }
 
 
 def _constant(value: float, sd: float, unit: str) -> str:

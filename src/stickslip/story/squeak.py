@@ -4,51 +4,74 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from stickslip.answers.squeak_comparison import Condition, SqueakComparison
-from stickslip.answers.squeaks import SqueakFindings, trend_of
+from stickslip.answers.findings import Comparison, Findings
+from stickslip.answers.squeak_comparison import Condition
+from stickslip.answers.squeaks import trend_of
 from stickslip.estimate import Estimate, decimals, doubts_of
 from stickslip.plot.squeak import plates_of, plates_together
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
 from stickslip.squeak.couplings import Coupling, Pair
 from stickslip.squeak.listening import burst_clips
-from stickslip.story.story import Line, Story, Table
-from stickslip.story.words import doubts, interval_of, leading, number, value_of
+from stickslip.story.story import Story, Table
+from stickslip.story.words import cautions, interval_of, number, value_of
 from stickslip.units import prefixed
 
 MOST = 40  # bursts in a table
 NONE = "–"
 
 
-def of_findings(found: SqueakFindings) -> Story:
+def of_findings(findings: Findings) -> Story:
     """One record."""
-    record, (low, high) = found.record, found.squeaks.band
-    return Story.of_record(
-        found.name, record, headline=[*leading(found.faults), *_headline(found)],
-        cautions=[*_cautions(found), *doubts(found.estimates)], lines=list(map(Line.of, found.estimates)),
-        faults=[str(fault) for fault in found.faults], notes=found.notes, tables=list(_tables(found)),
-        settings={
-            "heard in": found.squeaks.channel, "between": f"{low:g} and {high:g} Hz",
-            **({} if found.normal is None else {"normal load": number(found.normal, 0.0, "N")}),
-            "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s",
-        },
-        draw=lambda: plates_of(found), listen=lambda: burst_clips(found.squeaks), data=found.to_dict,
+    low, high = findings.squeaks.band
+    return Story(
+        findings.name, list(_headline(findings)), [*_cautions(findings), *cautions(findings)],
+        settings={"heard in": findings.squeaks.channel, "between": f"{low:g} and {high:g} Hz"},
+        tables=list(_tables(findings)), draw=lambda: plates_of(findings),
+        listen=lambda: burst_clips(findings.squeaks), data=lambda: _data(findings),
     )  # fmt: skip
 
 
-def of_comparison(comparison: SqueakComparison) -> Story:
+def of_comparison(comparison: Comparison) -> Story:
     """Several conditions; each by itself on the page, and in a line of the terminal."""
     return Story(
-        f"{len(comparison.conditions)} conditions compared", comparison.verdicts, notes=comparison.notes,
-        tables=[Table("Conditions", *_condition_table(comparison))],
-        parts=[of_findings(each) for each in comparison.findings], brief=True,
-        draw=lambda: plates_together(comparison), data=comparison.to_dict,
+        f"{len(comparison.conditions)} conditions compared", comparison.verdicts,
+        tables=[Table("Conditions", *_condition_table(comparison))], brief=True,
+        draw=lambda: plates_together(comparison), data=lambda: _together(comparison),
     )  # fmt: skip
 
 
-def _headline(found: SqueakFindings) -> Iterator[str]:
+def _data(found: Findings) -> dict[str, Any]:
+    """Bursts, coupling and how it is heard, for JSON."""
+    heard = found.squeaks.to_dict()
+    parts = {"coupling": found.coupling, "sound_quality": found.quality, "impulses": found.impulses}
+    return {
+        "normal_load": found.normal,
+        "squeaks": {key: value for key, value in heard.items() if key not in ("notes", "history")},
+        "beside": {
+            each.channel: {
+                "kind": each.kind, "reference": each.reference, "bursts": [burst.to_dict() for burst in each.bursts],
+            }
+            for each in found.beside
+        },
+        **{name: None if part is None else part.to_dict() for name, part in parts.items()},
+    }  # fmt: skip
+
+
+def _together(comparison: Comparison) -> dict[str, Any]:
+    """The conditions and what they say together, for JSON."""
+    rows = [
+        {key: value.to_dict() if isinstance(value, Estimate) else value for key, value in vars(each).items()}
+        for each in comparison.conditions
+    ]
+    told = [{**row, "trend": each.trend} for row, each in zip(rows, comparison.conditions, strict=True)]
+    return {"conditions": told, "verdicts": comparison.verdicts}
+
+
+def _headline(found: Findings) -> Iterator[str]:
     """What was heard, in a few sentences."""
     squeaks, record = found.squeaks, found.record
     heard = squeaks.of("squeak", "squeal")
@@ -67,11 +90,11 @@ def _headline(found: SqueakFindings) -> Iterator[str]:
         kinds = [(squeaks.of(kind), words) for kind, words in WORDS.items()]
         yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {words}' for of, words in kinds if of)}."
         yield from _power(squeaks)
-    elif found.frequency is not None:
+    else:
         many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"
-        tone = found.frequency.value
+        tone = squeaks.frequency.value
         yield f"It {squeaks.answer}{where} {many}, at {number(tone, tone / 500, 'Hz')}."
-    loudest = found.loudest
+    loudest = squeaks.loudest
     if loudest is not None:
         yield _of_one(loudest, squeaks)
     if found.coupling is not None:
@@ -164,7 +187,7 @@ def _counted(bursts: Sequence[Squeak]) -> str:
     return f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}"
 
 
-def _cautions(found: SqueakFindings) -> list[str]:
+def _cautions(found: Findings) -> list[str]:
     """What should keep the reader from trusting it."""
     told = list(found.squeaks.cautions)
     if any(fault.kind == "spike" for fault in found.faults):
@@ -180,7 +203,7 @@ def _cautions(found: SqueakFindings) -> list[str]:
     ]
 
 
-def _tables(found: SqueakFindings) -> Iterator[Table]:
+def _tables(found: Findings) -> Iterator[Table]:
     """The bursts, the channels, how it is heard, and what moves together."""
     bursts, joined = found.squeaks.bursts, found.coupling
     if bursts:
@@ -196,7 +219,7 @@ def _tables(found: SqueakFindings) -> Iterator[Table]:
         yield Table(title, *_coupling_table(joined), _coupling_note(joined))
 
 
-def _burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+def _burst_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each burst."""
     squeaks = found.squeaks
     moves, calibrated = not math.isnan(squeaks.forcing), any(not math.isnan(b.weighted_level) for b in squeaks.bursts)
@@ -216,7 +239,7 @@ def _burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]
     return headings, rows
 
 
-def _channel_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+def _channel_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each channel that vibrates."""
     rows = []
     for squeaks in (found.squeaks, *found.beside):
@@ -228,7 +251,7 @@ def _channel_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]
     return ["channel", "what it is", "squeaks", "Hz", "loudest, dB"], rows
 
 
-def _hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+def _hearing_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each measure of how it is heard."""
     rows, quality, impulses = [], found.quality, found.impulses
     if quality is not None:
@@ -250,7 +273,7 @@ def _hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]
     return ["", "value", "what it is"], rows
 
 
-def _hearing_note(found: SqueakFindings) -> str:
+def _hearing_note(found: Findings) -> str:
     """By what, and that no conformity is claimed."""
     by = "" if found.quality is None else f"Loudness, sharpness and roughness by {found.quality.method}. "
     return f"{by}No conformity to a standard is claimed; the pulses follow none."
@@ -306,7 +329,7 @@ def _pair(pair: Pair, *, rest: bool) -> list[str]:
     return [*told, phase, f"{factor * delay:.{digits}f} ± {factor * half:.{digits}f} {unit}"]
 
 
-def _condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[list[str]]]:
+def _condition_table(comparison: Comparison) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each condition; a column that is known of none is left out."""
     headings = ["condition", "load", "driven, stroke", "friction", "slope against speed (95 %)", "heard", "Hz", "dB"]
     rows = [_condition(each) for each in comparison.conditions]
