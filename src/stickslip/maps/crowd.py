@@ -29,20 +29,11 @@ from stickslip.maps.watch import (
 )
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
+from stickslip.solve.assembly import tables_of
 from stickslip.solve.glide import Model, Past, Pieces
 from stickslip.solve.kernel import scratch
 from stickslip.solve.phasors import phasors_of
-from stickslip.solve.tables import (
-    Array,
-    Systems,
-    Tables,
-    by_value,
-    kind_of_drive,
-    kind_of_law,
-    opened,
-    oscillators,
-    tables_of,
-)
+from stickslip.solve.tables import Array, Systems, Tables, by_value, kind_of_drive, kind_of_law, opened, oscillators
 
 Index = NDArray[np.int64]
 Watch = Callable[[Given, Counted, int, int], None]  # march what is given into what is left; modes and physical entries

@@ -15,10 +15,11 @@ from stickslip.errors import ModelError
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
+from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import CurvedTrajectory, run_curved
 from stickslip.solve.glide import Pieces
 from stickslip.solve.simulate import run, stops_of
-from stickslip.solve.tables import Array, System, Tables, table_of
+from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.tangent import carry_tangents
 from stickslip.solve.tape import Tape, tape
 from stickslip.solve.trajectory import Trajectory

@@ -16,12 +16,13 @@ from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.solve import kernel
+from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import degree, run_curved
 from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
-from stickslip.solve.tables import Array, System, Tables, table_of
+from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
 
