@@ -271,34 +271,15 @@ def _write_mp4(images: Iterable[Image], path: Path) -> None:
     pictures = iter(images)
     opening = next(pictures)
     height, width = (size - size % 2 for size in opening.shape[:2])
-    command = [
-        "ffmpeg",
-        "-loglevel",
-        "error",
-        "-y",
-        "-f",
-        "rawvideo",
-        "-pix_fmt",
-        "rgb24",
-        "-s",
-        f"{width}x{height}",
-        "-r",
-        str(RATE),
-        "-i",
-        "-",
-        "-an",
-        "-pix_fmt",
-        "yuv420p",
-        "-movflags",
-        "+faststart",
-        str(path),
-    ]
+    source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {RATE} -i -"
+    options = f"ffmpeg -loglevel error -y {source} -an -pix_fmt yuv420p -movflags +faststart"
+    command = [*options.split(), str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
         assert ffmpeg.stdin is not None
         assert ffmpeg.stderr is not None
         for image in (opening, *pictures):
             ffmpeg.stdin.write(image[:height, :width].tobytes())
         ffmpeg.stdin.close()
-        told = ffmpeg.stderr.read().decode(errors="replace").strip()
+        message = ffmpeg.stderr.read().decode(errors="replace").strip()
         if ffmpeg.wait():
-            raise OSError(f"ffmpeg: {told.splitlines()[-1] if told else ffmpeg.returncode}")
+            raise OSError(f"ffmpeg: {message.splitlines()[-1] if message else ffmpeg.returncode}")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.consistent.sliding_balance import Slider
 from stickslip.maps.attractor import Attractor
 from stickslip.maps.basins import Basins
 from stickslip.maps.bifurcation import Bifurcation
@@ -16,6 +15,7 @@ from stickslip.maps.boundaries import Boundary
 from stickslip.maps.dither import Dither, dithered_friction
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import unit as unit_of
+from stickslip.plot.maps import den_hartog
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -27,6 +27,7 @@ from stickslip.plot.style import (
     SKY,
     axes_of,
     axis_label,
+    coloured,
     empty_figure,
     legend_above,
     new_figure,
@@ -35,8 +36,7 @@ from stickslip.plot.style import (
     spelled,
     styled,
 )
-from stickslip.solve.tables import Array, System
-from stickslip.solve.trajectory import Trajectory
+from stickslip.solve.tables import System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,10 +69,9 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
     """
     figure, (top, bottom) = new_figure(2, height=4.6, heights=(3, 1))
     motion = found.up[0].orbit.orbit
-    factor, unit = prefixed(
-        np.concatenate([each.points[:, 0] for each in (*found.up, *found.down)]), motion.units("x")[0]
-    )
-    crowded = max(len(each.points) for each in (*found.up, *found.down)) > 20
+    points = [attractor.points[:, 0] for attractor in (*found.up, *found.down)]
+    factor, unit = prefixed(np.concatenate(points), motion.units("x")[0])
+    crowded = max(map(len, points)) > 20
     _follow(top, bottom, found, factor, dot=1.2 if crowded else None)
     _beside(top, found, factor)
     for change in found.changes:
@@ -94,44 +93,26 @@ def _follow(top: Axes, bottom: Axes, found: Bifurcation, factor: float, *, dot: 
     looks = (("down", ORANGE, "o", 5.0, "none"), ("up", BLUE, ".", 4.0, BLUE))
     for name, colour, marker, size, face in looks:
         way = getattr(found, name)
-        places = np.repeat(found.values, [len(each.points) for each in way])
-        heights = factor * np.concatenate([each.points[:, 0] for each in way])
-        style: dict[str, Any] = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
-        top.plot(
-            places,
-            heights,
-            markersize=size if dot is None else dot,
-            markeredgewidth=0.7,
-            label=f"followed {name}",
-            zorder=3 if name == "up" else 2,
-            **style,
-        )
-        bottom.plot(found.values, [_largest(each) for each in way], markersize=size, markeredgewidth=0.7, **style)
+        places = np.repeat(found.values, [len(attractor.points) for attractor in way])
+        heights = factor * np.concatenate([attractor.points[:, 0] for attractor in way])
+        look: Any = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
+        look |= {"markeredgewidth": 0.7, "zorder": 3 if name == "up" else 2}
+        top.plot(places, heights, markersize=dot or size, label=f"followed {name}", **look)
+        bottom.plot(found.values, [_largest(attractor) for attractor in way], markersize=size, **look)
 
 
 def _beside(top: Axes, found: Bifurcation, factor: float) -> None:
     """Motions from other starts, and branches that lose their stability."""
-    others = [(float(v), each) for v, others in zip(found.values, found.beside, strict=True) for each in others]
-    for number, (value, each) in enumerate(others):
-        top.plot(
-            [value] * len(each.points),
-            factor * each.points[:, 0],
-            "x",
-            color=GREEN,
-            markersize=5,
-            label="beside, from another start" if not number else None,
-        )
+    others = [(value, motion) for value, motions in zip(found.values, found.beside, strict=True) for motion in motions]
+    for number, (value, motion) in enumerate(others):
+        label = "beside, from another start" if not number else None
+        heights = factor * motion.points[:, 0]
+        top.plot([value] * len(heights), heights, "x", color=GREEN, markersize=5, label=label)
     for number, branch in enumerate(found.branches):
         unstable = np.array([orbit.status == "unstable" for orbit in branch.orbits])
         heights = factor * np.array([orbit.orbit.states[0, 0] for orbit in branch.orbits])
-        top.plot(
-            branch.values,
-            np.where(unstable, heights, np.nan),
-            "--",
-            color=INK,
-            linewidth=1.0,
-            label="unstable" if not number else None,
-        )
+        label = "unstable" if not number else None
+        top.plot(branch.values, np.where(unstable, heights, np.nan), "--", color=INK, linewidth=1.0, label=label)
 
 
 def _largest(attractor: Attractor) -> float:
@@ -152,16 +133,8 @@ def _name_regimes(ax: Axes, found: Bifurcation) -> None:
                 continue
             text = getattr(found, direction)[inside[len(inside) // 2]].regime
             if end - begin > 0.012 * len(text) * (last - first):
-                ax.text(
-                    (begin + end) / 2,
-                    0.985 - 0.075 * row,
-                    text,
-                    color=colour,
-                    fontsize=7,
-                    ha="center",
-                    va="top",
-                    transform=ax.get_xaxis_transform(),
-                )
+                at: Any = {"ha": "center", "va": "top", "transform": ax.get_xaxis_transform()}
+                ax.text((begin + end) / 2, 0.985 - 0.075 * row, text, color=colour, fontsize=7, **at)
 
 
 def _named(system: System, parameter: str) -> str:
@@ -196,53 +169,31 @@ def plot_basins(found: Basins, *, ax: Axes | None = None) -> Axes:
 
     ax = axes_of(ax, height=4.2)
     (down, across), (rows, columns) = found.names, found.axes
-    units = _state_units(found.attractors[0].orbit.orbit)
+    motion = found.attractors[0].orbit.orbit
+    units = dict(zip(motion.table.names, (*motion.units("x"), *motion.units("v")), strict=False))  # rad if it turns
     across_factor, across_unit = prefixed(rows, units.get(down, "1"))
     down_factor, down_unit = prefixed(columns, units.get(across, "1"))
     count = len(found.attractors)
     colours = [COLOURS[j % len(COLOURS)] for j in range(count)]
     known = np.ma.masked_less(found.which.T, 0)
-    ax.pcolormesh(
-        across_factor * rows,
-        down_factor * columns,
-        known,
-        cmap=ListedColormap(colours),
-        vmin=-0.5,
-        vmax=count - 0.5,
-        alpha=0.55,
-        shading="nearest",
-        rasterized=True,
-        linewidth=0,
-    )
-    ax.grid(visible=False)
+    options: Any = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": count - 0.5, "alpha": 0.55}
+    coloured(ax, across_factor * rows, down_factor * columns, known, **options)
     handles = []
-    for j, (each, share) in enumerate(zip(found.attractors, found.shares, strict=True)):
-        table = each.orbit.orbit.table
-        if set(found.names) <= set(table.names) and each.status != "rest":
+    for j, (attractor, share) in enumerate(zip(found.attractors, found.shares, strict=True)):
+        table = attractor.orbit.orbit.table
+        if set(found.names) <= set(table.names) and attractor.status != "rest":
             places = [table.names.index(name) for name in found.names]
-            points = each.points[:, places] * (across_factor, down_factor)
-            inside = np.all(
-                (points >= _ends(found, 0, across_factor, down_factor))
-                & (points <= _ends(found, -1, across_factor, down_factor)),
-                axis=1,
-            )
-            ax.plot(*points[inside].T, "+", color=INK, markersize=8, markeredgewidth=1.4)
+            points, factors = attractor.points[:, places], (across_factor, down_factor)
+            least, most = (np.array([axis[end] for axis in found.axes]) for end in (0, -1))
+            inside = np.all((points >= least) & (points <= most), axis=1)
+            ax.plot(*(points[inside] * factors).T, "+", color=INK, markersize=8, markeredgewidth=1.4)
         low, high = share.interval
-        words = f"{each.regime}: {100 * share.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+        words = f"{attractor.regime}: {100 * share.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
         handles.append(Patch(color=colours[j], alpha=0.55, label=words))
     legend_above(ax, handles=handles[:MOST_NAMED], columns=2)
     ax.set_xlabel(axis_label(down, across_unit))
     ax.set_ylabel(axis_label(across, down_unit))
     return ax
-
-
-def _state_units(motion: Trajectory) -> dict[str, str]:
-    """Of the coordinates of the state: rad and rad/s where a structure turns."""
-    return dict(zip(motion.table.names, (*motion.units("x"), *motion.units("v")), strict=False))
-
-
-def _ends(found: Basins, end: int, *factors: float) -> Array:
-    return np.array([factor * axis[end] for factor, axis in zip(factors, found.axes, strict=True)])
 
 
 @styled
@@ -270,59 +221,29 @@ def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
     'Den Hartog (1931)'
     """
     ax = axes_of(ax)
-    system = next(each for each in found.low if each is not None).orbit.orbit.system
-    free = np.array([each is not None and each.status == "not unique" for each in found.low])
+    system = next(motion for motion in found.low if motion is not None).orbit.orbit.system
+    free = np.array([motion is not None and motion.status == "not unique" for motion in found.low])
     for chosen, face, words in (
         (~free, BLUE, "bisection of exact runs"),
         (free, "none", "of a family, from one start"),
     ):
         if np.any(chosen & np.isfinite(found.values)):
-            ax.plot(
-                found.places[chosen],
-                found.values[chosen],
-                "o",
-                color=BLUE,
-                markerfacecolor=face,
-                markersize=4,
-                label=words,
-                zorder=3,
-            )
-    if is_den_hartog(system, found):
+            look: Any = {"color": BLUE, "markerfacecolor": face, "markersize": 4, "zorder": 3}
+            ax.plot(found.places[chosen], found.values[chosen], "o", label=words, **look)
+    kinds = next(pair for pair, value in zip(found.kinds, found.values, strict=True) if math.isfinite(value))
+    fine = np.linspace(found.places[0], found.places[-1], 400)
+    curve = den_hartog(system, (found.along, found.parameter), fine) if set(kinds) == {"no stops", "stops"} else None
+    if curve is not None:
         assert isinstance(system, Oscillator)
-        fine = np.linspace(found.places[0], found.places[-1], 400)
-        force = _force(system)
-        curve = [
-            force * Slider(system.mass, system.stiffness, 2 * math.pi * f, system.damping).boundary() for f in fine
-        ]
         ax.plot(fine, curve, color=ORANGE, label="Den Hartog (1931)")
         ax.axvline(system.frequency, color=FAINT, linewidth=0.8)
-    low, high = next(pair for pair, value in zip(found.kinds, found.values, strict=True) if math.isfinite(value))
     ax.margins(y=0.12)
-    for place, kind in ((0.98, high), (0.02, low)):
+    for place, kind in ((0.98, kinds[1]), (0.02, kinds[0])):
         ax.text(0.98, place, str(kind), transform=ax.transAxes, ha="right", va="top" if place > 0.5 else "bottom")
     ax.set_xlabel(_named(system, found.along) if found.along else "place")
     ax.set_ylabel(_named(system, found.parameter))
     legend_above(ax, columns=2)
     return ax
-
-
-def is_den_hartog(system: System, found: Boundary) -> bool:
-    """Whether the curve is that of rigid Coulomb friction under a harmonic drive, over the frequency."""
-    return (
-        isinstance(system, Oscillator)
-        and type(system.law).__name__ == "Coulomb"
-        and getattr(system.law, "static", None) in (None, getattr(system.law, "kinetic", None))
-        and type(system.drive).__name__ in ("HarmonicForce", "HarmonicBase")
-        and getattr(system.drive, "contact", "ground") == "ground"
-        and system.damper == "ground"
-        and (found.parameter, found.along) == ("kinetic", "frequency")
-        and {"no stops", "stops"} == set(next(k for k, v in zip(found.kinds, found.values, strict=True) if v == v))
-    )
-
-
-def _force(system: Oscillator) -> float:
-    amplitude = float(getattr(system.drive, "amplitude", math.nan))
-    return amplitude * (system.stiffness if type(system.drive).__name__ == "HarmonicBase" else 1.0)
 
 
 @styled
@@ -352,22 +273,14 @@ def plot_dither(found: Dither) -> Figure:
     factor, unit = prefixed(found.scan[:, 0], found.amplitude.unit)
     sticks = found.scan[:, 1] * found.frequency
     least = 0.3 * min(1.0, np.min(sticks[sticks > 0], initial=1.0))
-    top.loglog(
-        factor * found.scan[:, 0],
-        np.where(np.isfinite(sticks), np.maximum(sticks, least), np.nan),
-        ".",
-        color=BLUE,
-        label="exact runs",
-    )
+    known = np.where(np.isfinite(sticks), np.maximum(sticks, least), np.nan)
+    top.loglog(factor * found.scan[:, 0], known, ".", color=BLUE, label="exact runs")
     for axis in (top.xaxis, top.yaxis):
         plain_decades(axis)
     top.axhline(1.0, color=INK, linewidth=0.8)
-    top.axvline(
-        factor * found.amplitude.value,
-        color=ORANGE,
-        linestyle="--",
-        label=f"smallest that does it: {factor * found.amplitude.value:.3g} {spelled(unit)}",
-    )
+    smallest = factor * found.amplitude.value
+    label = f"smallest that does it: {smallest:.3g} {spelled(unit)}"
+    top.axvline(smallest, color=ORANGE, linestyle="--", label=label)
     if np.any(sticks == 0):
         top.text(0.99, 0.04, "lowest row: no stick at all", transform=top.transAxes, ha="right", fontsize=7)
     top.set_xlabel(axis_label(f"dither of {found.frequency:.4g} Hz on the {found.on}", unit))

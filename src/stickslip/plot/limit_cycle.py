@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from stickslip.plot.style import (
     SHADE,
     SKY,
     axis_label,
+    coloured,
     legend_above,
     new_figure,
     prefixed,
@@ -145,18 +146,8 @@ def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = No
     known = list(COLOURS)
     places = np.vectorize(known.index)(stability.mechanism.values)
     y, x = (stability[name].values for name in names)
-    axes.pcolormesh(
-        x,
-        y,
-        places,
-        cmap=ListedColormap(list(COLOURS.values())),
-        vmin=-0.5,
-        vmax=len(known) - 0.5,
-        alpha=FILLED,
-        shading="nearest",
-        linewidth=0,
-        rasterized=True,
-    )
+    options: Any = {"cmap": ListedColormap(list(COLOURS.values())), "vmin": -0.5, "vmax": len(known) - 0.5}
+    coloured(axes, x, y, places, alpha=FILLED, **options)
     growth = stability.growth.values
     if growth.min() < 0 < growth.max():
         axes.contour(x, y, growth, levels=[0.0], colors=INK, linewidths=1.2)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.plot.plate import Plate, plate
+from stickslip.plot.plate import Plate, captioned
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -111,19 +111,14 @@ def last_cycles(run: Trajectory, cycles: float) -> tuple[float, float]:
 
 def sampled(run: Trajectory, wanted: Sequence[str | Quantity], times: Array) -> Array:
     """Exact values of some quantities at increasing instants, a row for each."""
-    pairs = [(each, 0) if isinstance(each, str) else each for each in wanted]
+    pairs = [(quantity, 0) if isinstance(quantity, str) else quantity for quantity in wanted]
     names = list(dict.fromkeys("x" if name == "way" else name for name, _ in pairs))
     values, _ = run.sample(times, tuple(names))
     counts = [len(run.labels(name)) for name in names]
     rows = dict(zip(names, np.split(values, np.cumsum(counts)[:-1]), strict=True))
-    return np.array(
-        [
-            run.system.tangents[row] @ rows["x"]
-            if name == "way" and isinstance(run.system, Structure)
-            else rows["x" if name == "way" else name][row]
-            for name, row in pairs
-        ]
-    )
+    if "x" in rows:
+        rows["way"] = run.system.tangents @ rows["x"] if isinstance(run.system, Structure) else rows["x"]
+    return np.array([rows[name][row] for name, row in pairs])
 
 
 def curve(run: Trajectory, wanted: Sequence[str | Quantity], *, first: float, last: float) -> tuple[Array, list[Array]]:
@@ -148,7 +143,7 @@ def curve(run: Trajectory, wanted: Sequence[str | Quantity], *, first: float, la
 def stretches(run: Trajectory, kind: str, *, first: float, last: float, contact: int = 0) -> Array:
     """Start and length of each stretch of one kind of mode at a contact ("slip", "stick", "microstick", "flight"),
     within two instants (n, 2)."""
-    chosen = np.array([found == kind for found in kinds_of(run, contact)])[run.modes]
+    chosen = np.array([mode == kind for mode in kinds_of(run, contact)])[run.modes]
     chosen &= (run.starts < last) & (run.starts + run.durations > first)
     begin, end = (np.clip(ends[chosen], first, last) for ends in (run.starts, run.starts + run.durations))
     spans: Array = np.column_stack([begin, end - begin])[end > begin]
@@ -305,70 +300,25 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
     first, last = last_cycles(run, CLOSE_CYCLES)
     plates = []
     if first > 0:
-        plates.append(
-            plate(
-                "whole-run",
-                partial(plot_motion, run),
-                "The whole run",
-                f"From the start, over all of the time.{shaded}",
-            )
-        )
-    words = "As long as it moves" if run.status == "at rest" else "The last cycles"
+        plates.append(captioned("run", "whole-run", partial(plot_motion, run), shaded=shaded))
+    span = "As long as it moves" if run.status == "at rest" else "The last cycles"
     plates.append(
-        plate(
-            "motion",
-            partial(plot_motion, run, first=first, last=last),
-            words,
-            f"Exact between events; friction jumps where a slip begins, ends or turns.{shaded}",
-        )
+        captioned("run", "motion", partial(plot_motion, run, first=first, last=last), span=span, shaded=shaded)
     )
-    several = contacts_of(run) > 1
-    for c in range(min(contacts_of(run), MOST_DRAWN)):
-        plates += _of_contact(run, c, f"-{c + 1}" if several else "", f", contact {c + 1}" if several else "")
-    masses = len(run.labels("x"))
+    contacts, masses = contacts_of(run), len(run.labels("x"))
+    for c in range(min(contacts, MOST_DRAWN)):
+        number, of = (f"-{c + 1}", f", contact {c + 1}") if contacts > 1 else ("", "")
+        for name, against in (("displacement", "x"), ("velocity", "slip"), ("load", "load")):
+            if against == "load" and not pressed(run, c):
+                continue
+            draw = partial(plot_loop, run, against=against, contact=c)
+            plates.append(captioned("run", f"friction-{name}", draw, name=f"friction-{name}{number}", of=of))
+    holds = " Marked: where the contact holds." if contacts == 1 else ""
     for j in range(min(masses, MOST_DRAWN)):
-        name, which = (f"-x{j + 1}", f" of x{j + 1}") if masses > 1 else ("", "")
-        holds = "" if several or not contacts_of(run) else " Marked: where the contact holds."
-        plates.append(
-            plate(
-                f"phase-portrait{name}",
-                partial(plot_phase, run, mass=j),
-                f"Phase portrait{which}",
-                f"Velocity against displacement, run through clockwise.{holds}",
-            )
-        )
+        number, of = (f"-x{j + 1}", f" of x{j + 1}") if masses > 1 else ("", "")
+        draw, name = partial(plot_phase, run, mass=j), f"phase-portrait{number}"
+        plates.append(captioned("run", "phase-portrait", draw, name=name, of=of, holds=holds))
     return tuple(plates)
-
-
-def _of_contact(run: Trajectory, contact: int, name: str, which: str) -> list[Plate]:
-    """Loops of one contact; `name` and `which` tell it from others."""
-    plates = [
-        plate(
-            f"friction-displacement{name}",
-            partial(plot_loop, run, contact=contact),
-            f"Friction against displacement{which}",
-            "The area of a loop is the work that friction takes in a cycle. Flat top and bottom: sliding. Sides: the "
-            "contact holds, upright where it is rigid, sloping where it gives way.",
-        ),
-        plate(
-            f"friction-velocity{name}",
-            partial(plot_loop, run, against="slip", contact=contact),
-            f"Friction against sliding velocity{which}",
-            "The law as the motion passes through it. A contact that holds bears whatever the other forces ask for: "
-            "the upright at zero.",
-        ),
-    ]
-    if pressed(run, contact):
-        plates.append(
-            plate(
-                f"friction-load{name}",
-                partial(plot_loop, run, against="load", contact=contact),
-                f"Friction against normal load{which}",
-                "Sliding lies on the two edges of a wedge, whose slope is the coefficient of friction; holding lies "
-                "between them; at its tip the contact lifts off.",
-            )
-        )
-    return plates
 
 
 def _shade(ax: Axes, run: Trajectory, first: float, last: float, contact: int) -> None:
