@@ -72,8 +72,8 @@ def _fused(record: Record, rig: dict[str, Any], question: str) -> Acceleration:
     used = [*sensors, "z", *(["force"] if "force" in record else [])]
     record = without_delays(record, *used, question=question, samples=LEAST)
     compared = _compared(record)
-    found = fuse(record, balance, sensors)
-    sd, values = float(np.median(found.friction_sd)) / balance.mass, found.acceleration
+    fusion = fuse(record, balance, sensors)
+    sd, values = float(np.median(fusion.friction_sd)) / balance.mass, fusion.acceleration
     noise = max(SWINGS * sd, ROUNDED * float(values.std()))
     step = Step("acceleration_of_mass", {"sensors": sensors}, "by a smoother that knows the stated mounts")
     kept = replace(

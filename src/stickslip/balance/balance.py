@@ -153,10 +153,10 @@ def with_motion(record: Record, derive: Filter) -> Record:
     return made
 
 
-def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, words: Sequence[str]) -> Record:
+def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, notes: Sequence[str]) -> Record:
     """The record with the friction, its standard deviation at each sample, and how it was found."""
     arguments = {name: value for name, value in asdict(rig).items() if name != "lost"}
-    step = Step("friction_force", arguments, "; ".join(words))
+    step = Step("friction_force", arguments, "; ".join(notes))
     made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
     noise = float(np.median(sd))
     made = made.with_channel("friction", force, unit="N", source="friction_force", noise=noise, step=step)

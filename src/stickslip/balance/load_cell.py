@@ -33,9 +33,9 @@ def felt(record: Record, rig: StatedRig) -> Record:
     terms = {"load": {0: 1.0}, **({source: {"avx".index(source): -cell.inertia}} if source else {})}
     if method == "F2":
         derive = dict.fromkeys(terms, Filter("five-point", record.fs, 0.0))
-        words = ["the load cell, averaged over five points"]
+        notes = ["the load cell, averaged over five points"]
     else:
-        derive, words = _unmounted(record, terms)
+        derive, notes = _unmounted(record, terms)
     force, variance = np.zeros(len(record)), np.zeros(len(record))
     for name, orders in terms.items():
         noise = noise_along(record[name], record.fs, record.channels[name].noise)
@@ -47,13 +47,13 @@ def felt(record: Record, rig: StatedRig) -> Record:
             force += part
             variance += (derive[name].noise_gain(len(record), orders) * noise) ** 2
     if source:
-        words.append(f"less {cell.inertia:g} kg times the acceleration from {source}")
+        notes.append(f"less {cell.inertia:g} kg times the acceleration from {source}")
     elif cell.inertia:
-        words.append(f"no motion: the inertia of {cell.inertia:g} kg of its flange is left in")
+        notes.append(f"no motion: the inertia of {cell.inertia:g} kg of its flange is left in")
     if cell.discharge is not None:
-        words.append(f"its discharge of {cell.discharge:g} s is left in")
+        notes.append(f"its discharge of {cell.discharge:g} s is left in")
     name = ALONE if method == "load" else method  # no balance of forces stands behind it
-    return with_friction(record, force, np.sqrt(variance), replace(rig, method=name), words)
+    return with_friction(record, force, np.sqrt(variance), replace(rig, method=name), notes)
 
 
 def _unmounted(record: Record, terms: dict[str, dict[int, float]]) -> tuple[dict[str, Filter], list[str]]:
@@ -64,7 +64,7 @@ def _unmounted(record: Record, terms: dict[str, dict[int, float]]) -> tuple[dict
         angular = 2 * math.pi * mount[0]
         terms["load"] |= {1: 2 * mount[1] / angular, 2: angular**-2}
         width["load"] = checked_bandwidth(min(BEYOND * mount[0], 0.4 * record.fs), record.fs, len(record))
-    words = [f"the load cell alone, smoothed to {width['load']:.4g} Hz (-3 dB)"]
+    notes = [f"the load cell alone, smoothed to {width['load']:.4g} Hz (-3 dB)"]
     if mount is not None:
-        words.append(f"less what its mount of {mount[0]:g} Hz adds")
-    return {name: Filter("smoother", record.fs, each) for name, each in width.items()}, words
+        notes.append(f"less what its mount of {mount[0]:g} Hz adds")
+    return {name: Filter("smoother", record.fs, pair) for name, pair in width.items()}, notes

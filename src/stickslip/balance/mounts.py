@@ -58,7 +58,9 @@ class Resonance:
         }  # fmt: skip
 
     def __str__(self) -> str:
-        frequency, damping = (str(each).replace(f" of the {self.name}", "") for each in (self.frequency, self.damping))
+        frequency, damping = (
+            str(number).replace(f" of the {self.name}", "") for number in (self.frequency, self.damping)
+        )
         return f"{self.name}: {frequency}, {damping}; {self.evidence}"
 
 

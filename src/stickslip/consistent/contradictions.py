@@ -59,11 +59,11 @@ class Consistency(Result):
 
     def __getitem__(self, name: str) -> Check:
         """The check of that name."""
-        found = [check for check in self.checks if check.name == name]
-        if not found:
+        named = [check for check in self.checks if check.name == name]
+        if not named:
             names = ", ".join(check.name for check in self.checks)
             raise EstimateError(f"no check '{name}'", f"there are {names}", "choose one of them")
-        return found[0]
+        return named[0]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""

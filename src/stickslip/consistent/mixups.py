@@ -38,7 +38,7 @@ class Amplitudes:
             inertia = m * values.get("a", -(w**2) * x)
             driven = 1j * w * c * (x - (z if self.damper == "base" else 0.0))
             rest = k * (z - x) - driven + values.get("force", 0.0) - inertia - values["load"]
-            sizes = math.hypot(*(abs(each) for each in (k * z, k * x, inertia, values["load"])))
+            sizes = math.hypot(*(abs(term) for term in (k * z, k * x, inertia, values["load"])))
             total += abs(rest) ** 2 / (2 * (self.tolerance * sizes) ** 2)
         for name in ("z", "load"):
             if name in values and (name != "z" or "force" not in values):
@@ -51,8 +51,8 @@ def mixups(balance: Amplitudes, checks: Sequence[Check]) -> list[Check]:
     """A check that names every slip which would make the channels agree, or that none would."""
     before = balance.misfit(balance.values)
     most = 2 * APART**2
-    tried = sorted((balance.misfit(values), words) for words, values in _slips(balance.values))
-    cured = [words for misfit, words in tried if misfit < max(most, 1.2 * tried[0][0]) and misfit * BETTER < before]
+    tried = sorted((balance.misfit(values), slip) for slip, values in _slips(balance.values))
+    cured = [mixup for misfit, mixup in tried if misfit < max(most, 1.2 * tried[0][0]) and misfit * BETTER < before]
     if before <= most or not cured:
         return []
     sentence = " or ".join(cured)

@@ -105,14 +105,14 @@ def contact_damping(record: Record) -> Estimate:
     >>> bool(abs(contact_damping(record).value - 23.9) < 1)
     True
     """
-    found = likely_contact(record).damping
-    if NEGATIVE in kinds(found.status):
+    damping = likely_contact(record).damping
+    if NEGATIVE in kinds(damping.status):
         raise EstimateError(
-            f"a contact damping of {found.value:.3g} N s/m",
+            f"a contact damping of {damping.value:.3g} N s/m",
             "a contact takes energy from the motion, so that its damping is not below zero",
             "state the sensors' lags and mounts, by with_details or under [sensors] in the rig file",
         )
-    return found
+    return damping
 
 
 def _no_method(method: str | None, methods: tuple[str, ...]) -> EstimateError:
@@ -130,21 +130,21 @@ def branch_slopes(displacement: Array, friction: Array, level: float) -> Array:
     return np.array(slopes)
 
 
-def _slope(found: Array, unit: str) -> Estimate:
-    if len(found) < 2:
+def _slope(deflection: Array, unit: str) -> Estimate:
+    if len(deflection) < 2:
         raise EstimateError(
-            f"{len(found)} sticks with {LEAST} samples or more below the sliding friction",
+            f"{len(deflection)} sticks with {LEAST} samples or more below the sliding friction",
             "a slope needs two at least",
             "sample faster, or give a longer record",
         )
-    scatter = float(np.std(found, ddof=1) / abs(np.mean(found)))
+    scatter = float(np.std(deflection, ddof=1) / abs(np.mean(deflection)))
     said = (
-        f"{len(found)} sticks, which scatter by {100 * scatter:.0f} %",
+        f"{len(deflection)} sticks, which scatter by {100 * scatter:.0f} %",
         "noise in the displacement and lags make a slope too low: 2 to 27 % on a rig like the thesis's",
     )
     return mean_of_cycles(
         STIFFNESS,
-        found,
+        deflection,
         unit="N/m" if unit == "m" else "N m/rad",
         method="mean slope of friction against displacement in each stick",
         checks=said,

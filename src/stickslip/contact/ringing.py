@@ -315,8 +315,8 @@ def _pole(windows: list[Array], fs: float, noise: float, sticks: Sticks) -> comp
         corners = np.array([(math.log(f), z), (math.log(f) + 0.05, z), (math.log(f), 1.4 * z + 0.01)])
         options: dict[str, Any] = {"xatol": 5e-4, "fatol": 0.2, "maxiter": 40, "initial_simplex": corners}
         tried.append(minimize(of_pole, corners[0], method="Nelder-Mead", options=options))
-    found = min(tried, key=lambda each: float(each.fun)).x
-    return _mode(math.exp(found[0]), float(found[1]))
+    root = min(tried, key=lambda fit: float(fit.fun)).x
+    return _mode(math.exp(root[0]), float(root[1]))
 
 
 def _mode(frequency: float, damping: float) -> complex:

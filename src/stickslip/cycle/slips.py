@@ -116,26 +116,26 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
             "give the load cell's channel as friction",
         )  # fmt: skip
     strokes = find_strokes(record, contact=contact, question=QUESTION)
-    found = ringing_of(strokes.strokes, record.fs)
-    if found is None:
+    ringing = ringing_of(strokes.strokes, record.fs)
+    if ringing is None:
         raise EstimateError(
             f"no ringing: the friction of {len(strokes.strokes)} strokes swings about its level by less than "
             f"{LOUD:.0%} of it, or in each stroke otherwise",
             f"{QUESTION} needs {FASTER:g} cycles at least in the quarter of a stroke after the breakaway",
             "sample faster, or look at the map",
         )
-    return found
+    return ringing
 
 
 def ringing_of(strokes: Sequence[Stroke], fs: float) -> SlipRinging | None:
     """How the friction of some strokes rings; None where it does not."""
-    forward, back = (_direction([each for each in strokes if each.way == way], side, fs)
+    forward, back = (_direction([stroke for stroke in strokes if stroke.way == way], side, fs)
                      for way, side in ((1, "forward"), (-1, "back")))  # fmt: skip
     if forward is None and back is None:
         return None
     difference = None if forward is None or back is None else _difference(forward[0], back[0])
     (f, z, a), (g, y, b) = forward or (None, None, None), back or (None, None, None)
-    flags = [each.status for each in (f, g) if each is not None and each.status != "ok"]
+    flags = [part.status for part in (f, g) if part is not None and part.status != "ok"]
     verdict = ("back alone" if f is None else "forward alone") if difference is None else _verdict(difference)
     return SlipRinging(f, g, z, y, a, b, difference, verdict, flags[0] if flags else "ok")
 
@@ -153,7 +153,7 @@ def _difference(forward: Estimate, back: Estimate) -> Estimate:
         math.hypot(forward.value - low, over - back.value),
         math.hypot(high - forward.value, back.value - under),
     )
-    flags = [each.status for each in (forward, back) if each.status != "ok"]
+    flags = [estimate.status for estimate in (forward, back) if estimate.status != "ok"]
     return Estimate(
         "ringing after slip begins, forward less back", value, interval=(value - below, value + above),
         sd=math.hypot(forward.sd, back.sd), unit="Hz", method="difference of both directions",
@@ -164,15 +164,15 @@ def _difference(forward: Estimate, back: Estimate) -> Estimate:
 def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimate, Estimate, Estimate] | None:
     """Frequency, damping ratio and amplitude of the strokes of one direction; None where they do not ring alike."""
     chosen = strokes[:: len(strokes) // MOST + 1]
-    cuts = [values for each in chosen if len(values := _after(each)) >= LEAST]
+    cuts = [values for stroke in chosen if len(values := _after(stroke)) >= LEAST]
     start = _strongest([_swings(values, STIFF) for values in cuts], fs)
     if start is None or 2 * len(cuts) <= len(chosen):
         return None
     swings = [_swings(values, SLOW) for values in cuts]
     turn = 2 * math.pi * start
     mode = _mode(swings, np.array([-0.03 * turn, turn]), fs)
-    total = sum(float(each @ each) for each in swings)
-    amplitudes = [_amplitude(each, mode.x, fs) for each in swings]
+    total = sum(float(swing @ swing) for swing in swings)
+    amplitudes = [_amplitude(swing, mode.x, fs) for swing in swings]
     if (
         abs(mode.x[1] / turn - 1) > ALIKE
         or float(mode.fun @ mode.fun) > (1 - EXPLAINED) * total
@@ -213,17 +213,17 @@ def _told_surely(degrees: Array, without: Array, count: int, side: str) -> list[
         ends = f"{low:.4g} to {high:.4g} Hz by what is taken for it"
         status = Status(f"the friction's own course takes part of the ring: {ends}")
     checks = (f"{count} strokes", f"{low:.4g} to {high:.4g} Hz beside polynomials of degree {SLOW} to {STIFF}")
-    found = []
+    swings = []
     for row, (what, unit) in enumerate((("ringing after slip begins", "Hz"), ("damping ratio of that ringing", "1"))):
         half = math.hypot(quantile * sd[row], 2 * spread[row])
-        found.append(
+        swings.append(
             Estimate(
                 f"{what}, {side}", float(told[row]), interval=(told[row] - half, told[row] + half),
                 sd=math.hypot(sd[row], spread[row]), unit=unit, status=status, checks=checks,
                 method="one decaying mode in all strokes, least squares; jackknife over strokes, and polynomials",
             )
         )  # fmt: skip
-    return found
+    return swings
 
 
 def _told(parameters: Array) -> tuple[float, float]:
@@ -254,7 +254,7 @@ def _strongest(swings: Sequence[Array], fs: float) -> float | None:
     if not swings:
         return None
     longest = max(map(len, swings))
-    powers = np.sum([np.abs(np.fft.rfft(each, PADDED * longest)) ** 2 for each in swings], axis=0)
+    powers = np.sum([np.abs(np.fft.rfft(swing, PADDED * longest)) ** 2 for swing in swings], axis=0)
     frequencies = np.fft.rfftfreq(PADDED * longest, 1 / fs)
     allowed = (frequencies >= FASTER * fs / longest) & (frequencies <= fs / SAMPLES)
     if not allowed.any() or powers[allowed].max() == 0:
@@ -277,7 +277,7 @@ def _mode(swings: Sequence[Array], start: Array, fs: float, degree: int = SLOW) 
 
     def left(parameters: Array) -> Array:
         bases = {count: np.linalg.qr(_waves(parameters, count, fs, degree))[0] for count in counts}
-        return np.concatenate([each - (basis := bases[len(each)]) @ (basis.T @ each) for each in swings])
+        return np.concatenate([swing - (basis := bases[len(swing)]) @ (basis.T @ swing) for swing in swings])
 
     return least_squares(left, start, x_scale=[start[1], start[1]], method="lm", max_nfev=60)
 

@@ -248,8 +248,8 @@ def _threshold(motion: Motion, cycles: Cycles, threshold: float | str | None) ->
             "slips are told from sticks where they are three times as fast as the threshold",
             "give a record with less noise or more motion",
         )
-    told = "five deviations of its noise" if noisy >= creep else f"{100 * CREEP:g} % of its peak, to pass over creep"
-    return limit, f"time with the speed below {_words(limit, motion)} ({'given' if threshold is not None else told})"
+    rule = "five deviations of its noise" if noisy >= creep else f"{100 * CREEP:g} % of its peak, to pass over creep"
+    return limit, f"time with the speed below {_words(limit, motion)} ({'given' if threshold is not None else rule})"
 
 
 def _words(speed: float, motion: Motion) -> str:
@@ -386,27 +386,27 @@ def _events_of(
         else:
             spells.append([hold])
     first, last = motion.start, motion.start + len(stuck) / motion.fs
-    begins, ends = (motion.start + each / motion.fs for each in stretches(stuck))
+    begins, ends = (motion.start + stretch / motion.fs for stretch in stretches(stuck))
     unseen = motion.blur / motion.fs
     edges = [  # a stick that the record cuts has no hold of its own
         [Hold(begin, end, unseen, unseen)]
         for begin, end in zip(begins, ends, strict=True)
         if not any(spell[0].begin < end and begin < spell[-1].end for spell in spells)
     ]
-    found: list[StickEvent] = []
+    events: list[StickEvent] = []
     free = Hold(first, first, 0.0, 0.0)
-    for spell in sorted(spells + edges, key=lambda each: each[0].begin):
-        found += _slip(free, spell[0], first, last)
+    for spell in sorted(spells + edges, key=lambda event: event[0].begin):
+        events += _slip(free, spell[0], first, last)
         begin, end = spell[0], spell[-1]
         kind = "stick" if stuck[rows(begin.begin, end.end)].any() else "microstick"
         whole = begin.begin > first and end.end < last
-        found.append(_event(kind, (begin.begin, begin.begin_sd), (end.end, end.end_sd), whole))
-        found += [
+        events.append(_event(kind, (begin.begin, begin.begin_sd), (end.end, end.end_sd), whole))
+        events += [
             _event("microslip", (one.end, one.end_sd), (next_.begin, next_.begin_sd), True)
             for one, next_ in pairwise(spell)
         ]
         free = end
-    return (*found, *_slip(free, Hold(last, last, 0.0, 0.0), first, last))
+    return (*events, *_slip(free, Hold(last, last, 0.0, 0.0), first, last))
 
 
 def _slip(before: Hold, after: Hold, first: float, last: float) -> list[StickEvent]:
@@ -446,6 +446,6 @@ def _microslips(events: tuple[StickEvent, ...]) -> Estimate:
     """How many lie in each whole stick."""
     slips = np.array([event.time for event in events if event.kind == "microslip"])
     sticks = [event for event in events if event.kind == "stick" and event.whole]
-    counts = [float(np.sum((each.time < slips) & (slips < each.time + each.duration))) for each in sticks]
+    counts = [float(np.sum((stick.time < slips) & (slips < stick.time + stick.duration))) for stick in sticks]
     method = "turns of the velocity within a stick"
     return mean_of_cycles("micro-slips per stick", counts, unit="1", method=method).within(0.0)

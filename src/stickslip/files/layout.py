@@ -117,10 +117,10 @@ def find_layout(head: bytes, whole: bool, options: Options, name: str) -> Layout
     FormatError
         There is no row of numbers, or no text.
     """
-    found = encoding_of(head)
-    if found is None:
+    codec = encoding_of(head)
+    if codec is None:
         raise FormatError(f"'{name}' is not text", "rows of numbers are needed", "check the file")
-    encoding, mark = found
+    encoding, mark = codec
     lines = lines_of(head[mark:], encoding, whole=whole)[:LONGEST_HEADER]
     cells, delimiter, decimal = _best_split(lines, options)
     widths = Counter(len(row) for row in cells if row)

@@ -130,24 +130,24 @@ class Columns:
         """The arithmetic as numbers times columns."""
         first: dict[Key, str] = {}
         names = {name: first.setdefault(key, name) for name, key in self._by_name.items()}
-        found = linear(arithmetic, names, self.constants)
+        combined = linear(arithmetic, names, self.constants)
         scales: dict[Key, float] = {}
-        for name, scale in found.scales.items():
+        for name, scale in combined.scales.items():
             key = self._by_name[name]
             scales[key] = scales.get(key, 0.0) + scale
-        return scales, found
+        return scales, combined
 
     def asked(self, channels: Mapping[str, str]) -> list[Wanted]:
         """The channels of a channel map."""
         wanted = []
         for name, text in channels.items():
             spec = split_spec(str(text))
-            scales, found = self.combination(spec.arithmetic)
-            plain = next(iter(scales)) if found.plain() else None
+            scales, weights = self.combination(spec.arithmetic)
+            plain = next(iter(scales)) if weights.plain() else None
             stated = spec.unit if spec.unit is not None else self.units.get(name)
             if stated is None and plain:
                 stated = self.unit_of(plain)
-            wanted.append(Wanted(*self._channel(checked_name(name), spec, stated), scales, found.offset))
+            wanted.append(Wanted(*self._channel(checked_name(name), spec, stated), scales, weights.offset))
         return wanted
 
     def every(self, times: Mapping[int, TimeColumn]) -> tuple[list[Wanted], list[str]]:
@@ -232,13 +232,13 @@ class Columns:
         times = {}
         for number, source in enumerate(self.sources):
             if asked is not None:
-                found = self._asked_time(number, asked)
+                key = self._asked_time(number, asked)
             else:
                 named = [column for column in source.table.columns if is_time(column)]
                 best = min(named, key=_time_rank, default=None)
-                found = self._time_column(number, best, named) if best else None
-            if found:
-                times[number] = found
+                key = self._time_column(number, best, named) if best else None
+            if key:
+                times[number] = key
         if asked is not None and not times:
             raise unknown("time column", asked, [name for _, name in self.columns])
         return times

@@ -72,9 +72,9 @@ def run(request: Mapping[str, Any], go_on: GoOn) -> Answer:
 def tell(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """What the library says of the motion, in words and in numbers as it prints them."""
     case = read_case(request["state"])
-    found = ss.story.outcome(case, progress=go_on)
-    told = {"status": found.run.status, "sentences": found.sentences, "rows": found.rows}
-    return {**told, **_state(case)}, {}  # in SI, whatever units it was asked in
+    outcome = ss.story.outcome(case, progress=go_on)
+    answer = {"status": outcome.run.status, "sentences": outcome.sentences, "rows": outcome.rows}
+    return {**answer, **_state(case)}, {}  # in SI, whatever units it was asked in
 
 
 def wavelet(request: Mapping[str, Any], go_on: GoOn) -> Answer:

@@ -83,8 +83,8 @@ class Guard:
     def _welcomed(self, scope: Scope, inside: bool) -> Response | None:
         """Nothing for who knows the token; the page's address with it is exchanged for a cookie and the way inside."""
         headers = Headers(scope=scope)
-        told = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
-        if scope["type"] == "http" and scope["path"] == "/" and self._known(told):
+        token = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
+        if scope["type"] == "http" and scope["path"] == "/" and self._known(token):
             page = RedirectResponse(f"{self.inside}/", status_code=303)
             page.set_cookie(self.cookie, self.token, httponly=True, samesite="lax", path=f"{self.inside}/")
             return page
@@ -99,8 +99,8 @@ class Guard:
             return HTMLResponse(f'<!doctype html><script src="{ENTRANCE}"></script><p>{sentence}', 401)
         return _told(401, sentence)
 
-    def _known(self, told: str) -> bool:
-        return secrets.compare_digest(told.encode("utf-8", "surrogateescape"), self.token.encode())
+    def _known(self, token: str) -> bool:
+        return secrets.compare_digest(token.encode("utf-8", "surrogateescape"), self.token.encode())
 
     def _marked(self, send: Send) -> Send:
         """`send`, with the headers that hold the browser to this page."""

@@ -188,8 +188,8 @@ def _loop(findings: Findings | SqueakFindings, abscissa: str, ax: Axes) -> Axes:
     ax.plot(x_factor * x, y_factor * f, color=ORANGE, linewidth=1.8, label="mean cycle")
     ax.axhline(0, color=FAINT, linewidth=0.8)
     ax.axvline(0, color=FAINT, linewidth=0.8)
-    words = f"{abscissa} of the contact"
-    ax.set(xlabel=axis_label(words, x_unit), ylabel=axis_label("friction", y_unit))
+    text = f"{abscissa} of the contact"
+    ax.set(xlabel=axis_label(text, x_unit), ylabel=axis_label("friction", y_unit))
     legend_above(ax, columns=3)
     return ax
 
@@ -243,7 +243,7 @@ def plot_micro_slips(findings: Findings) -> Figure:
     time = record.time[rows]
     figure, axes = new_figure(2, height=3.8)
     speed = contact_motion(record, contact=findings.settings.get("contact"), question="the figure").velocity
-    for ax, values, words, unit in (
+    for ax, values, quantity, unit in (
         (axes[0], record["friction"], "friction", record.channels["friction"].unit),
         (axes[1], speed, "velocity", "m/s"),
     ):
@@ -253,7 +253,7 @@ def plot_micro_slips(findings: Findings) -> Figure:
         for number, event in enumerate(e for e in inside if stick.time <= e.time < stick.time + stick.duration):
             label = "micro-slip" if number == 0 else None
             ax.axvspan(event.time, event.time + event.duration, color=ORANGE, alpha=0.4, linewidth=0, label=label)
-        ax.set_ylabel(axis_label(words, text))
+        ax.set_ylabel(axis_label(quantity, text))
     axes[1].set(xlabel="time [s]", xlim=(float(time[0]), float(time[-1])))
     legend_above(axes[0], columns=3)
     return figure

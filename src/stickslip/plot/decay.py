@@ -69,9 +69,9 @@ def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = N
     rest = findings.rest
     time, viscous, dry = _envelopes(findings, ring)
     alone = ((viscous, BLUE, "viscous friction alone"), (dry, ORANGE, "dry friction alone"))
-    for curve, colour, words in alone if ring.isochronous else ():  # of a linear spring
+    for curve, colour, text in alone if ring.isochronous else ():  # of a linear spring
         for side in (1, -1):
-            label = words if side == 1 else None
+            label = text if side == 1 else None
             ax.plot(time, factor * (rest + side * curve), color=colour, linestyle="--", linewidth=1.1, label=label)
     ax.axhline(factor * rest, color=FAINT, linewidth=0.8)
     _shade_rest(ax, ring, rows)
@@ -95,12 +95,12 @@ def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
     -------
     Figure
     """
-    time, measured, fitted, words = _identified(findings, release)
+    time, measured, fitted, label = _identified(findings, release)
     ring = findings.releases.ring_downs[release]
     factor, unit = prefixed(measured - findings.rest, ring.unit)
     figure, (above, below) = new_figure(2, height=4.6, heights=[2, 1])
     above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="recorded")
-    above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=words)
+    above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=label)
     above.set_ylabel(axis_label(WORDS[ring.channel], unit))
     legend_above(above, columns=2)
     left = measured - fitted
@@ -178,8 +178,8 @@ def plot_bounds(decrement: Decrement) -> Figure:
             bounds.m, value - worst, value + worst, color=ORANGE, alpha=0.2, linewidth=0, label="exact worst case"
         )
         for side in (1, -1):
-            words = "to first order" if side == 1 else None
-            ax.plot(bounds.m, value + side * first_order, color=BLUE, linestyle="--", linewidth=1.0, label=words)
+            text = "to first order" if side == 1 else None
+            ax.plot(bounds.m, value + side * first_order, color=BLUE, linestyle="--", linewidth=1.0, label=text)
         ax.plot(bounds.m, value, "o-", color=INK, markersize=3, linewidth=0.9, label="estimate")
         ax.axvline(bounds.best, color=GREEN, linewidth=0.9, linestyle=":")
         _within_reach(ax, value, worst, first_order)
@@ -229,7 +229,7 @@ def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio"
 
 def plates_together(comparison: DecayComparison) -> list[Plate]:
     """The figures of several decays."""
-    words = (
+    sentence = (
         "The records differ by more than their own intervals allow: something changed between them that no single one "
         "shows. The band holds their scatter."
         if comparison.apart
@@ -237,7 +237,10 @@ def plates_together(comparison: DecayComparison) -> list[Plate]:
     )
     return [
         captioned(
-            "decay", quantity.replace("_", "-"), partial(plot_records, comparison, quantity=quantity), agreement=words
+            "decay",
+            quantity.replace("_", "-"),
+            partial(plot_records, comparison, quantity=quantity),
+            agreement=sentence,
         )
         for quantity in ("damping_ratio", "dry_displacement")
     ]
@@ -251,12 +254,12 @@ def plates_of(findings: DecayFindings) -> list[Plate]:
         "Viscous friction alone would let it die away along the curved envelope, dry friction alone along the straight "
         "one; together they are faster than either. "
     ) * ring.isochronous
-    words = {
+    filled = {
         "envelopes": envelopes,
         "grey": "Grey: at rest before the release or after." if ring.held or ring.stopped else "",
         "several": f" The first of {several} releases; the others are below." if several > 1 else "",
     }
-    plates = [captioned("decay", "decay", partial(plot_decay, findings), **words)]
+    plates = [captioned("decay", "decay", partial(plot_decay, findings), **filled)]
     if findings.waveform is not None or (ring.order == 0 and findings.best in (findings.motion, thesis)):
         plates.append(captioned("decay", "identified", partial(plot_identified, findings)))
     fitted = 0 if findings.waveform is None or findings.best is findings.motion else len(findings.waveform.time)

@@ -60,10 +60,10 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
 
     standings = [candidate.standing for candidate in comparison.candidates]
     ax, places = axes_of(ax, height=1.3 + 0.32 * len(standings)), np.arange(len(standings))
-    for kept, colour, words in ((True, BLUE, "not rejected"), (False, FAINT, "rejected")):
+    for kept, colour, label in ((True, BLUE, "not rejected"), (False, FAINT, "rejected")):
         rows = [j for j, standing in enumerate(standings) if standing.kept == kept]
         if rows:
-            ax.plot([standings[j].misfit for j in rows], places[rows], "o", color=colour, markersize=7, label=words)
+            ax.plot([standings[j].misfit for j in rows], places[rows], "o", color=colour, markersize=7, label=label)
     forecast = [(law.prediction, j) for j, law in enumerate(standings) if np.isfinite(law.prediction)]
     if forecast:
         ax.plot(*zip(*forecast, strict=True), "D", color=ORANGE, markersize=4, label="of records left out")
@@ -78,12 +78,12 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
 
 
 @styled
-def plot_fit(found: LawComparison | LawFit, *, record: int = 0) -> Figure:
+def plot_fit(result: LawComparison | LawFit, *, record: int = 0) -> Figure:
     """What was measured, what the fitted or best law predicts, and what is left, over the first part of a record.
 
     Parameters
     ----------
-    found : LawComparison or LawFit
+    result : LawComparison or LawFit
         What :func:`~stickslip.compare_laws` or :func:`~stickslip.fit_law` returned.
     record : int
         Which of several records, from 0.
@@ -92,8 +92,8 @@ def plot_fit(found: LawComparison | LawFit, *, record: int = 0) -> Figure:
     -------
     Figure
     """
-    fit = found.fit if isinstance(found, LawComparison) else found
-    name_of_law = found.best.name if isinstance(found, LawComparison) else type(fit.law).__name__
+    fit = result.fit if isinstance(result, LawComparison) else result
+    name_of_law = result.best.name if isinstance(result, LawComparison) else type(fit.law).__name__
     traces = fit.traces[record]
     names = list(traces.measured)
     figure, axes = new_figure(len(names) + 1, height=1.6 * len(names) + 1.8)
@@ -101,14 +101,14 @@ def plot_fit(found: LawComparison | LawFit, *, record: int = 0) -> Figure:
     for ax, name, colour in zip(axes, names, COLOURS, strict=False):
         time, measured, fitted = traces.time[name], traces.measured[name], traces.fitted[name]
         near = time <= time[0] + SHOWN
-        words, unit = WORDS.get(name, (name, ""))
+        quantity, unit = WORDS.get(name, (name, ""))
         factor, unit = prefixed(measured[near] - measured[near].mean(), unit)
         ax.plot(*envelope(time[near], factor * measured[near]), color=INK, linewidth=1.4, label="measured")
         label = f"fitted: {name_of_law}"
         ax.plot(*envelope(time[near], factor * fitted[near]), color=ORANGE, linewidth=1.0, linestyle="--", label=label)
-        ax.set_ylabel(axis_label(words, unit, "\n"))
+        ax.set_ylabel(axis_label(quantity, unit, "\n"))
         left = (measured - fitted)[near] / fit.noise[name]
-        below.plot(*envelope(time[near], left), color=colour, linewidth=0.8, label=words)
+        below.plot(*envelope(time[near], left), color=colour, linewidth=0.8, label=quantity)
     legend_above(axes[0], columns=2)
     below.axhline(0, color=FAINT, linewidth=0.8)
     below.set(xlabel="time [s]", ylabel="left over,\ntimes the noise")
@@ -118,12 +118,12 @@ def plot_fit(found: LawComparison | LawFit, *, record: int = 0) -> Figure:
 
 
 @styled
-def plot_curve(found: CurveFit, *, ax: Axes | None = None) -> Axes:
+def plot_curve(fit: CurveFit, *, ax: Axes | None = None) -> Axes:
     """A measured friction and the fitted curve.
 
     Parameters
     ----------
-    found : CurveFit
+    fit : CurveFit
         What :func:`~stickslip.fit_curve` returned.
     ax : Axes, optional
         Where to draw.
@@ -133,20 +133,18 @@ def plot_curve(found: CurveFit, *, ax: Axes | None = None) -> Axes:
     Axes
     """
     ax = axes_of(ax)
-    words, unit = ALONG[found.along]
-    factor, unit = prefixed(found.at, unit)
-    order = np.argsort(found.at, kind="stable") if found.along == "v" else np.arange(len(found.at))
-    force, force_unit = prefixed(found.measured, found.unit)
-    ax.plot(
-        factor * found.at, force * found.measured, ".", color=FAINT, markersize=2, label="measured", rasterized=True
-    )
-    at, fitted = factor * found.at[order], force * found.fitted[order]
-    if found.along == "v" and at[0] < 0 < at[-1]:  # the curve of neither direction goes through zero
+    label, unit = ALONG[fit.along]
+    factor, unit = prefixed(fit.at, unit)
+    order = np.argsort(fit.at, kind="stable") if fit.along == "v" else np.arange(len(fit.at))
+    force, force_unit = prefixed(fit.measured, fit.unit)
+    ax.plot(factor * fit.at, force * fit.measured, ".", color=FAINT, markersize=2, label="measured", rasterized=True)
+    at, fitted = factor * fit.at[order], force * fit.fitted[order]
+    if fit.along == "v" and at[0] < 0 < at[-1]:  # the curve of neither direction goes through zero
         middle = int(np.searchsorted(at, 0.0))
         at, fitted = np.insert(at, middle, 0.0), np.insert(fitted, middle, np.nan)
-    ax.plot(at, fitted, color=ORANGE, linewidth=1.4, label=f"fitted: {found.curve}")
-    quantity = "coefficient of friction" if found.unit == "1" else "friction"
-    ax.set(xlabel=axis_label(words, unit), ylabel=axis_label(quantity, force_unit))
+    ax.plot(at, fitted, color=ORANGE, linewidth=1.4, label=f"fitted: {fit.curve}")
+    quantity = "coefficient of friction" if fit.unit == "1" else "friction"
+    ax.set(xlabel=axis_label(label, unit), ylabel=axis_label(quantity, force_unit))
     legend_above(ax, columns=2)
     return ax
 

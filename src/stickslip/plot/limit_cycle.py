@@ -68,11 +68,11 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
     sizes = np.concatenate([branches.amplitudes(way) for way in ("up", "down")])
     factor, unit = prefixed(sizes, "m")
     looks = {"up": (BLUE, ">", "going up", 5), "down": (ORANGE, "<", "going down", 8)}
-    for way, (colour, marker, words, size) in reversed(looks.items()):
+    for way, (colour, marker, text, size) in reversed(looks.items()):
         cycles = branches.up if way == "up" else branches.down
         face = colour if way == "up" else "none"
         style = {"color": colour, "marker": marker, "markersize": size, "markerfacecolor": face, "linewidth": 1.0}
-        top.plot(branches.values, factor * branches.amplitudes(way), label=words, **style)
+        top.plot(branches.values, factor * branches.amplitudes(way), label=text, **style)
         frequencies = [cycle.frequency if cycle.vibrates else np.nan for cycle in cycles]
         middle.plot(branches.values, frequencies, **style)
     separating = branches.amplitudes("between")
@@ -87,8 +87,8 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
     if branches.threshold is not None:
         for axes in (top, middle, below):
             axes.axvline(branches.threshold.value, color=INK, linewidth=0.9, linestyle="--")
-        words = f"sliding ceases to be stable at {branches.threshold.value:.4g}"
-        top.plot([], [], color=INK, linewidth=0.9, linestyle="--", label=words)
+        text = f"sliding ceases to be stable at {branches.threshold.value:.4g}"
+        top.plot([], [], color=INK, linewidth=0.9, linestyle="--", label=text)
     if branches.both is not None and branches.both[0] < branches.both[1]:
         top.axvspan(*branches.both, color=SHADE, alpha=0.5, linewidth=0, label="either may last")
     top.set_ylabel(axis_label("amplitude of sliding", unit))

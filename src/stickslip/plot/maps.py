@@ -73,7 +73,7 @@ def plot_map(atlas: Any, *, variable: str | None = None, system: System | None =
     >>> plot_map(atlas, system=slider).get_xlabel()
     'frequency [Hz]'
     """
-    values, words, unit = _shown(atlas, variable)
+    values, quantity, unit = _shown(atlas, variable)
     if values.ndim not in (1, 2):
         raise ModelError(
             f"a map over {', '.join(values.dims)}", "one or two dimensions can be drawn", "choose with sel()"
@@ -92,10 +92,10 @@ def plot_map(atlas: Any, *, variable: str | None = None, system: System | None =
         if named:
             ax.set_yticks(list(named), list(named.values()))
         ax.set_xlabel(label)
-        ax.set_ylabel(axis_label(words, spelled))
+        ax.set_ylabel(axis_label(quantity, spelled))
         return ax
     up, lift, upward = _axis(atlas, values.dims[1])
-    _colour(ax, across, up, factor * values.values.T, axis_label(words, spelled), named)
+    _colour(ax, across, up, factor * values.values.T, axis_label(quantity, spelled), named)
     curve = None if system is None else den_hartog(system, values.dims, across / scale)
     handles: list[Any] = []
     if curve is not None:
@@ -157,13 +157,13 @@ def plates_of(atlas: Any, system: System | None = None) -> tuple[Plate, ...]:
     caption = f"Each point is a motion of its own, measured over {cycles} periods after {settle} in which it settles."
     plates = []
     for name, variable in (drawn or {"status": "status"}).items():
-        ax, (values, words, _) = plot_map(atlas, variable=variable, system=system), _shown(atlas, variable)
+        ax, (values, label, _) = plot_map(atlas, variable=variable, system=system), _shown(atlas, variable)
         line = (
             " Line: Den Hartog's boundary, below which sliding does not stop." if ax.get_legend() and ax.lines else ""
         )
         white = _white(atlas, values)
         left = f" {white[0].upper()}{white[1:]}." if white else ""
-        plates.append(plate(name, partial(_itself, ax), f"{words[0].upper()}{words[1:]}", caption + line + left))
+        plates.append(plate(name, partial(_itself, ax), f"{label[0].upper()}{label[1:]}", caption + line + left))
     return tuple(plates)
 
 
@@ -173,8 +173,8 @@ def _itself(drawn: Axes) -> Axes:
 
 def _outcomes(values: Any) -> dict[int, str]:
     """What the numbers of a status mean, of those that are there; nothing for other variables."""
-    codes, words = values.attrs.get("flag_values", ()), values.attrs.get("flag_meanings", "").split()
-    named = {int(code): word.replace("_", " ") for code, word in zip(codes, words, strict=True)}
+    codes, meanings = values.attrs.get("flag_values", ()), values.attrs.get("flag_meanings", "").split()
+    named = {int(code): word.replace("_", " ") for code, word in zip(codes, meanings, strict=True)}
     return {code: named[code] for code in np.unique(values.values).tolist() if code in named}
 
 
@@ -186,7 +186,7 @@ def _steps(values: Array) -> Array:
     return whole if counted else whole[:0]
 
 
-def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str, named: dict[int, str]) -> None:
+def _colour(ax: Axes, across: Array, up: Array, values: Array, label: str, named: dict[int, str]) -> None:
     """The map in colour; a count of few values in steps, which may have names."""
     import matplotlib as mpl
     from matplotlib.colors import BoundaryNorm, LogNorm
@@ -200,7 +200,7 @@ def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str, named
     elif len(known) and np.min(known) > 0 and np.max(known) > WIDE * np.min(known):
         options["norm"] = LogNorm(max(np.min(known), np.max(known) / SPAN), np.max(known))
     drawn = coloured(ax, across, up, np.ma.masked_invalid(values), **options)
-    bar = ax.figure.colorbar(drawn, ax=ax, label=words)
+    bar = ax.figure.colorbar(drawn, ax=ax, label=label)
     if isinstance(options.get("norm"), LogNorm):
         plain_decades(bar.ax.yaxis)
     if isinstance(options.get("norm"), BoundaryNorm):

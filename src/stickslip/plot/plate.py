@@ -146,8 +146,8 @@ def plate(name: str, draw: Callable[[], Figure | Axes], title: str, caption: str
 
 def captioned(family: str, kind: str, draw: Callable[[], Figure | Axes], *, name: str = "", **values: object) -> Plate:
     """A figure with the words that captions.toml has for its kind, some values filled in; called `name`, if given."""
-    words = _captions()[family][kind]
-    return plate(name or kind, draw, words["title"].format(**values), words["caption"].format(**values))
+    caption = _captions()[family][kind]
+    return plate(name or kind, draw, caption["title"].format(**values), caption["caption"].format(**values))
 
 
 @functools.cache

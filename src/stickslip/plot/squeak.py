@@ -69,12 +69,12 @@ MOST_ROWS = 6
 
 
 @styled
-def plot_squeaks(found: Squeaks) -> Figure:
+def plot_squeaks(squeaks: Squeaks) -> Figure:
     """The sound over time with its bursts shaded, and its spectrogram with their dominant frequencies.
 
     Parameters
     ----------
-    found : Squeaks
+    squeaks : Squeaks
         What :func:`~stickslip.find_squeaks` returned.
 
     Returns
@@ -92,18 +92,18 @@ def plot_squeaks(found: Squeaks) -> Figure:
     """
     from matplotlib.patches import Patch
 
-    record, name = found.record, found.channel
+    record, name = squeaks.record, squeaks.channel
     figure, (above, below) = new_figure(2, height=4.8, heights=(1, 2.2))
     _trace(above, record, name)
-    drawn = _spectrogram(below, found)
-    numbered = len(found.bursts) <= MOST_NUMBERS
-    for number, burst in enumerate(found.bursts):
+    drawn = _spectrogram(below, squeaks)
+    numbered = len(squeaks.bursts) <= MOST_NUMBERS
+    for number, burst in enumerate(squeaks.bursts):
         above.axvspan(burst.start, burst.end, color=COLOURS[burst.kind], alpha=0.22, linewidth=0)
         if numbered:
             at: Any = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": "center"}
             above.annotate(f"{number + 1}", ((burst.start + burst.end) / 2, 1), xytext=(0, 1), fontsize=7, **at)
         _frame(below, burst)
-    kinds = dict.fromkeys(burst.kind for burst in found.bursts)
+    kinds = dict.fromkeys(burst.kind for burst in squeaks.bursts)
     if kinds:
         handles = [Patch(color=COLOURS[kind], alpha=0.4, label=kind) for kind in kinds]
         figure.legend(handles=handles, ncols=len(handles), loc="outside upper left")
@@ -192,19 +192,19 @@ def plot_coherence(spectra: BurstSpectra, *, channel: str, record: Record) -> Fi
 
 
 @styled
-def plot_forcing_cycle(found: Squeaks) -> Figure:
+def plot_forcing_cycle(squeaks: Squeaks) -> Figure:
     """Where in the forcing cycle, and at which sliding velocity, the bursts come.
 
     Parameters
     ----------
-    found : Squeaks
+    squeaks : Squeaks
         Of a record with the forced motion.
 
     Returns
     -------
     Figure
     """
-    record, motion = found.record, ForcedMotion.of(found.record)
+    record, motion = squeaks.record, ForcedMotion.of(squeaks.record)
     assert motion.velocity is not None
     assert motion.phase is not None
     factor, unit = prefixed(motion.velocity, "m/s")
@@ -216,8 +216,8 @@ def plot_forcing_cycle(found: Squeaks) -> Figure:
     label = "sliding velocity, median of the cycles"
     above.plot((bins[1:] + bins[:-1])[filled] / 2, middle, color=INK, label=label)
     above.axhline(0, color=FAINT, linewidth=0.8)
-    thick = max(1.0, min(5.0, 100 / len(found.bursts)))
-    for number, burst in enumerate(found.bursts):
+    thick = max(1.0, min(5.0, 100 / len(squeaks.bursts)))
+    for number, burst in enumerate(squeaks.bursts):
         colour = COLOURS[burst.kind]
         above.plot(burst.phase, factor * burst.speed, "o", color=colour, markersize=4.5)
         for ends, wide in (((burst.start, burst.end), 0.3), (burst.loud, 1.0)):
@@ -229,19 +229,19 @@ def plot_forcing_cycle(found: Squeaks) -> Figure:
     legend_above(above)
     above.set_ylabel(axis_label("velocity", unit))
     below.set(xlabel="phase of the forcing cycle, 0 at the largest displacement", ylabel="burst", xlim=(0, 1))
-    below.set_ylim(len(found.bursts) + 0.7, 0.3)
+    below.set_ylim(len(squeaks.bursts) + 0.7, 0.3)
     below.yaxis.get_major_locator().set_params(integer=True)
     figure.align_ylabels([above, below])
     return figure
 
 
 @styled
-def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
+def plot_burst(findings: SqueakFindings, *, burst: Squeak) -> Figure:
     """Every channel about one burst.
 
     Parameters
     ----------
-    found : SqueakFindings
+    findings : SqueakFindings
         What :func:`~stickslip.analyze_squeaks` returned.
     burst : Squeak
         Which one.
@@ -251,8 +251,8 @@ def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
     Figure
     """
     around = min(0.5 * burst.duration, 0.1)
-    part = found.record.between(burst.start - around, burst.end + around)
-    names = [name for name in TRACED if name in part] or [found.squeaks.channel]
+    part = findings.record.between(burst.start - around, burst.end + around)
+    names = [name for name in TRACED if name in part] or [findings.squeaks.channel]
     figure, axes = _panels(len(names))
     for ax, name in zip(axes, names, strict=True):
         _trace(ax, part, name)
@@ -287,7 +287,7 @@ def plot_conditions(comparison: SqueakComparison) -> Figure:
         if over_load
         else (("level", "sliding friction"), ("slope", "its slope against speed"))
     )
-    for ax, (name, words) in zip((left, right), drawn, strict=True):
+    for ax, (name, label) in zip((left, right), drawn, strict=True):
         for place, condition in enumerate(conditions):
             estimate = getattr(condition, name)
             away = np.abs(np.array(estimate.interval)[:, None] - estimate.value)
@@ -295,7 +295,7 @@ def plot_conditions(comparison: SqueakComparison) -> Figure:
             look = {**BARS, "fmt": marker, "color": colour, "label": condition.answer}
             ax.errorbar(estimate.value, place, xerr=away, **look)
         ax.axvline(0, color=INK, linewidth=0.8)
-        ax.set_xlabel(axis_label(f"{words}, 95 %", getattr(conditions[0], name).unit, between="\n"))
+        ax.set_xlabel(axis_label(f"{label}, 95 %", getattr(conditions[0], name).unit, between="\n"))
     left.set_yticks(range(len(conditions)), [shortened(condition.name, 30) for condition in conditions])
     left.set_ylim(len(conditions) - 0.4, -0.6)
     handles, labels = left.get_legend_handles_labels()
@@ -321,15 +321,15 @@ def plot_condition_loops(comparison: SqueakComparison) -> Figure:
     rows = [findings for findings in comparison.findings if findings.loops is not None][:MOST_ROWS]
     figure = empty_figure(0.4 + 2.1 * len(rows))
     axes = figure.subplots(len(rows), 2, sharey="row", squeeze=False)
-    for (left, right), found in zip(axes, rows, strict=True):
-        assert found.loops is not None
+    for (left, right), condition in zip(axes, rows, strict=True):
+        assert condition.loops is not None
         for ax, draw in ((left, plot_displacement_loop), (right, plot_velocity_loop)):
-            draw(found, ax=ax)
+            draw(condition, ax=ax)
             ax.get_legend().remove()
         right.set_ylabel("")
-        slope = found.loops.slope
+        slope = condition.loops.slope
         low, high = slope.interval
-        left.set_title(shortened(found.name, 30), loc="left")
+        left.set_title(shortened(condition.name, 30), loc="left")
         digits = decimals(slope.spread, slope.value)
         text = f"{slope.value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f}) {spelled(slope.unit)}"
         right.set_title(text, loc="right", fontsize=8)
@@ -389,18 +389,18 @@ def _trace(ax: Axes, record: Record, name: str) -> None:
     ax.set_ylabel(axis_label(_quantity(record, name), unit, between="\n"))
 
 
-def _spectrogram(ax: Axes, found: Squeaks) -> Any:
+def _spectrogram(ax: Axes, squeaks: Squeaks) -> Any:
     """Power over time and frequency in decibel, the largest of each column's frames."""
     from scipy.signal import stft
 
-    record = found.record
-    values = record[found.channel] - record[found.channel].mean()
+    record = squeaks.record
+    values = record[squeaks.channel] - record[squeaks.channel].mean()
     size = min(len(values), max(64, 2 ** round(math.log2(WINDOW * record.fs))))
     frequencies, times, waves = stft(values, record.fs, nperseg=size, noverlap=size - max(1, size // 8))
     power = np.abs(waves) ** 2
     power, times = strongest(power, times, COLUMNS)
-    inside = (frequencies >= found.band[0] / 2) & (frequencies <= found.band[1])
-    last = _highest(frequencies[inside], {found.channel: power[inside].sum(axis=1)}, found.channel)
+    inside = (frequencies >= squeaks.band[0] / 2) & (frequencies <= squeaks.band[1])
+    last = _highest(frequencies[inside], {squeaks.channel: power[inside].sum(axis=1)}, squeaks.channel)
     shown = power[inside][:last]
     level = 10 * np.log10(np.maximum(shown / max(float(shown.max()), np.finfo(float).tiny), 1e-30))
     colours: Any = {"cmap": "cividis", "vmin": -SPAN, "vmax": 0}

@@ -86,9 +86,9 @@ def plain_decades(axis: Axis) -> None:
     axis.set_minor_formatter("{x:g}" if high <= 2 * low else NullFormatter())
 
 
-def axis_label(words: str, unit: str, between: str = " ") -> str:
+def axis_label(label: str, unit: str, between: str = " ") -> str:
     """ "displacement [mm]"; no bracket for a pure number."""
-    return words if unit in ("1", "") else f"{words}{between}[{spelled(unit)}]"
+    return label if unit in ("1", "") else f"{label}{between}[{spelled(unit)}]"
 
 
 def named_intervals(

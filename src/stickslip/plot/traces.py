@@ -161,11 +161,11 @@ def plot_force_balance(findings: Findings, *, record: Record | None = None, ax: 
     terms = force_balance(whole)
     assert terms is not None
     first = round((record.start - whole.start) * whole.fs)
-    parts = {words: values[first : first + len(record)] for words, values in terms.items()}
+    parts = {term: values[first : first + len(record)] for term, values in terms.items()}
     factor, unit = prefixed(np.concatenate(list(parts.values())), "N")
-    for words, values in parts.items():
-        colour, line = _TERMS[words]
-        ax.plot(*envelope(record.time, factor * values), line, color=colour, label=words)
+    for term, values in parts.items():
+        colour, line = _TERMS[term]
+        ax.plot(*envelope(record.time, factor * values), line, color=colour, label=term)
     shade_sticks(ax, findings, record)
     ax.axhline(0, color=FAINT, linewidth=0.8)
     ax.set(xlabel="time [s]", ylabel=axis_label("force on the mass", unit))
@@ -179,8 +179,14 @@ def _trace(ax: Axes, record: Record, names: Sequence[str]) -> None:
     factor, unit = prefixed(peak, record.channels[names[0]].unit)
     for name in names:
         ax.plot(*envelope(record.time, factor * record[name]), color=_COLOURS.get(name, INK), label=name)
-    words = {"x": "displacement", "theta": "angle", "y": "normal\ndisplacement", "a": "acceleration", "v": "velocity"}
-    ax.set_ylabel(axis_label(words.get(names[0], names[0]), unit, between="\n"))
+    quantities = {
+        "x": "displacement",
+        "theta": "angle",
+        "y": "normal\ndisplacement",
+        "a": "acceleration",
+        "v": "velocity",
+    }
+    ax.set_ylabel(axis_label(quantities.get(names[0], names[0]), unit, between="\n"))
     if len(names) > 1:
         labels = {"x": "mass (x)", "z": "base (z)"}
         for line in ax.get_lines():
@@ -260,12 +266,12 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     ax.plot(frequency, coherence, color=GREEN, linewidth=1.0, label="coherence")
     ax.plot(frequency, [b.significant for b in comparison.bands], ":", color=GREEN, linewidth=1.0, label="by chance")
     known = comparison.agree_up_to.value
-    words = f"agree up to {known:.2g} Hz" if known >= frequency[0] else "agree nowhere"
-    ax.axvline(max(known, frequency[0]), color=BLUE, linewidth=1.0, label=words)
+    label = f"agree up to {known:.2g} Hz" if known >= frequency[0] else "agree nowhere"
+    ax.axvline(max(known, frequency[0]), color=BLUE, linewidth=1.0, label=label)
     for number, resonance in enumerate(comparison.resonances):
-        at, words = resonance.frequency.value, f" {resonance.name}\n {resonance.frequency.value:.0f} Hz"
+        at, label = resonance.frequency.value, f" {resonance.name}\n {resonance.frequency.value:.0f} Hz"
         ax.axvline(at, color=FAINT, linewidth=1.0, linestyle="--")
-        ax.text(at, 0.97 - 0.25 * number, words, va="top", transform=ax.get_xaxis_transform(), fontsize=7)
+        ax.text(at, 0.97 - 0.25 * number, label, va="top", transform=ax.get_xaxis_transform(), fontsize=7)
     top = max(2.0, 1.1 * float(gain[heard].max(initial=0.0)))
     ax.set(xscale="log", ylim=(0, min(top, 10.0)), xlabel="frequency [Hz]", ylabel="ratio, coherence")
     ax.xaxis.set_major_formatter("{x:g}")

@@ -67,11 +67,11 @@ def contacts_of(run: Trajectory) -> int:
     return len(run.system.contacts) if isinstance(run.system, Structure) else 1
 
 
-def numbered_words(run: Trajectory, words: str, name: str, row: int) -> str:
+def numbered_words(run: Trajectory, label: str, name: str, row: int) -> str:
     """What a row of an output is called: "velocity" of one mass, "velocity v2", "friction, contact 2" of several."""
     if name in ("z", "force") or len(run.labels("x" if name in ("x", "v") else "friction")) == 1:
-        return words
-    return f"{words} {name}{row + 1}" if name in ("x", "v") else f"{words}, contact {row + 1}"
+        return label
+    return f"{label} {name}{row + 1}" if name in ("x", "v") else f"{label}, contact {row + 1}"
 
 
 def kinds_of(run: Trajectory, contact: int) -> list[str]:
@@ -226,22 +226,22 @@ def pressed(run: Trajectory, contact: int) -> bool:
 
 def _panel_words(run: Trajectory, wanted: list[Quantity]) -> str:
     name, row = wanted[0]
-    words = _named(run, wanted[0]) if name in ("x", "v") else numbered_words(run, _WORDS[name], name, row)
-    return words.replace(", ", "\n").replace("normal load", "load")
+    label = _named(run, wanted[0]) if name in ("x", "v") else numbered_words(run, _WORDS[name], name, row)
+    return label.replace(", ", "\n").replace("normal load", "load")
 
 
 def _line(run: Trajectory, quantity: Quantity, wanted: list[Quantity]) -> dict[str, Any]:
     """Colour, line and legend of one row of a panel."""
     name, row = quantity
     several = len(run.labels("x")) > 1
-    words = {"x": f"x{row + 1}" if several else "mass", "z": "base" if several else "spring's end"}.get(name)
+    labels = {"x": f"x{row + 1}" if several else "mass", "z": "base" if several else "spring's end"}.get(name)
     colour = MASSES[row % len(MASSES)] if several and name in ("x", "v") else _COLOURS[name]
     alone = name == "x" and not several and len(wanted) == 1
-    return {"color": colour, "linestyle": "--" if name == "z" else "-", "label": None if alone else words}
+    return {"color": colour, "linestyle": "--" if name == "z" else "-", "label": None if alone else labels}
 
 
 def _shades_alone(run: Trajectory, handle: Any) -> bool:
-    return handle.get_label() in {words for words, *_ in _KINDS.values()}
+    return handle.get_label() in {label for label, *_ in _KINDS.values()}
 
 
 @styled
@@ -295,7 +295,7 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
     kinds = {kinds_of(run, c)[mode] for c in range(contacts_of(run)) for mode in seen}
     marks = {"stick": "dark grey: it sticks", "microstick": "light grey: the contact holds and yields a little",
              "flight": "blue: the contact has lifted off"}  # fmt: skip
-    shaded = "; ".join(words for kind, words in marks.items() if kind in kinds)
+    shaded = "; ".join(label for kind, label in marks.items() if kind in kinds)
     shaded = f" {shaded[0].upper()}{shaded[1:]}." if shaded else ""
     first, last = last_cycles(run, CLOSE_CYCLES)
     plates = []
@@ -323,11 +323,11 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
 
 def _shade(ax: Axes, run: Trajectory, first: float, last: float, contact: int) -> None:
     low, high = ax.get_ylim()
-    for kind, (words, colour, opacity) in _KINDS.items():
+    for kind, (label, colour, opacity) in _KINDS.items():
         spans = stretches(run, kind, first=first, last=last, contact=contact)
         if 0 < len(spans) <= MOST_SHADES:
             ax.broken_barh(
-                spans.tolist(), (low, high - low), color=colour, alpha=opacity, linewidth=0, zorder=0, label=words
+                spans.tolist(), (low, high - low), color=colour, alpha=opacity, linewidth=0, zorder=0, label=label
             )
     ax.set_ylim(low, high)
 
@@ -348,7 +348,7 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
     label = "last cycle" if split > 0 else "the motion"
     ax.plot(x_factor * values[0], y_factor * values[1], color=ORANGE if up[0] == "friction" else GREEN, label=label)
     marks = (("microstick", SKY, "microstick"), ("stick", BLUE, "stick"), ("flight", PURPLE, "lifted off"))
-    for kind, colour, words in marks if contact is not None and contacts_of(run) else ():
+    for kind, colour, text in marks if contact is not None and contacts_of(run) else ():
         held = np.zeros(len(times), dtype=bool)
         for begin, length in stretches(run, kind, first=split, last=last, contact=contact or 0):
             held |= (times >= begin) & (times < begin + length)
@@ -358,7 +358,7 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
         # at rest, a stick is a point of the portrait
         point = up[0] == "v" and kind == "stick" and not run.table.motion.face and len(run.labels("x")) == 1
         dot = "o" if point else ""
-        ax.plot(x, y, marker=dot, markevery=_middles(held), color=colour, linewidth=3, markersize=6, label=words)
+        ax.plot(x, y, marker=dot, markevery=_middles(held), color=colour, linewidth=3, markersize=6, label=text)
     for line, row in ((ax.axvline, before[0]), (ax.axhline, before[1])):
         if row.min() < 0 < row.max():  # an axis far from the motion would only squeeze it
             line(0, color=FAINT, linewidth=0.8, zorder=0.5)

@@ -121,19 +121,19 @@ def plot_wavelet(
 
 
 @styled
-def plot_stick(found: TimeFrequency) -> Figure:
+def plot_stick(findings: TimeFrequency) -> Figure:
     """One stick from the middle of the record: its acceleration in pieces, and the map up to high frequencies.
 
     Parameters
     ----------
-    found : TimeFrequency
+    findings : TimeFrequency
         With ringing.
 
     Returns
     -------
     Figure
     """
-    ringing = found.ringing
+    ringing = findings.ringing
     assert ringing is not None
     record, window = ringing.record, ringing.windows[len(ringing.windows) // 2]
     margin = len(window.values) // 2
@@ -141,11 +141,11 @@ def plot_stick(found: TimeFrequency) -> Figure:
     lowest = 0.4 * ringing.pole.imag / (2 * np.pi)
     reach = int(2 * CENTRE / (2 * np.pi * lowest) * ringing.fs) + 1
     around = record.rows(max(0, first - reach), min(len(record), last + reach))
-    wavelets = wavelet_map(around, found.channel, frequencies=(lowest, 0.4 * ringing.fs))
+    wavelets = wavelet_map(around, findings.channel, frequencies=(lowest, 0.4 * ringing.fs))
     shown = wavelets.sel(time=slice(record.time[first], record.time[last - 1]))
     figure = plot_wavelet(shown, record=record)
-    top, heard = figure.axes[0], found.transition is not None and not ringing.silent
-    slips = heard and found.microslips is not None and found.microslips.kind != UNTOLD
+    top, heard = figure.axes[0], findings.transition is not None and not ringing.silent
+    slips = heard and findings.microslips is not None and findings.microslips.kind != UNTOLD
     for number, piece in enumerate(window.pieces if heard else ()):
         begin, end = ringing.time(window, piece.first), ringing.time(window, piece.last)
         if piece.kind == RING:
@@ -157,15 +157,15 @@ def plot_stick(found: TimeFrequency) -> Figure:
     return figure
 
 
-def plates_of(found: TimeFrequency) -> list[Plate]:
+def plates_of(findings: TimeFrequency) -> list[Plate]:
     """The figures of a channel over time and frequency."""
-    reached = found.record.start + found.record.duration >= float(found.wavelets.time.max())
-    record = found.record if reached else None  # one that came in parts is there no more
-    draw = partial(plot_wavelet, found.wavelets, record=record)
+    reached = findings.record.start + findings.record.duration >= float(findings.wavelets.time.max())
+    record = findings.record if reached else None  # one that came in parts is there no more
+    draw = partial(plot_wavelet, findings.wavelets, record=record)
     plates = [captioned("map", "map" if reached else "map-alone", draw, name="map")]
-    if found.ringing is not None:
-        kind = "stick-that-rings" if found.transition is not None else "stick"
-        plates.append(captioned("map", kind, partial(plot_stick, found), name="stick"))
+    if findings.ringing is not None:
+        kind = "stick-that-rings" if findings.transition is not None else "stick"
+        plates.append(captioned("map", kind, partial(plot_stick, findings), name="stick"))
     return [*plates, captioned("map", "contours", partial(draw, style="lines"), lines=LEVELS, span=SPAN)]
 
 
@@ -183,8 +183,8 @@ def _signal(axes: Axes, record: Record, channel: str, times: Array) -> None:
     values = record[channel][inside]
     factor, unit = prefixed(values, record.channels[channel].unit)
     axes.plot(*envelope(record.time[inside], factor * values), color=BLUE, linewidth=0.8)
-    words = re.split("[,(]", record.channels[channel].quantity or channel)[0].strip()  # the axis is short
-    axes.set_ylabel(axis_label(words, unit, between="\n"))
+    quantity = re.split("[,(]", record.channels[channel].quantity or channel)[0].strip()  # the axis is short
+    axes.set_ylabel(axis_label(quantity, unit, between="\n"))
 
 
 def _grid(axes: Axes, wavelets: xr.DataArray, steps: Array, style: str) -> Any:

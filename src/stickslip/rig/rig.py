@@ -240,8 +240,8 @@ class Rig:
                 continue
             samples[sensor.channel] = _read(sensor, signals, run.starts, times, own)
             unit = signals[sensor.source].unit
-            words = described(sensor.channel, unit)
-            channels[sensor.channel] = Channel(sensor.channel, unit, words, "Rig", sensor.sensitivity)
+            label = described(sensor.channel, unit)
+            channels[sensor.channel] = Channel(sensor.channel, unit, label, "Rig", sensor.sensitivity)
         if not samples:
             raise ModelError(
                 f"sensors of {', '.join(s.source for s in self.sensors)}",

@@ -66,7 +66,7 @@ class Splitter:
         best = np.full((many, 2, count + 1), np.inf)
         came = np.zeros((many, 2, count + 1), dtype=np.intp)
         best[:, RING, 0] = 0.0  # so that a glide comes first
-        each = np.arange(many)
+        rows = np.arange(many)
         for last in range(SHORTEST, count + 1):
             for kind in (GLIDE, RING):
                 firsts = last - least[kind] + 1
@@ -74,7 +74,7 @@ class Splitter:
                     total = best[:, 1 - kind, :firsts] + costs[kind][:, :firsts, last]
                     where = total.argmin(axis=1)
                     came[:, kind, last] = where
-                    best[:, kind, last] = total[each, where] + self.penalty
+                    best[:, kind, last] = total[rows, where] + self.penalty
         return best, came
 
     def _ring_costs(self, pole: complex) -> Array:
@@ -116,6 +116,6 @@ def _glide_costs(values: Array, squares: Array) -> Array:
     tt = np.maximum(m[1] - m[0] ** 2, 1e-15)
     tq, qq = m[2] - m[0] * m[1], m[3] - m[1] ** 2
     rest = qq - tq**2 / tt
-    told = rest > TOLD
-    extra = np.where(told, (tty - tq * ty / tt) ** 2 / np.where(told, rest, 1.0), 0.0)
+    resting = rest > TOLD
+    extra = np.where(resting, (tty - tq * ty / tt) ** 2 / np.where(resting, rest, 1.0), 0.0)
     return np.asarray(np.maximum(squares - n * (y**2 + ty**2 / tt + extra), 0.0))

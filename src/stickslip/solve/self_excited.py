@@ -54,9 +54,9 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
             if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, own]), axis=0)):
                 return _between(motion, first, last)
         if not isinstance(table, Tape) and (not ends or motion.starts[ends[-1]] < duration / 2):
-            found = _without_sticks(motion)
-            if found is not None:
-                return found
+            orbit = _without_sticks(motion)
+            if orbit is not None:
+                return orbit
         duration *= 2
     none = np.full(table.physical, np.nan, dtype=np.complex128)
     steady = len(motion.modes) == 1 or motion.durations[-1] > 0.5 * duration
@@ -67,10 +67,10 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
 
 def _without_sticks(motion: Trajectory) -> SteadyState | None:
     """The orbit that a motion of linear modes ends in; between events nothing bounds it, so it has some."""
-    found = settled_cycle(motion, 2 * math.pi * float(np.min(motion.table.cell)))
-    if found is None or len(found[0].modes) == 1:
+    cycle = settled_cycle(motion, 2 * math.pi * float(np.min(motion.table.cell)))
+    if cycle is None or len(cycle[0].modes) == 1:
         return None
-    orbit, across = found
+    orbit, across = cycle
     multipliers = np.append(across, 0.0)  # along the orbit nothing grows: its phase is free
     return SteadyState("unique" if abs(across[0]) < 1 else "unstable", orbit.duration, 1, orbit, multipliers)
 
@@ -145,9 +145,9 @@ def settled_cycle(motion: Trajectory, shortest: float) -> tuple[Trajectory, NDAr
         state, _ = opening(motion.table, {})
         values, piece = motion.sample([begin], ("state",))
         state[:physical] = values[:, 0]
-        found = closed(motion.system, motion.table, state, int(motion.modes[piece[0]]), period)
-        if found is not None:
-            return _shortest(*found)
+        orbit = closed(motion.system, motion.table, state, int(motion.modes[piece[0]]), period)
+        if orbit is not None:
+            return _shortest(*orbit)
     return None
 
 

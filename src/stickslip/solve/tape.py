@@ -369,9 +369,9 @@ def _flat(modes: list[_Operations]) -> tuple[NDArray[Any], ...]:
 def _guards(modes: list[_Operations]) -> Guards:
     """The nodes whose series may know nothing of what is ahead: what they are, and of what; and the first by mode."""
     kinds = (taylor.EXP, taylor.TANH, taylor.POWER)
-    found = [[row[:2] for row in mode.rows if row[0] in kinds] for mode in modes]
-    pairs = np.array([row for rows in found for row in rows], dtype=np.int64).reshape(-1, 2)
-    return Guards(pairs[:, 0].copy(), pairs[:, 1].copy(), np.cumsum([0, *map(len, found)]))
+    guarded = [[row[:2] for row in mode.rows if row[0] in kinds] for mode in modes]
+    pairs = np.array([row for rows in guarded for row in rows], dtype=np.int64).reshape(-1, 2)
+    return Guards(pairs[:, 0].copy(), pairs[:, 1].copy(), np.cumsum([0, *map(len, guarded)]))
 
 
 def _sums(modes: list[_Operations], rates: Any, exits: Any) -> Sums:

@@ -145,9 +145,9 @@ class Trajectory:
         Event
         """
         ends, codes = self._changes
-        words = {code: self._words(code) for code in np.unique(codes).tolist()}
+        texts = {code: self._words(code) for code in np.unique(codes).tolist()}
         for j, code in zip(ends.tolist(), codes.tolist(), strict=True):
-            for word in words[code]:
+            for word in texts[code]:
                 yield Event(float(self.starts[j]), *word)
 
     def event_counts(self) -> Counter[str]:
@@ -341,7 +341,7 @@ class Trajectory:
             for name in names
             for label, unit in zip(self.labels(name), self.units(name), strict=True)
         ]
-        channels = {label: Channel(label, unit, words, source="simulate") for label, unit, words in labels}
+        channels = {label: Channel(label, unit, title, source="simulate") for label, unit, title in labels}
         step = Step("simulate", {"system": repr(self.system), "fs": fs}, f"{len(self.modes)} pieces, {self.status}")
         samples: Mapping[str, Array] = dict(zip(channels, values, strict=True))
         return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(self.system)})

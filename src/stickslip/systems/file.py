@@ -72,12 +72,12 @@ class Case:
     @property
     def parts(self) -> str:
         """What it is made of, in a few words: its laws and its drive."""
-        laws = [each.law for each in self.system.contacts] if isinstance(self.system, Structure) else [self.system.law]
+        laws = [c.law for c in self.system.contacts] if isinstance(self.system, Structure) else [self.system.law]
         counts = {
             name: sum(type(law).__name__ == name for law in laws) for name in (type(law).__name__ for law in laws)
         }
-        told = [f"{count} x {name}" if count > 1 else name for name, count in counts.items()]
-        return f"{' and '.join(told)}, {type(self.system.drive).__name__}"
+        counted = [f"{count} x {name}" if count > 1 else name for name, count in counts.items()]
+        return f"{' and '.join(counted)}, {type(self.system.drive).__name__}"
 
     def having(self, **changes: Any) -> Case:
         """The same case with other values of its system, as text with units or SI numbers; nothing is known of it then.
@@ -225,8 +225,10 @@ def scenario_case(name: str) -> Case:
             "a file of a system ends in .toml",
             alike if alike.startswith("perhaps") else "'stickslip simulate --list' names the scenarios",
         )
-    found = scenarios.get(name)
-    return Case(name, found.about, found.system, found.start, found.run or {"cycles": CYCLES}, None, found.known)
+    scenario = scenarios.get(name)
+    return Case(
+        name, scenario.about, scenario.system, scenario.start, scenario.run or {"cycles": CYCLES}, None, scenario.known
+    )
 
 
 def read_system(path: str | Path | Mapping[str, Any]) -> Case:
@@ -363,8 +365,8 @@ def _checked_change(model: type[BaseModel], name: str, value: Any) -> Any:
     try:
         return checked(model, {"value": value}, source="the change").value  # type: ignore[attr-defined]
     except ModelError as error:
-        told = (text.replace(" value", f" {name}", 1) for text in (error.value, error.rule, error.next_step))
-        raise ModelError(*told) from error
+        texts = (text.replace(" value", f" {name}", 1) for text in (error.value, error.rule, error.next_step))
+        raise ModelError(*texts) from error
 
 
 def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mapping[str, Any], source: _Source) -> Any:
@@ -372,9 +374,11 @@ def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mappi
     name = values.get("name")
     if not isinstance(name, str) or name not in register:
         where = f"{source.name}{line_of([*table.split('.'), 'name'], source.lines)}"
-        told = f"sets {table}.name = {name!r}" if "name" in values else f"has no {table}.name"
+        sentence = f"sets {table}.name = {name!r}" if "name" in values else f"has no {table}.name"
         next_step = nearest(str(name), register) if "name" in values else "add name = NAME"
-        raise ModelError(f"{where} {told}", f"a {table.rpartition('.')[2]} is one of {', '.join(register)}", next_step)
+        raise ModelError(
+            f"{where} {sentence}", f"a {table.rpartition('.')[2]} is one of {', '.join(register)}", next_step
+        )
     factory = register[name]
     parameters = {key: value for key, value in values.items() if key != "name"}
     for part, known in (("law", LAWS), ("drive", DRIVES)):  # a law on a law, a tone on a drive
