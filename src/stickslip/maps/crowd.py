@@ -30,7 +30,7 @@ from stickslip.maps.watch import (
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
 from stickslip.solve.assembly import tables_of
-from stickslip.solve.glide import Model, Past, Pieces
+from stickslip.solve.glide import Model, Past, blank_pieces
 from stickslip.solve.kernel import scratch
 from stickslip.solve.phasors import phasors_of
 from stickslip.solve.tables import Array, Systems, Tables, by_value, kind_of_drive, kind_of_law, opened, oscillators
@@ -225,18 +225,10 @@ def on_cpu(given: Given, out: Counted, size: int, physical: int) -> None:
 
 def rooms(count: int, size: int, physical: int) -> Rooms:
     """Room for what so many motions need while they are marched."""
-    pieces = Pieces(
-        np.zeros((count, ROOM), np.int32),
-        np.zeros((count, ROOM)),
-        np.zeros((count, ROOM), np.int16),
-        np.zeros((count, ROOM)),
-        np.zeros((count, ROOM, size)),
-        np.zeros((count, ROOM), np.int16),
-    )
     return Rooms(
         np.zeros((count, *scratch(size, 17).shape)),
         pasts(count),
-        pieces,
+        blank_pieces((count, ROOM), size),
         np.zeros((count, physical, size)),
         np.zeros((count, 4, max(size + MARK + 1, log.ENTRIES))),
     )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import SolveError
 from stickslip.solve.curved import CurvedTrajectory
+from stickslip.solve.march import Dense
 from stickslip.solve.orbit import SteadyState
 from stickslip.solve.poincare import Table, closes, derivative, stretch
 from stickslip.solve.simulate import opening
@@ -87,7 +88,7 @@ def _between_turns(system: System, table: Tape, state: Array, mode: int, duratio
         values, pieces = motion.sample(turns, ("state",))
         state, mode = state.copy(), int(motion.modes[pieces[1]])
         state[:physical] = values[:, 1]
-        sizes = np.max(np.abs(motion.step_states[motion.step_starts > turns[0], :physical]), axis=0)
+        sizes = np.max(np.abs(motion.steps.states[motion.steps.starts > turns[0], :physical]), axis=0)
         if np.all(np.abs(values[:, 1] - values[:, 0]) <= 1e-9 * sizes):
             period = turns[1] - turns[0]
             orbit = stretch(system, table, state, mode, span=(0.0, period))
@@ -103,7 +104,7 @@ def _turns(motion: CurvedTrajectory) -> list[float]:
     """The last two instants at which the velocity rises through zero."""
     from scipy.optimize import brentq
 
-    v, ends = motion.step_states[:, 1], motion.step_starts
+    v, ends = motion.steps.states[:, 1], motion.steps.starts
     rises = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0))[-2:]
     return [
         float(brentq(lambda t: motion.sample([t], ("v",))[0][0, 0], ends[j], ends[j + 1], xtol=1e-15 * ends[j + 1]))
@@ -116,9 +117,10 @@ def _between(motion: Trajectory, first: int, last: int) -> SteadyState:
     part, begin, end = slice(first, last), motion.starts[first], motion.starts[last]
     own: dict[str, Any] = {}
     if isinstance(motion, CurvedTrajectory):
-        steps = slice(*np.searchsorted(motion.step_starts, [begin, end]))
-        own = {name: getattr(motion, name)[steps] for name in ("step_lengths", "step_modes", "step_states")}
-        own["step_starts"] = motion.step_starts[steps] - begin
+        steps = motion.steps
+        inside = slice(*np.searchsorted(steps.starts, [begin, end]))
+        columns = [column[inside] for column in steps[:-2]]
+        own = {"steps": Dense._make([columns[0] - begin, *columns[1:], steps.polys, steps.reach])}
     orbit = replace(
         motion,
         laps=np.zeros(last - first, np.int32),

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law, Mode
+from stickslip.laws.curved import CurvedMode
 from stickslip.oscillator import Oscillator
 from stickslip.solve.cells import Linear
 from stickslip.structure import Structure
@@ -113,10 +114,15 @@ class Tables:
 
     def index(self, mode: str) -> int:
         """Number of the mode of that name."""
-        names = [m.name for m in self.modes]
-        if mode not in names:
-            raise ModelError(f"no mode is called '{mode}'", f"the law has {', '.join(names)}", "choose one of them")
-        return names.index(mode)
+        return mode_number(self.modes, mode)
+
+
+def mode_number(modes: Sequence[Mode | CurvedMode], mode: str) -> int:
+    """The place of the mode of that name."""
+    names = [m.name for m in modes]
+    if mode not in names:
+        raise ModelError(f"no mode is called '{mode}'", f"the law has {', '.join(names)}", "choose one of them")
+    return names.index(mode)
 
 
 SHARED = {"target", "crossing", "first"}

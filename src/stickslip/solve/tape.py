@@ -18,7 +18,7 @@ from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
 from stickslip.oscillator import Oscillator
 from stickslip.solve import taylor
 from stickslip.solve.series import Nodes
-from stickslip.solve.tables import by_value
+from stickslip.solve.tables import by_value, mode_number
 from stickslip.solve.taylor import Array, Exits, Guards, Sums
 
 Form = tuple[dict[int, float], float]  # weights of nodes, and a constant
@@ -98,10 +98,7 @@ class Tape:
 
     def index(self, mode: str) -> int:
         """Number of the mode of that name."""
-        names = [m.name for m in self.modes]
-        if mode not in names:
-            raise ModelError(f"no mode is called '{mode}'", f"the law has {', '.join(names)}", "choose one of them")
-        return names.index(mode)
+        return mode_number(self.modes, mode)
 
 
 class _Operations:

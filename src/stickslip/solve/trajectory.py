@@ -203,6 +203,17 @@ class Trajectory:
         named = dict(zip(names, map(float, values[:, 0]), strict=True))
         return {**named, "mode": int(self.modes[piece[0]])}
 
+    def instants(self, times: ArrayLike) -> Array:
+        """Instants as an array, if the motion is known at the first and at the last."""
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        if len(times) and not (times[0] >= 0 and times[-1] <= self.duration * (1 + 1e-12)):
+            raise SolveError(
+                f"instants from {times[0]:g} to {times[-1]:g} s",
+                f"the motion is known from 0 to {self.duration:g} s",
+                "simulate longer, or ask within it",
+            )
+        return times
+
     def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, NDArray[np.int64]]:
         """Exact values at increasing instants.
 
@@ -226,13 +237,7 @@ class Trajectory:
         SolveError
             Instants out of order or outside the simulated time, or an output that the system does not have.
         """
-        times = np.ascontiguousarray(times, dtype=np.float64)
-        if len(times) and not (times[0] >= 0 and times[-1] <= self.duration * (1 + 1e-12)):
-            raise SolveError(
-                f"instants from {times[0]:g} to {times[-1]:g} s",
-                f"the motion is known from 0 to {self.duration:g} s",
-                "simulate longer, or ask within it",
-            )
+        times = self.instants(times)
         if np.any(np.diff(times) < 0):
             raise SolveError("instants that run back", "they are looked up in the order of time", "sort them")
         rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
