@@ -53,32 +53,22 @@ def questions(channels: set[str], records: int) -> dict[str, dict[str, Any]]:
     rig, felt = ["mass", "stiffness"], bool(channels & {"friction", "coefficient"})
     measured = "friction" in channels or ("load" in channels and moves) or "force" in channels
     motion = "name the displacement x or the velocity v among the channels"
+    own, decays = ["damping", "damper", "contact"], bool(channels & {"x", "theta", "v", "a"})
+    unmeasured, unfelt = moves and not measured, not felt or "x" in channels
     return {
-        "analyze": _question(
-            moves or forces,
-            motion,
-            needs=[] if measured or not moves else rig,
-            may=[*rig, "damping", "damper", "contact", "normal"],
-        ),
-        "decay": _question(
-            bool(channels & {"x", "theta", "v", "a"}), "name x, theta, v or a among the channels", may=rig
-        ),
-        "wavelet": _question(records == 1, "one record is mapped at a time", may=["frequencies", *rig]),
-        "squeak": _question(True, may=["frequencies", "normal"]),
-        "fit": _question(
-            moves or felt,
-            motion,
-            needs=[] if felt and "x" not in channels else rig,
-            may=["damping", "damper", "contact", "laws", "curve"],
-        ),
+        "analyze": _question(moves or forces, motion, rig if unmeasured else [], [*rig, *own, "normal"]),
+        "decay": _question(decays, "name x, theta, v or a among the channels", [], rig),
+        "wavelet": _question(records == 1, "one record is mapped at a time", [], ["frequencies", *rig]),
+        "squeak": _question(True, "", [], ["frequencies", "normal"]),
+        "fit": _question(moves or felt, motion, rig if unfelt else [], [*own, "laws", "curve"]),
     }
 
 
-def _question(able: bool, why: str = "", *, needs: Sequence[str] = (), may: Sequence[str] = ()) -> dict[str, Any]:
+def _question(able: bool, why: str, needs: list[str], may: list[str]) -> dict[str, Any]:
     return {
         "able": able,
         "why": "" if able else why,
-        "needs": list(needs),
+        "needs": needs,
         "may": [name for name in may if name not in needs],
     }
 
