@@ -15,13 +15,13 @@ from stickslip.balance.balance import (
     Rig,
     as_measured,
     averaged_gain,
+    felt,
     paths,
     stretch,
     with_friction,
     with_motion,
 )
 from stickslip.balance.fusion import fuse
-from stickslip.balance.load_cell import felt
 from stickslip.balance.mass import mass_and_stiffness, stiffness_per_mass
 from stickslip.balance.motion import require_change, require_fit
 from stickslip.errors import EstimateError, ModelError

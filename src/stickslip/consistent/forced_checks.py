@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.lines import Complex, Lines, find_lines, response_of
-from stickslip.consistent.checks import APART, HOLDS, UNTOLD, Check, compared, judged, untold
-from stickslip.consistent.mixups import Amplitudes
+from stickslip.consistent.checks import APART, HOLDS, UNTOLD, Amplitudes, Check, compared, judged, untold
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.accelerometer import acceleration_of_mass
 from stickslip.balance.motion import forcing_frequency
+from stickslip.balance.mounts import acceleration_of_mass
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import EstimateError
 from stickslip.estimate import Status

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.balance import Balance
+from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
-from stickslip.balance.load_cell import ALONE
 from stickslip.balance.motion import is_measured
 from stickslip.cycle.slips import ringing_of
 from stickslip.cycle.strokes import FAST, Stroke, Strokes, find_strokes

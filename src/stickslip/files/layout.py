@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from stickslip.errors import FormatError
+from stickslip.files.select import is_unit, split_name
 from stickslip.files.table import Options, unique
-from stickslip.files.titles import is_unit, split_name
 
 NOT_NUMBERS = ("OL", "Ol", "overload", "Overload", "OVERLOAD", "over", "----", "--", "-", "?", "*", "INVALID")
 WHITESPACE = r"\s+"

@@ -29,7 +29,7 @@ from stickslip.plot.style import (
     prefixed,
     styled,
 )
-from stickslip.solve.joint import JointMode
+from stickslip.solve.tables import JointMode
 from stickslip.structure import Structure
 
 if TYPE_CHECKING:

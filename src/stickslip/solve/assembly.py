@@ -18,8 +18,19 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Mode
 from stickslip.laws.curved import CurvedLaw
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, derive
-from stickslip.solve.joint import JointMode, numbered, reached
-from stickslip.solve.tables import Array, Rubbing, System, Systems, Tables, batch_of, by_value, systems_of
+from stickslip.solve.tables import (
+    Array,
+    JointMode,
+    Rubbing,
+    System,
+    Systems,
+    Tables,
+    batch_of,
+    by_value,
+    numbered,
+    reached,
+    systems_of,
+)
 from stickslip.structure import Structure
 
 Rows = NDArray[np.floating[Any]]

@@ -26,8 +26,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.parameters import PARTS, changed, declared, find, places
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
-from stickslip.solve.joint import numbered
-from stickslip.solve.tables import System
+from stickslip.solve.tables import System, numbered
 from stickslip.structure import Contact, Structure
 
 CYCLES = 20.0  # of a run where nothing is said
