@@ -327,16 +327,9 @@ def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
     unstated = fit.channel.name == "load" and fit.channel.mount is None
     mimicked = abs(lag.value) / passage if is_soft and passage else math.nan
     seen = give.value if is_soft else None, mimicked if is_late else math.nan
-    return Cause(
-        cause=cause,
-        reason=_reason(left, spread, lag, *seen),
-        lag=lag,
-        give=give,
-        stiffness=stiffness,
-        mimicked=mimicked,
-        left=left,
-        status="the load cell's mount is not stated: its own delay counts as negative lag" if unstated else "ok",
-    )
+    reason = _reason(left, spread, lag, *seen)
+    status = "the load cell's mount is not stated: its own delay counts as negative lag" if unstated else "ok"
+    return Cause(cause, reason, lag, give, stiffness, mimicked, left, status)
 
 
 def _named(left: tuple[float, float, float, float], spread: float, *, is_late: bool, is_soft: bool, held: bool) -> str:
@@ -377,23 +370,21 @@ def _give(parts: Array, value: float) -> Estimate:
     return replace(give, value=value, interval=(value - half, high), sd=(high - value + half) / (2 * NORMAL_95))
 
 
-def _give_of(rig: LikelyContact) -> Estimate:
-    """The give of a rig that was fitted with its damper."""
-    stiffness = rig.stiffness
-    low, high = (rig.level / end if end > 0 else math.inf for end in reversed(stiffness.interval))
-    return Estimate(
-        "give of the contact", rig.level / stiffness.value, (low, high), rig.level * stiffness.sd / stiffness.value**2,
-        "m", "sliding friction over the likeliest stiffness", stiffness.status,
-    )  # fmt: skip
+def _give_of(contact: LikelyContact) -> Estimate:
+    """The give of a contact that was fitted with its damper."""
+    stiffness, method = contact.stiffness, "sliding friction over the likeliest stiffness"
+    return _over(contact.level, stiffness, "give of the contact", "m", method, stiffness.status)
 
 
 def _stiffness(level: float, give: Estimate) -> Estimate:
-    low, high = (level / end if end > 0 else math.inf for end in reversed(give.interval))
     unknown = f"a damper in the contact may make it seem up to {STIFFENED:.0%} stiffer: see contact_stiffness"
-    return Estimate(
-        "contact stiffness", level / give.value, (low, high), level * give.sd / give.value**2, "N/m",
-        "sliding friction over give", unknown,
-    )  # fmt: skip
+    return _over(level, give, "contact stiffness", "N/m", "sliding friction over give", unknown)
+
+
+def _over(level: float, by: Estimate, name: str, unit: str, method: str, status: str) -> Estimate:
+    """A force over an estimate."""
+    low, high = (level / end if end > 0 else math.inf for end in reversed(by.interval))
+    return Estimate(name, level / by.value, (low, high), level * by.sd / by.value**2, unit, method, status)
 
 
 def _lag(parts: Array, value: float, open_: float, fs: float, against: Estimate | None) -> Estimate:

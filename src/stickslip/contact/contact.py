@@ -57,13 +57,12 @@ def contact_stiffness(record: Record | Loops, *, method: str | None = None) -> E
     >>> bool(abs(contact_stiffness(record).value / 192000 - 1) < 0.01)
     True
     """
+    methods = ("slope",) if isinstance(record, Loops) else ("stick", "slope")
+    if method not in (None, *methods):
+        raise EstimateError(f"method = '{method}'", f"it is one of {', '.join(methods)}", "choose one of them")
     if isinstance(record, Loops):
-        if method not in (None, "slope"):
-            raise _no_method(method, ("slope",))
         friction = record.friction - record.offset.value
         return _slope(branch_slopes(record.displacement, friction, record.level.value), record.unit)
-    if method not in (None, "stick", "slope"):
-        raise _no_method(method, ("stick", "slope"))
     if method == "slope":
         record.require_clean("x", "friction", question=STIFFNESS)
         level, middle = sliding_level(record["friction"], np.gradient(record["x"]))
@@ -115,10 +114,6 @@ def contact_damping(record: Record) -> Estimate:
     return damping
 
 
-def _no_method(method: str | None, methods: tuple[str, ...]) -> EstimateError:
-    return EstimateError(f"method = '{method}'", f"it is one of {', '.join(methods)}", "choose one of them")
-
-
 def branch_slopes(displacement: Array, friction: Array, level: float) -> Array:
     """The slope of friction against displacement in each stick that goes from one side of `level` to the other."""
     slopes = []
@@ -138,14 +133,9 @@ def _slope(deflection: Array, unit: str) -> Estimate:
             "sample faster, or give a longer record",
         )
     scatter = float(np.std(deflection, ddof=1) / abs(np.mean(deflection)))
-    said = (
+    checks = (
         f"{len(deflection)} sticks, which scatter by {100 * scatter:.0f} %",
         "noise in the displacement and lags make a slope too low: 2 to 27 % on a rig like the thesis's",
     )
-    return mean_of_cycles(
-        STIFFNESS,
-        deflection,
-        unit="N/m" if unit == "m" else "N m/rad",
-        method="mean slope of friction against displacement in each stick",
-        checks=said,
-    ).within(0.0)
+    unit, method = "N/m" if unit == "m" else "N m/rad", "mean slope of friction against displacement in each stick"
+    return mean_of_cycles(STIFFNESS, deflection, unit=unit, method=method, checks=checks).within(0.0)

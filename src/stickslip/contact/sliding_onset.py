@@ -66,8 +66,8 @@ class TransitionSpeed(Result):
     @property
     def speed(self) -> Estimate:
         """The transition speed [m/s] by `method`."""
-        estimate: Estimate = getattr(self, self.method)
-        return estimate
+        speed: Estimate = getattr(self, self.method)
+        return speed
 
 
 def transition_speed(record: Record | Loops, *, method: str | None = None) -> TransitionSpeed:
@@ -274,19 +274,10 @@ def _answer(
     )  # fmt: skip
     curve = _read(branches, level.value, lagging, off)
     equation = replace(equation, status=stops) if stops != "ok" else equation
-    doubts = (lost, stiffness.status, stops, curve.status)
     if math.isinf(stiffness.interval[1]):
         exact, equation = exact and _at_most(exact), _at_most(equation)
-    return TransitionSpeed(
-        method=method,
-        contact=exact,
-        curve=curve,
-        equation=equation,
-        friction=friction,
-        velocity=velocity,
-        level=level,
-        status=Status(*doubts),
-    )
+    status = Status(lost, stiffness.status, stops, curve.status)
+    return TransitionSpeed(method, exact, curve, equation, friction, velocity, level, status)
 
 
 def _equation(known: Array) -> float:

@@ -65,11 +65,9 @@ class Presliding(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Stiffness and play of a contact that gives way; else the compliances that leave it open."""
-        given = (self.stiffness, self.stiffness_forward, self.stiffness_back, self.backlash)
-        return tuple(estimate for estimate in given if estimate is not None) or (
-            self.compliance_forward,
-            self.compliance_back,
-        )
+        gives = (self.stiffness, self.stiffness_forward, self.stiffness_back, self.backlash)
+        open_ = (self.compliance_forward, self.compliance_back)
+        return tuple(estimate for estimate in gives if estimate is not None) or open_
 
 
 def presliding(record: Record, *, contact: str | None = None) -> Presliding:
@@ -77,11 +75,11 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
 
     In each stroke, from a reversal to the next slip, two lines :math:`x = x_0 + C f` are drawn by least squares: one
     while the friction of the stroke before falls, one while that of the new stroke builds up, each between 20 and 80 %
-    of the sliding friction. C of the second is the slope (the displacement is regressed on the friction, which is
+    of the sliding friction. C of the second is the compliance (the displacement is regressed on the friction, which is
     the surer of the two), :math:`1/C` the stiffness, and the distance of both lines at no friction the play. A contact
     that gives way does so alike in both directions; where C is not told from zero, or is smaller than 0.05 % of the
     stroke, it is rigid as far as the record can tell; where the mass moves against its load while it sticks, something
-    else moves (the frame, the sensor), and its slope can not be told. Nor can it where friction would take more
+    else moves (the frame, the sensor), and its compliance can not be told. Nor can it where friction would take more
     than a third of a stroke to turn round, as one that follows the speed seems to, or builds up within the samples over
     which a balance of forces blurs a jump.
 
@@ -121,7 +119,7 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     length = strokes.motion.unit
     slopes = [_compliance(strokes.to(way), f"compliance {side}", f"{length}/{strokes.unit}") for way, side in SIDES]
     level = float(np.median([stroke.level for stroke in strokes.strokes]))
-    least = max(FELT * span, noise) / level  # slope that would just be felt
+    least = max(FELT * span, noise) / level  # compliance that would just be felt
     most = ELASTIC * span / 2 / level  # friction turns from one side to the other
     verdict, evidence = _verdict(slopes, level, (least, RIGID * span / level, most), length)
     if verdict == "gives way" and not is_measured(record, "friction") and _blurred(strokes):
@@ -199,7 +197,7 @@ def _backlash(strokes: Strokes) -> Estimate | None:
 def _verdict(
     slopes: Sequence[Estimate], level: float, limits: tuple[float, float, float], length: str
 ) -> tuple[str, str]:
-    """Whether the contact gives way, and why; by the slope that is felt, still rigid, and possible."""
+    """Whether the contact gives way, and why; by the compliance that is felt, still rigid, and possible."""
     least, rigid, most = limits
     ways = [slope.value * level for slope in slopes]
     factor, unit = prefixed(np.array([*ways, least * level]), length)
@@ -229,10 +227,7 @@ def _uneven(compliances: Sequence[Estimate]) -> bool:
 def _both(slopes: Sequence[Estimate]) -> Estimate:
     """The mean of both directions, as unsure as each of them and as they are apart."""
     value = float(np.mean([slope.value for slope in slopes]))
-    low, high = (
-        min(slope.interval[0] for slope in slopes),
-        max(slope.interval[1] for slope in slopes),
-    )
+    low, high = min(slope.interval[0] for slope in slopes), max(slope.interval[1] for slope in slopes)
     sd = float(np.hypot(slopes[0].sd + slopes[1].sd, slopes[0].value - slopes[1].value) / 2)
     first = slopes[0]
     return Estimate(first.name, value, (low, high), sd, first.unit, first.method, first.status, first.checks)

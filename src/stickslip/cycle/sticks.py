@@ -199,19 +199,11 @@ def find_sticks(
         share = _share(stuck, certain, cycles, rule, stated)
     sticks = [event for event in events if event.kind == "stick"]
     microslips = _microslips(events) if holds and any(event.whole for event in sticks) else None
-    return Sticks(
-        share=share,
-        per_cycle=_per_cycle_of(sticks, cycles, motion, rule),
-        microslips=microslips,
-        kind=_kind(sticks, microslips),
-        events=events,
-        threshold=limit,
-        noise=motion.noise,
-        frequency=cycles.frequency,
-        method="fusion" if holds else "speed",
-        lost=lost,
-        status=_within_noise(limit, motion) or cycles.status,
-    )
+    how = f"sticks begun in each cycle; {rule}"
+    stops = mean_of_cycles("stops per cycle", _counted(sticks, cycles, motion), unit="1", method=how).within(0.0)
+    status, used = _within_noise(limit, motion) or cycles.status, "fusion" if holds else "speed"
+    kind, forcing = _kind(sticks, microslips), cycles.frequency
+    return Sticks(share, stops, microslips, kind, events, limit, motion.noise, forcing, used, lost, status)
 
 
 def _within_noise(limit: float, motion: Motion) -> str:
@@ -219,11 +211,6 @@ def _within_noise(limit: float, motion: Motion) -> str:
     if limit >= noisy:
         return ""
     return f"the threshold is within the velocity's noise ({_words(noisy, motion)} is five deviations)"
-
-
-def _per_cycle_of(sticks: Sequence[StickEvent], cycles: Cycles, motion: Motion, rule: str) -> Estimate:
-    method = f"sticks begun in each cycle; {rule}"
-    return mean_of_cycles("stops per cycle", _counted(sticks, cycles, motion), unit="1", method=method).within(0.0)
 
 
 def _kind(sticks: Sequence[StickEvent], microslips: Estimate | None) -> str:

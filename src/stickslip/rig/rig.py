@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -256,8 +256,7 @@ class Rig:
         return Record(samples, channels, float(fs), 0.0, history, None, _truth(run, begin, float(times[-1])))
 
 
-@dataclass(frozen=True)
-class _Signal:
+class _Signal(NamedTuple):
     """One thing a sensor may sit on: its values at increasing instants, and its unit."""
 
     values: Callable[[Array], Array]

@@ -59,7 +59,7 @@ def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] | None = Non
     >>> round(clock_offset(a, b).value, 6)
     0.1
     """
-    return _match(a, b, on).offset
+    return _match(a, b, on)[0]
 
 
 def clock_rate(a: Record, b: Record, *, on: str | tuple[str, str] | None = None) -> Estimate:
@@ -90,7 +90,7 @@ def clock_rate(a: Record, b: Record, *, on: str | tuple[str, str] | None = None)
     >>> round(clock_rate(a, b).value, 4)
     1.001
     """
-    return _match(a, b, on).rate
+    return _match(a, b, on)[1]
 
 
 def synchronise(
@@ -171,12 +171,6 @@ def synchronise(
     )
 
 
-@dataclass(frozen=True)
-class _Match:
-    offset: Estimate
-    rate: Estimate
-
-
 def _shared_motion(a: Record, b: Record, on: str | tuple[str, str] | None) -> tuple[str, str]:
     """The names of the motion that both saw, a's and b's."""
     if on is not None:
@@ -191,7 +185,8 @@ def _shared_motion(a: Record, b: Record, on: str | tuple[str, str] | None) -> tu
     )
 
 
-def _match(a: Record, b: Record, on: str | tuple[str, str] | None) -> _Match:
+def _match(a: Record, b: Record, on: str | tuple[str, str] | None) -> tuple[Estimate, Estimate]:
+    """Offset and rate of b's clock against a's."""
     names = _shared_motion(a, b, on)
     a.require_clean(names[0], question="clock_offset", samples=64)
     b.require_clean(names[1], question="clock_offset", samples=64)
@@ -283,7 +278,7 @@ def _coarse(a: _Motion, b: _Motion) -> tuple[float, float, list[float]]:
     return float(offsets[chosen]), float(likeness[chosen]), [float(offsets[k]) for k in near if k != chosen]
 
 
-def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> _Match:
+def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> tuple[Estimate, Estimate]:
     from scipy.interpolate import CubicSpline
 
     motion = CubicSpline(b.time, b.values)
@@ -323,7 +318,7 @@ def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> _Matc
         method="least squares of the stretch between the smoothed motions",
     )
     rest = float(np.std(residual) / np.std(data))
-    return _Match(_judged(estimate, gain, rest, rate, len(data) * a.step, others), rate)
+    return _judged(estimate, gain, rest, rate, len(data) * a.step, others), rate
 
 
 def _judged(

@@ -107,14 +107,7 @@ def wavelet_map(
             "cut the record, ask for fewer voices, or go through it with wavelet_blocks or wavelet_overview",
         )
     mean = float(record[channel].mean())
-    values = transform(
-        record[channel] - mean,
-        record.fs,
-        grid.scales,
-        centre=grid.centre,
-        normalisation=normalisation,
-        precision=precision,
-    )
+    values = grid.transform(record[channel] - mean, record.fs, precision=precision)
     return labelled(values, record.time, grid, record, channel, mean)
 
 
@@ -423,9 +416,7 @@ def _inner(values: Array, begin: int, count: int, fs: float, grid: Grid) -> NDAr
         reach = math.ceil(REACH["double"] * float(grid.scales[row]) * fs)  # the later ones reach less far
         low, high = max(0, begin - reach), min(len(values), begin + count + reach)
         some = slice(row, row + max(1, BLOCK_BYTES // 2 // (16 * (high - low))))
-        around = transform(
-            values[low:high], fs, grid.scales[some], centre=grid.centre, normalisation=grid.normalisation
-        )
+        around = grid.transform(values[low:high], fs, some)
         products[some] = around[:, begin - low : begin - low + count]
         row = some.stop
     return products

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import RecordError
 from stickslip.record.exchange import labelled_arrays
 from stickslip.record.record import Record
-from stickslip.signals.morlet import ridge_centre
+from stickslip.signals.morlet import ridge_centre, transform
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +41,13 @@ class Grid:
         """Dilation [s] of each frequency."""
         centre = ridge_centre(self.centre, self.normalisation) if self.corrected else self.centre
         return np.asarray(centre / (2 * np.pi * self.frequencies))
+
+    def transform(
+        self, values: Array, fs: float, rows: slice = slice(None), precision: str = "double"
+    ) -> NDArray[np.complexfloating]:
+        """The wavelets of some samples, of all frequencies or some."""
+        options: Any = {"centre": self.centre, "normalisation": self.normalisation, "precision": precision}
+        return transform(values, fs, self.scales[rows], **options)
 
 
 def grid_of(

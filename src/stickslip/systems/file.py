@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import typing
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -72,9 +73,7 @@ class Case:
     def parts(self) -> str:
         """What it is made of, in a few words: its laws and its drive."""
         laws = [c.law for c in self.system.contacts] if isinstance(self.system, Structure) else [self.system.law]
-        counts = {
-            name: sum(type(law).__name__ == name for law in laws) for name in (type(law).__name__ for law in laws)
-        }
+        counts = Counter(type(law).__name__ for law in laws)
         counted = [f"{count} x {name}" if count > 1 else name for name, count in counts.items()]
         return f"{' and '.join(counted)}, {type(self.system.drive).__name__}"
 
