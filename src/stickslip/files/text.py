@@ -161,13 +161,9 @@ def _blocks(path: Path, layout: Layout, stop: int, names: Sequence[str], size: i
         for frame in _frames(file, layout, stop, sorted(set(indexes.values())), size):
             if frame[str(len(layout.names))].notna().any():
                 raise ValueError(f"a row has more than {len(layout.names)} cells")
-            values = {
-                index: clocks[index].of(frame[str(index)])
-                if index in clocks
-                else frame[str(index)].to_numpy(dtype=np.float64)
-                for index in set(indexes.values())
-            }
-            yield {name: values[index] for name, index in indexes.items()}
+            values = {index: frame[str(index)] for index in set(indexes.values())}
+            numbers = {i: clocks[i].of(v) if i in clocks else v.to_numpy(dtype=np.float64) for i, v in values.items()}
+            yield {name: numbers[index] for name, index in indexes.items()}
 
 
 def _frames(file: BinaryIO, layout: Layout, stop: int, indexes: Sequence[int], size: int) -> Iterator[pd.DataFrame]:
@@ -248,8 +244,7 @@ def _first_fault(path: Path, layout: Layout, indexes: Sequence[int]) -> tuple[in
             text = line.split(layout.comment)[0] if layout.comment else line
             cells = split(text, layout.delimiter)
             wanted = [cells[index] for index in indexes if index < len(cells)]
-            fits = all(is_number(c, layout.decimal) or is_missing(c) or CLOCK.fullmatch(c) for c in wanted)
-            if not fits or any(cells[len(layout.names) :]) or line.count('"') % 2:
+            if not _is_row(wanted, layout.decimal) or any(cells[len(layout.names) :]) or line.count('"') % 2:
                 return number, line.strip()[:60]
     return None
 
