@@ -155,18 +155,18 @@ def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float |
 
     doubt = ringing.doubt or not_one_mode(ringing)
 
-    def told(estimate: Estimate) -> Estimate:
+    def doubted(estimate: Estimate) -> Estimate:
         return replace(estimate, status=doubt) if doubt else estimate
 
     contact, loop = _stiffness(pooled, mass, stiffness), _loop_stiffness(record, ringing, pooled)
     return Transition(
-        frequency=told(frequency),
-        damping=told(damping),
-        amplitude=told(amplitude),
-        wavelet_frequency=told(wavelet),
+        frequency=doubted(frequency),
+        damping=doubted(damping),
+        amplitude=doubted(amplitude),
+        wavelet_frequency=doubted(wavelet),
         agreement=_agreement(frequency, wavelet),
-        stiffness=told(contact) if contact is not None else None,
-        loop_stiffness=told(loop) if loop is not None else None,
+        stiffness=doubted(contact) if contact is not None else None,
+        loop_stiffness=doubted(loop) if loop is not None else None,
         sticks=sticks,
         status=_status(ringing, pooled, doubt),
     )  # fmt: skip

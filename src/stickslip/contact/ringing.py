@@ -168,9 +168,9 @@ def find_ringing(
     shortest, pieces, left, rest, count = _shortest(pole, record.fs), [], 0.0, 0.0, sum(map(len, windows))
     for few in range(0, len(windows), AT_ONCE):
         splitter = Splitter(windows[few : few + AT_ONCE], trusted**2, PENALTY)
-        found = splitter.split(pole / record.fs, shortest)
-        pieces += found
-        left += float(splitter.cost(pole / record.fs, shortest).sum()) - PENALTY * sum(map(len, found))
+        cuts = splitter.split(pole / record.fs, shortest)
+        pieces += cuts
+        left += float(splitter.cost(pole / record.fs, shortest).sum()) - PENALTY * sum(map(len, cuts))
         rest += float(splitter.cost(0.0, shortest).sum()) - PENALTY * sum(map(len, splitter.split(0.0, shortest)))
     doubt, rings = seen.doubt, pole.imag / (2 * math.pi)
     if rings > seen.fastest:

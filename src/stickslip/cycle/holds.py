@@ -104,7 +104,7 @@ def find_holds(trace: Trace) -> tuple[Hold, ...]:
     if len(cores) < FEW:
         return ()
     spring = _spring(trace, cores)
-    return tuple(_each(trace, spring, level, turns, dict(cores)))
+    return tuple(_hold_at_each_turn(trace, spring, level, turns, dict(cores)))
 
 
 def _cores(trace: Trace, level: float, turns: NDArray[np.intp]) -> list[tuple[int, slice]]:
@@ -150,7 +150,7 @@ def _centred(values: Array) -> Array:
     return np.asarray(values - values.mean())
 
 
-def _each(
+def _hold_at_each_turn(
     trace: Trace, spring: Spring, level: float, turns: NDArray[np.intp], cores: dict[int, slice]
 ) -> Iterator[Hold]:
     """Hold after hold; turns of the velocity within one are passed over."""

@@ -228,7 +228,7 @@ def _by_pull(record: Record, strokes: Strokes) -> _Borne | None:
         return None
     pull = balance.pull(record) - strokes.offset
     rested = [stroke for stroke in strokes.strokes if stroke.rests]
-    onsets = [(stroke, *told) for stroke in rested if (told := _begun(stroke, pull, balance.mass, record.fs))]
+    onsets = [(stroke, *onset) for stroke in rested if (onset := _begun(stroke, pull, balance.mass, record.fs))]
     if not onsets:
         return None
     chosen, friction, change = zip(*onsets, strict=True)

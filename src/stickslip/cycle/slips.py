@@ -181,13 +181,13 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
         return None
     parts = np.array_split(np.arange(len(swings)), min(len(swings), PARTS))
     without = [
-        _told(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
+        _ring_of(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
         for part in parts if len(parts) > 1
     ]  # fmt: skip
     degrees = np.array([
-        _told(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES
+        _ring_of(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES
     ])  # fmt: skip
-    frequency, damping = _told_surely(degrees, np.reshape(without, (-1, 2)), len(cuts), side)
+    frequency, damping = _averaged(degrees, np.reshape(without, (-1, 2)), len(cuts), side)
     amplitude = mean_of_cycles(
         f"amplitude of that ringing over the friction, {side}",
         amplitudes,
@@ -197,19 +197,19 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
     return frequency, damping, amplitude
 
 
-def _told_surely(degrees: Array, without: Array, count: int, side: str) -> list[Estimate]:
+def _averaged(degrees: Array, without: Array, count: int, side: str) -> list[Estimate]:
     """Frequency and damping ratio, as sure as the answers agree: those of the polynomials, those without some strokes.
 
     The two parts of the interval are added in squares; the second is a jackknife's.
     """
     parts = len(without)
     sd = np.sqrt((parts - 1) / parts * ((without - without.mean(axis=0)) ** 2).sum(axis=0)) if parts else [math.inf] * 2
-    told, spread = degrees.mean(axis=0), degrees.std(axis=0, ddof=1)
+    mean, spread = degrees.mean(axis=0), degrees.std(axis=0, ddof=1)
     quantile = student(max(parts - 1, 1))
     crude = f"only {count} stroke{'s' * (count > 1)} a direction: the interval is crude"
     status = Status(*([Doubt(crude, FEW, lesser=True)] if count < FEW_CYCLES else []))
     low, high = degrees[:, 0].min(), degrees[:, 0].max()
-    if spread[0] > max(sd[0], MIXED * told[0]):
+    if spread[0] > max(sd[0], MIXED * mean[0]):
         ends = f"{low:.4g} to {high:.4g} Hz by what is taken for it"
         status = Status(f"the friction's own course takes part of the ring: {ends}")
     checks = (f"{count} strokes", f"{low:.4g} to {high:.4g} Hz beside polynomials of degree {SLOW} to {STIFF}")
@@ -218,7 +218,7 @@ def _told_surely(degrees: Array, without: Array, count: int, side: str) -> list[
         half = math.hypot(quantile * sd[row], 2 * spread[row])
         swings.append(
             Estimate(
-                f"{what}, {side}", float(told[row]), interval=(told[row] - half, told[row] + half),
+                f"{what}, {side}", float(mean[row]), interval=(mean[row] - half, mean[row] + half),
                 sd=math.hypot(sd[row], spread[row]), unit=unit, status=status, checks=checks,
                 method="one decaying mode in all strokes, least squares; jackknife over strokes, and polynomials",
             )
@@ -226,7 +226,7 @@ def _told_surely(degrees: Array, without: Array, count: int, side: str) -> list[
     return swings
 
 
-def _told(parameters: Array) -> tuple[float, float]:
+def _ring_of(parameters: Array) -> tuple[float, float]:
     """Frequency [Hz] and damping ratio of a pole."""
     decay, turn = map(float, parameters)
     return turn / (2 * math.pi), -decay / math.hypot(decay, turn)

@@ -212,7 +212,7 @@ def plain(value: float) -> float | None:
 FOLDER = "results"
 
 
-def each(asked: Asked, answer: Callable[[int], Any]) -> tuple[list[Any], list[str]]:
+def results_of(asked: Asked, answer: Callable[[int], Any]) -> tuple[list[Any], list[str]]:
     """What each record answers, and why those that are left out do not; the reason where none does."""
     results, left_out = [], []
     for number in range(len(asked.records)):
@@ -236,10 +236,10 @@ def published(
     results = dataclasses.replace(results, notes=(*results.notes, *left_out))
     asked.say("drawing and writing", len(asked.records) / (len(asked.records) + 1))
     ss.publish(results, folder=FOLDER)
-    return _told(ss.summary(results))
+    return _shown(ss.summary(results))
 
 
-def _told(story: Story) -> dict[str, Any]:
+def _shown(story: Story) -> dict[str, Any]:
     """What the lab shows: the same words as the report and the command line. Also packs the folder."""
     shutil.make_archive(FOLDER, "zip", FOLDER)
     return {
@@ -266,13 +266,13 @@ def analyze(asked: Asked) -> dict[str, Any]:
 
         return ss.answers.analyze_blocks(asked.parts(number), rig=rig, method=method, progress=tell)
 
-    return published(asked, *each(asked, one), ss.compare)
+    return published(asked, *results_of(asked, one), ss.compare)
 
 
 def decay(asked: Asked) -> dict[str, Any]:
     """How a released mass dies away."""
     options = {name: value for name, value in asked.options.items() if value is not None}
-    results, left_out = each(asked, lambda number: ss.analyze_decay(asked.record(number), **options))
+    results, left_out = results_of(asked, lambda number: ss.analyze_decay(asked.record(number), **options))
     answer = published(asked, results, left_out, ss.answers.compare_decays)
     return {**answer, "overlay": [curve for findings in results for curve in _decay_curves(findings)]}
 
@@ -296,7 +296,7 @@ def squeak(asked: Asked) -> dict[str, Any]:
         load = rig.normal_load(findings.name)
         return findings if load is None else dataclasses.replace(findings, normal=load)
 
-    return published(asked, *each(asked, one), ss.answers.compare_squeaks)
+    return published(asked, *results_of(asked, one), ss.answers.compare_squeaks)
 
 
 def wavelet(asked: Asked) -> dict[str, Any]:
@@ -321,7 +321,7 @@ def fit(asked: Asked) -> dict[str, Any]:
         progress=lambda share: asked.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
     )
     ss.publish(result, folder=FOLDER, record=records)
-    answer = _told(ss.summary(result, record=records))
+    answer = _shown(ss.summary(result, record=records))
     curves = [*_law_curves(asked, records, result)]
     return {**answer, "overlay": curves, "state": fitted_system(Path(FOLDER, "law", "law.toml"))}
 

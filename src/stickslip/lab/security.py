@@ -75,9 +75,9 @@ class Guard:
     def _refused(self, scope: Scope) -> Response | None:
         headers = Headers(scope=scope)
         if [host.lower() for host in headers.getlist("host")] not in [[host] for host in self.hosts]:
-            return _told(400, "This lab answers at 127.0.0.1 alone; open the address that it printed.")
+            return _refusal(400, "This lab answers at 127.0.0.1 alone; open the address that it printed.")
         if not {origin.lower() for origin in headers.getlist("origin")} <= self.origins:
-            return _told(403, "Another page may not use this lab; open the address that it printed.")
+            return _refusal(403, "Another page may not use this lab; open the address that it printed.")
         return None
 
     def _welcomed(self, scope: Scope, inside: bool) -> Response | None:
@@ -97,7 +97,7 @@ class Guard:
         sentence = "The token is missing or of another start; open the address that 'stickslip lab' printed."
         if scope["path"] == "/" and "text/html" in headers.get("accept", ""):
             return HTMLResponse(f'<!doctype html><script src="{ENTRANCE}"></script><p>{sentence}', 401)
-        return _told(401, sentence)
+        return _refusal(401, sentence)
 
     def _known(self, token: str) -> bool:
         return secrets.compare_digest(token.encode("utf-8", "surrogateescape"), self.token.encode())
@@ -136,5 +136,5 @@ def _counted(scope: Scope, receive: Receive) -> Receive:
     return receiving
 
 
-def _told(status: int, sentence: str) -> Response:
+def _refusal(status: int, sentence: str) -> Response:
     return JSONResponse({"error": sentence}, status)

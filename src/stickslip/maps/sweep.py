@@ -38,7 +38,7 @@ WIDTH = 30  # characters of a notebook's bar
 
 
 @contextmanager
-def told(keep: Keep, done: int, count: int) -> Iterator[Keep]:
+def reported(keep: Keep, done: int, count: int) -> Iterator[Keep]:
     """`keep`, which also moves a bar of `count` blocks on, with the time left."""
     from rich.console import Console
 
@@ -202,7 +202,7 @@ def sweep(
         if store is not None and begun:
             require_disk(before * math.prod(plan.chunks), plan.variables, store)
         try:
-            with told(sensible(kept.keep, plan), len(plan.blocks) - before, len(plan.blocks)) as keep:
+            with reported(sensible(kept.keep, plan), len(plan.blocks) - before, len(plan.blocks)) as keep:
                 run(plan, kept.missing, keep, address)
         except KeyboardInterrupt:
             if len(kept.missing) == before:
