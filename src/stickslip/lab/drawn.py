@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.lab.forms import Answer, catalog
-from stickslip.plot.trajectory import cycle_of, last_cycles
 
 Array = NDArray[np.float64]
 GoOn = Callable[[float], None]
@@ -55,7 +54,8 @@ def run(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """The motion: traces, marks of what holds, and the spectrum."""
     case = read_case(request["state"])
     run = ss.simulate(case.system, start=case.start, progress=go_on, **case.run)  # type: ignore[arg-type]
-    cycle, (first, last) = cycle_of(run), last_cycles(run, SHOWN)
+    cycle = _cycle(run)
+    first, last = _window(run, cycle)
     times = _instants(run, first, last, cycle)
     series, values = _series(run, times)
     marks, micro = _marks(run, first, last)
@@ -99,7 +99,7 @@ def sound(request: Mapping[str, Any], go_on: GoOn) -> Answer:
         heard = ss.squeak.sound_pressure(run, fs=HEARD)["sound"][-int(LASTS * HEARD) :]
         label = f"sound pressure 10 cm away, in true time, {len(heard) / HEARD:.2g} s of it"
     else:
-        quicker = max(1.0, PITCH * cycle_of(run))
+        quicker = max(1.0, PITCH * _cycle(run))
         lasts = min(LASTS, run.duration / quicker)
         times = np.linspace(run.duration - lasts * quicker, run.duration, max(2, int(lasts * HEARD)))
         heard = run.sample(np.clip(times, 0, run.duration), ("friction",))[0][0]
@@ -144,6 +144,25 @@ def _state(case: ss.systems.Case) -> dict[str, Any]:
 def _frequency(case: ss.systems.Case) -> float:
     period = case.system.drive.motion().period
     return 1 / period if math.isfinite(period) else case.system.frequency
+
+
+def _cycle(run: ss.solve.Trajectory) -> float:
+    """The time after which the motion repeats, or would [s]: the drive's, that of the events themselves, or natural."""
+    motion, same = run.table.motion, np.flatnonzero(run.modes == run.modes[-1])
+    if math.isfinite(motion.period):
+        return min(motion.period, run.duration)
+    if len(same) > 1 and motion.rates and motion.knots is None:  # pulled by a belt or a ramp
+        return float(run.starts[same[-1]] - run.starts[same[-2]])
+    return min(1 / run.system.frequency, run.duration) if run.system.frequency else run.duration
+
+
+def _window(run: ss.solve.Trajectory, cycle: float) -> tuple[float, float]:
+    """First and last instant drawn: of a motion that comes to rest, of all that moved."""
+    last = run.duration
+    if run.status == "at rest" and len(run.starts) > 1:
+        moved = float(run.starts[-1])
+        last = min(last, moved + 0.15 * max(moved, cycle))
+    return max(0.0, last - SHOWN * cycle), last
 
 
 def _instants(run: ss.solve.Trajectory, first: float, last: float, cycle: float) -> Array:
