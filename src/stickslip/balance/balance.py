@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -13,7 +14,16 @@ from stickslip.balance.motion import is_measured
 from stickslip.errors import ModelError
 from stickslip.estimate import Estimate
 from stickslip.record.record import RIG_UNITS, Record, StatedRig, Step
-from stickslip.signals.derivatives import Filter, differentiate, noise_along
+from stickslip.signals.delay import without_delays
+from stickslip.signals.derivatives import (
+    LEAST,
+    Filter,
+    best_bandwidth,
+    checked_bandwidth,
+    differentiate,
+    five_point_average,
+    noise_along,
+)
 
 Array = NDArray[np.float64]
 
@@ -156,11 +166,11 @@ def with_motion(record: Record, derive: Filter) -> Record:
     return made
 
 
-def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, words: Sequence[str]) -> Record:
+def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, notes: Sequence[str]) -> Record:
     """The record with the friction, its standard deviation at each sample, and how it was found."""
     arguments = {name: value for name, value in asdict(rig).items() if name not in ("lost", "sd")}
     arguments |= {"sd": dict(rig.sd)} if rig.sd else {}
-    step = Step("friction_force", arguments, "; ".join(words))
+    step = Step("friction_force", arguments, "; ".join(notes))
     made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
     noise = float(np.median(sd))
     made = made.with_channel("friction", force, unit="N", source="friction_force", noise=noise, step=step)
@@ -170,3 +180,54 @@ def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, words
 def stretch(record: Record) -> Array:
     """Of the spring between mass and base [m]."""
     return record["z"] - record["x"] if "z" in record else -record["x"]
+
+
+ALONE = "load cell alone"
+BEYOND = 2.0  # times its mount's frequency up to which a load cell's reading is followed
+
+
+def felt(record: Record, rig: StatedRig) -> Record:
+    """What the load cell feels, less the inertia of its flange: the thesis's F2, or through its mount's inverse."""
+    method, cell = rig.method, record.channels["load"]
+    source = next((name for name in ("a", "v", "x") if name in record), "") if cell.inertia else ""
+    used = ["load", *([source] if source else [])]
+    record.require_clean(*used, question=FRICTION, samples=LEAST)
+    record = without_delays(record, *used, question=FRICTION, samples=LEAST)
+    terms = {"load": {0: 1.0}, **({source: {"avx".index(source): -cell.inertia}} if source else {})}
+    if method == "F2":
+        derive = dict.fromkeys(terms, Filter("five-point", record.fs, 0.0))
+        notes = ["the load cell, averaged over five points"]
+    else:
+        derive, notes = _unmounted(record, terms)
+    force, variance = np.zeros(len(record)), np.zeros(len(record))
+    for name, orders in terms.items():
+        noise = noise_along(record[name], record.fs, record.channels[name].noise)
+        part = derive[name].apply(record[name], orders)
+        if method == "F2":
+            force += five_point_average(part)
+            variance += (averaged_gain(len(record), derive[name], orders, five_point_average) * noise) ** 2
+        else:
+            force += part
+            variance += (derive[name].noise_gain(len(record), orders) * noise) ** 2
+    if source:
+        notes.append(f"less {cell.inertia:g} kg times the acceleration from {source}")
+    elif cell.inertia:
+        notes.append(f"no motion: the inertia of {cell.inertia:g} kg of its flange is left in")
+    if cell.discharge is not None:
+        notes.append(f"its discharge of {cell.discharge:g} s is left in")
+    name = ALONE if method == "load" else method  # no balance of forces stands behind it
+    return with_friction(record, force, np.sqrt(variance), replace(rig, method=name), notes)
+
+
+def _unmounted(record: Record, terms: dict[str, dict[int, float]]) -> tuple[dict[str, Filter], list[str]]:
+    """The filters of a load cell alone and of what its flange does; its mount's inverse is added to its terms."""
+    mount = record.channels["load"].mount
+    width = {name: best_bandwidth(record[name], record.fs) for name in terms}
+    if mount is not None:
+        angular = 2 * math.pi * mount[0]
+        terms["load"] |= {1: 2 * mount[1] / angular, 2: angular**-2}
+        width["load"] = checked_bandwidth(min(BEYOND * mount[0], 0.4 * record.fs), record.fs, len(record))
+    notes = [f"the load cell alone, smoothed to {width['load']:.4g} Hz (-3 dB)"]
+    if mount is not None:
+        notes.append(f"less what its mount of {mount[0]:g} Hz adds")
+    return {name: Filter("smoother", record.fs, pair) for name, pair in width.items()}, notes

@@ -61,12 +61,12 @@ class ImpactTest(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Frequency and damping of each."""
-        return tuple(number for each in self.resonances for number in (each.frequency, each.damping))
+        return tuple(number for resonance in self.resonances for number in (resonance.frequency, resonance.damping))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        told = {"time": self.time, "duration": self.duration, "residual": self.residual, "status": self.status}
-        return {"resonances": [each.to_dict() for each in self.resonances], **told}
+        table = {"time": self.time, "duration": self.duration, "residual": self.residual, "status": self.status}
+        return {"resonances": [resonance.to_dict() for resonance in self.resonances], **table}
 
 
 def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:

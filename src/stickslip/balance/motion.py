@@ -250,8 +250,8 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | str | None
 
 def _cycles(record: Record, motion: Motion) -> Cycles:
     reference = next((name for name in ("z", "force") if name in record and _moves(record[name])), "")
-    found = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
-    cycles = _periodic(motion, found)
+    frequency = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
+    cycles = _periodic(motion, frequency)
     repeated = 0.0 if cycles is None else _repeated(cycles, motion.displacement)
     return cycles if cycles is not None and repeated >= PERIODIC else _aperiodic(motion, repeated)
 

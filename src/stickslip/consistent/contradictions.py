@@ -8,7 +8,7 @@ from typing import Any
 
 from stickslip.balance.balance import known_constants
 from stickslip.balance.motion import is_measured, require_change
-from stickslip.consistent.checks import FAILS, Check
+from stickslip.consistent.checks import FAILS, ONE_SLIP, Check, mixups
 from stickslip.consistent.forced_checks import (
     Seen,
     acceleration_check,
@@ -19,7 +19,6 @@ from stickslip.consistent.forced_checks import (
     stops_check,
     velocity_check,
 )
-from stickslip.consistent.mixups import ONE_SLIP, mixups
 from stickslip.consistent.sensor_checks import cycle_checks, range_checks, sampling_check, silence_checks, silent
 from stickslip.consistent.stated import Stated, stated_checks, what_fails
 from stickslip.errors import EstimateError
@@ -59,11 +58,11 @@ class Consistency(Result):
 
     def __getitem__(self, name: str) -> Check:
         """The check of that name."""
-        found = [check for check in self.checks if check.name == name]
-        if not found:
+        named = [check for check in self.checks if check.name == name]
+        if not named:
             names = ", ".join(check.name for check in self.checks)
             raise EstimateError(f"no check '{name}'", f"there are {names}", "choose one of them")
-        return found[0]
+        return named[0]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""

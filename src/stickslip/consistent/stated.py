@@ -82,7 +82,7 @@ def _sd(of: Callable[[Values], float], numbers: Mapping[str, _Number]) -> float:
         for name, number in numbers.items()
         if number.sd > 0
     ]
-    return float(np.linalg.norm([each for each in moved if math.isfinite(each)])) if moved else 0.0
+    return float(np.linalg.norm([number for number in moved if math.isfinite(number)])) if moved else 0.0
 
 
 def _slider(values: Values) -> Slider:
@@ -149,7 +149,7 @@ def _needed(values: Values) -> float:
         return _short({**values, "sliding friction": friction})
 
     grid = np.linspace(0.0, 1.2 * values["stiffness"] * values["base amplitude"], 13)
-    over = [short(float(each)) for each in grid]
+    over = [short(float(number)) for number in grid]
     rising = [j for j in range(len(grid) - 1) if over[j] * over[j + 1] <= 0]
     if not rising:
         return math.nan
@@ -183,8 +183,8 @@ def _boundary(numbers: Mapping[str, _Number]) -> Check:
     )  # fmt: skip
     elastic = "contact stiffness" in at and share(at) < math.pi / 4
     if check.verdict != HOLDS and elastic:
-        words = "a rigid contact would stop on its way (Den Hartog); an elastic one may slide on"
-        return Check(check.name, check.left, check.right, "1", check.discrepancy, UNTOLD, words)
+        sentence = "a rigid contact would stop on its way (Den Hartog); an elastic one may slide on"
+        return Check(check.name, check.left, check.right, "1", check.discrepancy, UNTOLD, sentence)
     return check
 
 

@@ -142,10 +142,7 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
     ).within(0.0)  # fmt: skip
     blurred = "without a load cell whose mount is stated, one may be missed or seen twice" if ringing.blurred else ""
     status = Status(ringing.status, astray, blurred)
-    low, high = per_stick.interval
-    per_stick = replace(
-        per_stick, interval=(max(low, 0.0), high), status=per_stick.status if status == "ok" else status
-    )
+    per_stick = replace(per_stick, status=per_stick.status if status == "ok" else status)
     return MicroSlips(per_stick, tuple(events), counts, UNTOLD if astray else _kind(counts), status)
 
 
@@ -177,14 +174,10 @@ def _edges(window: Window, glide: Piece, pole: complex) -> tuple[float, float]:
 def _left(rows: Array, values: Array, begin: float, end: float, pole: complex) -> float:
     """Sum of squares, but for a constant, that the ring, the line and the next ring leave."""
     first, second = np.searchsorted(rows, (begin, end))
-    before, between, after = (
-        np.exp(pole * (rows[:first] - begin)),
-        rows[first:second],
-        np.exp(pole * (rows[second:] - end)),
-    )
+    before, after = np.exp(pole * (rows[:first] - begin)), np.exp(pole * (rows[second:] - end))
     design = np.zeros((4, len(rows)))  # level and slope where the line begins; what each ring has of its own
     design[0, :first], design[0, first:second], design[0, second:] = before.real, 1.0, after.real
-    design[1, first:second], design[1, second:] = between - begin, (end - begin) * after.real
+    design[1, first:second], design[1, second:] = rows[first:second] - begin, (end - begin) * after.real
     design[2, :first], design[3, second:] = before.imag, after.imag
     along = design @ values
     return -float(along @ np.linalg.lstsq(design @ design.T, along, rcond=None)[0])

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.accelerometer import acceleration_of_mass
 from stickslip.balance.motion import forcing_frequency
+from stickslip.balance.mounts import acceleration_of_mass
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Status
@@ -168,9 +168,9 @@ def find_ringing(
     shortest, pieces, left, rest, count = _shortest(pole, record.fs), [], 0.0, 0.0, sum(map(len, windows))
     for few in range(0, len(windows), AT_ONCE):
         splitter = Splitter(windows[few : few + AT_ONCE], trusted**2, PENALTY)
-        found = splitter.split(pole / record.fs, shortest)
-        pieces += found
-        left += float(splitter.cost(pole / record.fs, shortest).sum()) - PENALTY * sum(map(len, found))
+        cuts = splitter.split(pole / record.fs, shortest)
+        pieces += cuts
+        left += float(splitter.cost(pole / record.fs, shortest).sum()) - PENALTY * sum(map(len, cuts))
         rest += float(splitter.cost(0.0, shortest).sum()) - PENALTY * sum(map(len, splitter.split(0.0, shortest)))
     doubt, rings = seen.doubt, pole.imag / (2 * math.pi)
     if rings > seen.fastest:
@@ -315,8 +315,8 @@ def _pole(windows: list[Array], fs: float, noise: float, sticks: Sticks) -> comp
         corners = np.array([(math.log(f), z), (math.log(f) + 0.05, z), (math.log(f), 1.4 * z + 0.01)])
         options: dict[str, Any] = {"xatol": 5e-4, "fatol": 0.2, "maxiter": 40, "initial_simplex": corners}
         tried.append(minimize(of_pole, corners[0], method="Nelder-Mead", options=options))
-    found = min(tried, key=lambda each: float(each.fun)).x
-    return _mode(math.exp(found[0]), float(found[1]))
+    root = min(tried, key=lambda fit: float(fit.fun)).x
+    return _mode(math.exp(root[0]), float(root[1]))
 
 
 def _mode(frequency: float, damping: float) -> complex:

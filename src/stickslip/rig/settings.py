@@ -150,7 +150,7 @@ class RigSettings(BaseModel):
         A name with folders before it fits by its last part too.
         """
         names = (name, name.rpartition("/")[2])
-        fits = (load for pattern, load in self.normal.items() if any(fnmatch.fnmatch(each, pattern) for each in names))
+        fits = (load for pattern, load in self.normal.items() if any(fnmatch.fnmatch(name, pattern) for name in names))
         return next(fits, None)
 
     def row_range(self) -> tuple[int, int | None] | None:

@@ -101,6 +101,6 @@ def _glide_costs(values: Array) -> Array:
     tt = np.maximum(m[1] - m[0] ** 2, 1e-15)
     tq, qq = m[2] - m[0] * m[1], m[3] - m[1] ** 2
     rest = qq - tq**2 / tt
-    told = rest > TOLD
-    extra = np.where(told, (tty - tq * ty / tt) ** 2 / np.where(told, rest, 1.0), 0.0)
+    resting = rest > TOLD
+    extra = np.where(resting, (tty - tq * ty / tt) ** 2 / np.where(resting, rest, 1.0), 0.0)
     return np.asarray(np.maximum(_between(values**2) - n * (y**2 + ty**2 / tt + extra), 0.0))

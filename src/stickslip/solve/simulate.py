@@ -16,12 +16,13 @@ from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.solve import kernel
+from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import degree, run_curved
 from stickslip.solve.delayed import delayed_tape, run_delayed
-from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
+from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
-from stickslip.solve.tables import Array, System, Tables, table_of
+from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
 
@@ -264,7 +265,7 @@ class _Log:
 
     def __init__(self, size: int, room: int) -> None:
         self.count, self.passed, self.least = 0, 0.0, room
-        self.columns = _columns(256, size)
+        self.columns = blank_pieces((256,), size)
 
     def room(self) -> Pieces:
         """The part that is free, at most one chunk."""
@@ -277,7 +278,8 @@ class _Log:
         if self.count < len(self.columns.laps):
             return
         foretold = self.count * min(64.0, 1.05 * total / self.passed) if self.passed > 0 else 0.0
-        grown = _columns(max(int(foretold), self.count + self.least), self.columns.states.shape[1])
+        room = max(int(foretold), self.count + self.least)
+        grown = blank_pieces((room,), self.columns.states.shape[1])
         for name in Pieces._fields:
             getattr(grown, name)[: self.count] = getattr(self.columns, name)[: self.count]
         self.columns = grown
@@ -285,17 +287,6 @@ class _Log:
     def done(self) -> Pieces:
         """The pieces alone."""
         return self.columns.part(0, self.count)
-
-
-def _columns(room: int, size: int) -> Pieces:
-    return Pieces(
-        np.empty(room, np.int32),
-        np.empty(room),
-        np.empty(room, np.int16),
-        np.empty(room),
-        np.empty((room, size)),
-        np.empty(room, np.int16),
-    )
 
 
 def stops_of(table: Tables | Tape, laps: float, offset: float) -> Any:
