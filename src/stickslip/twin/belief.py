@@ -337,8 +337,8 @@ class Fit:
     freedom: float
 
     def sd(self, name: str) -> float:
-        """Standard deviation of a value."""
-        return float(np.linalg.norm(self.root[self.names.index(name)]))
+        """Standard deviation of a value; infinite of one that moves nothing."""
+        return float(np.linalg.norm(self.root[self.names.index(name)])) if name in self.names else math.inf
 
 
 def believe(record: Record) -> Belief:
@@ -559,7 +559,12 @@ def _linearised(belief: Belief) -> Belief:
 def _slope_of(belief: Belief, name: str) -> Array:
     """How the displacement changes with one value, by a difference forward: a part at zero has no other side."""
     step = NUDGE * belief.size(name)
-    return np.asarray((belief.at(**{name: belief.values[name] + step}).moved - belief.moved) / step)
+    try:
+        moved = belief.at(**{name: belief.values[name] + step}).moved
+    except StickslipError:  # an exit that is a tangency just there
+        step /= 3
+        moved = belief.at(**{name: belief.values[name] + step}).moved
+    return np.asarray((moved - belief.moved) / step)
 
 
 def _unsure(record: Record, drive: DriveFrom) -> dict[str, float]:

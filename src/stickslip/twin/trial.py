@@ -238,7 +238,7 @@ def _powers(belief: Belief) -> tuple[Power | None, Power | None]:
         yields = Power(1 / belief.contact, 0.0, chance * fit.sd(GIVE) / belief.contact)
     elif felt := belief.first_felt(softer, chance):
         yields = Power(0.0, 0.0, math.exp(-felt[GIVE]))
-    return static, yields
+    return static if static and math.isfinite(static.felt) else None, yields
 
 
 def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], strays: float, *, both: bool) -> Estimate:
