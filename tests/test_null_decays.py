@@ -14,15 +14,15 @@ from stickslip.cli.program import main
 
 
 @cache
-def analyzed(seed: int, noise: str, dry: float = 0.0) -> ss.answers.DecayFindings:
+def analyzed(seed: int, noise: str, dry: float = 0.0) -> ss.answers.Findings:
     values, fs, _ = null_decay(seed, noise, dry=dry)
     return ss.analyze_decay(ss.Record.of({"x": values}, fs=fs), stiffness=1000.0)
 
 
 def test_an_interval_that_misses_zero_by_chance_is_no_dry_friction() -> None:
     found = analyzed(105, "12 bit")
-    assert found.best.dry_displacement.interval[0] > 0  # as of one null record in forty
-    assert not found.rubs
+    assert found.decay.best.dry_displacement.interval[0] > 0  # as of one null record in forty
+    assert not found.decay.rubs
     told = " ".join(ss.summary(found).headline)
     assert "dies away by viscous friction" in told
     assert "That there is dry friction too can not be told" in told
@@ -31,7 +31,7 @@ def test_an_interval_that_misses_zero_by_chance_is_no_dry_friction() -> None:
 
 def test_dry_friction_that_is_there_is_told() -> None:
     found = analyzed(101, "white", 0.02)
-    assert found.rubs
+    assert found.decay.rubs
     told = " ".join(ss.summary(found).headline)
     assert "dies away by viscous and dry friction" in told
     assert "dry friction force of" in told
