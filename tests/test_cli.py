@@ -434,7 +434,10 @@ def test_help_is_there_before_the_heavy_libraries_are() -> None:
     assert "analyze" in told.stdout
     loaded = set(told.stdout.split())
     assert not loaded & {"numpy", "scipy", "pandas", "matplotlib", "pydantic", "jinja2", "rich"}
-    assert min(_processor_seconds([PROGRAM, "--help"]) for _ in range(5)) < 0.15
+    # 0.12 to 0.15 s on a quiet machine, where Python with click alone takes 0.06: on a busy one both take longer
+    commands = [PROGRAM, "--help"], [sys.executable, "-c", "import click, importlib.resources"]
+    ours, least = np.min([[_processor_seconds([*command]) for command in commands] for _ in range(6)], axis=0)
+    assert ours < 3 * least
 
 
 def _processor_seconds(command: list[object]) -> float:
