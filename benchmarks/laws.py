@@ -166,7 +166,6 @@ def draw(name: str, condition: str, seed: int, laws: list[str] | None) -> dict[s
         "excess": None if excess is None else [excess.value, *excess.interval],
         "misfits": {each.name: each.standing.misfit for each in found.candidates},
         "criteria": {each.name: each.standing.criterion for each in found.candidates},
-        "predictions": {each.name: each.standing.prediction for each in found.candidates},
     }  # fmt: skip
 
 

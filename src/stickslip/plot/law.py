@@ -63,9 +63,6 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
         rows = [j for j, each in enumerate(told) if each.kept == kept]
         if rows:
             ax.plot([told[j].misfit for j in rows], places[rows], "o", color=colour, markersize=7, label=words)
-    forecast = [(each.prediction, j) for j, each in enumerate(told) if np.isfinite(each.prediction)]
-    if forecast:
-        ax.plot(*zip(*forecast, strict=True), "D", color=ORANGE, markersize=4, label="of records left out")
     ax.set_xscale("log")
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.xaxis.set_minor_formatter(NullFormatter())
