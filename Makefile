@@ -49,6 +49,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/law.py --draws 2
 	$(BIN)/python benchmarks/laws.py --draws 1 --laws "Coulomb,compliant,state variable"
 	$(BIN)/python benchmarks/squeak.py 40
+	$(BIN)/python benchmarks/sounds.py --draws 20
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/sweep.py
 	$(BIN)/python benchmarks/squeak_model.py
 	command -v chromium >/dev/null && $(BIN)/python benchmarks/lab.py || echo "no chromium: the lab is not timed"

@@ -24,7 +24,8 @@ import stickslip as ss
 from stickslip.estimate import stands
 
 NAMES = ("sliding friction", "slope of friction against speed", "stuck share of the time", "stops per cycle")
-RATIO = "static over sliding friction"
+CLAIMS = ("dry friction", "static", "sticks", "gives way")
+RATIO, GIVES = "static over sliding friction", "presliding stiffness"
 
 
 def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, list[bool]]) -> None:
@@ -33,12 +34,19 @@ def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, li
     for estimate in findings.estimates:
         if not estimate.known or not stands(estimate.status):
             continue
-        if estimate.name in NAMES and not (rig.kind in ("Stribeck", "compliant") and estimate.name != NAMES[0]):
+        compared = {"compliant": (NAMES[0], NAMES[1], RATIO), "Stribeck": (NAMES[0], *NAMES[2:], RATIO)}
+        if estimate.name in compared.get(rig.kind, (*NAMES, RATIO)) and np.isfinite(truth[estimate.name]):
             tally[estimate.name].append(estimate.includes(truth[estimate.name]))
+        if estimate.name == GIVES:
+            tally["claim: gives way"].append(rig.kind == "compliant")
+            if rig.kind == "compliant":
+                tally[GIVES].append(estimate.includes(rig.contact))
         if estimate.name == RATIO and estimate.interval[0] > 1:
             tally["claim: static"].append(truth[RATIO] > 1)
         if estimate.name == NAMES[2] and estimate.interval[0] > 0 and rig.kind != "compliant":
             tally["claim: sticks"].append(truth[NAMES[2]] > 0)
+        if estimate.name == NAMES[0] and estimate.interval[0] > 0:
+            tally["claim: dry friction"].append(rig.kinetic > 0)
 
 
 def main() -> None:
@@ -47,7 +55,7 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=20, help="of each kind")
     parser.add_argument("--twins", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--off", type=float, default=0.0, help="standard deviation of the sensors' gains")
+    parser.add_argument("--off", type=float, default=0.0, help="by which gains and constants are off, as is stated")
     parser.add_argument("--kinds", default=",".join(stepped.KINDS))
     options = parser.parse_args()
     for kind in options.kinds.split(","):
@@ -57,11 +65,17 @@ def main() -> None:
             rng = np.random.default_rng(seed)
             rig = stepped.drawn(kind, rng)
             record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3), off=options.off)
+            stated: dict[str, float | tuple[float, float]] = dict(rig.stated)
+            if options.off:
+                record = record.with_details("x", gain_sd=options.off).with_details("z", gain_sd=options.off)
+                for name, value in rig.stated.items():
+                    written = value * (1 + options.off * rng.standard_normal())
+                    stated[name] = (written, options.off * written)
             begun = time.process_time()
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("error")
-                    quick = ss.analyze(record, **rig.stated)
+                    quick = ss.analyze(record, **stated)
                     spent[0] += time.process_time() - begun
                     begun = time.process_time()
                     tried = ss.tried(quick, twins=options.twins)
@@ -76,7 +90,7 @@ def main() -> None:
         asked = max(1, options.draws - lost)
         print(f"{kind}: {options.draws} rigs, {lost} refused, {unlike} unlike their twins; "
               f"{spent[0] / asked:.2f} s quick, {spent[1] / asked:.2f} s on twins")  # fmt: skip
-        for name in (*NAMES, "claim: static", "claim: sticks"):
+        for name in (*NAMES, RATIO, GIVES, *(f"claim: {what}" for what in CLAIMS)):
             row = [f"{sum(held):3d} of {len(held):3d}" for held in (tallies[way][name] for way in ("quick", "tried"))]
             print(f"    {name:34s} quick {row[0]}   tried {row[1]}", flush=True)
 

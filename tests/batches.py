@@ -14,11 +14,12 @@ from stickslip.errors import ModelError
 from stickslip.maps.crowd import pasts
 from stickslip.maps.watch import TIRELESS, model_of, past_of
 from stickslip.oscillator import Oscillator
+from stickslip.solve.assembly import tables_of
 from stickslip.solve.glide import Clock, Model, Past, Pieces
 from stickslip.solve.kernel import CHATTER, begin, march, scratch
 from stickslip.solve.phasors import phasors_of
 from stickslip.solve.simulate import opening
-from stickslip.solve.tables import Array, kind_of_drive, kind_of_law, opened, systems_of, tables_of
+from stickslip.solve.tables import Array, kind_of_drive, kind_of_law, opened, systems_of
 
 
 class Batch(NamedTuple):

@@ -15,6 +15,7 @@ import tempfile
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
+from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,8 @@ def program(*words: object, folder: Path) -> Outcome:
 
 def limited(call: Callable[..., object], *arguments: Any, folder: Path) -> Outcome:
     """A function that can be pickled, called in this folder; an exception that it lets out is a traceback in `err`."""
+    with contextlib.chdir(Path(__file__).parent):  # where the server looks for what it preloads, silent if in vain
+        forkserver.ensure_running()
     with tempfile.TemporaryDirectory() as place:
         process = _FORKS.Process(target=_within_limits, args=(call, arguments, str(folder), place))
         process.start()
@@ -85,6 +88,7 @@ def _program(words: list[str]) -> None:
 
 
 def _within_limits(call: Callable[..., object], arguments: tuple[Any, ...], folder: str, place: str) -> None:
+    assert "warm" in sys.modules, "imported in each case anew"
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

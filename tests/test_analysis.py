@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.answers.comparison import Comparison, compare
-from stickslip.answers.findings import Findings, record_name
+from stickslip.answers.comparison import compare
+from stickslip.answers.findings import Comparison, Findings, record_name
 from stickslip.answers.mending import mend
 from stickslip.answers.questions import analyze
 from stickslip.errors import EstimateError, ModelError
@@ -169,7 +169,7 @@ def test_records_left_out_of_the_coefficient_are_named() -> None:
         fs=FS, units={"friction": "N m"},
     )  # fmt: skip
     torque = replace(analyze(turning), name="torque")
-    mute = replace(found[0], name="mute", loops=None)
+    mute = replace(found[0].having(loops=None), name="mute")
     comparison = compare([*found, torque, mute])
     assert comparison.coefficient is not None
     assert comparison.coefficient.value == pytest.approx(0.3, abs=0.01)
@@ -181,17 +181,16 @@ def test_the_line_is_no_surer_than_its_records() -> None:
     found = [analyze(sliding(0.3 * n, normal=n)) for n in (1.0, 2.0, 4.0)]
     levels = [f.loops.level for f in found if f.loops is not None]
     vague = [
-        replace(f, loops=replace(f.loops, level=replace(level, sd=0.1)))
+        f.having(loops=replace(f.loops, level=replace(level, sd=0.1)))
         for f, level in zip(found, levels, strict=True)
         if f.loops is not None
     ]
     comparison = compare(vague)
-    assert comparison.line is not None
     design = np.column_stack([[1.0, 2.0, 4.0], np.ones(3)])
     own = 0.1 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-    for estimate, sd in zip(comparison.line, own, strict=True):
+    for estimate, sd in zip((comparison.slope, comparison.offset), own, strict=True):
         assert estimate.interval[1] - estimate.value == pytest.approx(1.96 * sd, rel=1e-3)
-    endless = compare([replace(vague[0], loops=replace(vague[0].loops, level=replace(levels[0], sd=np.inf))), *vague])
+    endless = compare([vague[0].having(loops=replace(vague[0].loops, level=replace(levels[0], sd=np.inf))), *vague])
     assert np.isfinite(endless.estimates[0].sd)
 
 
@@ -199,8 +198,7 @@ def test_the_line_is_no_surer_than_its_records() -> None:
 def test_the_coefficient_and_the_line_are_those_of_the_law(offset: float) -> None:
     loads = [1.0, 2.0, 4.0, 8.0]
     comparison = compare([analyze(sliding(0.3 * n + offset, seed=int(n), normal=n)) for n in loads])
-    assert comparison.line is not None
-    slope, at_no_load = comparison.line
+    slope, at_no_load = comparison.slope, comparison.offset
     assert slope.value == pytest.approx(0.3, abs=0.003)  # noise 0.02 N, some 4000 sliding samples each
     assert at_no_load.value == pytest.approx(offset, abs=0.005)
     assert comparison.coefficient is not None
@@ -229,7 +227,7 @@ def test_without_loads_there_is_a_table_and_a_note() -> None:
 
 def test_results_are_plain_data() -> None:
     findings = analyze(sliding(normal=3.0))
-    told = json.loads(json.dumps(findings.to_dict(), allow_nan=False))
+    told = json.loads(json.dumps(ss.summary(findings).data(), allow_nan=False))
     assert told["normal_load"] == 3.0
     assert {"friction coefficient", "sliding friction"} <= {estimate["name"] for estimate in told["estimates"]}
     assert isinstance(compare([findings, findings]), Comparison)

@@ -140,7 +140,7 @@ def test_a_friction_that_drives_is_no_number() -> None:
     assert not findings.loops.energy_per_cycle.known
     assert "-" not in sentences(findings).replace("stick-slip", "")
     assert "slides against" not in sentences(findings)
-    assert findings.to_dict()["estimates"][0]["value"] is None
+    assert ss.summary(findings).data()["estimates"][0]["value"] is None
     assert ss.figures(findings)
 
 
@@ -174,8 +174,7 @@ def test_records_side_by_side_have_no_friction_below_zero_at_no_load() -> None:
         return ss.analyze(ss.Record.of({"x": x, "friction": friction, "normal": np.full(time.size, load)}, fs=500))
 
     found = ss.compare([slide(load) for load in (2.0, 4.0, 8.0)])
-    assert found.line is not None
-    assert not found.line[1].known
+    assert not found.offset.known
     assert found.coefficient is not None
     assert found.coefficient.status != "ok"
 
@@ -239,7 +238,7 @@ def test_a_unit_that_nobody_stated_is_a_finding_that_leads(tmp_path: Path) -> No
     assert headline[:2] == [str(fault) for fault in unstated]
     assert findings.level is not None
     assert findings.level.status != "ok"
-    told = list(findings.to_dict())
+    told = list(ss.summary(findings).data())
     assert told.index("faults") < told.index("estimates")
 
 
@@ -281,7 +280,7 @@ def test_channels_that_contradict_each_other_lead_and_no_force_is_told(scale: fl
     assert not any(f" {unit} " in sentence for sentence in headline for unit in ("N", "kN", "mN", "N/m", "kg"))
     assert findings.loops is not None
     assert findings.loops.level.status.startswith("the channels contradict each other")
-    told = list(findings.to_dict())
+    told = list(ss.summary(findings).data())
     assert told.index("contradiction") < told.index("estimates")
 
 

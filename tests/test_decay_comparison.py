@@ -36,11 +36,11 @@ def test_alike_records_share_friction_and_narrow_the_static_bracket():
     assert together.joint.damping_ratio.includes(0.0316)
     assert together.joint.dry_displacement.includes(0.02)
     assert together.dry_force.includes(2.0)
-    narrowest = min(width(one.waveform.static_displacement) for one in each)
+    narrowest = min(width(one.decay.waveform.static_displacement) for one in each)
     assert together.joint.static_displacement.includes(0.02)
     assert width(together.joint.static_displacement) < narrowest
     for name in ("damping_ratio", "dry_displacement", "frequency"):
-        assert width(getattr(together.joint, name)) < 0.7 * width(getattr(each[0].best, name))
+        assert width(getattr(together.joint, name)) < 0.7 * width(getattr(each[0].decay.best, name))
     told = " ".join(ss.summary(together).headline)
     assert "4 records agree" in told
     assert "the surest record alone leaves" in told
@@ -52,17 +52,18 @@ def test_unlike_records_are_told_and_their_mean_holds_the_scatter(method):
     together = ss.answers.compare_decays(each)
     assert together.joint is None
     assert together.apart["dry friction displacement"] > 5
-    mean = next(one for one in together.means if one.name == "dry friction displacement")
+    mean = together.dry_displacement
     assert mean.includes(0.020)
     assert mean.includes(0.028)
     assert "differ in dry friction displacement" in mean.status
     assert "not alike" in ss.summary(together).headline[0]
-    assert together.to_dict()["comparison"]["joint"] is False
+    assert ss.summary(together).data()["comparison"]["joint"] is False
 
 
 def test_records_of_one_oscillator_are_seldom_called_unlike():
     """At one in a hundred: of 60 pairs at most three (0.3 % chance of more)."""
-    each = [SimpleNamespace(best=ss.fit_decay(record(seed, amplitude=1 - 0.002 * seed))) for seed in range(120)]
+    fits = [ss.fit_decay(record(seed, amplitude=1 - 0.002 * seed)) for seed in range(120)]
+    each = [SimpleNamespace(decay=SimpleNamespace(best=fit)) for fit in fits]
     assert sum(bool(_apart(each[2 * k : 2 * k + 2])) for k in range(60)) <= 3
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from stickslip.errors import FormatError, RecordError
 from stickslip.record.exchange import from_pandas, from_sep005, from_xarray
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, StatedRig, Step
 
 WAYS = [
     pytest.param(Record.to_pandas, from_pandas, id="pandas"),
@@ -27,8 +27,9 @@ def rich_record() -> Record:
     rng = np.random.default_rng(5)
     samples = {"x": rng.standard_normal(300), "load": rng.standard_normal(300), "ch1": np.full(300, np.nan)}
     record = Record.of(samples, fs=150.3, units={"x": "mm", "load": "kip"}, start=17.2, truth={"level": 0.68})
-    record = record.with_details("load", sensitivity="500 mV/lbf", delay=1.5e-3, noise=0.02)
-    return replace(record, history=(*record.history, Step("repair", {"rows": (3, 9), "how": [1, 2.5]}, "mended")))
+    record = record.with_details("load", sensitivity="500 mV/lbf", delay=1.5e-3, noise=0.02, gain_sd=0.005)
+    step = Step("repair", {"rows": (3, 9), "how": [1, 2.5]}, "mended")
+    return replace(record, history=(*record.history, step), rig=StatedRig("smoother", mass=2.42, sd={"mass": 0.02}))
 
 
 def broken_clock() -> Record:

@@ -186,10 +186,11 @@ def pendulum(*, seed: int = 0, noise: float = 1e-3, seconds: float = 20.0) -> ss
     return ss.Record.of({"theta": theta + noise * np.random.default_rng(seed).standard_normal(t.size)}, fs=200)
 
 
-def test_a_pendulum_of_large_swings_is_fitted_with_its_sine() -> None:
-    """Values and intervals by 30 records; the straight spring is far off and says so."""
+@pytest.mark.parametrize(("draws", "share"), [(10, 0.74), pytest.param(30, 0.83, marks=pytest.mark.soak)])
+def test_a_pendulum_of_large_swings_is_fitted_with_its_sine(draws: int, share: float) -> None:
+    """Values, and intervals of 95 % less three deviations; the straight spring is far off and says so."""
     inside = []
-    for seed in range(30):
+    for seed in range(draws):
         found = ss.fit_decay(pendulum(seed=seed), restoring="pendulum", stiffness=2.0)
         answers = (found.damping_ratio, found.dry_displacement, found.bias, found.amplitude, found.release_time)
         inside.append([each.includes(true) for each, true in zip(answers, PENDULUM[1:6], strict=True)])
@@ -199,7 +200,7 @@ def test_a_pendulum_of_large_swings_is_fitted_with_its_sine() -> None:
     assert found.frequency.value == pytest.approx(1.0, abs=1e-4)
     assert found.dry_force is not None
     assert found.dry_force.includes(0.03)
-    assert np.all(np.mean(inside, axis=0) > 0.83)
+    assert np.all(np.mean(inside, axis=0) > share)
     assert np.std(found.residual[0]) == pytest.approx(1e-3 / math.sqrt(5), rel=0.15)
     assert found.noise_level == pytest.approx(1e-3, rel=0.1)
     straight = ss.fit_decay(pendulum())

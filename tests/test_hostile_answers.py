@@ -60,9 +60,10 @@ def test_findings_outlive_a_figure_that_can_not_be_drawn(tmp_path, monkeypatch):
 
 def test_a_decay_without_a_finite_worst_case_is_drawn_and_written(tmp_path):
     found = ss.analyze_decay(free_decay(), method="thesis")
-    unbounded = {name: np.full(len(found.thesis.bounds.m), np.inf) for name in ("rate_worst", "dry_worst")}
-    bounds = replace(found.thesis.bounds, **unbounded)
-    folder = ss.publish(replace(found, thesis=replace(found.thesis, bounds=bounds)), folder=tmp_path / "results")
+    unbounded = {name: np.full(len(found.decay.thesis.bounds.m), np.inf) for name in ("rate_worst", "dry_worst")}
+    bounds = replace(found.decay.thesis.bounds, **unbounded)
+    decay = replace(found.decay, thesis=replace(found.decay.thesis, bounds=bounds))
+    folder = ss.publish(found.having(decay=decay), folder=tmp_path / "results")
     assert (folder / "figures" / "bounds.svg").exists()
 
 

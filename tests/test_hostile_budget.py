@@ -19,11 +19,11 @@ import scipy.io
 import soundfile
 
 import stickslip as ss
+from format_files import write_uff
 from limits import civil, limited, program
 from stickslip.cli.records import groups_of
 from stickslip.files.table import unique
 from stickslip.settings import read_toml
-from test_formats import write_uff
 from test_read import LVM
 
 # ---- settings

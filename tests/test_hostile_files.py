@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import stickslip as ss
-from test_formats import SMALL
+from format_files import SMALL
 from test_read import LVM
 from test_text import DIALECTS
 

@@ -17,8 +17,8 @@ import pytest
 import scipy.io.wavfile
 
 import stickslip as ss
+from format_files import SMALL
 from limits import Outcome, civil, limited, program
-from test_formats import SMALL
 
 EVIL = "a\x1b[31m\x1b]0;owned\x07\x9b2J\r\u202egnp\u2066\x08"
 BYTES = os.fsdecode(b"caf\xe9\xff")

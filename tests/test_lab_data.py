@@ -175,7 +175,7 @@ def test_the_answer_is_the_librarys_to_the_last_printed_digit(client: Client, tm
     assert told["state"] == "done", told["message"]
     assert told["answer"]["lines"] == [[line.name, line.value, line.interval, line.status] for line in words.lines]
     kept = client.get(f"/jobs/{job}/results.json").json()
-    assert kept["estimates"] == json.loads(json.dumps(findings.to_dict()["estimates"]))
+    assert kept["estimates"] == json.loads(json.dumps(ss.summary(findings).data()["estimates"]))
     page = client.get(f"/jobs/{job}/report")
     assert page.headers["content-security-policy"].startswith("sandbox; default-src 'none'")
     assert path.name in page.text

@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +17,7 @@ import pytest
 import stickslip as ss
 from stickslip.files import write
 from stickslip.record.channels import Channel
+from stickslip.record.metadata import metadata_to_record, record_to_metadata
 from stickslip.record.record import Record, Step
 
 
@@ -42,12 +44,33 @@ def test_rows_share_the_samples_of_their_record() -> None:
     [
         {"delay": math.nan}, {"delay": math.inf}, {"delay": "x"}, {"delay": None}, {"delay": True},
         {"noise": -1.0}, {"noise": math.nan}, {"noise": "x"}, {"sensitivity": 5}, {"quantity": None},
+        {"gain_sd": -0.01}, {"gain_sd": math.nan}, {"gain_sd": 1.0}, {"gain_sd": "1 %"},
         {"foo": 1}, {"name": "y"}, {"unit": "mm"},
     ],
 )  # fmt: skip
 def test_details_that_make_no_sense_are_refused(details: dict[str, Any]) -> None:
     with pytest.raises(ss.errors.RecordError):
         Record.of({"x": [1.0, 2.0]}, fs=1.0).with_details("x", **details)
+
+
+@pytest.mark.parametrize("sd", [{"mass": -0.02}, {"stiffness": math.nan}, {"damping": math.inf}, {"length": 0.1}])
+def test_a_deviation_that_makes_no_sense_is_refused(sd: dict[str, float]) -> None:
+    with pytest.raises(ss.errors.RecordError, match="standard deviation"):
+        ss.record.StatedRig("smoother", mass=2.42, sd=sd)
+
+
+def test_a_rig_with_deviations_is_one_key_and_no_other_rig() -> None:
+    exact, unsure = (ss.record.StatedRig("smoother", mass=2.42, sd=sd) for sd in ({}, {"mass": 0.02}))
+    assert exact != unsure
+    assert len({exact, unsure, replace(unsure)}) == 2
+
+
+def test_a_description_from_before_deviations_is_read() -> None:
+    rig = ss.record.StatedRig("smoother", mass=2.42, stiffness=2310.0)
+    record = replace(Record.of({"x": [1.0, 2.0]}, fs=1.0), rig=rig)
+    told = record_to_metadata(record)
+    del told["rig"]["sd"], told["channels"][0]["gain_sd"]
+    assert metadata_to_record(told, record.samples).equals(record)
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.solve.assembly import table_of
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise, opening_order
-from stickslip.solve.tables import table_of
 
 
 def rise(roots: list[float], *, lead: float = 1.0, low: int = 0, limit: float = 1.0) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.errors import EstimateError, RecordError
+from stickslip.signals.alignment import Lines
 from stickslip.signals.derivative_spectra import derivative_spectra, window
 
 Array = NDArray[np.float64]
@@ -53,6 +54,24 @@ def test_the_spectrum_of_a_derivative_is_that_of_the_measured_one(order: int, ch
     found = derivative_spectra(motion(T)["x"], fs=FS, orders=[order], shift=shift)[0]
     true = np.fft.rfft(window(T.size) * motion(T - shift)[channel])
     assert np.abs(found - true).max() < 1e-6 * np.abs(true).max()
+
+
+def test_the_misfit_is_expanded_as_its_residuals_change() -> None:
+    """Against central differences of the residuals, and of the slopes that they confirm."""
+    rng, n = np.random.default_rng(1), 50
+    waves = rng.standard_normal((5, n)) + 1j * rng.standard_normal((5, n))
+    noise = rng.uniform(0.5, 2.0, (2, n))
+    lines = Lines(rng.uniform(1.0, 3.0, n), waves[0], waves[1:4], noise, waves[4])
+    theta, steps = np.array([0.1, 1.3, 0.2, 0.15]), 1e-5 * np.eye(4)
+    value, slopes, curvature, products = lines.expansion(theta)
+    by_theta = np.array([lines.residual(theta + d) - lines.residual(theta - d) for d in steps]) / 2e-5
+    residual = lines.residual(theta)
+    bent = np.array([lines.expansion(theta + d)[1] - lines.expansion(theta - d)[1] for d in steps]) / 2e-5
+    assert value == pytest.approx(np.sum(np.abs(residual) ** 2))
+    bound = {"rtol": 1e-8, "atol": 1e-6}  # what differences of such steps leave
+    np.testing.assert_allclose(slopes, (by_theta.conj() @ residual).real, **bound)
+    np.testing.assert_allclose(products, (by_theta.conj() @ by_theta.T).real, **bound)
+    np.testing.assert_allclose(curvature, bent, **bound)
 
 
 @pytest.mark.parametrize("part", [0.0, 0.25, 0.5, 0.75])

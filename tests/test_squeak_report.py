@@ -37,11 +37,11 @@ def measured(surface: str, load: float) -> ss.Record:
 
 
 @cache
-def findings(surface: str, load: float) -> ss.answers.SqueakFindings:
+def findings(surface: str, load: float) -> ss.answers.Findings:
     return ss.analyze_squeaks(measured(surface, load), name=f"{surface}, {load:g} N", normal=load)
 
 
-def compared() -> ss.answers.SqueakComparison:
+def compared() -> ss.answers.Comparison:
     return ss.answers.compare_squeaks([findings(*each) for each in CONDITIONS])
 
 
@@ -49,10 +49,10 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(main, ["squeak", *map(str, arguments)])
 
 
-def tone(duration: float = 0.4) -> np.ndarray:
-    t = np.arange(int(FS)) / FS
+def tone(duration: float = 0.4, *, frequency: float = 500.0, fs: float = FS) -> np.ndarray:
+    t = np.arange(int(fs)) / fs
     inside = np.exp(-((np.maximum(0, np.abs(t - 0.5) - duration / 2) / 0.01) ** 2))
-    wave = sum(np.sin(2 * np.pi * order * 500 * t) / order**2 for order in (1, 2, 3))
+    wave = sum(np.sin(2 * np.pi * order * frequency * t) / order**2 for order in (1, 2, 3))
     return inside * wave + 1e-3 * np.random.default_rng(0).standard_normal(len(t))
 
 
@@ -86,20 +86,20 @@ def test_a_condition_says_what_drove_it() -> None:
     x = measured("wet", 6.13)["x"]
     assert each.stroke == pytest.approx((x.max() - x.min()) / 2)
     assert each.rate == pytest.approx(each.count / 2.0)
-    assert each.to_dict()["trend"] == each.trend
+    assert ss.summary(compared()).data()["comparison"]["conditions"][1]["trend"] == each.trend
 
 
-def of_sound(values: np.ndarray, name: str) -> ss.answers.SqueakFindings:
-    return ss.analyze_squeaks(ss.Record.of({"sound": values}, fs=FS), name=name)
+def of_sound(values: np.ndarray, name: str, fs: float = FS) -> ss.answers.Findings:
+    return ss.analyze_squeaks(ss.Record.of({"sound": values}, fs=fs), name=name)
 
 
 def test_what_creaks_or_whistles_is_not_called_silent() -> None:
     t = np.arange(int(FS)) / FS
-    creak = np.exp(-np.mod(t, 1 / 25) / 0.002) * np.random.default_rng(3).standard_normal(len(t))
+    since = np.mod(20 * t + 6 * t**2, 1) / (20 + 12 * t)  # 20 to 32 in a second
+    creak = np.exp(-since / 0.002) * np.random.default_rng(3).standard_normal(len(t))
     whistle = np.sin(2 * np.pi * 800 * t) * np.exp(-(((t - 0.5) / 0.2) ** 2)) + 1e-3 * creak
-    found = [
-        of_sound(*each) for each in ((tone(), "Chalk"), (creak * (t > 0.1) * (t < 0.9), "Door"), (whistle, "Pipe"))
-    ]
+    chalk = of_sound(tone(frequency=2500, fs=20_000), "Chalk", 20_000)
+    found = [chalk, of_sound(creak * (t > 0.1) * (t < 0.9), "Door"), of_sound(whistle, "Pipe")]
     together = ss.answers.compare_squeaks(found)
     assert [each.answer for each in together.conditions] == ["squeals", "creaks", "can not be told"]
     assert together.verdicts == ("Chalk squeals; Door creaks.", "Whether Pipe squeaks can not be told.")
@@ -125,7 +125,7 @@ def test_friction_falls_too_only_where_it_is_known_to_fall_in_what_squeaks() -> 
     slope = pair[0].loops.slope
     for low, too in ((-3.0, True), (-4.0, False)):
         ends = replace(slope, value=-2.0, interval=(low, -4.0 - low))
-        squeaking = replace(pair[0], loops=replace(pair[0].loops, slope=ends))
+        squeaking = pair[0].having(loops=replace(pair[0].loops, slope=ends))
         (told,) = (each for each in ss.answers.compare_squeaks([squeaking, pair[1]]).verdicts if "falls" in each)
         assert (" too," in told) == too
         assert "a falling friction alone is not enough" in told
@@ -212,9 +212,9 @@ def test_names_of_a_usual_length_are_not_broken_in_the_terminal(
 # ---- coupling in words
 
 
-def told_of(pairs: tuple[ss.squeak.Pair, ...], found: ss.answers.SqueakFindings) -> list[str]:
+def told_of(pairs: tuple[ss.squeak.Pair, ...], found: ss.answers.Findings) -> list[str]:
     joined = replace(found.coupling, pairs=pairs)
-    return list(ss.summary(replace(found, coupling=joined)).headline)
+    return list(ss.summary(found.having(coupling=joined)).headline)
 
 
 def test_what_a_squeak_adds_is_said_and_not_what_is_there_without_it() -> None:
@@ -246,7 +246,7 @@ def test_where_the_energy_is_not_told_the_lever_is_asked_for() -> None:
     )
     found = findings("wet", 6.13)
     stated = ss.squeak.coupling(found.record, squeaks=found.squeaks, lever="1.7 mm")
-    told = list(ss.summary(replace(found, coupling=stated)).headline)
+    told = list(ss.summary(found.having(coupling=stated)).headline)
     assert any(each.startswith("Friction feeds the torsion: ") for each in told)
     assert not any("lever" in each for each in told)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 
+import numpy as np
 import pytest
 
 import stickslip as ss
@@ -30,7 +31,8 @@ def test_figures_are_drawn_when_they_are_looked_at() -> None:
 
 
 def test_results_json_of_a_record_keeps_its_keys() -> None:
-    findings = ss.answers.Findings("run", ss.datasets.demo())
+    way = np.linspace(0, 6 * np.pi, 600)
+    findings = ss.analyze(ss.Record.of({"x": np.sin(way), "friction": np.sign(np.cos(way))}, fs=100))
     assert set(ss.summary(findings).data()) == {
         "name", "faults", "contradiction", "settings", "normal_load", "estimates", "regression_residual", "truth",
         "notes", "history",

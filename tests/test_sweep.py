@@ -17,7 +17,7 @@ import pytest
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Exit, Mode, Rigid
-from stickslip.maps import engines, progress
+from stickslip.maps import engines
 from stickslip.maps.plan import Arrays, Plan
 
 pytest.importorskip("xarray")
@@ -324,7 +324,7 @@ def test_a_notebook_shows_one_line_that_is_written_anew(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(builtins, "get_ipython", ZMQInteractiveShell, raising=False)
     monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=display))  # type: ignore[arg-type]
-    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(sys.modules["stickslip.maps.sweep"], "PATIENCE", 0.0)
     ss.sweep(UNIT, {"kinetic": [0.1, 0.2, 0.3, 0.4]}, settle=0, cycles=1, engine="serial")
     assert [line.partition("blocks")[0][-4:-1] for line in shown[:-1]] == ["1/4", "2/4", "3/4", "4/4"]
     assert shown[1].startswith("mapping " + 15 * "━" + 15 * "─")

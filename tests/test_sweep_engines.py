@@ -21,7 +21,8 @@ from stickslip.maps.engines import threads
 from stickslip.maps.measures import LOG, MEASURES
 from stickslip.maps.sweep import planned
 from stickslip.solve import cells
-from stickslip.solve.tables import systems_of, table_of, tables_of
+from stickslip.solve.assembly import table_of, tables_of
+from stickslip.solve.tables import systems_of
 
 xarray = pytest.importorskip("xarray")
 COUNTED = [measure for measure in MEASURES if measure != LOG]  # what a march counts without keeping the motion

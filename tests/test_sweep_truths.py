@@ -19,7 +19,7 @@ import stickslip as ss
 from batches import simulate_batch
 from stickslip.errors import ModelError
 from stickslip.scenarios import forced, grid
-from stickslip.solve.tables import table_of
+from stickslip.solve.assembly import table_of
 
 pytest.importorskip("xarray")
 CIRCLE = 2 * math.pi

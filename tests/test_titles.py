@@ -14,7 +14,7 @@ import pytest
 import scipy.io
 
 import stickslip as ss
-from stickslip.files.titles import last_part
+from stickslip.files.select import last_part
 
 ROWS = np.arange(64)
 COLUMNS = {

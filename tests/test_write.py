@@ -25,11 +25,12 @@ def example(rows: int = 500, **changes: object) -> ss.Record:
         "time": rng.normal(size=rows) * 1e300,
     }
     record = ss.Record.of(samples, fs=1000 / 3, units={"x": "mm", "load": "lbf"}, start=0.1, truth={"level": 1 / 3})
-    record = record.with_details("x", delay=1e-3, noise=2e-7, sensitivity="2 mm/V")
+    record = record.with_details("x", delay=1e-3, noise=2e-7, sensitivity="2 mm/V", gain_sd=0.01)
     step = ss.record.Step(
         "invented", {"rows": (1, None), "nested": {"list": [1, (2.5, "two")]}, "text": 'a "b", ü\n#'}, "done"
     )
-    return replace(record, history=(*record.history, step), **changes)
+    rig = ss.record.StatedRig("smoother", mass=2.42, stiffness=2310.0, sd={"mass": 0.02, "stiffness": 1 / 3})
+    return replace(record, history=(*record.history, step), rig=rig, **changes)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -11,14 +11,18 @@ import stickslip
 from stickslip.signals.turns import turning_points
 
 LATE = (
+    "h5py",
     "jinja2",
     "matplotlib.figure",
     "pandas",
     "pint",
+    "pyarrow.parquet",
+    "pytest",
     "scipy.ndimage",
     "scipy.optimize",
     "scipy.signal",
     "scipy.stats",
+    "xarray",
 )
 ROOMS = (module.name for module in pkgutil.walk_packages(stickslip.__path__, "stickslip."))
 

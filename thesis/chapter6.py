@@ -54,7 +54,7 @@ def plates(given: Given) -> Iterator[Plate]:
     record = motion(given).record(fs=100)
     yield figure(
         "6.1",
-        plot_decay(ss.analyze_decay(record, method="thesis")),
+        plot_decay(ss.analyze_decay(record, method="thesis").decay),
         "Neither friction alone decays so: the envelopes are of each by itself, fitted to the same motion.",
     )
     yield figure(
@@ -65,14 +65,15 @@ def plates(given: Given) -> Iterator[Plate]:
     yield figure("6.3", system_i(given), "Drawn from Table 6.2 and the chapter's parameters.")
     made_with = "The virtual rig with the values of Table 6.2; mass, spring and release are ours."
     for number, kind, case in (("6.4", "dry", 1), ("6.5", "dry", 2), ("6.6", "viscous", 1), ("6.7", "viscous", 2)):
-        yield figure(number, plot_decay(ss.analyze_decay(on_paper(given, case, kind), method="thesis")), made_with)
-    found = {case: ss.analyze_decay(on_paper(given, case, "both"), method="thesis") for case in (1, 2)}
+        alone = ss.analyze_decay(on_paper(given, case, kind), method="thesis").decay
+        yield figure(number, plot_decay(alone), made_with)
+    found = {case: ss.analyze_decay(on_paper(given, case, "both"), method="thesis").decay for case in (1, 2)}
     yield figure("6.8", plot_decay(found[1]), made_with)
     yield figure("6.9", plot_differences(found[1].thesis), made_with)
     yield figure("6.10", plot_identified(found[2]), made_with)
     yield figure("6.11", plot_differences(found[2].thesis), made_with)
     yield figure("6.12", system_ii(given), "Drawn from the parameters of section 6.5.")
-    bearing = ss.analyze_decay(on_bearing(given), method="thesis")
+    bearing = ss.analyze_decay(on_bearing(given), method="thesis").decay
     made_with = "The virtual rig with section 6.5's mass, spring, damping and friction; the release is ours."
     yield figure("6.13", plot_decay(bearing), made_with)
     yield figure("6.14", plot_differences(bearing.thesis), made_with)

@@ -58,8 +58,8 @@ def decay() -> None:
     noisy = x + 5e-3 * np.random.default_rng(1).standard_normal(len(x))
     findings = ss.analyze_decay(ss.Record.of({"x": noisy}, fs=100), stiffness=10.0)
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
-    plot_decay(findings, ax=left)
-    plot_differences(findings.thesis, ax=right)
+    plot_decay(findings.decay, ax=left)
+    plot_differences(findings.decay.thesis, ax=right)
     for axes in (left, right):
         axes.legend(ncols=1, loc="lower right" if axes is left else "upper right", fontsize="small")
     saved(figure, "decay.png")

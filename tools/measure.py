@@ -9,6 +9,7 @@ import argparse
 import ast
 import re
 import sys
+import tomllib
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import cached_property
@@ -240,6 +241,13 @@ def measured(checkout: Path, show: bool) -> dict[str, int | str]:
         "places that read a sentence": len(read),
         "fmt: skip": sum(len(re.findall(r"# fmt: skip", source.text)) for source in sources),
     }
+
+
+def floors() -> list[list[str]]:
+    """The rooms of each floor of this checkout, from the top down, as the import-linter's contract has them."""
+    settings = tomllib.loads((Path(__file__).resolve().parents[1] / "pyproject.toml").read_text("utf-8"))
+    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
+    return [[room.strip() for room in layer.split("|")] for layer in layers]
 
 
 def doc_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:

@@ -13,8 +13,8 @@ run = ss.simulate(slider, duration=20.0, start={"x": 1.0})
 record = ss.Rig((ss.rig.Sensor("x", noise=ss.rig.Noise(1e-3)),)).measure(run, fs=100, rng=1)
 
 found = ss.analyze_decay(record, stiffness=10.0, method="thesis")
-print(found.thesis.damping_ratio, "- true: 0.0316")
-print(found.thesis.dry_displacement, "- true: 0.02 m")
+print(found.decay.thesis.damping_ratio, "- true: 0.0316")
+print(found.decay.thesis.dry_displacement, "- true: 0.02 m")
 
 drawn = {plate.name: plate.figure for plate in ss.figures(found)}
 decay, differences = drawn["decay"], drawn["differences"]

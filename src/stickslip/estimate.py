@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from stickslip.errors import EstimateError
-from stickslip.units import prefixed
+from stickslip.errors import EstimateError, ModelError, RecordError
+from stickslip.units import parse_uncertain, prefixed
 
 NORMAL_95 = 1.959963984540054  # two-sided 95 % quantile of the normal distribution
 MOST_DECIMALS = 6  # printed in the plain unit
@@ -167,6 +167,31 @@ class Estimate:
         value, sd = float(value), float(sd)
         return cls(name, value, (value - quantile * sd, value + quantile * sd), sd, unit, method, **more)
 
+    @classmethod
+    def stated(cls, name: str, constant: Constant, unit: str) -> Estimate:
+        """A constant as a person states it, with its standard uncertainty; without one it is exact, its `sd` 0.
+
+        Raises
+        ------
+        ModelError
+            No finite number, another unit, or an uncertainty without meaning.
+
+        Examples
+        --------
+        >>> mass = Estimate.stated("mass", "2.42 ± 0.02 kg", "kg")
+        >>> mass.value, mass.sd, Estimate.stated("stiffness", 2310, "N/m").sd
+        (2.42, 0.02, 0.0)
+        """
+        step = f"correct the {name}, written like '2.5 ± 0.1 {unit}'"
+        if isinstance(constant, Estimate) and constant.unit != unit:
+            raise ModelError(f"{name} = {constant}", f"a {name} is measured in {unit}", step)
+        try:
+            pair = (constant.value, constant.sd) if isinstance(constant, Estimate) else constant
+            value, sd = parse_uncertain(pair, unit)
+        except RecordError as error:
+            raise ModelError(f"{name}: {error.value}", error.rule, step) from error
+        return cls.normal(name, value, sd=sd, unit=unit, method="stated")
+
     def scaled(self, factor: float, unit: str, name: str | None = None) -> Estimate:
         """The same estimate in another unit, or of a quantity proportional to it."""
         ends = sorted(factor * end for end in self.interval)
@@ -280,6 +305,9 @@ class Estimate:
             exponent = digits > MOST_DECIMALS and largest > 0
             form = f".{max(0, digits + math.floor(math.log10(largest)))}e" if exponent else f".{digits}f"
         return (lambda number: f"{factor * number:{form}}"), "" if unit == "1" else f" {unit}"
+
+
+Constant = float | str | tuple[float, float] | Estimate  # of a rig, as a person states it
 
 
 class Result:

@@ -147,7 +147,9 @@ def mean_uncertainty(series: ArrayLike) -> tuple[float, float]:
     return math.sqrt(float(np.mean(lowest**2 / fall)) / count), float(cosines)
 
 
-def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, checks: tuple[str, ...] = ()) -> Estimate:
+def mean_of_cycles(
+    name: str, values: ArrayLike, *, unit: str, method: str, checks: tuple[str, ...] = (), of: str = "cycle"
+) -> Estimate:
     """Mean over cycles, its interval from the scatter between them.
 
     Parameters
@@ -158,6 +160,8 @@ def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, chec
         One value per cycle, in order; cycles without a value are NaN and left out.
     checks : tuple of str
         What else was checked.
+    of : str
+        What the values are of, where it is not cycles.
 
     Returns
     -------
@@ -183,11 +187,11 @@ def mean_of_cycles(name: str, values: ArrayLike, *, unit: str, method: str, chec
         )
     sd, freedom = mean_uncertainty(present)
     if count == 1:
-        status, check = Status("only 1 cycle: how sure it is can not be told"), "1 cycle"
+        status, check = Status(f"only 1 {of}: how sure it is can not be told"), f"1 {of}"
     else:
-        status = Status(*([Doubt.few(count, "cycle")] if count < FEW_CYCLES else []))
+        status = Status(*([Doubt.few(count, of)] if count < FEW_CYCLES else []))
         scatter = f"{present.std(ddof=1):.3g}{'' if unit == '1' else ' ' + unit}"
-        check = f"{count} cycles, scatter between them {scatter}"
+        check = f"{count} {of}s, scatter between them {scatter}"
     return Estimate.normal(
         name, present.mean(), sd=sd, unit=unit, method=method, quantile=student(freedom), status=status,
         checks=(check, *checks),

@@ -9,6 +9,7 @@ import collections
 import functools
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,10 @@ _TERM = rf"[{_LETTER}][{_LETTER}0-9]*(?:\^(?:{_POWER}))?"
 _CHAIN = rf"{_TERM}(?:[ /]{_TERM})*"
 _UNIT = re.compile(rf"(1/)?({_CHAIN})(?:/\(({_CHAIN})\))?")  # of all that pint would evaluate, only this reaches it
 _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+PLUS_MINUS = r"(?:±|\+/-|\+-)"
+_SPREAD = re.compile(rf"({_NUMBER})\s*(%?)\s*(.*)")  # behind the sign
+_BRACKETED = re.compile(r"\((.*)\)\s*(.*)")  # (2.42 ± 0.02) kg
+_CONCISE = re.compile(r"([-+]?[0-9]+\.?([0-9]*))\(([0-9]*\.?[0-9]+)\)(?:[eE]([-+]?[0-9]+))?\s*(.*)")  # 2.42(2) kg
 
 
 @dataclass(frozen=True)
@@ -202,6 +207,80 @@ def parse_value(text: str | float, expect: str) -> float:
             f"write it like '2.5 {expect}'",
         )
     return value
+
+
+def parse_uncertain(stated: str | float | Sequence[str | float], expect: str) -> tuple[float, float]:
+    """Read a number and its standard uncertainty, in the ways of writing of the GUM (7.2.2), into SI.
+
+    Parameters
+    ----------
+    stated : str, float or pair
+        "2.42 ± 0.02 kg" (also ``+-`` and ``+/-``), "(2.42 ± 0.02) kg", "2.42 kg ± 20 g", "2.42 kg ± 1 %",
+        "2.42(2) kg"; a pair of value and uncertainty; or what :func:`parse_value` reads, which is exact.
+    expect : str
+        The SI unit of the quantity.
+
+    Returns
+    -------
+    tuple of float
+        The value and its standard deviation, 0 of an exact one.
+
+    Raises
+    ------
+    RecordError
+        As :func:`parse_value`; or an uncertainty that is negative, without its value, or a part of zero.
+
+    Examples
+    --------
+    >>> parse_uncertain("2.42 ± 0.02 kg", "kg"), parse_uncertain("2310(5) N/m", "N/m"), parse_uncertain("250 g", "kg")
+    ((2.42, 0.02), (2310.0, 5.0), (0.25, 0.0))
+    """
+    if isinstance(stated, str) and len(stated) <= LONGEST_VALUE:
+        return _apart(stated.strip(), expect)
+    if isinstance(stated, str) or not isinstance(stated, Sequence):
+        return parse_value(stated, expect), 0.0
+    if len(stated) != 2:
+        raise _uncertain(stated, expect, "a pair is a value and its uncertainty")
+    value, sd = (parse_value(number, expect) for number in stated)
+    return value, _checked_sd(sd, stated, expect)
+
+
+def _apart(stated: str, expect: str) -> tuple[float, float]:
+    """:func:`parse_uncertain` of a text."""
+    value, *spread = (part.strip() for part in re.split(PLUS_MINUS, _spelled_out(stated), maxsplit=1))
+    if not spread:
+        return parse_value(stated, expect), 0.0
+    number = _SPREAD.fullmatch(spread[0])
+    if not value or number is None:
+        raise _uncertain(stated, expect, "a value stands before the sign, and a number behind it")
+    bare, (size, percent, unit) = re.fullmatch(_NUMBER, value), number.groups()
+    if not bare and bool(unit) == bool(percent):
+        raise _uncertain(stated, expect, "behind a value with a unit stands a number with one, or per cent")
+    level = parse_value(f"{value} {unit}" if bare else value, expect)
+    if percent and level == 0:
+        raise _uncertain(stated, expect, "a per cent of 0 is no uncertainty")
+    sd = float(size) / 100 * abs(level) if percent else parse_value(f"{size} {unit}", expect)
+    return level, _checked_sd(sd, stated, expect)
+
+
+def _spelled_out(stated: str) -> str:
+    """Of "2.42(2) kg" and "(2.42 ± 0.02) kg" "2.42 ± 0.02 kg"; any other text as it is."""
+    if concise := _CONCISE.fullmatch(stated):
+        digits, decimals, last, power, unit = concise.groups(default="0")
+        places = 0 if "." in last else len(decimals)
+        return f"{digits}e{power} ± {last}e{int(power) - places} {unit}"
+    bracketed = _BRACKETED.fullmatch(stated)
+    return " ".join(bracketed.groups()) if bracketed else stated
+
+
+def _checked_sd(sd: float, stated: object, expect: str) -> float:
+    if not 0 <= sd < math.inf:
+        raise _uncertain(stated, expect, "an uncertainty is a standard deviation, finite and not negative")
+    return sd
+
+
+def _uncertain(stated: object, expect: str, rule: str) -> RecordError:
+    return RecordError(f"'{str(stated)[:LONGEST_VALUE]}'", rule, f"write it like '2.5 ± 0.1 {expect}'")
 
 
 def parse_constant(name: str, text: str | float, expect: str) -> float:

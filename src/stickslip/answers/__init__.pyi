@@ -1,9 +1,8 @@
-from stickslip.answers.comparison import Comparison as Comparison
-from stickslip.answers.decay_comparison import DecayComparison as DecayComparison
 from stickslip.answers.decay_comparison import compare_decays as compare_decays
-from stickslip.answers.decays import DecayFindings as DecayFindings
+from stickslip.answers.decays import Decay as Decay
 from stickslip.answers.experiment import ExperimentPlan as ExperimentPlan
 from stickslip.answers.experiment import plan_experiment as plan_experiment
+from stickslip.answers.findings import Comparison as Comparison
 from stickslip.answers.findings import Findings as Findings
 from stickslip.answers.fits import fit_records as fit_records
 from stickslip.answers.frequencies import TimeFrequency as TimeFrequency
@@ -11,8 +10,6 @@ from stickslip.answers.frequencies import time_frequency as time_frequency
 from stickslip.answers.long_records import analyze_blocks as analyze_blocks
 from stickslip.answers.mending import mend as mend
 from stickslip.answers.squeak_comparison import Condition as Condition
-from stickslip.answers.squeak_comparison import SqueakComparison as SqueakComparison
 from stickslip.answers.squeak_comparison import compare_squeaks as compare_squeaks
-from stickslip.answers.squeaks import SqueakFindings as SqueakFindings
 
 __all__: list[str]

@@ -4,51 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.answers.findings import Findings
-from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result
+from stickslip.answers.findings import Comparison, Findings, require_several
+from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.law.load import LATE
 from stickslip.statistics import student
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Result):
-    """Several records side by side.
-
-    Attributes
-    ----------
-    findings : tuple of Findings
-        One per record.
-    coefficient : Estimate or None
-        Slope of the line through the origin: friction over normal load.
-    line : tuple of Estimate or None
-        Slope and friction at no load of a straight line, where three loads or more allow it.
-    notes : tuple of str
-        What could not be compared, and why.
-    """
-
-    findings: tuple[Findings, ...]
-    coefficient: Estimate | None = None
-    line: tuple[Estimate, Estimate] | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """The fitted coefficient, and the line where there is one."""
-        return (*([self.coefficient] if self.coefficient is not None else []), *(self.line or ()))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {
-            "comparison": {"estimates": [e.to_dict() for e in self.estimates], "notes": list(self.notes)},
-            "records": [findings.to_dict() for findings in self.findings],
-        }
 
 
 def compare(findings: Sequence[Findings]) -> Comparison:
@@ -84,8 +48,7 @@ def compare(findings: Sequence[Findings]) -> Comparison:
     >>> round(compare([analyze(slide(load)) for load in (2.0, 4.0, 8.0)]).coefficient.value, 2)
     0.3
     """
-    if len(findings) < 2:
-        raise EstimateError(f"{len(findings)} record", "a comparison needs two or more", "give several files")
+    require_several(findings)
     known = [f for f in findings if f.normal is not None and f.level is not None and f.level.unit == "N"]
     left_out = {
         "The normal load of {} is not known; state it to fit the coefficient.": [f for f in findings if not f.normal],
@@ -95,8 +58,9 @@ def compare(findings: Sequence[Findings]) -> Comparison:
         ],
     }
     notes = [words.format(", ".join(f.name for f in those)) for words, those in left_out.items() if those]
+    results: dict[str, Estimate | None] = dict.fromkeys(("coefficient", "slope", "offset"))
     if len(known) < 2:
-        return Comparison(tuple(findings), notes=tuple(notes))
+        return Comparison(tuple(findings), tuple(notes), results=results)
     loads = np.array([f.normal for f in known], dtype=float)
     levels, sds = (np.array([getattr(f.level, key) for f in known]) for key in ("value", "sd"))
     over = f"over {len(known)} records"
@@ -106,19 +70,18 @@ def compare(findings: Sequence[Findings]) -> Comparison:
         "friction coefficient", **slope, unit="1", method=f"slope through the origin {over}",
         checks=(f"scatter about the line {scatter:.3g} N",),
     )  # fmt: skip
-    line = None
     if len(np.unique(loads)) >= 3:
-        slope, offset = _line(np.column_stack([loads, np.ones_like(loads)]), levels, sds)
-        line = (
-            Estimate.normal("slope of the line", **slope, unit="1", method=f"straight line {over}"),
-            Estimate.normal("friction at no load", **offset, unit="N", method=f"straight line {over}"),
-        )
-        if not line[1].includes(0.0):
+        rise, rest = _line(np.column_stack([loads, np.ones_like(loads)]), levels, sds)
+        way = f"straight line {over}"
+        tilt = Estimate.normal("slope of the line", **rise, unit="1", method=way)
+        offset = Estimate.normal("friction at no load", **rest, unit="N", method=way)
+        if not offset.includes(0.0):
             coefficient = replace(coefficient, status="the line misses the origin: see friction at no load")
-        line = (line[0].within(0.0, otherwise="friction falls with the load"), line[1].within(0.0, otherwise=LATE))
+        results["slope"] = tilt.within(0.0, otherwise="friction falls with the load")
+        results["offset"] = offset.within(0.0, otherwise=LATE)
     else:
         notes.append("Fewer than three loads: whether the line passes through the origin can not be told.")
-    return Comparison(tuple(findings), coefficient, line, tuple(notes))
+    return Comparison(tuple(findings), tuple(notes), results={**results, "coefficient": coefficient})
 
 
 def _line(design: NDArray[np.float64], levels: NDArray[np.float64], sds: NDArray[np.float64]) -> list[dict[str, float]]:

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from stickslip.answers.asked import Asked
-from stickslip.answers.findings import plain, record_name
+from stickslip.answers.findings import BY_DECREMENTS, Findings, record_name
 from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.decrement import Decrement, decrement
 from stickslip.decay.envelope import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
@@ -20,19 +20,17 @@ from stickslip.decay.motions import Restoring
 from stickslip.decay.release import Releases, find_releases
 from stickslip.decay.swings import SEEN
 from stickslip.decay.which_motion import DecayMotion, choose_motion
-from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.errors import EstimateError, StickslipError
+from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
 from stickslip.units import parse_constant
-
-if TYPE_CHECKING:
-    from stickslip.record.check import Fault
-
 
 EXTREMES = "extremes alone"
 LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
 PLAIN = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
 CLEAR = 1e-3  # p-value below which a motion's rejection is no chance of one true motion in twenty
+CHANCE = 0.01  # of a record without dry friction to be told to have some
+ONE_IN_100 = 2.33 / 1.96  # by which the lower end of 95 % lies farther off where one in a hundred lies beyond it
 METHODS = ("thesis", "waveform", "all")
 OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
     "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, EXTREMES: extreme_decay,
@@ -59,17 +57,11 @@ class BothFrictions(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DecayFindings(Result):
-    """What a record says about the damping of a free decay.
+class Decay(Result):
+    """What a free decay tells of its damping, by every way of asking.
 
     Attributes
     ----------
-    name : str
-        The record's name.
-    record : Record
-        The record.
-    faults : tuple of Fault
-        What the check-up found in it.
     releases : Releases
         Where something is let go.
     waveform : DecayFit or None
@@ -80,22 +72,20 @@ class DecayFindings(Result):
         Which motion it was, of all those that a decay may follow.
     older : mapping of str to EnvelopeDecay
         What the older methods say, for comparison.
-    notes : tuple of str
-        What could not be asked, and why.
-    settings : mapping
-        What was chosen and stated.
+    mass, stiffness : float or None
+        Of the oscillator, where stated.
+    refusal : StickslipError or None
+        Why it could not be read from the whole waveform, where that was asked in vain.
     """
 
-    name: str
-    record: Record
-    faults: tuple[Fault, ...]
     releases: Releases
     waveform: DecayFit | None = None
     thesis: Decrement | None = None
     motion: DecayMotion | None = None
     older: Mapping[str, EnvelopeDecay] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    mass: float | None = None
+    stiffness: float | None = None
+    refusal: StickslipError | None = None
 
     @property
     def best(self) -> BothFrictions:
@@ -147,30 +137,73 @@ class DecayFindings(Result):
 
     def as_force(self, displacement: Estimate, name: str) -> Estimate | None:
         """A displacement of the spring as its force, where the mass or the stiffness is stated."""
-        spring = self.settings.get("stiffness")
-        if spring is None and self.settings.get("mass") is not None:
-            spring = self.settings["mass"] * (2 * math.pi * self.best.frequency.value) ** 2
+        spring = self.stiffness
+        if spring is None and self.mass is not None:
+            spring = self.mass * (2 * math.pi * self.best.frequency.value) ** 2
         if spring is None:
             return None
         unit, word = ("N m", "torque") if displacement.unit == "rad" else ("N", "force")
         return displacement.scaled(spring, unit, name.replace("force", word))
 
     @property
+    def rubs(self) -> bool:
+        """Whether there is dry friction: records without it would show as much in fewer than one of a hundred.
+
+        Every motion tried that has none is spoken against so clearly; where none was tried, the interval says it.
+        """
+        dry = self.best.dry_displacement
+        fits = self.waveform.motions if self.waveform is not None and self.waveform.motions else ()
+        tried = [each.choice for each in fits or ([] if self.motion is None else [self.motion])]
+        without = [
+            len(tried) * min(choice.candidate(each.name).p_value for choice in tried)
+            for each in (tried[0].candidates if tried else ())
+            if "dry_displacement" not in each.fitted.motion.terms
+        ]
+        if without:
+            return dry.interval[0] > 0 and max(without) < CHANCE
+        return dry.value - ONE_IN_100 * (dry.value - dry.interval[0]) > 0
+
+    @property
+    def denied(self) -> bool:
+        """Whether the record speaks against viscous and dry friction, and for none of the other motions."""
+        negative = self.best.dry_displacement.interval[1] < 0
+        return self.best is not self.motion and (self.against < CLEAR or negative)
+
+    @property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Every number found, the best answer first; the decrements' are named so where both methods answer."""
+        """Every number found: those that are quoted, then the same by other ways."""
+        return (*self.quoted, *self.beside)
+
+    @property
+    def quoted(self) -> tuple[Estimate, ...]:
+        """The best answer's numbers, with one damping ratio: that of whichever motion, where its own is denied."""
         force = self.dry_force
         found = [] if force is None else [force]
         if self.motion is not None and self.best is self.motion:
             found += [*self.motion.terms, self.motion.frequency, *self.whichever]
-        elif self.waveform is None and self.thesis is None:
+        elif self.waveform is None:
             found += self.best.estimates
-        elif self.waveform is not None:
+        else:
             found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
             found += [] if self.waveform.motions else self.whichever
-        if self.thesis is not None:
-            also = ", by decrements" if self.best is not self.thesis else ""
-            found += [replace(each, name=f"{each.name}{also}") for each in self.thesis.estimates]
-        return tuple(found)
+        other = self._other_ratio
+        return tuple(each for each in found if each is not other)
+
+    @property
+    def beside(self) -> tuple[Estimate, ...]:
+        """The other damping ratio, and what the decrements say where they are not the best answer."""
+        other, more = (
+            self._other_ratio,
+            () if self.thesis is None or self.best is self.thesis else self.thesis.estimates,
+        )
+        found = [replace(each, name=f"{each.name}{BY_DECREMENTS}") for each in more]
+        return tuple(found) if other is None else (other, *found)
+
+    @property
+    def _other_ratio(self) -> Estimate | None:
+        """The damping ratio that is not quoted, where there are two: of the motion, and of whichever it was."""
+        either = self.whichever[0] if self.whichever and self.best is not self.thesis else None
+        return self.best.damping_ratio if either is not None and self.denied else either
 
     @property
     def comparisons(self) -> tuple[Estimate, ...]:
@@ -184,68 +217,16 @@ class DecayFindings(Result):
             if estimate is not None
         )
 
-    def true_value(self, estimate: Estimate) -> float | None:
-        """The true value of what was estimated, where the record is simulated and tells it."""
-        true = self.record.truth.get(estimate.name.removesuffix(", by decrements"))
-        return None if true is None else float(true)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON: settings, releases, estimates, bounds, faults, notes and history."""
-        told: dict[str, Any] = {
-            "name": self.name,
-            "faults": [str(fault) for fault in self.faults],
-            "settings": dict(self.settings),
-            "model": self.best.model,
-            "status": self.best.status,
-            "releases": [
-                {
-                    "release": each.release, "stop": each.stop, "held": each.held, "stopped": each.stopped,
-                    "channel": each.channel, "unit": each.unit, "amplitude": each.amplitude, "rest": each.rest,
-                    "noise": each.noise, "step": each.step, "extremes": len(each.turns), "status": each.status,
-                }
-                for each in self.releases.ring_downs
-            ],
-            "estimates": [estimate.to_dict() for estimate in self.estimates],
-            "motions": [] if self.motion is None else [
-                {"name": name, "words": words, "verdict": verdict} for name, words, verdict in self.motion.candidates
-            ],
-            "viscous_residual": self.viscous_residual,
-            "comparisons": [estimate.to_dict() for estimate in self.comparisons],
-            "decrements": None if self.thesis is None else _decrements(self.thesis),
-            "truth": dict(self.record.truth),
-            "notes": list(self.notes),
-            "history": [step.to_dict() for step in self.record.history],
-        }  # fmt: skip
-        return {key: plain(value) for key, value in told.items()}
-
-
-def _decrements(found: Decrement) -> dict[str, Any]:
-    """Extremes, and the table of the bounds, for JSON."""
-    bounds = found.bounds
-    rows = ("m", "rate", "rate_first_order", "rate_worst", "dry", "dry_first_order", "dry_worst")
-    return {
-        "extremes": {"time": found.time.tolist(), "value": found.extremes.tolist(), "sd": found.sd.tolist()},
-        "differences": found.differences.tolist(),
-        "bounds": {
-            "i": bounds.i, "best_m": bounds.best, "error": bounds.error,
-            **{name: getattr(bounds, name).tolist() for name in rows},
-        },
-        "scatter": {
-            name: {"mean": float(values.mean()), "sd": float(values.std())}
-            for name, values in vars(found.scatter).items() if len(values)
-        },
-    }  # fmt: skip
-
 
 def analyze_decay(
     record: Record,
     *,
     method: str = "all",
     channel: str | None = None,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
     restoring: Restoring = "linear",
-) -> DecayFindings:
+) -> Findings:
     """How much viscous and how much dry friction does a free decay show, by every way of asking?
 
     The check-up, the releases (:func:`find_releases`), the whole waveform (:func:`fit_decay`), the decrements of the
@@ -260,7 +241,7 @@ def analyze_decay(
         Which questions are asked: all, those of the whole waveform, or the decrements alone.
     channel : str, optional
         Which channel; the first of these when left out.
-    mass, stiffness : float or str, optional
+    mass, stiffness : float, str, tuple or Estimate, optional
         Mass [kg] or stiffness [N/m] (of an angle: kg m^2, N m/rad), for the dry friction as a force.
     restoring : {"linear", "pendulum"}
         The spring's law: x, or sin x of a pendulum's angle. The decrements hold for x alone: a pendulum's extremes are
@@ -268,7 +249,8 @@ def analyze_decay(
 
     Returns
     -------
-    DecayFindings
+    Findings
+        With :class:`~stickslip.answers.Decay` as ``decay``.
 
     Raises
     ------
@@ -283,7 +265,7 @@ def analyze_decay(
     >>> slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
     >>> run = ss.simulate(slider, duration=40.0, start={"x": 1.0})
     >>> found = analyze_decay(run.record(fs=100), method="thesis", stiffness=10.0)
-    >>> round(found.best.damping_ratio.value, 3), round(found.dry_force.value, 2)
+    >>> round(found.decay.best.damping_ratio.value, 3), round(found.decay.dry_force.value, 2)
     (0.032, 0.2)
     """
     if method not in METHODS:
@@ -299,10 +281,10 @@ def analyze_decay(
     faults = tuple(each for each in record.check() if (each.kind, each.channel) != ("drift", used))  # a hold is none
     constants = _constants(used, mass=mass, stiffness=stiffness)
     asked = Asked(list(releases.notes))
-    waveform = thesis = motion = None
+    waveform = thesis = motion = refusal = None
     if method != "thesis":
         way: dict[str, Any] = {"channel": used, "restoring": restoring}
-        waveform, motion = _by_waveform(record, asked, way, constants, displaced=displaced)
+        waveform, motion, refusal = _by_waveform(record, asked, way, constants, displaced=displaced)
     if method != "waveform" and restoring == "linear":
         thesis = asked.ask("The decrements", partial(decrement, record, channel=used))
     last = asked.refusals[-1:]
@@ -314,31 +296,35 @@ def analyze_decay(
     }
     if waveform is None and thesis is None and motion is None and (restoring == "linear" or not older):
         raise last[0]
-    return DecayFindings(
-        record_name(record), record, faults, releases, waveform, thesis, motion, older,
-        tuple(dict.fromkeys(asked.notes)), {"method": method, "channel": used, "restoring": restoring, **constants},
-    )  # fmt: skip
+    decay = Decay(releases, waveform, thesis, motion, older, refusal=refusal, **constants)
+    settings = {"method": method, "channel": used, "restoring": restoring, **constants}
+    notes = tuple(dict.fromkeys(asked.notes))
+    return Findings(record_name(record), record, faults, notes=notes, settings=settings, results={"decay": decay})
 
 
-def _constants(channel: str, **stated: float | str | None) -> dict[str, Any]:
+def _constants(channel: str, **stated: Constant | None) -> dict[str, Any]:
     """Mass and stiffness where stated, in SI."""
     units = rig_units(channel)
-    return {name: parse_constant(name, value, units[name]) for name, value in stated.items() if value is not None}
+    known = {name: Estimate.stated(name, value, units[name]) for name, value in stated.items() if value is not None}
+    return {name: parse_constant(name, float(constant), units[name]) for name, constant in known.items()}
 
 
 def _by_waveform(
     record: Record, asked: Asked, way: dict[str, Any], constants: dict[str, Any], *, displaced: bool
-) -> tuple[DecayFit | None, DecayMotion | None]:
+) -> tuple[DecayFit | None, DecayMotion | None, StickslipError | None]:
     """The whole waveform, and of a displacement which motion it was; the latter alone where nothing fits the former."""
     fit = partial(fit_decay, record, **way, **constants)
     waveform = asked.ask("Which motion", partial(fit, candidates="all")) if displaced else None
     waveform = waveform or asked.ask("The whole waveform", fit)
     if waveform is None:
-        return None, asked.ask("Which motion", partial(choose_motion, record, **way)) if displaced else None
+        refusal = asked.refusals[-1]
+        return None, asked.ask("Which motion", partial(choose_motion, record, **way)) if displaced else None, refusal
     motion = waveform.motions[0] if waveform.motions else None
     waveform = asked.ask("The whole waveform", partial(_followed, waveform, way["restoring"]))
+    if waveform is not None:
+        return waveform, motion, None
     unsure = motion is not None and motion.choice.status != "ok"
-    return waveform, None if waveform is None and unsure else motion
+    return None, None if unsure else motion, asked.refusals[-1]
 
 
 def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.balance.balance import ALONE
 from stickslip.balance.likely_contact import STRAYING
-from stickslip.balance.load_cell import ALONE
 from stickslip.consistent.contradictions import Consistency
 from stickslip.errors import StickslipError
 from stickslip.estimate import Doubt, Estimate, Status, stands

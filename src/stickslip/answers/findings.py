@@ -1,36 +1,51 @@
-"""What was found in one record: every answer, what keeps it from being sure, and what was not asked."""
+"""What was found: of one record every answer by its name, of several what they tell together."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
-
-from stickslip.balance.felt_and_computed import ForceComparison
-from stickslip.balance.lag import SensorDelay
-from stickslip.balance.pull import Pull
-from stickslip.consistent.contradictions import Consistency
-from stickslip.contact.cause import Cause
-from stickslip.contact.sliding_onset import TransitionSpeed
-from stickslip.cycle.before_slip import Presliding
-from stickslip.cycle.loops import Loops
-from stickslip.cycle.onset import Breakaway
-from stickslip.cycle.regression import Regression
-from stickslip.cycle.sticks import Sticks
+from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record
-from stickslip.twin.trial import Trial
 
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
 
+# Answers that may be unsure as wholes, and what they are called then.
+WHOLES = {
+    "loops": "friction loops",
+    "consistency": "consistency",
+    "delay": "sensor delay",
+    "comparison": "comparison of the forces",
+}
+BY_DECREMENTS = ", by decrements"  # behind the name of a number that another method gave already
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Findings(Result):
-    """What a record says about its friction.
+class Answers(Result):
+    """Results by name, each of them an attribute, too; None where a question was asked in vain."""
+
+    results: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+
+    def __getattr__(self, name: str) -> Any:
+        results = vars(self).get("results", {})  # none while it is unpickled
+        if name not in results:
+            raise AttributeError(f"there is no result '{name}'; there are {', '.join(results) or 'none'}")
+        return results[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self.results]
+
+    def having(self, **results: Any) -> Self:
+        """The same with other results."""
+        return replace(self, results={**self.results, **results})
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Findings(Answers):
+    """What one record tells.
 
     Attributes
     ----------
@@ -38,55 +53,34 @@ class Findings(Result):
         The record's name: its file, or what the caller called it.
     record : Record
         The record, with the channel ``friction`` where it could be found.
+    results : mapping
+        What each question found, by its name, which is an attribute, too; None where it found no answer. Of
+        :func:`~stickslip.analyze`: ``loops``, ``regression`` and ``asymmetric`` (both directions by themselves),
+        ``sticks``, ``breakaway``, ``stiffness``, ``contact_damping``, ``transition``, ``coupled``, ``cause``,
+        ``consistency``, ``presliding``, ``pull``, ``delay`` (of the accelerometer), ``comparison`` (of the friction
+        felt and computed) and ``trial`` (of its twins, by :func:`~stickslip.tried`). Of
+        :func:`~stickslip.analyze_decay`: ``decay``. Of :func:`~stickslip.analyze_squeaks`: ``squeaks``, ``beside``,
+        ``loops``, ``coupling``, ``spectra``, ``quality`` and ``impulses``.
     faults : tuple of Fault
         What the check-up found in the record as it was given.
-    loops, regression, asymmetric, sticks : Loops, Regression, Regression, Sticks or None
-        The answers to the questions that could be asked; `asymmetric` lets both directions differ.
-    breakaway, presliding, pull : Breakaway, Presliding, Pull or None
-        How it begins to slip, what it does before, and of a force alone how a pulled slider moves.
-    stiffness, contact_damping : Estimate or None
-        Of the contact while it holds, from all sensors together.
-    transition : TransitionSpeed or None
-        Speed at which the contact begins to slide after the motion has turned.
-    coupled : Estimate or None
-        Frequency at which the mass rings while the contact holds.
-    cause : Cause or None
-        Whether a lag of the sensors or a contact that gives way makes the friction turn late.
-    consistency : Consistency or None
-        What of the record and the rig's constants can not all be true.
-    delay : SensorDelay or None
-        Of the accelerometer behind the displacement.
-    comparison : ForceComparison or None
-        The friction felt by the load cell against the friction computed from the motion.
-    trial : Trial or None
-        What came of its twins, where it was tried on them: see :func:`~stickslip.tried`.
     normal : float or None
         Normal load [N] on the contact, where stated or measured.
     notes : tuple of str
         What could not be asked, and why; what was assumed.
     settings : mapping
         The constants and choices that the answers rest on.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> found = ss.analyze(ss.datasets.demo(), mass=2.42, stiffness=2310, damping=0.12)
+    >>> found.loops is found.results["loops"], found.pull is None
+    (True, True)
     """
 
     name: str
     record: Record
     faults: tuple[Fault, ...] = ()
-    loops: Loops | None = None
-    regression: Regression | None = None
-    asymmetric: Regression | None = None
-    sticks: Sticks | None = None
-    breakaway: Breakaway | None = None
-    presliding: Presliding | None = None
-    pull: Pull | None = None
-    stiffness: Estimate | None = None
-    contact_damping: Estimate | None = None
-    transition: TransitionSpeed | None = None
-    coupled: Estimate | None = None
-    cause: Cause | None = None
-    consistency: Consistency | None = None
-    delay: SensorDelay | None = None
-    comparison: ForceComparison | None = None
-    trial: Trial | None = None
     normal: float | None = None
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -94,70 +88,98 @@ class Findings(Result):
     @property
     def level(self) -> Estimate | None:
         """The sliding friction, where it is known: from the loops, or the Coulomb term of the regression."""
-        told = self.loops.level if self.loops is not None else None
-        if self.loops is None and self.regression is not None:
-            told = self.regression.coulomb
+        loops, regression = self.results.get("loops"), self.results.get("regression")
+        told: Estimate | None = loops.level if loops is not None else regression and regression.coulomb
         return told if told is not None and told.known else None
 
     @property
     def coefficient(self) -> Estimate | None:
         """Sliding friction over the normal load, where both are known."""
-        if self.level is None or self.normal is None or self.level.unit != "N":
+        return self._over_load(self.level, "1", "friction coefficient")
+
+    @property
+    def slope_of_coefficient(self) -> Estimate | None:
+        """Change of the coefficient of friction with speed [s/m], where the load is known."""
+        loops = self.results.get("loops")
+        return loops and self._over_load(loops.slope, "s/m", "slope of the friction coefficient against speed")
+
+    def _over_load(self, found: Estimate | None, unit: str, name: str) -> Estimate | None:
+        if found is None or self.normal is None or self.level is None or self.level.unit != "N":
             return None
-        return self.level.scaled(1 / self.normal, "1", "friction coefficient")
+        return found.scaled(1 / self.normal, unit, name)
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number found, in the order of asking."""
-        level = [self.coefficient] if self.coefficient is not None else []
-        found = list(level)
-        for answer in vars(self).values():
-            found += (
-                answer.estimates if isinstance(answer, Result) else [answer] if isinstance(answer, Estimate) else []
-            )
         first: dict[str, Estimate] = {}
-        for estimate in found:
+        for estimate in _numbers((self.coefficient, self.slope_of_coefficient, *self.results.values())):
             first.setdefault(estimate.name, estimate)
         return tuple(first.values())
 
     @property
+    def quoted(self) -> tuple[Estimate, ...]:
+        """The numbers that lead, without those that a result tells by other ways, too."""
+        beside = [estimate for result in self.results.values() for estimate in getattr(result, "beside", ())]
+        return tuple(estimate for estimate in self.estimates if estimate not in beside)
+
+    @property
     def doubts(self) -> tuple[tuple[str, str], ...]:
         """The answers that are not sure as wholes, and what each says of it."""
-        names = {
-            "delay": "sensor delay",
-            "comparison": "comparison of the forces",
-            "loops": "friction loops",
-            "consistency": "consistency",
-        }
-        told = ((names.get(name, name), getattr(value, "status", "ok")) for name, value in vars(self).items())
-        return tuple((name, status) for name, status in told if status != "ok" and name in names.values())
+        told = ((name, getattr(self.results.get(key), "status", "ok")) for key, name in WHOLES.items())
+        return tuple((name, status) for name, status in told if status != "ok")
 
     @property
     def contradiction(self) -> str:
         """What slip of the hand in the channels forbids to trust any force, in words; else empty."""
-        return self.consistency.slip if self.consistency is not None else ""
+        consistency = self.results.get("consistency")
+        return consistency.slip if consistency is not None else ""
 
     def true_value(self, estimate: Estimate) -> float | None:
         """The true value of what was estimated, where the record is simulated and tells it."""
-        true = self.record.truth.get(estimate.name)
+        true = self.record.truth.get(estimate.name.removesuffix(BY_DECREMENTS))
         return None if true is None else float(true)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON: settings, estimates, faults, notes and history."""
-        told = {
-            "name": self.name,
-            "faults": [str(fault) for fault in self.faults],
-            "contradiction": self.contradiction,
-            "settings": dict(self.settings),
-            "normal_load": self.normal,
-            "estimates": [estimate.to_dict() for estimate in self.estimates],
-            "regression_residual": None if self.regression is None else self.regression.residual,
-            "truth": dict(self.record.truth),
-            **({} if self.trial is None else {"twins": self.trial.to_dict()}),
-            "notes": list(self.notes),
-            "history": [step.to_dict() for step in self.record.history],
-        }
-        return {key: plain(value) for key, value in told.items()}
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Answers):
+    """Several records side by side, and what they tell together.
+
+    Attributes
+    ----------
+    findings : tuple of Findings
+        One per record.
+    results : mapping
+        By name, which is an attribute, too. Of :func:`~stickslip.compare`: ``coefficient``, the slope of friction over
+        normal load through the origin, and of a straight line, where three loads or more allow it, ``slope`` and
+        ``offset``; :func:`~stickslip.answers.compare_decays` and :func:`~stickslip.answers.compare_squeaks` say theirs.
+    notes : tuple of str
+        What could not be compared, and why.
+    """
+
+    findings: tuple[Findings, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every number that they tell together."""
+        return tuple(result for result in self.results.values() if isinstance(result, Estimate))
+
+
+def require_several(findings: Sequence[Findings]) -> None:
+    """Refuse to compare one record with nothing."""
+    if len(findings) < 2:
+        raise EstimateError(f"{len(findings)} record", "a comparison needs two or more", "give several files")
+
+
+def _numbers(results: Iterable[Any]) -> list[Estimate]:
+    """The estimates among results, and those that results are made of."""
+    numbers: list[Estimate] = []
+    for result in results:
+        if isinstance(result, Estimate):
+            numbers.append(result)
+        elif isinstance(result, Result):
+            numbers += result.estimates
+    return numbers
 
 
 def record_name(record: Record) -> str:
@@ -167,18 +189,3 @@ def record_name(record: Record) -> str:
     if reads:
         return " + ".join(file["name"] for file in reads[-1])
     return "simulated record" if record.truth else "record"
-
-
-def plain(value: Any) -> Any:
-    """Plain JSON data of anything that settings, truth or history may hold; a number not finite becomes None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, (bool, int, str)) else str(value)

@@ -13,7 +13,7 @@ from stickslip.law.start import CALIBRATION
 from stickslip.law.which_law import LawComparison, compare_laws
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
-from stickslip.record.record import Record
+from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.settings import RigSettings
 
 FRICTION = {"friction", "coefficient"}
@@ -132,14 +132,15 @@ def _oscillator(rig: RigSettings, system: object) -> Oscillator:
             f"give {' and '.join(f'{name}=' for name in missing)}",
         )  # fmt: skip
     drive = BASE if rig.contact == "base" else Release()
-    return Oscillator(**constants, damping=rig.damping or 0.0, damper=rig.damper, law=Coulomb(1.0), drive=drive)
+    numbers = {name: float(value or 0.0) for name, value in {**constants, "damping": rig.damping}.items()}
+    return Oscillator(**numbers, damper=rig.damper, law=Coulomb(1.0), drive=drive)
 
 
 def _with_stated(system: Oscillator, rig: RigSettings) -> Oscillator:
     """The oscillator with what the settings state of it in front."""
     words = ("mass", "stiffness", "damping", "damper", "contact")
     stated = {name: getattr(rig, name) for name in words if name in rig.model_fields_set}
-    stated = {name: value for name, value in stated.items() if value is not None}
+    stated = {n: float(v) if n in RIG_UNITS else v for n, v in stated.items() if v is not None}
     if "contact" in stated and not hasattr(system.drive, "contact"):
         if stated.pop("contact") == "base" and not isinstance(system.drive, Release):
             raise ModelError(

@@ -18,7 +18,7 @@ from stickslip.contact.microslip import MicroSlips, microslips_of
 from stickslip.contact.ringing import Ringing, checked_mass, find_ringing
 from stickslip.cycle.slips import SlipRinging, slip_ringing
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
 from stickslip.signals.ridges import Ridge, Spike, find_ridges, find_spikes
 from stickslip.signals.wavelet import wavelet_map, wavelet_overview
@@ -116,8 +116,8 @@ def time_frequency(
     frequencies: ArrayLike | str | None = None,
     wavelet_frequency: float = CENTRE,
     normalisation: str = "energy",
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
 ) -> TimeFrequency:
     """Ask a channel everything about time and frequency: the map, ridges, spikes, and what the sticks tell.
 
@@ -135,7 +135,7 @@ def time_frequency(
         As in :func:`wavelet_map`.
     normalisation : {"energy", "amplitude"}
         As in :func:`wavelet_map`.
-    mass, stiffness : float or str, optional
+    mass, stiffness : float, str, tuple or Estimate, optional
         Oscillating mass [kg] and spring [N/m], for the contact's stiffness.
 
     Returns
@@ -191,7 +191,7 @@ def time_frequency(
 
 
 def _spikes_and_sticks(
-    record: Record, name: str, mass: float | str | None, stiffness: float | str | None
+    record: Record, name: str, mass: Constant | None, stiffness: Constant | None
 ) -> tuple[dict[str, Any], list[str]]:
     """What is asked beside the map, and why some of it has no answer."""
     if len(record) < LEAST:

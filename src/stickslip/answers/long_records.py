@@ -93,8 +93,10 @@ def analyze_blocks(
         )
     told = f"The record was analysed in {number} blocks, {size} samples in all; numbers are means over them. {shown}"
     notes = [note for note, _ in Counter(note for each in found for note in each.notes).most_common()]
-    whole: Findings = _together(found)
-    return replace(whole, record=kept, notes=(told, *refused, *notes))
+    middle = found[len(found) // 2]
+    results = {name: _joined([each.results[name] for each in found], middle.results[name]) for name in middle.results}
+    faults = tuple(fault for each in found for fault in each.faults)
+    return replace(middle, record=kept, results=results, faults=faults, notes=(told, *refused, *notes))
 
 
 def _first_row(record: Record) -> Record:
@@ -109,19 +111,26 @@ def _together(parts: Sequence[Any]) -> Any:
     joined: dict[str, Any] = {}
     for name in (field.name for field in fields(middle)):
         values = [getattr(part, name) for part in parts]
-        present = [value for value in values if value is not None]
-        kind = present[0] if present else None
-        if isinstance(kind, Estimate):
-            joined[name] = _mean(present)
-        elif isinstance(kind, Result) and not isinstance(kind, Findings):
-            joined[name] = _together(present)
-        elif name in TIMES:
-            joined[name] = np.concatenate(present)
-        elif name in ("events", "faults"):
-            joined[name] = tuple(each for value in present for each in value)
-        elif isinstance(kind, str):
-            joined[name] = Counter(present).most_common(1)[0][0]
+        if name in TIMES:
+            joined[name] = np.concatenate(values)
+        elif name == "events":
+            joined[name] = tuple(event for value in values for event in value)
+        else:
+            joined[name] = _joined(values, getattr(middle, name))
     return replace(middle, **joined)
+
+
+def _joined(values: Sequence[Any], otherwise: Any) -> Any:
+    """A number, a part of an answer or words of several blocks as one; of anything else what the middle one has."""
+    present = [value for value in values if value is not None]
+    kind = present[0] if present else None
+    if isinstance(kind, Estimate):
+        return _mean(present)
+    if isinstance(kind, Result):
+        return _together(present)
+    if isinstance(kind, str):
+        return Counter(present).most_common(1)[0][0]
+    return otherwise
 
 
 def _mean(estimates: Sequence[Estimate]) -> Estimate:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -17,7 +18,7 @@ from stickslip.errors import StickslipError
 from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record
 from stickslip.twin.belief import believe
-from stickslip.twin.trial import Trial, try_on_twins
+from stickslip.twin.trial import GIVES, Trial, try_on_twins
 
 Answer = TypeVar("Answer", Loops | None, Sticks | None, Breakaway | None)
 ASKED = (friction_loops, find_sticks, breakaway, presliding)
@@ -69,42 +70,61 @@ def tried(
     belief = believe(findings.record)
     answers = {estimate.name: estimate for estimate in findings.estimates}
     trial = try_on_twins(belief, answers, partial(_ask, like=findings.record), count=twins, rng=rng, progress=progress)
-    return replace(
-        findings,
+    answered = findings.having(
         loops=_with(findings.loops, trial.estimates),
         sticks=_with(findings.sticks, trial.estimates),
         breakaway=_with(findings.breakaway, trial.estimates),
         presliding=_yields(findings.presliding, trial),
         trial=trial,
-        notes=(*findings.notes, _note(trial)),
     )
+    return replace(answered, notes=(*findings.notes, _note(trial)))
 
 
 def _note(trial: Trial) -> str:
-    law = trial.belief.law
     return (
-        f"Tried on {trial.count} twins: simulated rigs with the constants as stated and the law f = {law.kinetic:.4g} "
-        f"N sgn v + {law.slope:.4g} N s/m v, whose sensors have the noise and the counts of the record's. What the "
-        "same questions get wrong of them is taken off, and the intervals are as wide as their errors."
+        f"Tried on {trial.count} twins: simulated rigs with {trial.belief}, whose sensors have the noise and the "
+        "counts of the record's. What the same questions get wrong of them is taken off, and the intervals are as wide "
+        "as their errors."
     )
 
 
-def _yields(found: Presliding | None, trial: Trial) -> Presliding | None:
-    """What a contact does before it slips, as far as rigid twins do not show it too, or are like the record."""
-    power = trial.yields
-    if found is not None and power is not None and not power.claimed:
-        why = (
-            f"twins of a rigid contact seem to give way by {power.null:.3g} m/N too, and {power.felt:.3g} m/N would be "
-            "needed"
-        )
-    elif found is not None and found.verdict == "rigid" and trial.unlike:
-        why = f"x strays {trial.strays:.2g} times as far from the twins of a rigid contact as noise explains"
+def _yields(quick: Presliding | None, trial: Trial) -> Presliding | None:
+    """What a contact does before it slips, by the fit to x where it tells; not what rigid twins show too."""
+    if quick is None:
+        return None
+    stiffness, power = trial.estimates.get(GIVES), trial.yields
+    if stiffness is not None:
+        return _telling(quick, "gives way", f"a contact of {stiffness} leaves less of x than a rigid one", stiffness)
+    if trial.unlike:
+        why = f"x strays {trial.strays:.2g} times as far from its twins as noise explains"
+    elif power is None:
+        why = "a contact that gives way would not have moved x enough to be seen"
     else:
-        return found
-    unknown = (found.compliance_forward.unknown(why), found.compliance_back.unknown(why))
+        return _telling(quick, "rigid", f"a contact softer than {1 / power.felt:.3g} N/m would have been seen in x")
+    return _telling(quick, "can not be told", why)
+
+
+def _telling(quick: Presliding, verdict: str, why: str, stiffness: Estimate | None = None) -> Presliding:
+    """Another verdict on how a contact gives way, both directions alike."""
+    sides = (quick.compliance_forward, quick.compliance_back)
+    if verdict == "rigid":
+        forward, back = sides
+    elif stiffness is None:
+        forward, back = (side.unknown(why) for side in sides)
+    else:
+        low, high = stiffness.interval
+        ends = (1 / high, 1 / low if low > 0 else math.inf)
+        sd = stiffness.sd / stiffness.value**2
+        forward, back = (
+            replace(
+                side, value=1 / stiffness.value, interval=ends, sd=sd, method=stiffness.method, status=stiffness.status
+            )
+            for side in sides
+        )
     return replace(
-        found, stiffness=None, stiffness_forward=None, stiffness_back=None, backlash=None,
-        compliance_forward=unknown[0], compliance_back=unknown[1], verdict="can not be told", evidence=why,
+        quick, stiffness=stiffness, stiffness_forward=None, stiffness_back=None, backlash=None,
+        compliance_forward=forward, compliance_back=back, verdict=verdict, evidence=why,
+        status="ok" if stiffness is None else stiffness.status,
     )  # fmt: skip
 
 

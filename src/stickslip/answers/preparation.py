@@ -127,7 +127,7 @@ def _weighed(record: Record, rig: RigSettings, asked: Asked) -> RigSettings:
     ends = {"damper": rig.damper, "contact": rig.contact}
     found = asked.ask(
         "Mass and stiffness",
-        lambda: mass_and_stiffness(middle(record, STRETCH), damping=rig.damping or 0.0, **ends),
+        lambda: mass_and_stiffness(middle(record, STRETCH), damping=float(rig.damping or 0.0), **ends),
         aside=True,
     )
     if found is None:

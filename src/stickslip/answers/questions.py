@@ -34,7 +34,7 @@ from stickslip.cycle.onset import breakaway
 from stickslip.cycle.regression import regress_friction
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Status
+from stickslip.estimate import Constant, Status
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record
 from stickslip.rig.settings import RigSettings
@@ -46,9 +46,9 @@ def analyze(
     record: Record,
     *,
     rig: RigSettings | None = None,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
-    damping: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
+    damping: Constant | None = None,
     damper: str | None = None,
     contact: str | None = None,
     method: str = "auto",
@@ -69,7 +69,7 @@ def analyze(
         applied ``force`` [N].
     rig : RigSettings, optional
         The rig's constants, as :func:`read_rig` returns them; the arguments below go before it.
-    mass, stiffness, damping : float or str, optional
+    mass, stiffness, damping : float, str, tuple or Estimate, optional
         Oscillating mass [kg], spring [N/m], viscous damping [N s/m]; or text with a unit ("250 g").
     damper, contact : {"ground", "base"}, optional
         What the damper ends on, and what the mass slides on; the ground unless stated.
@@ -117,11 +117,11 @@ def analyze(
     answers["loops"] = _late(answers.get("loops"), record, rig)
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
-    return Findings(
-        name, whole, faults, **answers, delay=made.delay, comparison=made.comparison,
-        normal=normal_load(record, rig, name, asked.notes), notes=tuple(asked.notes),
-        settings={**_told(whole), "contact": slid},
-    )  # fmt: skip
+    names = [question.key for question in QUESTIONS]
+    results = {**dict.fromkeys(names), **answers, "delay": made.delay, "comparison": made.comparison, "trial": None}
+    normal = normal_load(record, rig, name, asked.notes)
+    settings = {**_told(whole), "contact": slid}
+    return Findings(name, whole, faults, normal, tuple(asked.notes), settings, results=results)
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class Question:
     Attributes
     ----------
     key : str
-        The attribute of :class:`Findings` that holds the answer.
+        The name of its answer among the results.
     name : str
         In words.
     needs : tuple of tuple of str
@@ -177,6 +177,11 @@ def _answer(question: Question, whole: Record, fused: Callable[[], Record], slid
 FORCE = ("load", "force", "friction")
 QUESTIONS = (
     Question("loops", "Friction loops", (("friction",), MOTION), lambda r, on: friction_loops(r, contact=on)),
+    Question("regression", "Regression", (("force",), MOTION), lambda r, on: regress_friction(r)),
+    Question(
+        "asymmetric", "Regression of each direction", (("force",), MOTION),
+        lambda r, on: regress_friction(r, symmetric=False), follows="regression",
+    ),
     Question("sticks", "Sticks and slips", (MOTION,), lambda r, on: find_sticks(r, contact=on)),
     Question("breakaway", "Breakaway", (("friction",), MOTION), lambda r, on: breakaway(r, contact=on)),
     Question(
@@ -205,11 +210,6 @@ QUESTIONS = (
     Question(
         "presliding", "Presliding", (("friction",), MOTION), lambda r, on: presliding(r, contact=on),
         unless="stiffness",
-    ),
-    Question("regression", "Regression", (("force",), MOTION), lambda r, on: regress_friction(r)),
-    Question(
-        "asymmetric", "Regression of each direction", (("force",), MOTION),
-        lambda r, on: regress_friction(r, symmetric=False), follows="regression",
     ),
     Question(
         "pull", "Pulled slider", (FORCE,),
@@ -262,7 +262,8 @@ def _told(record: Record) -> dict[str, Any]:
         return {}
     if Balance.of(record.rig) is None:
         return {}
-    return {key.replace("method", "differentiation"): getattr(record.rig, key) for key in (*CONSTANTS, "method")}
+    told = {key.replace("method", "differentiation"): getattr(record.rig, key) for key in (*CONSTANTS, "method")}
+    return told | ({"sd": dict(record.rig.sd)} if record.rig is not None and record.rig.sd else {})
 
 
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from stickslip.answers.findings import plain
-from stickslip.answers.squeaks import SqueakFindings, trend_of
-from stickslip.errors import EstimateError
+from stickslip.answers.findings import Comparison, Findings, require_several
+from stickslip.answers.squeaks import trend_of
 from stickslip.estimate import Estimate
 
 
@@ -80,48 +78,8 @@ class Condition:
         """Whether friction "falls" or "rises" with speed; "flat or not told" where the slope's interval holds zero."""
         return trend_of(self.slope)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        told = {key: value.to_dict() if isinstance(value, Estimate) else value for key, value in vars(self).items()}
-        return {key: plain(value) for key, value in {**told, "trend": self.trend}.items()}
 
-
-@dataclass(frozen=True, eq=False)
-class SqueakComparison:
-    """Several conditions side by side.
-
-    Attributes
-    ----------
-    findings : tuple of SqueakFindings
-        One per record.
-    conditions : tuple of Condition
-        The same in a row each.
-    verdicts : tuple of str
-        What the conditions say together, in sentences.
-    notes : tuple of str
-        What was left out, and why.
-    """
-
-    findings: tuple[SqueakFindings, ...]
-    conditions: tuple[Condition, ...]
-    verdicts: tuple[str, ...]
-    notes: tuple[str, ...] = ()
-
-    @property
-    def squeaking(self) -> tuple[str, ...]:
-        """Names of the conditions that squeak."""
-        return tuple(each.name for each in self.conditions if each.squeaks)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON: the conditions, and each record's own."""
-        together = {
-            "conditions": [each.to_dict() for each in self.conditions], "verdicts": list(self.verdicts),
-            "notes": list(self.notes),
-        }  # fmt: skip
-        return {"comparison": together, "records": [each.to_dict() for each in self.findings]}
-
-
-def compare_squeaks(findings: Sequence[SqueakFindings]) -> SqueakComparison:
+def compare_squeaks(findings: Sequence[Findings]) -> Comparison:
     """In which conditions does it squeak, and is it the slope of friction against speed, or the load, that decides?
 
     Each record is a condition: wet or dry, light or heavy, as in the thesis's figures 7.3 and 7.6. Of each are told the
@@ -131,12 +89,14 @@ def compare_squeaks(findings: Sequence[SqueakFindings]) -> SqueakComparison:
 
     Parameters
     ----------
-    findings : sequence of SqueakFindings
+    findings : sequence of Findings
         What :func:`analyze_squeaks` returned of two records or more, each named by its condition.
 
     Returns
     -------
-    SqueakComparison
+    Comparison
+        Its results are ``conditions``, a :class:`~stickslip.answers.Condition` for each record, ``verdicts``, what they
+        say together in sentences, and ``squeaking``, the names of those that squeak.
 
     Raises
     ------
@@ -155,13 +115,14 @@ def compare_squeaks(findings: Sequence[SqueakFindings]) -> SqueakComparison:
     >>> compared.squeaking, compared.conditions[0].trend
     (('wet, 6.13 N',), 'falls')
     """
-    if len(findings) < 2:
-        raise EstimateError(f"{len(findings)} record", "a comparison needs two or more", "give several")
+    require_several(findings)
     conditions = tuple(_condition(each) for each in findings)
-    return SqueakComparison(tuple(findings), conditions, tuple(_verdicts(conditions)))
+    squeaking = tuple(each.name for each in conditions if each.squeaks)
+    results = {"conditions": conditions, "verdicts": tuple(_verdicts(conditions)), "squeaking": squeaking}
+    return Comparison(tuple(findings), results=results)
 
 
-def _condition(found: SqueakFindings) -> Condition:
+def _condition(found: Findings) -> Condition:
     squeaks, loops, record = found.squeaks, found.loops, found.record
     heard = squeaks.of("squeak", "squeal")
     levels = [burst.level for burst in heard if np.isfinite(burst.level)]
@@ -173,7 +134,7 @@ def _condition(found: SqueakFindings) -> Condition:
         coefficient=found.coefficient, slope_of_coefficient=found.slope_of_coefficient,
         answer=squeaks.answer, kind=squeaks.kind, count=len(heard), rate=len(heard) / record.duration,
         pulses=max(squeaks.of("creak"), key=lambda burst: burst.duration).rate if squeaks.of("creak") else float("nan"),
-        frequency=found.frequency, sound=max(levels, default=float("nan")), reference=squeaks.reference,
+        frequency=squeaks.frequency, sound=max(levels, default=float("nan")), reference=squeaks.reference,
     )  # fmt: skip
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,18 @@ from numpy.typing import NDArray
 
 from stickslip.balance.motion import is_measured
 from stickslip.errors import ModelError
-from stickslip.record.record import Record, StatedRig, Step
-from stickslip.signals.derivatives import Filter, differentiate, noise_along
-from stickslip.units import parse_value
+from stickslip.estimate import Estimate
+from stickslip.record.record import RIG_UNITS, Record, StatedRig, Step
+from stickslip.signals.delay import without_delays
+from stickslip.signals.derivatives import (
+    LEAST,
+    Filter,
+    best_bandwidth,
+    checked_bandwidth,
+    differentiate,
+    five_point_average,
+    noise_along,
+)
 
 Array = NDArray[np.float64]
 
@@ -50,26 +60,27 @@ class Balance:
 
 @dataclass(frozen=True)
 class Rig(Balance):
-    """A balance of forces, and what the mass slides on."""
+    """A balance of forces, what the mass slides on, and how sure the constants are, where that is stated."""
 
     contact: str
+    sd: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @classmethod
     def stated(cls, constants: Mapping[str, Any], damper: str, contact: str) -> Rig:
         """The constants with their units read; refused where they have no meaning."""
-        units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
-        values = {name: parse_value(constants[name], unit) for name, unit in units.items()}
-        for name, value in values.items():
-            if value < 0 or (name == "mass" and value == 0):
+        known = {name: Estimate.stated(name, constants[name], unit) for name, unit in RIG_UNITS.items()}
+        for name, constant in known.items():
+            if constant.value < 0 or (name == "mass" and constant.value == 0):
                 raise ModelError(
                     f"{name} = {constants[name]}",
                     "a mass is positive, a stiffness or damping not negative",
-                    f"state the rig's {name} in {units[name]}",
+                    f"state the rig's {name} in {RIG_UNITS[name]}",
                 )
         for word, end in (("damper", damper), ("contact", contact)):
             if end not in ENDS:
                 raise ModelError(f"{word} = '{end}'", f"a {word} goes to the {' or the '.join(ENDS)}", "choose one")
-        return cls(damper=damper, contact=contact, **values)
+        sd = {name: constant.sd for name, constant in known.items() if constant.sd}
+        return cls(damper=damper, contact=contact, sd=sd, **{name: float(constant) for name, constant in known.items()})
 
     def terms(self, record: Record) -> dict[str, dict[int, float]]:
         """Per channel, the coefficient of each order of its derivative in the friction force."""
@@ -107,9 +118,11 @@ class Rig(Balance):
 
 
 def known_constants(record: Record, **given: Any) -> dict[str, Any]:
-    """The rig's constants for :func:`friction_force`: as given, or as the friction was found with."""
+    """The rig's constants as numbers, and its damper: as given, or as the friction was found with."""
     stated = {} if record.rig is None else record.rig.constants
-    return {**stated, **{name: value for name, value in given.items() if value is not None}}
+    told = {name: value for name, value in given.items() if value is not None}
+    numbers = {name: Estimate.stated(name, told[name], unit).value for name, unit in RIG_UNITS.items() if name in told}
+    return {**stated, **told, **numbers}
 
 
 def paths(
@@ -153,10 +166,11 @@ def with_motion(record: Record, derive: Filter) -> Record:
     return made
 
 
-def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, words: Sequence[str]) -> Record:
+def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, notes: Sequence[str]) -> Record:
     """The record with the friction, its standard deviation at each sample, and how it was found."""
-    arguments = {name: value for name, value in asdict(rig).items() if name != "lost"}
-    step = Step("friction_force", arguments, "; ".join(words))
+    arguments = {name: value for name, value in asdict(rig).items() if name not in ("lost", "sd")}
+    arguments |= {"sd": dict(rig.sd)} if rig.sd else {}
+    step = Step("friction_force", arguments, "; ".join(notes))
     made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
     noise = float(np.median(sd))
     made = made.with_channel("friction", force, unit="N", source="friction_force", noise=noise, step=step)
@@ -166,3 +180,54 @@ def with_friction(record: Record, force: Array, sd: Array, rig: StatedRig, words
 def stretch(record: Record) -> Array:
     """Of the spring between mass and base [m]."""
     return record["z"] - record["x"] if "z" in record else -record["x"]
+
+
+ALONE = "load cell alone"
+BEYOND = 2.0  # times its mount's frequency up to which a load cell's reading is followed
+
+
+def felt(record: Record, rig: StatedRig) -> Record:
+    """What the load cell feels, less the inertia of its flange: the thesis's F2, or through its mount's inverse."""
+    method, cell = rig.method, record.channels["load"]
+    source = next((name for name in ("a", "v", "x") if name in record), "") if cell.inertia else ""
+    used = ["load", *([source] if source else [])]
+    record.require_clean(*used, question=FRICTION, samples=LEAST)
+    record = without_delays(record, *used, question=FRICTION, samples=LEAST)
+    terms = {"load": {0: 1.0}, **({source: {"avx".index(source): -cell.inertia}} if source else {})}
+    if method == "F2":
+        derive = dict.fromkeys(terms, Filter("five-point", record.fs, 0.0))
+        notes = ["the load cell, averaged over five points"]
+    else:
+        derive, notes = _unmounted(record, terms)
+    force, variance = np.zeros(len(record)), np.zeros(len(record))
+    for name, orders in terms.items():
+        noise = noise_along(record[name], record.fs, record.channels[name].noise)
+        part = derive[name].apply(record[name], orders)
+        if method == "F2":
+            force += five_point_average(part)
+            variance += (averaged_gain(len(record), derive[name], orders, five_point_average) * noise) ** 2
+        else:
+            force += part
+            variance += (derive[name].noise_gain(len(record), orders) * noise) ** 2
+    if source:
+        notes.append(f"less {cell.inertia:g} kg times the acceleration from {source}")
+    elif cell.inertia:
+        notes.append(f"no motion: the inertia of {cell.inertia:g} kg of its flange is left in")
+    if cell.discharge is not None:
+        notes.append(f"its discharge of {cell.discharge:g} s is left in")
+    name = ALONE if method == "load" else method  # no balance of forces stands behind it
+    return with_friction(record, force, np.sqrt(variance), replace(rig, method=name), notes)
+
+
+def _unmounted(record: Record, terms: dict[str, dict[int, float]]) -> tuple[dict[str, Filter], list[str]]:
+    """The filters of a load cell alone and of what its flange does; its mount's inverse is added to its terms."""
+    mount = record.channels["load"].mount
+    width = {name: best_bandwidth(record[name], record.fs) for name in terms}
+    if mount is not None:
+        angular = 2 * math.pi * mount[0]
+        terms["load"] |= {1: 2 * mount[1] / angular, 2: angular**-2}
+        width["load"] = checked_bandwidth(min(BEYOND * mount[0], 0.4 * record.fs), record.fs, len(record))
+    notes = [f"the load cell alone, smoothed to {width['load']:.4g} Hz (-3 dB)"]
+    if mount is not None:
+        notes.append(f"less what its mount of {mount[0]:g} Hz adds")
+    return {name: Filter("smoother", record.fs, pair) for name, pair in width.items()}, notes

@@ -14,7 +14,7 @@ from stickslip.balance.force import friction_force
 from stickslip.balance.lines import Complex, Lines, find_lines
 from stickslip.balance.mounts import Resonance, find_mounts
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Estimate, Result, Status
+from stickslip.estimate import NORMAL_95, Constant, Estimate, Result, Status
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
@@ -110,15 +110,15 @@ class ForceComparison(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number found."""
-        swinging = [number for each in self.resonances for number in (each.frequency, each.damping)]
+        swinging = [number for resonance in self.resonances for number in (resonance.frequency, resonance.damping)]
         return (self.difference, self.agree_up_to, *swinging)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return {
-            "estimates": [each.to_dict() for each in self.estimates],
+            "estimates": [estimate.to_dict() for estimate in self.estimates],
             "bands": [vars(band) for band in self.bands],
-            "resonances": [each.to_dict() for each in self.resonances],
+            "resonances": [resonance.to_dict() for resonance in self.resonances],
             "status": self.status,
         }
 
@@ -126,9 +126,9 @@ class ForceComparison(Result):
 def compare_force(
     record: Record,
     *,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
-    damping: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
+    damping: Constant | None = None,
     damper: str | None = None,
     tolerance: float = 0.1,
 ) -> ForceComparison:
@@ -151,7 +151,7 @@ def compare_force(
     record : Record
         With ``load`` and ``x``, and z, a, force where measured; the rig as :func:`~stickslip.friction_force` was told,
         where not given here.
-    mass, stiffness, damping : float or str, optional
+    mass, stiffness, damping : float, str, tuple or Estimate, optional
         Of the rig [kg], [N/m], [N s/m].
     damper : {"ground", "base"}, optional
         Where the damper's other end is fixed.
@@ -221,14 +221,14 @@ def compare_force(
 
 def _bands(lines: Lines, tolerance: float) -> list[ForceBand]:
     """Bands of about equal width on a logarithmic axis, each with an odd and an even line at least."""
-    found, first, frequency = [], 0, lines.frequency
+    bands, first, frequency = [], 0, lines.frequency
     while first < len(frequency):
         last = max(first + (2 if first else 1), int(np.searchsorted(frequency, RATIO * frequency[first])))
         part = slice(first, min(last, len(frequency)))
         direct, indirect = (lines.amplitudes[name][:, part] for name in ("direct", "indirect"))
-        found.append(_band(frequency[part], direct, indirect, lines.worth, tolerance))
+        bands.append(_band(frequency[part], direct, indirect, lines.worth, tolerance))
         first = last
-    return found
+    return bands
 
 
 def _band(frequency: Array, direct: Complex, indirect: Complex, worth: float, tolerance: float) -> ForceBand:
@@ -300,8 +300,8 @@ def _crossing(frequency: Array, off: Array, tolerance: float) -> float:
 def _cut(record: Record) -> str:
     """Which sensors stand at the end of their range, in words."""
     cut = {name: int(saturated(record[name]).sum()) for name in ("a", "load") if name in record}
-    told = [f"{name} in {count} of {len(record)} samples" for name, count in cut.items() if count]
-    return f"at the end of the range is {' and '.join(told)}: what lies beyond is missing here" if told else ""
+    losses = [f"{name} in {count} of {len(record)} samples" for name, count in cut.items() if count]
+    return f"at the end of the range is {' and '.join(losses)}: what lies beyond is missing here" if losses else ""
 
 
 def _flagged(estimate: Estimate, cut: str) -> Estimate:
@@ -313,12 +313,12 @@ def _opposite(bands: tuple[ForceBand, ...]) -> bool:
 
 
 def _status(bands: tuple[ForceBand, ...], record: Record, cut: str) -> str:
-    words = [cut] if cut else []
+    doubts = [cut] if cut else []
     if _opposite(bands):
-        words.append("the forces have opposite signs: one sensor is wired the wrong way round, or the sign convention")
+        doubts.append("the forces have opposite signs: one sensor is wired the wrong way round, or the sign convention")
     elif bands[0].verdict != "agree":
-        words.append("the forces differ where they are largest: ask consistency(record) which channel it is")
+        doubts.append("the forces differ where they are largest: ask consistency(record) which channel it is")
     stated = any(record.channels[name].delay for name in ("x", "a") if name in record)
     if not stated and "delays" not in str(record.history):
-        words.append("no delay is stated of any sensor")
-    return Status(*words)
+        doubts.append("no delay is stated of any sensor")
+    return Status(*doubts)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +14,17 @@ from stickslip.balance.balance import (
     Rig,
     as_measured,
     averaged_gain,
+    felt,
     paths,
     stretch,
     with_friction,
     with_motion,
 )
 from stickslip.balance.fusion import fuse
-from stickslip.balance.load_cell import felt
 from stickslip.balance.mass import mass_and_stiffness, stiffness_per_mass
 from stickslip.balance.motion import require_change, require_fit
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import NORMAL_95, Estimate
+from stickslip.estimate import NORMAL_95, Constant, Estimate
 from stickslip.record.record import Record, StatedRig, Step
 from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import (
@@ -55,9 +54,9 @@ LOST = {
 def friction_force(
     record: Record,
     *,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
-    damping: float | str = 0.0,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
+    damping: Constant = 0.0,
     damper: str = "ground",
     method: str = "smoother",
     contact: str = "ground",
@@ -85,11 +84,13 @@ def friction_force(
     record : Record
         With ``x`` [m], and z, v, a, force [N] where measured. What an earlier call derived is derived afresh. Delays
         stated for these channels are taken out first, see :func:`~stickslip.signals.delay.without_delays`.
-    mass : float or str
-        Moving mass m [kg], or with its unit: ``"250 g"``.
-    stiffness : float or str
+    mass : float, str, tuple or Estimate
+        Moving mass m [kg]; or with its unit, ``"250 g"``, and with its standard uncertainty, ``"2.42 ± 0.02 kg"`` or
+        ``(2.42, 0.02)``, which the friction does not feel: ``record.rig`` keeps it for the twins of a record. So may
+        the next two.
+    stiffness : float, str, tuple or Estimate
         Of the spring between mass and base, k [N/m].
-    damping : float or str
+    damping : float, str, tuple or Estimate
         Viscous damping c [N s/m].
     damper : {"ground", "base"}
         Where the damper's other end is fixed.
@@ -156,6 +157,11 @@ def friction_force(
         return _weighed(record, rig)
     if unknown:
         return _completed(record, rig, unknown, method, bandwidth)
+    return _known(record, rig, method, asked, bandwidth)
+
+
+def _known(record: Record, rig: Rig, method: str, asked: str, bandwidth: float | str | None) -> Record:
+    """The friction force on a mass whose rig is known, by the method; another was `asked` where a channel lacks."""
     if method in FUSIONS:
         return _fused(record, rig, method, asked)
     if method in THESIS:
@@ -184,8 +190,8 @@ def _smoothed(record: Record, rig: Rig, method: str, bandwidth: float | str | No
     sd = total_sd(force, np.sqrt(variance), derive if one_filter else None, ratio)
 
     stated = StatedRig(method, bandwidth=width if method == "smoother" else None, **asdict(rig))
-    words = rig.words(record, method, width, one_filter=one_filter)
-    return with_friction(with_motion(record, derive), force, sd, stated, words)
+    note = rig.words(record, method, width, one_filter=one_filter)
+    return with_friction(with_motion(record, derive), force, sd, stated, note)
 
 
 def _punctual(record: Record) -> Record:
@@ -206,12 +212,12 @@ def _balanced(record: Record, rig: Rig, method: str, asked: str) -> Record:
         noise = noise_along(record[name], record.fs, record.channels[name].noise)
         force += last(derive.apply(record[name], terms))
         variance += (averaged_gain(len(record), derive, terms, last) * noise) ** 2
-    words = [
+    notes = [
         *_lacking(record, asked, ("a", "load") if asked != method else ("a",)),
         *rig.words(record, "five-point", 0.0, one_filter=False),
         "averaged over five points" if method == "F1" else "as read",
     ]
-    return with_friction(with_motion(record, derive), force, np.sqrt(variance), StatedRig(method, **asdict(rig)), words)
+    return with_friction(with_motion(record, derive), force, np.sqrt(variance), StatedRig(method, **asdict(rig)), notes)
 
 
 def _lacking(record: Record, asked: str, wanted: Sequence[str]) -> list[str]:
@@ -221,20 +227,17 @@ def _lacking(record: Record, asked: str, wanted: Sequence[str]) -> list[str]:
 
 def _weighed(record: Record, rig: Rig) -> Record:
     """The friction force by all sensors, with mass and stiffness from what the load cell feels."""
-    ends = {"damper": rig.damper, "contact": rig.contact}
-    mass, stiffness = mass_and_stiffness(record, damping=rig.damping, **ends)
-    made = friction_force(
-        record, mass=mass.value, stiffness=stiffness.value, damping=rig.damping, method="fusion", **ends
-    )
+    mass, stiffness = mass_and_stiffness(record, damping=rig.damping, damper=rig.damper, contact=rig.contact)
+    made = _fused(record, replace(rig, mass=mass.value, stiffness=stiffness.value), "fusion", "fusion")
     sd = np.sqrt(made["friction_sd"] ** 2 + (mass.sd * made["a"]) ** 2 + (stiffness.sd * stretch(made)) ** 2)
-    words = f"m = {mass.value:.5g} kg and k = {stiffness.value:.5g} N/m from what the load cell feels"
-    return _less_sure(made, sd, words)
+    note = f"m = {mass.value:.5g} kg and k = {stiffness.value:.5g} N/m from what the load cell feels"
+    return _less_sure(made, sd, note)
 
 
-def _less_sure(record: Record, sd: Array, words: str) -> Record:
+def _less_sure(record: Record, sd: Array, note: str) -> Record:
     """A friction found with constants that are themselves found: its standard deviation, and what to say first."""
     last = record.history[-1]
-    history = (*record.history[:-1], replace(last, outcome=f"{words}; {last.outcome}"))
+    history = (*record.history[:-1], replace(last, outcome=f"{note}; {last.outcome}"))
     made = record.with_channel("friction_sd", sd, unit="N", source="friction_force")
     noise = float(np.median(sd))
     made = made.with_channel("friction", record["friction"], unit="N", source="friction_force", noise=noise)
@@ -261,38 +264,34 @@ def _completed(record: Record, rig: Rig, unknown: Sequence[str], method: str, ba
         across = -stretch(punctual) if rig.damper == "base" else punctual["x"]
         known = known - rig.damping * differentiate(across, record.fs).values
     over = {"stretched": known / rig.stiffness} if "mass" in unknown else {"resisting": -known / rig.mass}
-    found = stiffness_per_mass(punctual, contact=rig.contact, **(over if others else {}))
-    if found.value <= 0:
+    per_mass = stiffness_per_mass(punctual, contact=rig.contact, **(over if others else {}))
+    if per_mass.value <= 0:
         raise EstimateError(
-            f"k/m = {found.value:.3g} 1/s^2 where it slides",
+            f"k/m = {per_mass.value:.3g} 1/s^2 where it slides",
             "a spring pulls back: no mass or stiffness can be found with a sensor of the wrong sign",
             "correct the signs of x, z and a, or give mass and stiffness",
         )
-    ends = {"damper": rig.damper, "contact": rig.contact}
     if len(unknown) == 2:
-        return _per_mass(record, found, method=method, bandwidth=bandwidth, **ends)
-    moving = rig.stiffness / found.value if "mass" in unknown else rig.mass
-    made = friction_force(
-        record, mass=moving, stiffness=found.value * moving, damping=rig.damping, method=method, bandwidth=bandwidth,
-        **ends,
-    )  # fmt: skip
-    unsure = made["a"] if "mass" in unknown else found.value * stretch(made)
-    sd = np.hypot(made["friction_sd"], moving * found.sd / found.value * np.abs(unsure))
-    return _less_sure(made, sd, _ratio(found))
+        return _per_mass(record, rig, per_mass, method, bandwidth)
+    moving = rig.stiffness / per_mass.value if "mass" in unknown else rig.mass
+    made = _known(record, replace(rig, mass=moving, stiffness=per_mass.value * moving), method, method, bandwidth)
+    unsure = made["a"] if "mass" in unknown else per_mass.value * stretch(made)
+    sd = np.hypot(made["friction_sd"], moving * per_mass.sd / per_mass.value * np.abs(unsure))
+    return _less_sure(made, sd, _ratio(per_mass))
 
 
-def _per_mass(record: Record, found: Estimate, *, method: str, **rig: Any) -> Record:
+def _per_mass(record: Record, rig: Rig, per_mass: Estimate, method: str, bandwidth: float | str | None) -> Record:
     """The friction per mass, where neither mass nor stiffness is known."""
     method = "motion" if method in FUSIONS else method  # a force says nothing of a motion whose mass is not known
-    made = friction_force(record, mass=1.0, stiffness=found.value, method=method, **rig)
+    made = _known(record, replace(rig, stiffness=per_mass.value), method, method, bandwidth)  # of a mass of 1 kg
     last = made.history[-1]
-    words = "neither mass nor stiffness is known: the friction per mass is all that can be said"
+    note = "neither mass nor stiffness is known: the friction per mass is all that can be said"
     step = Step(
         "friction_force",
         {**last.arguments, "mass": None, "stiffness": None},
-        f"{words}; {_ratio(found)}; {last.outcome}",
+        f"{note}; {_ratio(per_mass)}; {last.outcome}",
     )
-    sd = np.hypot(made["friction_sd"], found.sd * np.abs(stretch(made)))
+    sd = np.hypot(made["friction_sd"], per_mass.sd * np.abs(stretch(made)))
     kept = {name: made[name] for name in made if name not in ("friction", "friction_sd")}
     bare = replace(made, samples=kept, channels={name: made.channels[name] for name in kept}, history=made.history[:-1])
     bare = bare.with_channel("friction_per_mass_sd", sd, unit="m/s^2", source="friction_force")
@@ -300,8 +299,8 @@ def _per_mass(record: Record, found: Estimate, *, method: str, **rig: Any) -> Re
     return bare if made.rig is None else replace(bare, rig=replace(made.rig, mass=None, stiffness=None))
 
 
-def _ratio(found: Estimate) -> str:
-    return f"k/m = {found.value:.5g} +- {NORMAL_95 * found.sd:.2g} 1/s^2 from how it slides"
+def _ratio(ratio: Estimate) -> str:
+    return f"k/m = {ratio.value:.5g} +- {NORMAL_95 * ratio.sd:.2g} 1/s^2 from how it slides"
 
 
 def _fused(record: Record, rig: Rig, method: str, asked: str) -> Record:
@@ -313,21 +312,21 @@ def _fused(record: Record, rig: Rig, method: str, asked: str) -> Record:
     record.require_clean(*whole, question=FRICTION, samples=LEAST)
     require_fit(record, *({"force", "load"} & set(used)), length="m", question=FRICTION)
     record = without_delays(record, *used, question=FRICTION, samples=LEAST)
-    found = fuse(record, rig, sensors)
+    fusion = fuse(record, rig, sensors)
     swinging = [f"{name} on a mount of {mount[0]:g} Hz" for name in sensors if (mount := record.channels[name].mount)]
-    words = [
+    notes = [
         *_lacking(record, asked, FUSIONS[asked]),
         f"{', '.join(sensors)} together by a Kalman smoother",
         ", ".join(swinging) or "no mounts stated",
-        *found.lost,
+        *fusion.lost,
         f"contact against the {rig.contact}",
     ]
     made = record
     if "v" not in record:
-        noise = float(np.median(found.velocity_sd))
-        made = made.with_channel("v_sd", found.velocity_sd, unit="m/s", source="friction_force")
-        made = made.with_channel("v", found.velocity, unit="m/s", source="friction_force", noise=noise)
+        noise = float(np.median(fusion.velocity_sd))
+        made = made.with_channel("v_sd", fusion.velocity_sd, unit="m/s", source="friction_force")
+        made = made.with_channel("v", fusion.velocity, unit="m/s", source="friction_force", noise=noise)
     if "a" not in record:
-        made = made.with_channel("a", found.acceleration, unit="m/s^2", source="friction_force")
-    stated = StatedRig(method, lost=found.lost, **asdict(rig))
-    return with_friction(made, found.friction, found.friction_sd, stated, words)
+        made = made.with_channel("a", fusion.acceleration, unit="m/s^2", source="friction_force")
+    stated = StatedRig(method, lost=fusion.lost, **asdict(rig))
+    return with_friction(made, fusion.friction, fusion.friction_sd, stated, notes)

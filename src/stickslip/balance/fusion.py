@@ -83,11 +83,13 @@ def fuse(record: Record, balance: Balance, sensors: Sequence[str]) -> Fused:
     Fused
     """
     known, lost = _readable(record, sensors)
-    found = [
+    candidates = [
         _smoothed(record.rows(rows.start, rows.stop), balance, {n: v[rows] for n, v in known.items()}, inside)
         for rows, inside in _blocks(len(record))
     ]
-    friction, friction_sd, velocity, velocity_sd, acceleration = (np.concatenate(p) for p in zip(*found, strict=True))
+    friction, friction_sd, velocity, velocity_sd, acceleration = (
+        np.concatenate(p) for p in zip(*candidates, strict=True)
+    )
     return Fused(friction, friction_sd, velocity, velocity_sd, acceleration, lost)
 
 
@@ -166,16 +168,16 @@ def _smoothed(record: Record, balance: Balance, known: Mapping[str, Array], insi
     forms = np.eye(3, len(motion.start))
     unknown = np.full(len(record), (FIRST * sensed.force) ** 2)
     for _ in range(search.passes - 1):
-        told = smooth_motion(motion, seen, unknown=unknown, forms=forms[:0])
-        unknown = unknown * _excess(told)
+        smoothed = smooth_motion(motion, seen, unknown=unknown, forms=forms[:0])
+        unknown = unknown * _excess(smoothed)
         unknown = np.maximum(unknown, max(float(np.median(unknown)), (CALMEST * sensed.force) ** 2))
-    told = smooth_motion(motion, seen, unknown=unknown, forms=forms)
-    falling = np.minimum(_excess(told), 1.0) ** search.falling
-    _, velocity_sd, friction_sd = np.sqrt(told.variance)
-    displacement, velocity, friction = told.values
+    smoothed = smooth_motion(motion, seen, unknown=unknown, forms=forms)
+    falling = np.minimum(_excess(smoothed), 1.0) ** search.falling
+    _, velocity_sd, friction_sd = np.sqrt(smoothed.variance)
+    displacement, velocity, friction = smoothed.values
     force = sensed.push - balance.stiffness * displacement - balance.damping * velocity - friction
-    found = friction, search.narrower * falling * friction_sd, velocity, velocity_sd, force / balance.mass
-    return tuple(values[inside] for values in found)
+    terms = friction, search.narrower * falling * friction_sd, velocity, velocity_sd, force / balance.mass
+    return tuple(values[inside] for values in terms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,21 +224,21 @@ class Held:
     def misfit(self, stiffness: float, damping: float) -> Array:
         """Each sensor's mean square surprise while the contact holds: 1 where all is as stated."""
         motion, seen = self._motion(stiffness, damping)
-        found = surprises(motion, seen, unknown=self.unknown)[self.regime == 1]
-        return np.asarray(np.nanmean(found**2, axis=0))
+        surprise = surprises(motion, seen, unknown=self.unknown)[self.regime == 1]
+        return np.asarray(np.nanmean(surprise**2, axis=0))
 
     def _motion(self, stiffness: float, damping: float) -> tuple[Motion, Seen]:
         models = [self.model, self.model.held(stiffness, damping), replace(self.model, share=0.5)]
         return _steps(models, self.regime, self.sensed)
 
 
-def _excess(told: Smoothed) -> Array:
+def _excess(smoothed: Smoothed) -> Array:
     """What the steps' variance is over what it was taken to be, averaged over a few samples."""
     reach = round(4 * POOL)
     weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) / POOL) ** 2)
     score, information = (
         np.convolve(np.pad(values, reach, mode="reflect"), weight, mode="valid")
-        for values in (told.score**2, told.information)
+        for values in (smoothed.score**2, smoothed.information)
     )
     return np.asarray(score / information)
 

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from stickslip.balance.balance import known_constants
 from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import noise_along
-from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -62,15 +61,15 @@ class ImpactTest(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Frequency and damping of each."""
-        return tuple(number for each in self.resonances for number in (each.frequency, each.damping))
+        return tuple(number for resonance in self.resonances for number in (resonance.frequency, resonance.damping))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        told = {"time": self.time, "duration": self.duration, "residual": self.residual, "status": self.status}
-        return {"resonances": [each.to_dict() for each in self.resonances], **told}
+        table = {"time": self.time, "duration": self.duration, "residual": self.residual, "status": self.status}
+        return {"resonances": [resonance.to_dict() for resonance in self.resonances], **table}
 
 
-def impact_test(record: Record, *, mass: float | str | None = None) -> ImpactTest:
+def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:
     r"""Which resonances does a hammer tap excite, and which sensor shows them?
 
     The thesis's section 2.5: the base held, the contact engaged, a tap on the mass. After it every channel is a sum
@@ -85,7 +84,7 @@ def impact_test(record: Record, *, mass: float | str | None = None) -> ImpactTes
     ----------
     record : Record
         With ``a`` or ``load``, better both, and one tap.
-    mass : float or str, optional
+    mass : float, str, tuple or Estimate, optional
         Moving mass [kg]; as :func:`~stickslip.friction_force` was told, if it was. Without it, the lowest mode that
         both show is taken for the contact's.
 
@@ -119,7 +118,7 @@ def impact_test(record: Record, *, mass: float | str | None = None) -> ImpactTes
     known = known_constants(record, mass=mass).get("mass")
     ringing = _ringing(record, channels)
     modes, residual = _modes(ringing)
-    named = _named(modes, channels, parse_value(known, "kg") if known is not None else None)
+    named = _named(modes, channels, known)
     status = "ok"
     if residual > MISFIT:
         status = f"what rings is no sum of decaying oscillations: {residual:.2g} times the noise is left over (slips?)"

@@ -131,21 +131,22 @@ def sensor_delay(
         raise EstimateError(f"method = '{method}'", f"a delay is found by {' or '.join(METHODS)}", "choose one of them")
     if not records:
         raise EstimateError("no record", "a delay is found in one record or several", "pass a record")
-    for each in records:
-        each.require_clean(*channels, question=QUESTION, samples=LEAST)
+    for source in records:
+        source.require_clean(*channels, question=QUESTION, samples=LEAST)
     if method == "residual":
         if len(records) > 1:
             raise EstimateError(f"{len(records)} records", "the least residual is that of one", "pass them one by one")
         return _by_residual(records[0], channels)
-    pairs, mount = [_pair(each, channels, order) for each in records], records[0].channels[channels[1]].mount
-    found, free, others = _fit(pairs, mount)
-    if abs(found.theta[1]) < FAINT * found.sd([0, 1, 0, 0]):
+    pairs, mount = [_pair(record, channels, order) for record in records], records[0].channels[channels[1]].mount
+    alignment, free, others = _fit(pairs, mount)
+    gain, spread = alignment.theta[1], alignment.sd([0, 1, 0, 0])
+    if abs(gain) < FAINT * spread:
         raise EstimateError(
-            f"{channels[1]} does not follow {channels[0]} (gain {found.theta[1]:.2g} -+ {found.sd([0, 1, 0, 0]):.2g})",
+            f"{channels[1]} does not follow {channels[0]} (gain {gain:.2g} -+ {spread:.2g})",
             f"{QUESTION} needs one motion that both see",
             "check whether the channels are named right",
         )
-    if order and not _alike(found):
+    if order and not _alike(alignment):
         turned = _fit(
             [replace(pair, first=pair.second, second=pair.first, noise=pair.noise[::-1]) for pair in pairs], None
         )
@@ -155,7 +156,7 @@ def sensor_delay(
                 "the channels are swapped",
                 "name them the other way round when reading",
             )
-    return _answer(found, free, others, mount, channels)
+    return _answer(alignment, free, others, mount, channels)
 
 
 def _fit(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> tuple[Alignment, Alignment, list[Alignment]]:
@@ -165,9 +166,9 @@ def _fit(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> tuple[Alig
     return free if _is_firm(free, held) else held, free, others
 
 
-def _alike(found: Alignment) -> bool:
+def _alike(pair: Alignment) -> bool:
     """Whether both sensors give the same size to what they see."""
-    return bool(1 / ALIKE < abs(found.theta[1]) < ALIKE)
+    return bool(1 / ALIKE < abs(pair.theta[1]) < ALIKE)
 
 
 def _order(channels: tuple[str, str]) -> int:
@@ -197,8 +198,8 @@ def _pair(record: Record, channels: tuple[str, str], order: int) -> Pair:
         raise EstimateError(
             f"a channel of {' and '.join(channels)} does not change", f"{QUESTION} needs a motion", "check the sensors"
         )
-    found = [record.channels[name].noise or noise_level(record[name], record.fs) for name in channels]
-    low, high = (max(noise, FINEST * size) for noise, size in zip(found, ranges, strict=True))
+    noises = [record.channels[name].noise or noise_level(record[name], record.fs) for name in channels]
+    low, high = (max(noise, FINEST * size) for noise, size in zip(noises, ranges, strict=True))
     return Pair(first, second, record.fs, (low, high), order)
 
 
@@ -224,64 +225,66 @@ def _is_firm(free: Alignment, held: Alignment) -> bool:
 
 
 def _answer(
-    found: Alignment,
+    alignment: Alignment,
     free: Alignment,
     others: Sequence[Alignment],
     mount: tuple[float, float] | None,
     channels: tuple[str, str],
 ) -> SensorDelay:
     """What the fit supports; `free` is the one whose mount is free."""
-    (first, second), method, fitted = channels, "phase of all lines that both channels show", found is free
-    gain = found.theta[1]
+    (first, second), method, fitted = channels, "phase of all lines that both channels show", alignment is free
+    gain = alignment.theta[1]
     alike = [other.delay for other in others if gain < 0 or other.theta[1] > 0]
-    hidden = second == "a" and not fitted and mount is None and free.sd([1, 0, 0, 0]) > MASKED * found.sd([1, 0, 0, 0])
-    status = _status(found, alike, channels, hidden=hidden)
-    low, high = found.lines.turn.min() / (2 * math.pi), found.lines.turn.max() / (2 * math.pi)
+    hidden = (
+        second == "a" and not fitted and mount is None and free.sd([1, 0, 0, 0]) > MASKED * alignment.sd([1, 0, 0, 0])
+    )
+    status = _status(alignment, alike, channels, hidden=hidden)
+    low, high = alignment.lines.turn.min() / (2 * math.pi), alignment.lines.turn.max() / (2 * math.pi)
     stated = f"held at {mount[0]:g} Hz and {mount[1]:g}, as stated" if mount else "taken to be rigid"
     checks = (
-        f"{len(found.lines.turn)} lines of {low:.3g} to {high:.3g} Hz; mount {'fitted' if fitted else stated}",
-        f"the residual at the lines has {found.unexplained:.2f} times the power of the noise between them",
+        f"{len(alignment.lines.turn)} lines of {low:.3g} to {high:.3g} Hz; mount {'fitted' if fitted else stated}",
+        f"the residual at the lines has {alignment.unexplained:.2f} times the power of the noise between them",
     )
 
     def estimate(name: str, value: float, slope: Sequence[float], unit: str, status: str = "ok") -> Estimate:
-        sd = found.sd(slope)
+        sd = alignment.sd(slope)
         return Estimate.normal(name, value, sd=sd, unit=unit, method=method, status=status, checks=checks)
 
     frequency = damping = None
     if fitted:
-        damped, root = found.theta[2], math.sqrt(found.theta[3])
+        damped, root = alignment.theta[2], math.sqrt(alignment.theta[3])
         name, slope = f"mount of {second}", [0, 0, 1 / (2 * root), -damped / (4 * root**3)]
         frequency = estimate(
             f"{name}, frequency", 1 / (2 * math.pi * root), [0, 0, 0, 1 / (4 * math.pi * root**3)], "Hz"
         )
         damping = estimate(f"{name}, damping ratio", damped / (2 * root), slope, "1").within(0.0)
     return SensorDelay(
-        estimate(f"delay of {second} behind {first}", found.delay, [1, 0, 0, 0], "s", status),
+        estimate(f"delay of {second} behind {first}", alignment.delay, [1, 0, 0, 0], "s", status),
         estimate(f"gain of {second} over {first}", gain, [0, 1, 0, 0], "1"),
         frequency, damping, tuple(alike), channels, "phase", status,
     )  # fmt: skip
 
 
-def _status(found: Alignment, others: Sequence[float], channels: tuple[str, str], *, hidden: bool) -> str:
-    (first, second), gain = channels, found.theta[1]
+def _status(pair: Alignment, others: Sequence[float], channels: tuple[str, str], *, hidden: bool) -> str:
+    (first, second), gain = channels, pair.theta[1]
     said: list[Doubt | str] = []
     if gain < 0:
         said.append(f"{first} or {second} has the wrong sign: the gain is {gain:.3g}")
-    if not _alike(found):
+    if not _alike(pair):
         said.append(f"{second} is {abs(gain):.3g} times what {first} makes of it: see the units and the sensitivities")
     if others:
         delays = " or ".join(f"{delay:.4g}" for delay in others[:2])
-        words = f"the motion repeats itself: a delay of {delays} s would explain it as well; the shortest is taken"
-        said.append(Doubt(words, REPEATS))
+        sentence = f"the motion repeats itself: a delay of {delays} s would explain it as well; the shortest is taken"
+        said.append(Doubt(sentence, REPEATS))
     if hidden:
-        words = (
+        sentence = (
             f"what a mount of {second} delays (2 zeta/w_m) is in it: this motion does not tell them apart; state the "
             "mount, or give runs at other frequencies too"
         )
-        said.append(Doubt(words, HIDDEN))
-    if found.unexplained > UNEXPLAINED:
+        said.append(Doubt(sentence, HIDDEN))
+    if pair.unexplained > UNEXPLAINED:
         said.append(
-            f"{first} and {second} differ by more than noise, a delay and a mount ({found.unexplained:.3g} times the "
+            f"{first} and {second} differ by more than noise, a delay and a mount ({pair.unexplained:.3g} times the "
             "power of the noise); the intervals are widened"
         )
     return Status(*said)

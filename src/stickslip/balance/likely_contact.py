@@ -82,29 +82,29 @@ def _likeliest(record: Record) -> LikelyContact:
     misfit = np.mean([part.misfit(math.exp(best[0]), best[1]) for part in seen.parts], axis=0)
     stray, scale = _stray(misfit, sensors), max(1.0, float(misfit.max()))
     _require_spring(best, balance)
-    words: list[Doubt | str] = []
+    doubts: list[Doubt | str] = []
     if scale > STRAYS:  # what a sensor misreads it misreads alike all through a stick
-        words.append(stray)
+        doubts.append(stray)
         scale *= float(np.median(sticks))
-    words += _unsure(best, balance, record.fs, sticks)
+    doubts += _unsure(best, balance, record.fs, sticks)
     # a damping below zero shows how far off the sensors put the contact
     below = max(1.0, -best[1] / (NORMAL_95 * math.sqrt(scale * covariance[1, 1])))
     if below > 1 or (best[1] < 0 and scale > STRAYS):
         sentence = "its damping comes out negative: a sensor's lag or mount is not accounted for"
-        words.append(Doubt(f"{sentence} ({best[1]:.3g} N s/m)", NEGATIVE))
+        doubts.append(Doubt(f"{sentence} ({best[1]:.3g} N s/m)", NEGATIVE))
         scale *= below**2
     if sensors == ["x"]:
-        words.append("from the displacement alone, which blurs where sticks begin and end")
-    told: dict[str, Any] = {
+        doubts.append("from the displacement alone, which blurs where sticks begin and end")
+    common: dict[str, Any] = {
         "method": METHOD,
-        "status": Status(*words),
+        "status": Status(*doubts),
         "checks": (
             f"{len(sticks)} sticks, in which the friction is below {HELD:g} of {seen.level:.3g} N",
             f"from {', '.join(sensors)}; a common error of gains, lags or mounts is not in the interval",
             f"at most, {stray}",
         ),
     }
-    estimates = replace(search, scale=scale).estimates(best, scale * covariance, told)
+    estimates = replace(search, scale=scale).estimates(best, scale * covariance, common)
     return LikelyContact(*estimates, scale * covariance, seen.level, balance)
 
 
@@ -125,9 +125,9 @@ def _looked_through(record: Record, balance: Balance, sensors: Sequence[str], *,
         friction, velocity = (part["friction"], part["v"]) if fused else _fused(part, balance, sensors)
         level, middle = sliding_level(friction, velocity)
         levels.append(level)
-        holds, found = held_steps(friction - middle, velocity, level)
-        sticks += [last - first for first, last in found]
-        if found:
+        holds, steps = held_steps(friction - middle, velocity, level)
+        sticks += [last - first for first, last in steps]
+        if steps:
             parts.append(Held.of(part, balance, sensors, holds, level))
             change, way = np.diff(friction)[holds[:-1]], (velocity[:-1] / record.fs)[holds[:-1]]
             guesses.append((float(change @ way), float(way @ way)))
@@ -144,15 +144,15 @@ def _looked_through(record: Record, balance: Balance, sensors: Sequence[str], *,
 def _stray(misfit: Array, sensors: Sequence[str]) -> str:
     """How far the worst sensor is from what it should read, in words, if it is not absurd."""
     worst = int(np.argmax(misfit))
-    words = f"{sensors[worst]} strays from the likeliest contact by {math.sqrt(misfit[worst]):.3g} times its noise"
+    sentence = f"{sensors[worst]} strays from the likeliest contact by {math.sqrt(misfit[worst]):.3g} times its noise"
     if misfit[worst] > ABSURD:
         raise EstimateError(
-            words,
+            sentence,
             "a contact that holds is a spring and a damper, and every sensor reads it as stated",
             "check signs, and state gains, delays and mounts, by with_details or under [sensors] in the rig file",
             kind=STRAYING,
         )
-    return words
+    return sentence
 
 
 def _require_spring(best: Array, balance: Balance) -> None:
@@ -168,12 +168,12 @@ def _require_spring(best: Array, balance: Balance) -> None:
 def _unsure(best: Array, balance: Balance, fs: float, sticks: Sequence[int]) -> list[str]:
     """Where the rate is too low for the contact, in words."""
     cycle = fs * 2 * math.pi * math.sqrt(balance.mass / (balance.stiffness + math.exp(best[0])))
-    words = []
+    doubts = []
     if cycle < CYCLE:
-        words.append(f"{fs:g} Hz gives {cycle:.2g} samples to a cycle of the contact's ringing: sample faster")
+        doubts.append(f"{fs:g} Hz gives {cycle:.2g} samples to a cycle of the contact's ringing: sample faster")
     if np.median(sticks) < SHORT:
-        words.append(f"sticks of {np.median(sticks):g} samples: sample faster")
-    return words
+        doubts.append(f"sticks of {np.median(sticks):g} samples: sample faster")
+    return doubts
 
 
 def sliding_level(friction: Array, velocity: Array) -> tuple[float, float]:
@@ -193,7 +193,7 @@ def held_steps(friction: Array, velocity: Array, level: float) -> tuple[NDArray[
     """
     inside = np.abs(friction) < HELD * level
     against = friction * velocity <= 0
-    holds, found = np.zeros(len(friction), dtype=bool), []
+    holds, steps = np.zeros(len(friction), dtype=bool), []
     for begin, last in zip(*stretches(inside), strict=True):
         if last - begin < LEAST:
             continue
@@ -204,8 +204,8 @@ def held_steps(friction: Array, velocity: Array, level: float) -> tuple[NDArray[
             first -= 1
         if last - first >= LEAST:
             holds[first : last - 1] = True
-            found.append((first, last))
-    return holds, found
+            steps.append((first, last))
+    return holds, steps
 
 
 def _balanced(record: Record) -> tuple[Balance, list[str], bool]:
@@ -307,12 +307,12 @@ class _Search:
                 return at + unit * (near - inverse @ slope), inverse * np.outer(unit, unit)
         return at + unit * near, np.full((2, 2), math.inf)
 
-    def estimates(self, best: Array, covariance: Array, told: dict[str, Any]) -> tuple[Estimate, Estimate]:
+    def estimates(self, best: Array, covariance: Array, common: dict[str, Any]) -> tuple[Estimate, Estimate]:
         """Stiffness and damping; of a stiffness that is unsure both ends where the likelihood has fallen."""
         stiffness, sd = math.exp(best[0]), np.sqrt(np.diag(covariance))
         if sd[0] < UNSURE:
-            found = Estimate.normal(STIFFNESS, stiffness, sd=stiffness * sd[0], unit="N/m", **told)
-            return found, Estimate.normal(DAMPING, best[1], sd=sd[1], unit="N s/m", **told)
+            contact = Estimate.normal(STIFFNESS, stiffness, sd=stiffness * sd[0], unit="N/m", **common)
+            return contact, Estimate.normal(DAMPING, best[1], sd=sd[1], unit="N s/m", **common)
         low, high = (self._end(best, sd[1], end) for end in (self.lowest, self.highest))
         if math.isinf(low):
             raise EstimateError(
@@ -321,11 +321,11 @@ class _Search:
                 "use better sensors, or a longer record",
             )
         if math.isinf(high):
-            words = f"at least {math.exp(low):.3g} N/m: not told from a rigid contact"
-            told["status"] = words if told["status"] == "ok" else f"{words}; {told['status']}"
+            sentence = f"at least {math.exp(low):.3g} N/m: not told from a rigid contact"
+            common["status"] = sentence if common["status"] == "ok" else f"{sentence}; {common['status']}"
         interval = math.exp(low), math.exp(high)
-        found = Estimate(STIFFNESS, stiffness, interval, stiffness * sd[0], "N/m", **told)
-        return found, Estimate.normal(DAMPING, best[1], sd=sd[1], unit="N s/m", **told)
+        contact = Estimate(STIFFNESS, stiffness, interval, stiffness * sd[0], "N/m", **common)
+        return contact, Estimate.normal(DAMPING, best[1], sd=sd[1], unit="N s/m", **common)
 
     def _end(self, best: Array, unsure: float, end: float) -> float:
         """Where, from the peak towards an end, twice the likelihood has fallen by chi square's 3.84; or infinite.
@@ -339,11 +339,11 @@ class _Search:
 
         def highest(log_stiffness: float) -> float:
             reach = self.critical(log_stiffness)
-            found = minimize_scalar(
+            optimum = minimize_scalar(
                 lambda c: -self.likelihood(log_stiffness, c), bounds=(-0.1 * reach, reach), method="bounded",
                 options={"xatol": min(0.1 * unsure, 1e-2 * reach)},
             )  # fmt: skip
-            return max(-float(found.fun), self.likelihood(log_stiffness, best[1]))  # the search is of one valley
+            return max(-float(optimum.fun), self.likelihood(log_stiffness, best[1]))  # the search is of one valley
 
         top = highest(best[0])
 

@@ -68,10 +68,8 @@ def find_lines(record: Record, channels: Sequence[str], *, contact: str | None =
     chosen = np.unique(np.linspace(0, len(cycles.edges) - 2, min(MOST, len(cycles.edges) - 1)).astype(int))
     places = cycles.edges[chosen][:, None] + np.arange(points) * length / points
     places = np.minimum(places, len(record) - 1.0)
-    spectra = {}
-    for name in channels:
-        folded = band_limited(record[name], places.ravel()).reshape(places.shape)
-        spectra[name] = np.fft.rfft(folded, axis=1) / points
+    folded = band_limited(np.array([record[name] for name in channels]), places.ravel())
+    spectra = dict(zip(channels, np.fft.rfft(folded.reshape(-1, *places.shape)) / points, strict=True))
     orders = np.arange(1, points // 2)
     return Lines(
         np.asarray(orders * (record.fs / length), dtype=np.float64),

@@ -111,14 +111,14 @@ def mass_and_stiffness(
     lines = find_lines(record, names, contact=contact, question=BOTH)
     if lines.cycles is None:
         raise EstimateError("the motion does not repeat", f"{BOTH} need cycles", "give the mass, or the stiffness")
-    told = lines.frequency[:HARMONICS]
-    s = 2j * np.pi * told
-    made = {name: lines.amplitudes[name][:, :HARMONICS] / response_of(record.channels[name]).at(told) for name in names}
+    line = lines.frequency[:HARMONICS]
+    s = 2j * np.pi * line
+    made = {name: lines.amplitudes[name][:, :HARMONICS] / response_of(record.channels[name]).at(line) for name in names}
     x, z = made["x"], made["z"]
     a = made.get("a", s**2 * x)
     felt = made["load"] - record.channels["load"].inertia * a
     felt = felt + damping * s * (x - z if damper == "base" else x) - made.get("force", 0.0)
-    fits = [_fitted(*each) for each in zip(z - x, a, felt, strict=True)]
+    fits = [_fitted(*terms) for terms in zip(z - x, a, felt, strict=True)]
     left_over = float(np.mean([rest for _, rest in fits]))
     stiffness, mass = np.transpose([values for values, _ in fits])
     if left_over > LEFT_OVER or stiffness.mean() <= 0 or mass.mean() <= 0:

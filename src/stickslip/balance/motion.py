@@ -28,6 +28,7 @@ TURNED = 0.1  # share of the typical peak speed that the motion reaches before i
 NEARLY = 0.02  # of a period: a cycle that lacks no more is complete
 PERIODIC = 0.9  # share of the displacement's variance that repeats from cycle to cycle
 PHASES = 200  # points of a mean cycle
+STILL = 1e-10  # of a frequency: a smaller step is none
 ENOUGH = 65536  # samples for the search of a frequency; longer records are averaged in blocks
 
 
@@ -249,8 +250,8 @@ def find_cycles(record: Record, motion: Motion, *, frequency: float | str | None
 
 def _cycles(record: Record, motion: Motion) -> Cycles:
     reference = next((name for name in ("z", "force") if name in record and _moves(record[name])), "")
-    found = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
-    cycles = _periodic(motion, found)
+    frequency = forcing_frequency(record[reference] if reference else motion.displacement, motion.fs)
+    cycles = _periodic(motion, frequency)
     repeated = 0.0 if cycles is None else _repeated(cycles, motion.displacement)
     return cycles if cycles is not None and repeated >= PERIODIC else _aperiodic(motion, repeated)
 
@@ -285,29 +286,34 @@ def forcing_frequency(values: Array, fs: float) -> Estimate:
     block = max(1, len(values) // ENOUGH)
     short = values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
     rate, count = fs / block, len(short)
-    time = (np.arange(count) - (count - 1) / 2) / rate
+    time = np.asarray((np.arange(count) - (count - 1) / 2) / rate, dtype=float)
     trend = np.column_stack([np.ones(count), time / time[-1]])
     level = short - trend @ np.linalg.lstsq(trend, short, rcond=None)[0]
     size = next_fast_len(4 * count, real=True)
     spectrum = np.abs(rfft(level * np.hanning(count), size))
     first = max(1, size // count)  # one cycle in the record
-    guess = (first + int(np.argmax(spectrum[first:]))) * rate / size
-    name, method, sd = "forcing frequency", "least-squares sine", math.inf
+    guess = frequency = (first + int(np.argmax(spectrum[first:]))) * rate / size
+    name, method = "forcing frequency", "least-squares sine"
     for _ in range(12):
-        turn = 2 * np.pi * guess * time
-        wave = np.column_stack([np.cos(turn), np.sin(turn), trend])
-        a, b = np.linalg.lstsq(wave, short, rcond=None)[0][:2]
-        slope = 2 * np.pi * time * (b * wave[:, 0] - a * wave[:, 1])
-        try:
-            fit = least_squares(np.column_stack([wave, slope]), short)
-        except EstimateError:  # about a cycle: a sine is not told from a trend
-            status = "too few cycles to tell the frequency from a trend"
-            return Estimate.normal(name, guess, sd=math.inf, unit="Hz", method=method, status=status)
-        step, sd = float(fit.coefficients[-1]), float(fit.sd[-1])
-        guess += float(np.clip(step, -0.2 * guess, 0.2 * guess))
-        if abs(step) < 1e-3 * sd or abs(step) < 1e-12 * guess:
+        columns = np.column_stack([*_wave(frequency, time, short, trend), trend])
+        step = float(np.linalg.lstsq(columns, short, rcond=None)[0][0])
+        frequency += float(np.clip(step, -0.2 * frequency, 0.2 * frequency))
+        if abs(step) < STILL * frequency:
             break
-    return Estimate.normal(name, guess, sd=sd, unit="Hz", method=method)
+    try:
+        fit = least_squares(np.column_stack([*_wave(frequency, time, short, trend), trend]), short)
+    except EstimateError:  # about a cycle: a sine is not told from a trend
+        status = "too few cycles to tell the frequency from a trend"
+        return Estimate.normal(name, guess, sd=math.inf, unit="Hz", method=method, status=status)
+    return Estimate.normal(name, frequency, sd=float(fit.sd[0]), unit="Hz", method=method)
+
+
+def _wave(frequency: float, time: Array, values: Array, trend: Array) -> tuple[Array, Array, Array]:
+    """How the nearest sine changes with its frequency, and its cosine and sine."""
+    turn = 2 * np.pi * frequency * time
+    cosine, sine = np.cos(turn), np.sin(turn)
+    a, b = np.linalg.lstsq(np.column_stack([cosine, sine, trend]), values, rcond=None)[0][:2]
+    return 2 * np.pi * time * (b * cosine - a * sine), cosine, sine
 
 
 def is_measured(record: Record, name: str) -> bool:

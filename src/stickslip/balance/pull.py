@@ -141,10 +141,10 @@ def _turns(force: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.int
     """
     from scipy.signal import find_peaks
 
-    _, found = find_peaks(force, prominence=NOISY * noise)
-    if not len(found["prominences"]):
+    _, peaks = find_peaks(force, prominence=NOISY * noise)
+    if not len(peaks["prominences"]):
         return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
-    usual = float(np.quantile(found["prominences"], 0.9))
+    usual = float(np.quantile(peaks["prominences"], 0.9))
     counts = max(NOISY * noise, DROP * usual)
     tops = find_peaks(force, prominence=counts)[0]
     edges = np.append(tops, len(force))

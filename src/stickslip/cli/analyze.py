@@ -26,7 +26,7 @@ from stickslip.cli.show import show
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("250 g").')
+@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("250 g", "2.42 ± 0.02 kg").')
 @click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
 @click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
 @click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")

@@ -28,7 +28,7 @@ def reading_options(command: Callable[..., None]) -> Callable[..., None]:
             "--channels",
             multiple=True,
             metavar='"NAME=COLUMN [UNIT]"',
-            help='What a column is: "x=qm [m]", "force=vir * 35.15 [N]". Repeatable.',
+            help='What a column is: "x=qm [m]", "force=vir * 35.15 [N]", "a=acc [g] ± 1 %". Repeatable.',
         ),
         click.option(
             "--units",

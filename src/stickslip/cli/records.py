@@ -23,7 +23,7 @@ from stickslip.printing import printable
 
 if TYPE_CHECKING:
     from stickslip import Record
-    from stickslip.answers import Comparison, DecayComparison, DecayFindings, Findings, SqueakComparison, SqueakFindings
+    from stickslip.answers import Comparison, Findings
     from stickslip.record import Step
     from stickslip.rig import RigSettings
 
@@ -31,9 +31,6 @@ Answer = TypeVar("Answer")
 
 LONG = 1 << 26  # bytes on the disk
 PART = 1 << 18  # rows of a long record's part
-Result = TypeVar(
-    "Result", "Findings | Comparison", "DecayFindings | DecayComparison", "SqueakFindings | SqueakComparison"
-)
 
 
 def rig_of(
@@ -248,7 +245,7 @@ def _say(tell: Callable[[str, float], None], what: str, done: float, words: str)
     tell(f"{what}, {words}", done)
 
 
-def with_left_out(results: Result, refused: Sequence[ss.StickslipError]) -> Result:
+def with_left_out(results: Findings | Comparison, refused: Sequence[ss.StickslipError]) -> Findings | Comparison:
     """The results, with a note for each record that is not among them."""
     notes = (*results.notes, *(f"Left out: {error}" for error in refused))
     return dataclasses.replace(results, notes=notes)

@@ -44,6 +44,9 @@ def _print_story(story: Story) -> None:
         paragraph(spoken(sentence))
     _print_lines(story)
     for table in story.tables:
+        if table.folded:
+            paragraph((f"{table.title}: {len(table.rows)} rows, on the page", "dim"))
+            continue
         paragraph(f"\n{table.title}")
         print_table(table.headings, table.rows)
         if table.note:

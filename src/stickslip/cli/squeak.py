@@ -23,7 +23,7 @@ from stickslip.cli.show import show
 
 if TYPE_CHECKING:
     from stickslip import Record
-    from stickslip.answers import SqueakFindings
+    from stickslip.answers import Findings
 
 
 @click.command()
@@ -72,7 +72,7 @@ def squeak(
     require_fits(options["normal"], groups)
     folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
 
-    def ask(record: Record) -> SqueakFindings:
+    def ask(record: Record) -> Findings:
         found = ss.analyze_squeaks(record, channel=channel, frequencies=frequencies, contact=rig.contact, lever=lever)
         loads = (rig.normal_load(part) for part in (*found.name.split(" + "), found.name))
         return replace(found, normal=next((load for load in loads if load is not None), found.normal))

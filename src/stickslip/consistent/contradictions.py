@@ -8,7 +8,7 @@ from typing import Any
 
 from stickslip.balance.balance import known_constants
 from stickslip.balance.motion import is_measured, require_change
-from stickslip.consistent.checks import FAILS, Check
+from stickslip.consistent.checks import FAILS, ONE_SLIP, Check, mixups
 from stickslip.consistent.forced_checks import (
     Seen,
     acceleration_check,
@@ -19,11 +19,10 @@ from stickslip.consistent.forced_checks import (
     stops_check,
     velocity_check,
 )
-from stickslip.consistent.mixups import ONE_SLIP, mixups
 from stickslip.consistent.sensor_checks import cycle_checks, range_checks, sampling_check, silence_checks, silent
 from stickslip.consistent.stated import Stated, stated_checks, what_fails
 from stickslip.errors import EstimateError
-from stickslip.estimate import Result
+from stickslip.estimate import Constant, Result
 from stickslip.record.record import Record
 from stickslip.signals.delay import without_delays
 
@@ -59,11 +58,11 @@ class Consistency(Result):
 
     def __getitem__(self, name: str) -> Check:
         """The check of that name."""
-        found = [check for check in self.checks if check.name == name]
-        if not found:
+        named = [check for check in self.checks if check.name == name]
+        if not named:
             names = ", ".join(check.name for check in self.checks)
             raise EstimateError(f"no check '{name}'", f"there are {names}", "choose one of them")
-        return found[0]
+        return named[0]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -76,9 +75,9 @@ class Consistency(Result):
 def consistency(
     record: Record | Stated,
     *,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
-    damping: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
+    damping: Constant | None = None,
     damper: str | None = None,
     tolerance: float = 0.01,
 ) -> Consistency:
@@ -103,7 +102,7 @@ def consistency(
         out. Or "mass", "stiffness", "damping", "forcing frequency", "base amplitude", "amplitude", "sliding friction",
         "contact stiffness", "transition speed", each a number in SI, a text with its unit, an Estimate, or (value,
         standard deviation).
-    mass, stiffness, damping : float or str, optional
+    mass, stiffness, damping : float, str, tuple or Estimate, optional
         Of the rig; as :func:`~stickslip.friction_force` was told, where not given. For a record only.
     damper : {"ground", "base"}, optional
         Where the damper's other end is fixed.

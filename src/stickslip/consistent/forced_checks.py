@@ -11,17 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.lines import Complex, Lines, find_lines, response_of
-from stickslip.consistent.checks import APART, HOLDS, UNTOLD, Check, compared, judged, untold
-from stickslip.consistent.mixups import Amplitudes
+from stickslip.consistent.checks import APART, HOLDS, UNTOLD, Amplitudes, Check, compared, judged, untold
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.record.channels import Channel
-from stickslip.record.record import Record
+from stickslip.record.record import RIG_UNITS, Record
 from stickslip.statistics import mean_uncertainty
-from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
-UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 RATES = ("x_rate", "x_rate_rate")  # the displacement's derivatives
 ENERGY, STOPPING = "energy of whole cycles", "sliding without stops"
 MOST_ORDERS, PLACES = 40, 2000  # harmonics, and places in a cycle, of which the mean cycle is drawn
@@ -52,14 +49,14 @@ class Seen:
             rates = dict(zip(RATES, _rates(record["x"], record.fs), strict=True))
             whole = replace(record, samples={**record.samples, **rates}, channels={**record.channels, **_plain(RATES)})
             lines = find_lines(whole, [*names, *RATES], contact=contact, question=question)
-        known = {name: parse_value(rig[name], unit) for name, unit in UNITS.items() if name in rig}
-        told = {name: record.channels[name] for name in names}
-        made = {name: lines.amplitudes[name] / response_of(told[name]).at(lines.frequency) for name in names}
-        if "load" in made and told["load"].inertia:
+        known = {name: rig[name] for name in RIG_UNITS if name in rig}
+        channels = {name: record.channels[name] for name in names}
+        made = {name: lines.amplitudes[name] / response_of(channels[name]).at(lines.frequency) for name in names}
+        if "load" in made and channels["load"].inertia:
             w = 2 * np.pi * lines.frequency
-            made["load"] = made["load"] - told["load"].inertia * made.get("a", -(w**2) * made["x"])
+            made["load"] = made["load"] - channels["load"].inertia * made.get("a", -(w**2) * made["x"])
         at = 0 if lines.cycles is not None else int(np.argmax(np.abs(made["x"]).mean(axis=0) * lines.frequency))
-        return cls(lines, made, known, str(rig.get("damper", "ground")), tolerance, at, _trips(record), told)
+        return cls(lines, made, known, str(rig.get("damper", "ground")), tolerance, at, _trips(record), channels)
 
     @property
     def angular(self) -> float:
@@ -99,8 +96,8 @@ class Seen:
     def sd(self, values: Array | Complex) -> float:
         """Of the mean over stretches."""
         parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
-        found = [mean_uncertainty(np.asarray(part, dtype=float))[0] if len(part) > 1 else 0.0 for part in parts]
-        return math.hypot(*found) / math.sqrt(self.lines.worth)
+        spreads = [mean_uncertainty(np.asarray(part, dtype=float))[0] if len(part) > 1 else 0.0 for part in parts]
+        return math.hypot(*spreads) / math.sqrt(self.lines.worth)
 
     @property
     def balance(self) -> Amplitudes:
@@ -161,19 +158,19 @@ def _off(name: str, other: str, ratio: complex, seen: Seen) -> str:
     """In which way one reading is not what another lets expect."""
     phase = float(np.angle(ratio))
     small = 3 * math.sqrt(2) * seen.tolerance
-    words = []
+    reasons = []
     if abs(abs(phase) - math.pi) < 0.3:
-        words.append(f"{name} and {other} have opposite signs")
+        reasons.append(f"{name} and {other} have opposite signs")
         phase = float(np.angle(-ratio))
     if abs(phase) > small:
         ahead = "ahead of" if phase > 0 else "behind"
-        words.append(
+        reasons.append(
             f"{name} is {1e3 * abs(phase) / seen.angular:.3g} ms {ahead} {other}, or that and whole cycles: state the "
             "delay of the later one (sensor_delay finds it)"
         )
     if abs(abs(ratio) - 1) > small:
-        words.append(f"{name} is {abs(ratio):.3g} times what {other} lets expect")
-    return "; ".join(words) or f"{name} is not quite what {other} lets expect"
+        reasons.append(f"{name} is {abs(ratio):.3g} times what {other} lets expect")
+    return "; ".join(reasons) or f"{name} is not quite what {other} lets expect"
 
 
 def forces_check(seen: Seen) -> Check:
@@ -187,7 +184,7 @@ def forces_check(seen: Seen) -> Check:
     inertia = m * seen.acceleration
     computed = k * (z - x) - seen.drag[:, seen.at] + seen.strongest("force") - inertia
     felt = seen.strongest("load")
-    sizes = [abs(each.mean()) for each in (k * z, k * x, inertia, felt, seen.strongest("force"))]
+    sizes = [abs(term.mean()) for term in (k * z, k * x, inertia, felt, seen.strongest("force"))]
     sd = math.hypot(seen.sd(felt - computed), math.sqrt(2) * seen.tolerance * float(np.linalg.norm(sizes)))
     rest = complex((felt - computed).mean())
     return judged(
@@ -209,9 +206,11 @@ def _unbalanced(rest: complex, felt: complex, acceleration: complex, stretch: co
             cures.append(f"a {name} of {other:.4g} {unit}")
     turned = math.degrees(float(np.angle(felt / (felt - rest))))
     leaves = f"the motion leaves {abs(felt - rest):.3g} N, {turned:.0f} degrees apart"
-    words = f"the load cell feels {abs(felt):.3g} N where {leaves}"
+    sentence = f"the load cell feels {abs(felt):.3g} N where {leaves}"
     return (
-        f"{words}; {' or '.join(cures)} would balance them" if cures else f"{words}: a delay, a calibration or a sign"
+        f"{sentence}; {' or '.join(cures)} would balance them"
+        if cures
+        else f"{sentence}: a delay, a calibration or a sign"
     )
 
 
@@ -279,17 +278,17 @@ def momentum_check(seen: Seen) -> Check:
         left, right, unit = pull, means["load"], "N"
         size = float(abs(seen.strongest("load").mean()))
         off = float(np.mean(left) - np.mean(right))
-        words = f"a zero is off by {off:.3g} N, or {1e3 * off / seen.rig['stiffness']:.3g} mm of x or z"
+        sentence = f"a zero is off by {off:.3g} N, or {1e3 * off / seen.rig['stiffness']:.3g} mm of x or z"
     elif "a" in means:
         left, right, unit = means["a"], np.zeros(seen.lines.count), "m/s^2"
         size = float(abs(seen.strongest("a").mean()))
-        words = f"the accelerometer's zero is off by {float(np.mean(left)):.3g} m/s^2"
+        sentence = f"the accelerometer's zero is off by {float(np.mean(left)):.3g} m/s^2"
     else:
         return untold(name, "neither an accelerometer nor a load cell that keeps its charge, with mass and stiffness")
     sd = math.hypot(seen.sd(np.asarray(left - right)), seen.tolerance * size)
     return compared(
         name, float(np.mean(left)), float(np.mean(right)), sd=sd, unit=unit,
-        holds="what acts on the mass has no mean over whole cycles", fails=words,
+        holds="what acts on the mass has no mean over whole cycles", fails=sentence,
     )  # fmt: skip
 
 
@@ -355,8 +354,10 @@ def _stopping(share: float, least: float, sd: float) -> Check:
     """Of a mass that stops: whether friction makes it."""
     if share > least - APART * sd:
         return Check(STOPPING, share, least, "1", 0.0, HOLDS, "it stops, and friction makes it stop")
-    words = "it stops, though sliding on is possible too: friction at rest above that of sliding, or it was started so"
-    return Check(STOPPING, share, least, "1", (least - share) / sd, UNTOLD, words)
+    sentence = (
+        "it stops, though sliding on is possible too: friction at rest above that of sliding, or it was started so"
+    )
+    return Check(STOPPING, share, least, "1", (least - share) / sd, UNTOLD, sentence)
 
 
 def _sliding_on(share: float, least: float, sd: float, friction: float, drive: float) -> Check:
@@ -367,8 +368,8 @@ def _sliding_on(share: float, least: float, sd: float, friction: float, drive: f
         "it can not: friction, base motion or stiffness is wrong",
     )  # fmt: skip
     if check.verdict == HOLDS and share > least + APART * sd:
-        words = (
+        sentence = (
             f"it slides on where a rigid contact would stop ({least:.3g} of k Z, Den Hartog): the contact is elastic"
         )
-        return Check(STOPPING, share, least, "1", (share - least) / sd, HOLDS, words)
+        return Check(STOPPING, share, least, "1", (share - least) / sd, HOLDS, sentence)
     return replace(check, right=least) if check.verdict == HOLDS else check

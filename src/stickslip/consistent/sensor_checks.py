@@ -33,29 +33,31 @@ SURE = 5.0  # standard deviations of what is left over, from which shifts differ
 
 def silent(record: Record, names: Sequence[str]) -> dict[str, str]:
     """Why a channel tells nothing, of those that do not."""
-    found = {}
+    silent_channels = {}
     for name in names:
         values, unit = record[name], record.channels[name].unit
         lost = int(np.sum(~np.isfinite(values)))
         if lost:
-            found[name] = f"{name} has {lost} values that are not numbers: see record.check()"
+            silent_channels[name] = f"{name} has {lost} values that are not numbers: see record.check()"
         elif constant(values) and name not in MAY_REST:
-            found[name] = f"{name} does not change, it reads {values[0]:.4g} {unit} throughout: look at its cable"
-    return found
+            silent_channels[name] = (
+                f"{name} does not change, it reads {values[0]:.4g} {unit} throughout: look at its cable"
+            )
+    return silent_channels
 
 
 def silence_checks(record: Record, why: Mapping[str, str]) -> list[Check]:
     """That a channel tells nothing: one that does not change can not be true, of one with gaps nothing is known."""
     return [
-        Check(f"{name} is heard", math.nan, math.nan, "1", math.nan, UNTOLD if gaps else FAILS, words)
-        for name, words in why.items()
+        Check(f"{name} is heard", math.nan, math.nan, "1", math.nan, UNTOLD if gaps else FAILS, reason)
+        for name, reason in why.items()
         for gaps in [not np.isfinite(record[name]).all()]
     ]
 
 
 def range_checks(record: Record, names: Sequence[str]) -> list[Check]:
     """Whether a sensor stands at the end of its range."""
-    found = []
+    checks = []
     for name in names:
         cut = find_clipping(record, name) if np.isfinite(record[name]).all() else None
         mask = saturated(record[name]) if name in NOISY else np.zeros(1, dtype=bool)
@@ -63,18 +65,18 @@ def range_checks(record: Record, names: Sequence[str]) -> list[Check]:
             continue
         top = float(np.abs(record[name]).max())
         held = f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples"
-        words = held if cut is None else cut.message
-        found.append(
-            Check(f"range of {name}", top, top, record.channels[name].unit, math.inf, FAILS, words.rstrip("."))
+        sentence = held if cut is None else cut.message
+        checks.append(
+            Check(f"range of {name}", top, top, record.channels[name].unit, math.inf, FAILS, sentence.rstrip("."))
         )
-    return found or [
+    return checks or [
         Check("range of the sensors", math.nan, math.nan, "1", math.nan, HOLDS, "none stands at the end of its range")
     ]
 
 
 def sampling_check(record: Record, seen: Seen) -> Check:
     name = "samples of a reversal"
-    source = next((each for each in ("load", "friction") if each in record), "")
+    source = next((name for name in ("load", "friction") if name in record), "")
     if not source or not np.isfinite(record[source]).all():
         return untold(name, "no friction is measured, or computed yet")
     force = record[source] - np.mean(record[source])
@@ -127,7 +129,7 @@ def cycle_checks(record: Record, seen: Seen) -> list[Check]:
         return [untold("channels are of the same cycle", f"fewer than {FEW_CYCLES} cycles")]
     smooth = Filter("smoother", record.fs, min(SMOOTHED / float(np.diff(edges).mean()), 0.2) * record.fs)
     expected = _foretold(record, seen, smooth)
-    for name in (each for each in expected if each in seen.channels):
+    for name in (channel for channel in expected if channel in seen.channels):
         title = f"{name} is of the same cycle as x"
         left = _left_over(smooth.apply(record[name], {0: 1.0}), expected[name], edges)
         best, here = min(left, key=lambda shift: left[shift]), left[0]
@@ -163,7 +165,7 @@ def _foretold(record: Record, seen: Seen, smooth: Filter) -> dict[str, Array]:
 
 def _left_over(read: Array, expected: Array, edges: Array) -> dict[int, float]:
     """Root mean square of what one holds beyond the other and does not repeat, by the shift of whole cycles."""
-    found, period = {}, float(np.diff(edges).mean())
+    rests, period = {}, float(np.diff(edges).mean())
     most = min(FARTHEST, (len(edges) - 1) // 3)
     margin = round(period / 2)  # where the smoothing feels the ends
     read, expected = read[margin:-margin], expected[margin:-margin]
@@ -171,8 +173,8 @@ def _left_over(read: Array, expected: Array, edges: Array) -> dict[int, float]:
         rows = round(shift * period)
         late, early = (read[rows:], expected[: len(read) - rows]) if rows >= 0 else (read[:rows], expected[-rows:])
         rest = _unrepeated(late - early, period)
-        found[shift] = float(np.sqrt(np.mean(rest**2) / (1 - period / len(rest))))
-    return found
+        rests[shift] = float(np.sqrt(np.mean(rest**2) / (1 - period / len(rest))))
+    return rests
 
 
 def _unrepeated(values: Array, period: float) -> Array:

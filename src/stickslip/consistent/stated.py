@@ -12,8 +12,8 @@ import numpy as np
 from stickslip.consistent.checks import HOLDS, UNTOLD, Check, compared, untold
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import Estimate
-from stickslip.units import parse_value
+from stickslip.estimate import Constant, Estimate
+from stickslip.units import parse_uncertain
 
 UNITS = {
     "mass": "kg",
@@ -29,7 +29,7 @@ UNITS = {
 NEEDED = ("mass", "stiffness", "forcing frequency", "base amplitude", "amplitude", "sliding friction")
 EXACT = ("forcing frequency",)  # not measured by a calibrated sensor
 Values = Mapping[str, float]
-Stated = Mapping[str, float | str | Estimate | tuple[float, float]]
+Stated = Mapping[str, Constant]
 
 
 @dataclass(frozen=True)
@@ -52,16 +52,16 @@ def stated_checks(stated: Stated, tolerance: float) -> list[Check]:
     return [_energy(numbers), _friction(numbers), _boundary(numbers), _transition(numbers)]
 
 
-def _number(name: str, value: float | str | Estimate | tuple[float, float], tolerance: float) -> _Number:
-    """Value and deviation: as stated, the rounding of a text's last digit, and the tolerance of what is measured."""
+def _number(name: str, value: Constant, tolerance: float) -> _Number:
+    """Value and deviation: as stated, or the rounding of a text's last digit and the tolerance of what is measured."""
     unit = UNITS[name]
     if isinstance(value, Estimate):
         return _checked(name, value.value, value.sd)
-    if isinstance(value, tuple):
-        return _checked(name, float(value[0]), float(value[1]))
-    number, rounding = parse_value(value, unit), 0.0
+    (number, sd), rounding = parse_uncertain(value, unit), 0.0
+    if sd or isinstance(value, tuple):
+        return _checked(name, number, sd)
     if isinstance(value, str) and (digits := re.match(r"\s*[-+]?\d*\.?(\d*)", value)):
-        scale = parse_value(re.sub(r"^\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?", "1", value), unit)
+        scale, _ = parse_uncertain(re.sub(r"^\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?", "1", value), unit)
         exponent = re.match(r"\s*[-+]?[\d.]+[eE]([-+]?\d+)", value)
         rounding = scale * 10.0 ** (-len(digits[1]) + int(exponent[1] if exponent else 0)) / math.sqrt(12)
     measured = 0.0 if name in EXACT else tolerance * abs(number)
@@ -82,7 +82,7 @@ def _sd(of: Callable[[Values], float], numbers: Mapping[str, _Number]) -> float:
         for name, number in numbers.items()
         if number.sd > 0
     ]
-    return float(np.linalg.norm([each for each in moved if math.isfinite(each)])) if moved else 0.0
+    return float(np.linalg.norm([number for number in moved if math.isfinite(number)])) if moved else 0.0
 
 
 def _slider(values: Values) -> Slider:
@@ -149,7 +149,7 @@ def _needed(values: Values) -> float:
         return _short({**values, "sliding friction": friction})
 
     grid = np.linspace(0.0, 1.2 * values["stiffness"] * values["base amplitude"], 13)
-    over = [short(float(each)) for each in grid]
+    over = [short(float(number)) for number in grid]
     rising = [j for j in range(len(grid) - 1) if over[j] * over[j + 1] <= 0]
     if not rising:
         return math.nan
@@ -183,8 +183,8 @@ def _boundary(numbers: Mapping[str, _Number]) -> Check:
     )  # fmt: skip
     elastic = "contact stiffness" in at and share(at) < math.pi / 4
     if check.verdict != HOLDS and elastic:
-        words = "a rigid contact would stop on its way (Den Hartog); an elastic one may slide on"
-        return Check(check.name, check.left, check.right, "1", check.discrepancy, UNTOLD, words)
+        sentence = "a rigid contact would stop on its way (Den Hartog); an elastic one may slide on"
+        return Check(check.name, check.left, check.right, "1", check.discrepancy, UNTOLD, sentence)
     return check
 
 

@@ -129,7 +129,7 @@ def lag_or_compliance(record: Record, *, contact: str | None = None) -> Cause:
     >>> lag_or_compliance(record.between(2, 3)).cause
     'contact compliance'
     """
-    told, force = record, "load" if is_measured(record, "load") else "friction"
+    with_cell, force = record, "load" if is_measured(record, "load") else "friction"
     names = ["x", force, *(["z"] if slid_on(record, contact) == "base" else [])]
     record = without_delays(record, *names, question=QUESTION)
     record.require_clean(*names, question=QUESTION, samples=LEAST)
@@ -142,11 +142,11 @@ def lag_or_compliance(record: Record, *, contact: str | None = None) -> Cause:
         raise EstimateError(
             f"{len(fit.reversals)} reversals of the motion", f"{QUESTION} is told from {FEW}", "give a longer record"
         )
-    found = _answer(fit, _by_accelerometer(seen), told)
+    answer = _answer(fit, _by_accelerometer(seen), with_cell)
     if len(seen) < len(record):
-        words = f"told from the {seen.duration:.4g} s in the middle of {record.duration:.4g} s"
-        found = replace(found, reason=f"{found.reason}; {words}")
-    return found
+        sentence = f"told from the {seen.duration:.4g} s in the middle of {record.duration:.4g} s"
+        answer = replace(answer, reason=f"{answer.reason}; {sentence}")
+    return answer
 
 
 def _middle(record: Record) -> Record:
@@ -298,10 +298,10 @@ def _by_accelerometer(record: Record) -> Estimate | None:
     if not is_measured(record, "a"):
         return None
     try:
-        found = sensor_delay(without_delays(record, "a", question=QUESTION), channels=("x", "a"))
+        alignment = sensor_delay(without_delays(record, "a", question=QUESTION), channels=("x", "a"))
     except StickslipError:
         return None
-    return found.delay if found.delay.status == "ok" else None
+    return alignment.delay if alignment.delay.status == "ok" else None
 
 
 def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
@@ -327,16 +327,9 @@ def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
     unstated = fit.channel.name == "load" and fit.channel.mount is None
     mimicked = abs(lag.value) / passage if is_soft and passage else math.nan
     seen = give.value if is_soft else None, mimicked if is_late else math.nan
-    return Cause(
-        cause=cause,
-        reason=_reason(left, spread, lag, *seen),
-        lag=lag,
-        give=give,
-        stiffness=stiffness,
-        mimicked=mimicked,
-        left=left,
-        status="the load cell's mount is not stated: its own delay counts as negative lag" if unstated else "ok",
-    )
+    reason = _reason(left, spread, lag, *seen)
+    status = "the load cell's mount is not stated: its own delay counts as negative lag" if unstated else "ok"
+    return Cause(cause, reason, lag, give, stiffness, mimicked, left, status)
 
 
 def _named(left: tuple[float, float, float, float], spread: float, *, is_late: bool, is_soft: bool, held: bool) -> str:
@@ -344,56 +337,54 @@ def _named(left: tuple[float, float, float, float], spread: float, *, is_late: b
     neither, lagging, _, both = left
     good = math.sqrt(EXPLAINED) * spread
     if is_soft:
-        told = both < good
+        certain = both < good
     elif held:
-        told = lagging < math.sqrt(FAR) * spread
+        certain = lagging < math.sqrt(FAR) * spread
     else:
-        told = lagging < good and (is_late or neither < WORSE * both)
+        certain = lagging < good and (is_late or neither < WORSE * both)
     names = {(True, True): "both", (True, False): CAUSES[0], (False, True): CAUSES[1], (False, False): "neither"}
-    return names[is_late, is_soft] if told else CAUSES[-1]
+    return names[is_late, is_soft] if certain else CAUSES[-1]
 
 
 def _reason(left: tuple[float, ...], spread: float, lag: Estimate, give: float | None, mimicked: float) -> str:
     neither, lagging, soft, both = left
-    words = (
+    sentence = (
         f"of the friction's {spread:.3g} N (rms) a rigid contact read without lag leaves {neither:.3g} N unexplained, "
         f"a lag alone {lagging:.3g} N, a contact that gives way {soft:.3g} N, "
         f"both together {min(both, soft, lagging):.3g} N"
     )
-    words += (
+    sentence += (
         f"; the displacement comes {1e3 * lag.value:.3g} ms "
         f"(95 %: {1e3 * lag.interval[0]:.3g} to {1e3 * lag.interval[1]:.3g}) after the force, by {lag.method}"
     )
     if give is not None:
-        words += f"; the contact gives way by {1e6 * give:.3g} um before it slides"
-    return words + (f"; the lag would pass for {mimicked:.0%} of the transition speed" if mimicked > 0 else "")
+        sentence += f"; the contact gives way by {1e6 * give:.3g} um before it slides"
+    return sentence + (f"; the lag would pass for {mimicked:.0%} of the transition speed" if mimicked > 0 else "")
 
 
 def _give(parts: Array, value: float) -> Estimate:
     """The element's give about that of the whole, as unsure as its parts are, and as a damper leaves it."""
-    found = mean_of_cycles("give of the contact", parts, unit="m", method="element fitted to each of some parts")
-    half = (found.interval[1] - found.interval[0]) / 2 + abs(found.value - value)
+    give = mean_of_cycles("give of the contact", parts, unit="m", method="element fitted to each of some parts")
+    half = (give.interval[1] - give.interval[0]) / 2 + abs(give.value - value)
     high = (value + half) * (1 + STIFFENED)
-    return replace(found, value=value, interval=(value - half, high), sd=(high - value + half) / (2 * NORMAL_95))
+    return replace(give, value=value, interval=(value - half, high), sd=(high - value + half) / (2 * NORMAL_95))
 
 
 def _give_of(contact: LikelyContact) -> Estimate:
     """The give of a contact that was fitted with its damper."""
-    found = contact.stiffness
-    low, high = (contact.level / end if end > 0 else math.inf for end in reversed(found.interval))
-    return Estimate(
-        "give of the contact", contact.level / found.value, (low, high), contact.level * found.sd / found.value**2,
-        "m", "sliding friction over the likeliest stiffness", found.status,
-    )  # fmt: skip
+    stiffness, method = contact.stiffness, "sliding friction over the likeliest stiffness"
+    return _over(contact.level, stiffness, "give of the contact", "m", method, stiffness.status)
 
 
 def _stiffness(level: float, give: Estimate) -> Estimate:
-    low, high = (level / end if end > 0 else math.inf for end in reversed(give.interval))
     unknown = f"a damper in the contact may make it seem up to {STIFFENED:.0%} stiffer: see contact_stiffness"
-    return Estimate(
-        "contact stiffness", level / give.value, (low, high), level * give.sd / give.value**2, "N/m",
-        "sliding friction over give", unknown,
-    )  # fmt: skip
+    return _over(level, give, "contact stiffness", "N/m", "sliding friction over give", unknown)
+
+
+def _over(level: float, by: Estimate, name: str, unit: str, method: str, status: str) -> Estimate:
+    """A force over an estimate."""
+    low, high = (level / end if end > 0 else math.inf for end in reversed(by.interval))
+    return Estimate(name, level / by.value, (low, high), level * by.sd / by.value**2, unit, method, status)
 
 
 def _lag(parts: Array, value: float, open_: float, fs: float, against: Estimate | None) -> Estimate:
@@ -406,6 +397,6 @@ def _lag(parts: Array, value: float, open_: float, fs: float, against: Estimate 
             interval=(min(-high, -against.value - floor), max(-low, -against.value + floor)),
             method="its phases against the accelerometer's",
         )  # fmt: skip
-    found = mean_of_cycles("lag of the displacement", parts, unit="s", method="the friction's shape at the reversals")
-    half = (found.interval[1] - found.interval[0]) / 2 + open_
-    return replace(found, value=value, interval=(value - half, value + half), sd=half / NORMAL_95)
+    lag = mean_of_cycles("lag of the displacement", parts, unit="s", method="the friction's shape at the reversals")
+    half = (lag.interval[1] - lag.interval[0]) / 2 + open_
+    return replace(lag, value=value, interval=(value - half, value + half), sd=half / NORMAL_95)

@@ -57,13 +57,12 @@ def contact_stiffness(record: Record | Loops, *, method: str | None = None) -> E
     >>> bool(abs(contact_stiffness(record).value / 192000 - 1) < 0.01)
     True
     """
+    methods = ("slope",) if isinstance(record, Loops) else ("stick", "slope")
+    if method not in (None, *methods):
+        raise EstimateError(f"method = '{method}'", f"it is one of {', '.join(methods)}", "choose one of them")
     if isinstance(record, Loops):
-        if method not in (None, "slope"):
-            raise _no_method(method, ("slope",))
         friction = record.friction - record.offset.value
         return _slope(branch_slopes(record.displacement, friction, record.level.value), record.unit)
-    if method not in (None, "stick", "slope"):
-        raise _no_method(method, ("stick", "slope"))
     if method == "slope":
         record.require_clean("x", "friction", question=STIFFNESS)
         level, middle = sliding_level(record["friction"], np.gradient(record["x"]))
@@ -105,18 +104,14 @@ def contact_damping(record: Record) -> Estimate:
     >>> bool(abs(contact_damping(record).value - 23.9) < 1)
     True
     """
-    found = likely_contact(record).damping
-    if NEGATIVE in kinds(found.status):
+    damping = likely_contact(record).damping
+    if NEGATIVE in kinds(damping.status):
         raise EstimateError(
-            f"a contact damping of {found.value:.3g} N s/m",
+            f"a contact damping of {damping.value:.3g} N s/m",
             "a contact takes energy from the motion, so that its damping is not below zero",
             "state the sensors' lags and mounts, by with_details or under [sensors] in the rig file",
         )
-    return found
-
-
-def _no_method(method: str | None, methods: tuple[str, ...]) -> EstimateError:
-    return EstimateError(f"method = '{method}'", f"it is one of {', '.join(methods)}", "choose one of them")
+    return damping
 
 
 def branch_slopes(displacement: Array, friction: Array, level: float) -> Array:
@@ -130,22 +125,17 @@ def branch_slopes(displacement: Array, friction: Array, level: float) -> Array:
     return np.array(slopes)
 
 
-def _slope(found: Array, unit: str) -> Estimate:
-    if len(found) < 2:
+def _slope(deflection: Array, unit: str) -> Estimate:
+    if len(deflection) < 2:
         raise EstimateError(
-            f"{len(found)} sticks with {LEAST} samples or more below the sliding friction",
+            f"{len(deflection)} sticks with {LEAST} samples or more below the sliding friction",
             "a slope needs two at least",
             "sample faster, or give a longer record",
         )
-    scatter = float(np.std(found, ddof=1) / abs(np.mean(found)))
-    said = (
-        f"{len(found)} sticks, which scatter by {100 * scatter:.0f} %",
+    scatter = float(np.std(deflection, ddof=1) / abs(np.mean(deflection)))
+    checks = (
+        f"{len(deflection)} sticks, which scatter by {100 * scatter:.0f} %",
         "noise in the displacement and lags make a slope too low: 2 to 27 % on a rig like the thesis's",
     )
-    return mean_of_cycles(
-        STIFFNESS,
-        found,
-        unit="N/m" if unit == "m" else "N m/rad",
-        method="mean slope of friction against displacement in each stick",
-        checks=said,
-    ).within(0.0)
+    unit, method = "N/m" if unit == "m" else "N m/rad", "mean slope of friction against displacement in each stick"
+    return mean_of_cycles(STIFFNESS, deflection, unit=unit, method=method, checks=checks).within(0.0)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stickslip.contact.mechanisms import not_one_mode
 from stickslip.contact.ringing import Ringing, Window, checked_mass, find_ringing
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result, Status
+from stickslip.estimate import Constant, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.morlet import ridge_centre
 from stickslip.signals.wavelet import wavelet_map
@@ -91,7 +91,7 @@ class Transition(Result):
 
 
 def transition(
-    record: Record, *, channel: str = "a", mass: float | str | None = None, stiffness: float | str | None = None
+    record: Record, *, channel: str = "a", mass: Constant | None = None, stiffness: Constant | None = None
 ) -> Transition:
     """At which frequency does the contact ring while the mass sticks, how is it damped, how stiff is the contact?
 
@@ -111,9 +111,9 @@ def transition(
         acceleration's integral.
     channel : str
         The acceleration.
-    mass : float or str, optional
+    mass : float, str, tuple or Estimate, optional
         Oscillating mass [kg], for the contact's stiffness.
-    stiffness : float or str, optional
+    stiffness : float, str, tuple or Estimate, optional
         Spring [N/m], for the same.
 
     Returns
@@ -140,7 +140,7 @@ def transition(
     return transition_of(ringing, mass, stiffness)
 
 
-def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float | str | None) -> Transition:
+def transition_of(ringing: Ringing, mass: Constant | None, stiffness: Constant | None) -> Transition:
     """The transition of sticks that are cut into pieces already."""
     record, channel = ringing.record, ringing.channel
     pooled = heard_mode(ringing)
@@ -155,18 +155,18 @@ def transition_of(ringing: Ringing, mass: float | str | None, stiffness: float |
 
     doubt = ringing.doubt or not_one_mode(ringing)
 
-    def told(estimate: Estimate) -> Estimate:
+    def doubted(estimate: Estimate) -> Estimate:
         return replace(estimate, status=doubt) if doubt else estimate
 
     contact, loop = _stiffness(pooled, mass, stiffness), _loop_stiffness(record, ringing, pooled)
     return Transition(
-        frequency=told(frequency),
-        damping=told(damping),
-        amplitude=told(amplitude),
-        wavelet_frequency=told(wavelet),
+        frequency=doubted(frequency),
+        damping=doubted(damping),
+        amplitude=doubted(amplitude),
+        wavelet_frequency=doubted(wavelet),
         agreement=_agreement(frequency, wavelet),
-        stiffness=told(contact) if contact is not None else None,
-        loop_stiffness=told(loop) if loop is not None else None,
+        stiffness=doubted(contact) if contact is not None else None,
+        loop_stiffness=doubted(loop) if loop is not None else None,
         sticks=sticks,
         status=_status(ringing, pooled, doubt),
     )  # fmt: skip
@@ -253,13 +253,13 @@ def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> Mode | None:
         return np.concatenate(rests)
 
     start, scale = [ringing.pole.real, ringing.pole.imag], abs(ringing.pole)
-    found = nonlinear(left, start, x_scale=[scale, scale], jac="3-point", method="lm", max_nfev=60)
-    pole, slopes, rings = complex(*found.x), np.asarray(found.jac), sum(len(rows) for _, rows in used)
-    free, normal = len(found.fun) - sum(2 * len(rows) + 2 for _, rows in used) - 2, slopes.T @ slopes
-    told = free >= 4 and np.isfinite(normal).all() and np.linalg.cond(normal) <= 1e12
-    if not told or pole.imag <= 0 or abs(pole - ringing.pole) >= 0.5 * scale:
+    fit = nonlinear(left, start, x_scale=[scale, scale], jac="3-point", method="lm", max_nfev=60)
+    pole, slopes, rings = complex(*fit.x), np.asarray(fit.jac), sum(len(rows) for _, rows in used)
+    free, normal = len(fit.fun) - sum(2 * len(rows) + 2 for _, rows in used) - 2, slopes.T @ slopes
+    definite = free >= 4 and np.isfinite(normal).all() and np.linalg.cond(normal) <= 1e12
+    if not definite or pole.imag <= 0 or abs(pole - ringing.pole) >= 0.5 * scale:
         return None
-    variance, tau = float(found.fun @ found.fun) / free, max(1.0, float(correlation_time(found.fun)))
+    variance, tau = float(fit.fun @ fit.fun) / free, max(1.0, float(correlation_time(fit.fun)))
     spread, quantile = np.linalg.inv(normal) * variance * tau, student(free / tau)
     slope = np.array([-(pole.imag**2), pole.real * pole.imag]) / abs(pole) ** 3  # of the damping ratio
     method = f"one decaying mode, least squares over {rings} rings"
@@ -288,7 +288,7 @@ def _amplitude(window: Window, mode: Mode, ringing: Ringing) -> tuple[float, flo
 
 
 def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: Mode) -> tuple[StickTransition, ...]:
-    found, events = [], [event for event in ringing.sticks.events if event.kind == "stick" and event.whole]
+    rings, events = [], [event for event in ringing.sticks.events if event.kind == "stick" and event.whole]
     peaks = _local_maxima(record, channel, ringing, pooled)
     for window, peak in zip(pooled.windows, peaks, strict=True):
         own = _fitted((window,), ringing)
@@ -296,7 +296,7 @@ def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: Mode
         event = min(events, key=lambda event: abs(event.time + event.duration / 2 - middle))
         size, sd = _amplitude(window, pooled, ringing)
         frequency, damping = own.possible(ringing.fs) if own is not None else _untold_alone(pooled)
-        found.append(
+        rings.append(
             StickTransition(
                 time=ringing.time(window, begin), duration=event.duration, frequency=frequency, damping=damping,
                 amplitude=Estimate.normal(
@@ -306,12 +306,14 @@ def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: Mode
                 wavelet_frequency=peak, rings=len(window.rings),
             )
         )  # fmt: skip
-    return tuple(found)
+    return tuple(rings)
 
 
 def _untold_alone(pooled: Mode) -> tuple[Estimate, ...]:
     """Frequency and damping of all sticks, for one that does not tell them by itself."""
-    return tuple(each.unknown("this stick alone does not tell it") for each in (pooled.frequency, pooled.damping))
+    return tuple(
+        estimate.unknown("this stick alone does not tell it") for estimate in (pooled.frequency, pooled.damping)
+    )
 
 
 def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: Mode) -> list[float]:
@@ -319,7 +321,7 @@ def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: Mode) 
     centre = pooled.frequency.value
     wanted = centre * np.geomspace(1 / OCTAVE, min(OCTAVE, 0.45 * ringing.fs / centre), 61)
     reach = math.ceil(7 * ridge_centre(CENTRE, "energy") / (2 * math.pi * wanted[0]) * ringing.fs)
-    found = []
+    maxima = []
     for window in pooled.windows:
         first, last = max(0, window.first - reach), min(len(record), window.first + len(window.values) + reach)
         part = record.rows(first, last)
@@ -330,10 +332,10 @@ def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: Mode) 
         low, middle, high = np.log(np.maximum(ridge[peak - 1 : peak + 2], 1e-300)).tolist()
         bend = low - 2 * middle + high
         higher = bend < 0 and middle >= max(low, high)
-        found.append(
+        maxima.append(
             float(wanted[peak] * (wanted[1] / wanted[0]) ** (0.5 * (low - high) / bend)) if higher else math.nan
         )
-    return found
+    return maxima
 
 
 def _by_wavelet(peaks: list[float]) -> Estimate:
@@ -359,7 +361,7 @@ def _agreement(frequency: Estimate, wavelet: Estimate) -> str:
     return f"the mode and the wavelet differ: {reads}, {why}"
 
 
-def _stiffness(mode: Mode, mass: float | str | None, spring: float | str | None) -> Estimate | None:
+def _stiffness(mode: Mode, mass: Constant | None, spring: Constant | None) -> Estimate | None:
     kilograms, k = checked_mass(mass, spring)
     if kilograms is None:
         return None
@@ -397,8 +399,8 @@ def _loop_stiffness(record: Record, ringing: Ringing, mode: Mode) -> Estimate | 
 
 
 def _status(ringing: Ringing, pooled: Mode, doubt: str) -> str:
-    words = [doubt, ringing.sticks.status]
+    doubts = [doubt, ringing.sticks.status]
     silent = len(ringing.windows) - len(pooled.windows)
     if silent:
-        words.append(f"{silent} of {len(ringing.windows)} sticks hold no ringing long enough")
-    return Status(*words)
+        doubts.append(f"{silent} of {len(ringing.windows)} sticks hold no ringing long enough")
+    return Status(*doubts)

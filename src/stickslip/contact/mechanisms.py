@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from stickslip.contact.ringing import MISFIT, Ringing, checked_mass, find_ringing
 from stickslip.errors import EstimateError
+from stickslip.estimate import Constant
 from stickslip.record.record import Record
 
 QUESTION = "the mechanism"
@@ -79,7 +80,7 @@ class Mechanism:
 
 
 def mechanism(
-    record: Record, *, channel: str = "a", mass: float | str | None = None, stiffness: float | str | None = None
+    record: Record, *, channel: str = "a", mass: Constant | None = None, stiffness: Constant | None = None
 ) -> Mechanism:
     """Do the sticks show a rigid contact, a compliant one with or without micro-slips, or friction with a memory?
 
@@ -94,7 +95,7 @@ def mechanism(
         With an acceleration; see :func:`transition`.
     channel : str
         The acceleration.
-    mass, stiffness : float or str, optional
+    mass, stiffness : float, str, tuple or Estimate, optional
         Oscillating mass [kg] and spring [N/m]: with ``x`` and ``z``, to take a stated mount out of the acceleration.
 
     Returns
@@ -125,19 +126,19 @@ def mechanism(
 
 def mechanism_of(ringing: Ringing) -> Mechanism:
     """The mechanism of sticks that are cut into pieces already."""
-    found = features(ringing)
+    observed = features(ringing)
     doubt = ringing.doubt or too_fast(ringing)
     if doubt:
-        return Mechanism(UNTOLD, math.nan, features=found, reason=doubt)
-    probabilities = _weighed(found)
-    name = max(probabilities, key=lambda each: probabilities[each])
+        return Mechanism(UNTOLD, math.nan, features=observed, reason=doubt)
+    probabilities = _weighed(observed)
+    name = max(probabilities, key=lambda mechanism: probabilities[mechanism])
     sure, reason = probabilities[name], MEANINGS[name]
-    against = _unlike(found, name) or _undecided(probabilities) or (name == SWINGING and _swings_otherwise(ringing))
+    against = _unlike(observed, name) or _undecided(probabilities) or (name == SWINGING and _swings_otherwise(ringing))
     if against:
-        return Mechanism(UNTOLD, sure, probabilities, found, against)
+        return Mechanism(UNTOLD, sure, probabilities, observed, against)
     if name == SWINGING and _mount_unknown(ringing):
         sure, reason = ALONE * sure, f"{reason}; an accelerometer whose mount rings looks alike: {STATE_MOUNT}"
-    return Mechanism(name, sure, probabilities, found, reason)
+    return Mechanism(name, sure, probabilities, observed, reason)
 
 
 def too_fast(ringing: Ringing) -> str:
@@ -147,27 +148,27 @@ def too_fast(ringing: Ringing) -> str:
     return f"what rings in the sticks is faster than {FASTEST:g} cycles in each, and was not looked for"
 
 
-def _weighed(found: Mapping[str, float]) -> dict[str, float]:
+def _weighed(observed: Mapping[str, float]) -> dict[str, float]:
     """Probability of each mechanism by multinomial logistic regression."""
     table = _learnt()
-    scaled = (columns(found) - np.array(table["mean"])) / np.array(table["sd"])
+    scaled = (columns(observed) - np.array(table["mean"])) / np.array(table["sd"])
     score = np.array(table["weights"]) @ np.append(scaled, 1.0)
     weight = np.exp(score - score.max())
     return {name: float(w / weight.sum()) for name, w in zip(table["names"], weight, strict=True)}
 
 
-def _unlike(found: Mapping[str, float], name: str) -> str:
+def _unlike(observed: Mapping[str, float], name: str) -> str:
     """In words: what no simulated record of that name was like."""
     table = _learnt()
     kind = table["names"].index(name)
-    apart = np.abs((columns(found) - np.array(table["centres"][kind])) / np.array(table["spreads"][kind]))
+    apart = np.abs((columns(observed) - np.array(table["centres"][kind])) / np.array(table["spreads"][kind]))
     if apart.max() <= STRANGE:
         return ""
     return f"the sticks are unlike those of any simulated contact (by their {table['columns'][int(apart.argmax())]})"
 
 
 def _undecided(probabilities: Mapping[str, float]) -> str:
-    first, second, *_ = sorted(probabilities, key=lambda each: -probabilities[each])
+    first, second, *_ = sorted(probabilities, key=lambda name: -probabilities[name])
     return f"{first} or {second}" if probabilities[first] < SURE else ""
 
 
@@ -219,23 +220,23 @@ COLUMNS = ("loudness", "excess", "gain over rest", "noise", "glides", "any glide
            "longest ring", "damping", "time glided")  # fmt: skip
 
 
-def columns(found: Mapping[str, float]) -> NDArray[np.float64]:
+def columns(observed: Mapping[str, float]) -> NDArray[np.float64]:
     """The features as the regression takes them: logarithms and bounds keep single ones from deciding alone.
 
     Noise counts from where it is larger than the pieces' misfit: less leaves them as they are, and moves no verdict.
     """
     return np.array([
-        math.log10(found["loudness"] + 0.005),
-        math.log10(min(max(found["excess"], 1.0), 10.0)),
-        math.log10(min(max(found["rest"] / max(found["excess"], 1.0), 1.0), 1e3)),
-        math.log10(min(max(found["noise"], MISFIT), 0.3)),
-        min(found["glides"], 6.0),
-        min(found["glides"], 1.0),
-        min(found["shortest"], 1.0),
-        1 / (1 + math.exp((min(found["shortest"], 1.0) - 0.24) / 0.01)),
-        min(found["longest"], 3.0),
-        found["damping"],
-        found["glided"],
+        math.log10(observed["loudness"] + 0.005),
+        math.log10(min(max(observed["excess"], 1.0), 10.0)),
+        math.log10(min(max(observed["rest"] / max(observed["excess"], 1.0), 1.0), 1e3)),
+        math.log10(min(max(observed["noise"], MISFIT), 0.3)),
+        min(observed["glides"], 6.0),
+        min(observed["glides"], 1.0),
+        min(observed["shortest"], 1.0),
+        1 / (1 + math.exp((min(observed["shortest"], 1.0) - 0.24) / 0.01)),
+        min(observed["longest"], 3.0),
+        observed["damping"],
+        observed["glided"],
     ])  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from stickslip.contact.frequency_transition import heard_mode
 from stickslip.contact.mechanisms import UNTOLD, not_one_mode, too_fast
 from stickslip.contact.ringing import Ringing, Window, find_ringing
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result, Status
+from stickslip.estimate import Constant, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.pieces import Piece
 from stickslip.statistics import mean_of_cycles
@@ -71,7 +71,7 @@ class MicroSlips(Result):
 
 
 def find_microslips(
-    record: Record, *, channel: str = "a", mass: float | str | None = None, stiffness: float | str | None = None
+    record: Record, *, channel: str = "a", mass: Constant | None = None, stiffness: Constant | None = None
 ) -> MicroSlips:
     """How many times does the contact slip by a little within each stick, when, and for how long?
 
@@ -88,7 +88,7 @@ def find_microslips(
         With an acceleration; see :func:`transition`.
     channel : str
         The acceleration.
-    mass, stiffness : float or str, optional
+    mass, stiffness : float, str, tuple or Estimate, optional
         Oscillating mass [kg] and spring [N/m]: with ``x`` and ``z``, to take a stated mount out of the acceleration.
 
     Returns
@@ -142,10 +142,7 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
     ).within(0.0)  # fmt: skip
     blurred = "without a load cell whose mount is stated, one may be missed or seen twice" if ringing.blurred else ""
     status = Status(ringing.status, astray, blurred)
-    low, high = per_stick.interval
-    per_stick = replace(
-        per_stick, interval=(max(low, 0.0), high), status=per_stick.status if status == "ok" else status
-    )
+    per_stick = replace(per_stick, status=per_stick.status if status == "ok" else status)
     return MicroSlips(per_stick, tuple(events), counts, UNTOLD if astray else _kind(counts), status)
 
 
@@ -177,14 +174,10 @@ def _edges(window: Window, glide: Piece, pole: complex) -> tuple[float, float]:
 def _left(rows: Array, values: Array, begin: float, end: float, pole: complex) -> float:
     """Sum of squares, but for a constant, that the ring, the line and the next ring leave."""
     first, second = np.searchsorted(rows, (begin, end))
-    before, between, after = (
-        np.exp(pole * (rows[:first] - begin)),
-        rows[first:second],
-        np.exp(pole * (rows[second:] - end)),
-    )
+    before, after = np.exp(pole * (rows[:first] - begin)), np.exp(pole * (rows[second:] - end))
     design = np.zeros((4, len(rows)))  # level and slope where the line begins; what each ring has of its own
     design[0, :first], design[0, first:second], design[0, second:] = before.real, 1.0, after.real
-    design[1, first:second], design[1, second:] = between - begin, (end - begin) * after.real
+    design[1, first:second], design[1, second:] = rows[first:second] - begin, (end - begin) * after.real
     design[2, :first], design[3, second:] = before.imag, after.imag
     along = design @ values
     return -float(along @ np.linalg.lstsq(design @ design.T, along, rcond=None)[0])

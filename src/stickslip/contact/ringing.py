@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.accelerometer import acceleration_of_mass
 from stickslip.balance.motion import forcing_frequency
+from stickslip.balance.mounts import acceleration_of_mass
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import EstimateError
-from stickslip.estimate import Status
+from stickslip.estimate import Constant, Estimate, Status
 from stickslip.record.record import Record
+from stickslip.signals.cutting import GLIDE, RING
 from stickslip.signals.noise import noise_level
-from stickslip.signals.pieces import GLIDE, RING, Piece, Splitter
-from stickslip.units import parse_value
+from stickslip.signals.pieces import Piece, Splitter
 
 Array = NDArray[np.float64]
 
@@ -137,8 +137,8 @@ def find_ringing(
     channel: str,
     *,
     question: str,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
 ) -> Ringing:
     """Cut the acceleration around each stick into glides and rings of one mode.
 
@@ -168,9 +168,9 @@ def find_ringing(
     shortest, pieces, left, rest, count = _shortest(pole, record.fs), [], 0.0, 0.0, sum(map(len, windows))
     for few in range(0, len(windows), AT_ONCE):
         splitter = Splitter(windows[few : few + AT_ONCE], trusted**2, PENALTY)
-        found = splitter.split(pole / record.fs, shortest)
-        pieces += found
-        left += float(splitter.cost(pole / record.fs, shortest).sum()) - PENALTY * sum(map(len, found))
+        cuts = splitter.split(pole / record.fs, shortest)
+        pieces += cuts
+        left += float(splitter.cost(pole / record.fs, shortest).sum()) - PENALTY * sum(map(len, cuts))
         rest += float(splitter.cost(0.0, shortest).sum()) - PENALTY * sum(map(len, splitter.split(0.0, shortest)))
     doubt, rings = seen.doubt, pole.imag / (2 * math.pi)
     if rings > seen.fastest:
@@ -179,10 +179,10 @@ def find_ringing(
     return Ringing(cut, pole, noise, left / count, rest / count, sticks, record, channel, doubt, seen.blurred)
 
 
-def checked_mass(mass: float | str | None, stiffness: float | str | None) -> tuple[float | None, float]:
+def checked_mass(mass: Constant | None, stiffness: Constant | None) -> tuple[float | None, float]:
     """Mass [kg] and spring [N/m] as numbers, 0 for no spring; refused where they are none of a mass and a spring."""
-    kilograms = parse_value(mass, "kg") if mass is not None else None
-    spring = parse_value(stiffness, "N/m") if stiffness is not None else 0.0
+    kilograms = Estimate.stated("mass", mass, "kg").value if mass is not None else None
+    spring = Estimate.stated("stiffness", stiffness, "N/m").value if stiffness is not None else 0.0
     if not (kilograms is None or 0 < kilograms < math.inf) or not 0 <= spring < math.inf:
         raise EstimateError(
             f"mass = {mass}, stiffness = {stiffness}", "a mass is positive, a spring not negative",
@@ -315,8 +315,8 @@ def _pole(windows: list[Array], fs: float, noise: float, sticks: Sticks) -> comp
         corners = np.array([(math.log(f), z), (math.log(f) + 0.05, z), (math.log(f), 1.4 * z + 0.01)])
         options: dict[str, Any] = {"xatol": 5e-4, "fatol": 0.2, "maxiter": 40, "initial_simplex": corners}
         tried.append(minimize(of_pole, corners[0], method="Nelder-Mead", options=options))
-    found = min(tried, key=lambda each: float(each.fun)).x
-    return _mode(math.exp(found[0]), float(found[1]))
+    root = min(tried, key=lambda fit: float(fit.fun)).x
+    return _mode(math.exp(root[0]), float(root[1]))
 
 
 def _mode(frequency: float, damping: float) -> complex:

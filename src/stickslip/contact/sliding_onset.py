@@ -66,8 +66,8 @@ class TransitionSpeed(Result):
     @property
     def speed(self) -> Estimate:
         """The transition speed [m/s] by `method`."""
-        found: Estimate = getattr(self, self.method)
-        return found
+        speed: Estimate = getattr(self, self.method)
+        return speed
 
 
 def transition_speed(record: Record | Loops, *, method: str | None = None) -> TransitionSpeed:
@@ -175,8 +175,8 @@ def coupled_frequency(record: Record) -> Estimate:
     fitted = likely_contact(record)
     mass, spring = fitted.balance.mass, fitted.balance.stiffness
     low, value, high = (
-        math.sqrt((spring + each) / mass) / (2 * math.pi)
-        for each in (fitted.stiffness.interval[0], fitted.stiffness.value, fitted.stiffness.interval[1])
+        math.sqrt((spring + value) / mass) / (2 * math.pi)
+        for value in (fitted.stiffness.interval[0], fitted.stiffness.value, fitted.stiffness.interval[1])
     )
     sd = fitted.stiffness.sd / (8 * math.pi**2 * mass * value)
     said, status = _ringing(record, fitted, value, sd)
@@ -192,17 +192,17 @@ def _ringing(record: Record, fitted: LikelyContact, value: float, sd: float) -> 
     balanced = (rig.pull(record) - rig.damping * record["v"] - record["friction"]) / rig.mass
     bare = Record.of({"a": balanced, "v": record["v"]}, fs=record.fs, start=record.start)
     try:
-        found = transition(bare)
+        ringing = transition(bare)
     except EstimateError as error:
         return f"no ringing to compare with: {error.value}", "ok"
-    undamped = 1 / math.sqrt(1 - found.damping.value**2)
-    other = found.frequency.scaled(undamped, "Hz")
+    undamped = 1 / math.sqrt(1 - ringing.damping.value**2)
+    other = ringing.frequency.scaled(undamped, "Hz")
     apart = abs(other.value - value) / math.hypot(other.sd, sd)
     half = NORMAL_95 * other.sd
-    told = f"by the ringing of {len(found.sticks)} sticks {other.value:.5g} +- {half:.2g} Hz"
+    method = f"by the ringing of {len(ringing.sticks)} sticks {other.value:.5g} +- {half:.2g} Hz"
     if apart <= NORMAL_95:
-        return f"{told}: they agree", "ok"
-    return told, f"the ringing says {other.value:.5g} +- {half:.2g} Hz, {apart:.2g} deviations away"
+        return f"{method}: they agree", "ok"
+    return method, f"the ringing says {other.value:.5g} +- {half:.2g} Hz, {apart:.2g} deviations away"
 
 
 def _fitted(record: Record, method: str | None) -> tuple[LikelyContact | None, str]:
@@ -231,32 +231,32 @@ class Branch:
 
 
 def _branches(friction: Array, velocity: Array, level: float) -> list[Branch]:
-    found = []
+    branches = []
     for first, last in held_steps(friction, velocity, level)[1]:
         side = math.copysign(1.0, friction[last - 1])
         force, speed = side * friction[first:last], side * velocity[first:last]
         highest = np.maximum.accumulate(force)
         whole = force[0] < -level / 2 and force[-1] > level / 2
         if whole and last - first > LEAST and np.max(highest - force) < MONOTONE * level:
-            found.append(Branch(first, side, highest, speed))
-    if not found:
+            branches.append(Branch(first, side, highest, speed))
+    if not branches:
         raise EstimateError(
             f"no turn from sliding to sliding with more than {LEAST} samples below {HELD:g} of the sliding friction",
             "the transition speed is read where sliding begins after a turn",
             "sample faster; in stick-slip see contact_stiffness and transition instead",
         )
-    return found
+    return branches
 
 
 def _answer(
-    loops: Loops, branches: Sequence[Branch], found: tuple[Estimate, Estimate | None, float], method: str, lost: str
+    loops: Loops, branches: Sequence[Branch], estimates: tuple[Estimate, Estimate | None, float], method: str, lost: str
 ) -> TransitionSpeed:
     """All three, from the contact's stiffness, the speed by the fitted contact, and how far off the curve may be."""
-    level, (stiffness, exact, off) = loops.level, found
+    level, (stiffness, exact, off) = loops.level, estimates
     amplitude = _amplitude(loops.displacement)
     turn = 2 * math.pi * loops.frequency.value
     friction = np.linspace(-HELD, HELD, LEVELS) * level.value
-    velocity = np.mean([np.interp(friction, each.force, each.speed) for each in branches], axis=0)
+    velocity = np.mean([np.interp(friction, branch.force, branch.speed) for branch in branches], axis=0)
     # per lag, friction is read where the mass has gathered more speed: by its acceleration at the turn
     lagging = f"a lag of 1 ms that is not stated would change it by {1e3 * LAG * turn**2 * amplitude[0]:.2g} mm/s"
     if not stiffness.value > 0:
@@ -273,19 +273,11 @@ def _answer(
         ("without damping of the contact, and for harmonic sliding: 3 to 5 % high on a rig like the thesis's",),
     )  # fmt: skip
     curve = _read(branches, level.value, lagging, off)
-    told = [exact, replace(equation, status=stops) if stops != "ok" else equation]
-    words = (lost, stiffness.status, stops, curve.status)
-    told = told if not math.isinf(stiffness.interval[1]) else [each and _at_most(each) for each in told]
-    return TransitionSpeed(
-        method=method,
-        contact=told[0],
-        curve=curve,
-        equation=told[1],
-        friction=friction,
-        velocity=velocity,
-        level=level,
-        status=Status(*words),
-    )
+    equation = replace(equation, status=stops) if stops != "ok" else equation
+    if math.isinf(stiffness.interval[1]):
+        exact, equation = exact and _at_most(exact), _at_most(equation)
+    status = Status(lost, stiffness.status, stops, curve.status)
+    return TransitionSpeed(method, exact, curve, equation, friction, velocity, level, status)
 
 
 def _equation(known: Array) -> float:
@@ -298,20 +290,20 @@ def _exact(
     record: Record, friction: Array, offset: float, branches: Sequence[Branch], fitted: LikelyContact
 ) -> Estimate:
     """From the contact, and from the friction before, the pull at, and its change after each turn."""
-    rig, found = fitted.balance, []
+    rig, speeds = fitted.balance, []
     pull = rig.pull(record) - offset  # the zero of a sensor is in both
-    for each in branches:
-        before = slice(max(0, each.first - BEFORE - 1), max(1, each.first - 1))
-        rows = np.arange(each.first, each.first + len(each.force))
-        late = each.speed[0] / max(each.speed[1] - each.speed[0], 1e-300)  # samples since the turn
-        change, start = np.polyfit((np.arange(len(rows)) + late) / record.fs, each.side * pull[rows], 1)
-        found.append((float(np.mean(-each.side * friction[before])), float(start), float(change)))
-    known, doubt = np.mean(found, axis=0), np.zeros((5, 5))
-    doubt[range(3), range(3)] = [mean_uncertainty(column)[0] ** 2 for column in np.transpose(found)]
+    for branch in branches:
+        before = slice(max(0, branch.first - BEFORE - 1), max(1, branch.first - 1))
+        rows = np.arange(branch.first, branch.first + len(branch.force))
+        late = branch.speed[0] / max(branch.speed[1] - branch.speed[0], 1e-300)  # samples since the turn
+        change, start = np.polyfit((np.arange(len(rows)) + late) / record.fs, branch.side * pull[rows], 1)
+        speeds.append((float(np.mean(-branch.side * friction[before])), float(start), float(change)))
+    known, doubt = np.mean(speeds, axis=0), np.zeros((5, 5))
+    doubt[range(3), range(3)] = [mean_uncertainty(column)[0] ** 2 for column in np.transpose(speeds)]
     doubt[3:, 3:] = fitted.covariance
-    told = math.log(fitted.stiffness.value), fitted.damping.value
+    centre = math.log(fitted.stiffness.value), fitted.damping.value
     return _propagated(
-        "contact", lambda values: _set_going(values, rig), np.array([*known, *told]), doubt,
+        "contact", lambda values: _set_going(values, rig), np.array([*known, *centre]), doubt,
         "motion after the turn on the fitted contact",
         ("with the friction and the pull found at the turns; errors of the mass and of gains go into it",),
     )  # fmt: skip
@@ -366,8 +358,8 @@ def _propagated(
 
 
 def _at_most(speed: Estimate) -> Estimate:
-    words = f"at most {speed.interval[1]:.3g} m/s: the contact is not told from a rigid one"
-    return replace(speed, interval=(0.0, speed.interval[1]), status=words)
+    sentence = f"at most {speed.interval[1]:.3g} m/s: the contact is not told from a rigid one"
+    return replace(speed, interval=(0.0, speed.interval[1]), status=sentence)
 
 
 def _amplitude(displacement: Array) -> tuple[float, float]:
@@ -380,7 +372,7 @@ def _amplitude(displacement: Array) -> tuple[float, float]:
 
 def _stops(loops: Loops, branches: Sequence[Branch], peak: float) -> str:
     """Whether the contact holds for too long for harmonic sliding, in words."""
-    speeds = [float(each.speed[-1]) for each in branches]
+    speeds = [float(branch.speed[-1]) for branch in branches]
     held = math.asin(min(1.0, float(np.mean(speeds)) / peak)) / math.pi  # of half a cycle
     measured = float(np.median(np.abs(loops.velocity)) / np.max(np.abs(loops.velocity)))
     if held < STOPPED and measured > 0.5:  # of a sine it is 0.71
@@ -391,13 +383,13 @@ def _stops(loops: Loops, branches: Sequence[Branch], peak: float) -> str:
 def _read(branches: Sequence[Branch], level: float, lagging: str, off: float) -> Estimate:
     """Where the curve of each turn reaches the sliding friction, the square of its velocity being carried on."""
     speeds = []
-    for each in branches:
-        degree = min(2, len(np.unique(each.force)) - 1)
-        square = np.polyval(np.polyfit(each.force, each.speed**2, degree), level)
+    for branch in branches:
+        degree = min(2, len(np.unique(branch.force)) - 1)
+        square = np.polyval(np.polyfit(branch.force, branch.speed**2, degree), level)
         speeds.append(math.sqrt(max(0.0, float(square))))
     sd, freedom = mean_uncertainty(speeds)
     scatter = float(np.std(speeds, ddof=1)) if len(speeds) > 1 else math.nan
-    found = Estimate.normal(
+    speed = Estimate.normal(
         f"{SPEED} by the curve", float(np.mean(speeds)), sd=sd, unit="m/s", quantile=student(freedom),
         method="curve of friction against velocity, where it reaches the sliding friction",
         status=Status(*([Doubt.few(len(speeds), "turn")] if len(speeds) < FEW else [])),
@@ -407,5 +399,5 @@ def _read(branches: Sequence[Branch], level: float, lagging: str, off: float) ->
             f"the smoother rounds the end of the turn: off by {100 * off:.2g} % at most on a rig like the thesis's",
         ),
     )  # fmt: skip
-    half = (found.interval[1] - found.interval[0]) / 2 + off * found.value
-    return replace(found, interval=(found.value - half, found.value + half), sd=half / NORMAL_95)
+    half = (speed.interval[1] - speed.interval[0]) / 2 + off * speed.value
+    return replace(speed, interval=(speed.value - half, speed.value + half), sd=half / NORMAL_95)

@@ -65,8 +65,9 @@ class Presliding(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Stiffness and play of a contact that gives way; else the compliances that leave it open."""
-        given = (self.stiffness, self.stiffness_forward, self.stiffness_back, self.backlash)
-        return tuple(each for each in given if each is not None) or (self.compliance_forward, self.compliance_back)
+        gives = (self.stiffness, self.stiffness_forward, self.stiffness_back, self.backlash)
+        open_ = (self.compliance_forward, self.compliance_back)
+        return tuple(estimate for estimate in gives if estimate is not None) or open_
 
 
 def presliding(record: Record, *, contact: str | None = None) -> Presliding:
@@ -114,28 +115,28 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     """
     strokes = find_strokes(record, contact=contact, question=QUESTION)
     noise = noise_level(strokes.motion.displacement, record.fs)
-    span = float(np.median([np.ptp(each.displacement) for each in strokes.strokes]))
+    span = float(np.median([np.ptp(stroke.displacement) for stroke in strokes.strokes]))
     length = strokes.motion.unit
-    found = [_compliance(strokes.to(way), f"compliance {side}", f"{length}/{strokes.unit}") for way, side in SIDES]
-    level = float(np.median([each.level for each in strokes.strokes]))
+    slopes = [_compliance(strokes.to(way), f"compliance {side}", f"{length}/{strokes.unit}") for way, side in SIDES]
+    level = float(np.median([stroke.level for stroke in strokes.strokes]))
     least = max(FELT * span, noise) / level  # compliance that would just be felt
     most = ELASTIC * span / 2 / level  # friction turns from one side to the other
-    verdict, evidence = _verdict(found, level, (least, RIGID * span / level, most), length)
+    verdict, evidence = _verdict(slopes, level, (least, RIGID * span / level, most), length)
     if verdict == "gives way" and not is_measured(record, "friction") and _blurred(strokes):
         verdict, evidence = "can not be told", f"{evidence}, as fast as the balance of forces lets a jump be seen"
     gives = verdict == "gives way"
     sides = [
-        _inverse(each, f"presliding stiffness {side}") if gives else None
-        for each, (_, side) in zip(found, SIDES, strict=True)
+        _inverse(slope, f"presliding stiffness {side}") if gives else None
+        for slope, (_, side) in zip(slopes, SIDES, strict=True)
     ]
     untold = verdict == "can not be told"
-    found = [each.unknown(evidence) if untold else each.within(0.0, otherwise=evidence) for each in found]
-    status = evidence if untold or _uneven(found) else "ok"
+    slopes = [slope.unknown(evidence) if untold else slope.within(0.0, otherwise=evidence) for slope in slopes]
+    status = evidence if untold or _uneven(slopes) else "ok"
     if _rings(strokes.strokes):
         status = "the contact rings while friction builds up, so that a line says little: see contact_stiffness(record)"
     return Presliding(
-        _inverse(_both(found), "presliding stiffness") if gives else None,
-        sides[0], sides[1], _backlash(strokes) if gives else None, found[0], found[1], verdict, evidence, status,
+        _inverse(_both(slopes), "presliding stiffness") if gives else None,
+        sides[0], sides[1], _backlash(strokes) if gives else None, slopes[0], slopes[1], verdict, evidence, status,
     )  # fmt: skip
 
 
@@ -152,9 +153,9 @@ def _branch(stroke: Stroke, low: float, high: float) -> tuple[float, float] | No
 def _blurred(strokes: Strokes) -> bool:
     """Whether the friction builds up faster than a balance of forces can follow, in most strokes."""
     rows = [
-        np.count_nonzero((each.friction > LOW * each.level) & (each.friction < HIGH * each.level)
-                         & (np.arange(len(each.friction)) <= each.slip))
-        for each in strokes.strokes
+        np.count_nonzero((stroke.friction > LOW * stroke.level) & (stroke.friction < HIGH * stroke.level)
+                         & (np.arange(len(stroke.friction)) <= stroke.slip))
+        for stroke in strokes.strokes
     ]  # fmt: skip
     return float(np.median(rows)) < BLURRED * strokes.motion.blur
 
@@ -194,41 +195,41 @@ def _backlash(strokes: Strokes) -> Estimate | None:
 
 
 def _verdict(
-    found: Sequence[Estimate], level: float, limits: tuple[float, float, float], length: str
+    slopes: Sequence[Estimate], level: float, limits: tuple[float, float, float], length: str
 ) -> tuple[str, str]:
     """Whether the contact gives way, and why; by the compliance that is felt, still rigid, and possible."""
     least, rigid, most = limits
-    ways = [each.value * level for each in found]
+    ways = [slope.value * level for slope in slopes]
     factor, unit = prefixed(np.array([*ways, least * level]), length)
     said = " and ".join(f"{factor * way:.2g} {unit} {side}" for way, (_, side) in zip(ways, SIDES, strict=True))
     moves = f"while friction builds up to {level:.3g} {FORCES[length]} it moves {said}"
-    against = [each for each in found if each.interval[1] < 0 and abs(each.value) > least]
+    against = [slope for slope in slopes if slope.interval[1] < 0 and abs(slope.value) > least]
     if against:
         return "can not be told", f"{moves}, against its load: something else moves than the contact"
-    if any(each.value > most for each in found):
+    if any(slope.value > most for slope in slopes):
         return "can not be told", f"{moves}, too much of its stroke for a contact that slides"
-    if all(abs(each.value) < least or each.includes(0.0) for each in found):
-        if any(each.interval[1] > max(rigid, least) for each in found):
+    if all(abs(slope.value) < least or slope.includes(0.0) for slope in slopes):
+        if any(slope.interval[1] > max(rigid, least) for slope in slopes):
             return "can not be told", f"{moves}, or much more: it scatters too much"
         return "rigid", f"{moves}; {factor * least * level:.2g} {unit} would be felt"
-    if any(each.value < least or each.interval[0] <= 0 for each in found):
+    if any(slope.value < least or slope.interval[0] <= 0 for slope in slopes):
         return "can not be told", f"{moves}: not in both directions"
-    small, large = sorted(each.value for each in found)
-    return "gives way", f"{moves}: {large / small:.2g} times as much one way" if _uneven(found) else moves
+    small, large = sorted(slope.value for slope in slopes)
+    return "gives way", f"{moves}: {large / small:.2g} times as much one way" if _uneven(slopes) else moves
 
 
-def _uneven(found: Sequence[Estimate]) -> bool:
+def _uneven(compliances: Sequence[Estimate]) -> bool:
     """Whether a contact that gives way does so by far more in one direction."""
-    small, large = sorted(each.value for each in found)
+    small, large = sorted(compliance.value for compliance in compliances)
     return 0 < APART * small <= large
 
 
-def _both(found: Sequence[Estimate]) -> Estimate:
+def _both(slopes: Sequence[Estimate]) -> Estimate:
     """The mean of both directions, as unsure as each of them and as they are apart."""
-    value = float(np.mean([each.value for each in found]))
-    low, high = min(each.interval[0] for each in found), max(each.interval[1] for each in found)
-    sd = float(np.hypot(found[0].sd + found[1].sd, found[0].value - found[1].value) / 2)
-    first = found[0]
+    value = float(np.mean([slope.value for slope in slopes]))
+    low, high = min(slope.interval[0] for slope in slopes), max(slope.interval[1] for slope in slopes)
+    sd = float(np.hypot(slopes[0].sd + slopes[1].sd, slopes[0].value - slopes[1].value) / 2)
+    first = slopes[0]
     return Estimate(first.name, value, (low, high), sd, first.unit, first.method, first.status, first.checks)
 
 

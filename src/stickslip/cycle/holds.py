@@ -104,13 +104,13 @@ def find_holds(trace: Trace) -> tuple[Hold, ...]:
     if len(cores) < FEW:
         return ()
     spring = _spring(trace, cores)
-    return tuple(_each(trace, spring, level, turns, dict(cores)))
+    return tuple(_hold_at_each_turn(trace, spring, level, turns, dict(cores)))
 
 
 def _cores(trace: Trace, level: float, turns: NDArray[np.intp]) -> list[tuple[int, slice]]:
     """For each turn of the velocity out of sliding, the samples after it in which the contact certainly holds."""
     begins, ends = stretches(np.abs(trace.friction) < HELD * level)
-    found: dict[int, tuple[int, slice]] = {}
+    first_and_core: dict[int, tuple[int, slice]] = {}
     for turn in turns:
         at = int(np.searchsorted(ends, turn, side="right"))
         side = math.copysign(1.0, trace.velocity[turn])
@@ -118,11 +118,11 @@ def _cores(trace: Trace, level: float, turns: NDArray[np.intp]) -> list[tuple[in
         if at == len(begins) or side * trace.friction[turn] < HELD * HELD * level:
             continue
         first, last = max(int(begins[at]), turn + 1), int(ends[at])
-        if last - first >= LEAST and last < len(trace.velocity) and at not in found:
+        if last - first >= LEAST and last < len(trace.velocity) and at not in first_and_core:
             between = trace.velocity[turn + 1 : first + 1] * side
             if np.all(between <= 0):
-                found[at] = (int(turn), slice(first, last))
-    return list(found.values())
+                first_and_core[at] = (int(turn), slice(first, last))
+    return list(first_and_core.values())
 
 
 def _spring(trace: Trace, cores: list[tuple[int, slice]]) -> Spring:
@@ -150,7 +150,7 @@ def _centred(values: Array) -> Array:
     return np.asarray(values - values.mean())
 
 
-def _each(
+def _hold_at_each_turn(
     trace: Trace, spring: Spring, level: float, turns: NDArray[np.intp], cores: dict[int, slice]
 ) -> Iterator[Hold]:
     """Hold after hold; turns of the velocity within one are passed over."""
@@ -163,10 +163,10 @@ def _each(
         if side * trace.friction[turn] < HELD * HELD * before:
             continue
         begin, slope = _crossing(trace.velocity, turn)
-        found = _end(trace, spring, int(turn), {1.0: before, -1.0: level}, cores.get(int(turn)))
-        if found is None or slope == 0:
+        hold = _end(trace, spring, int(turn), {1.0: before, -1.0: level}, cores.get(int(turn)))
+        if hold is None or slope == 0:
             continue
-        end, end_sd = found
+        end, end_sd = hold
         yield Hold(
             trace.start + begin / trace.fs,
             trace.start + end / trace.fs,

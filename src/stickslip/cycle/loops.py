@@ -168,11 +168,11 @@ def friction_loops(
     friction, unit = record["friction"], record.channels["friction"].unit
     sliding = _sliding(motion, cycles)
     label = cycles.labels(len(friction))
-    found = _magnitudes(friction, motion, sliding, label, len(cycles.edges) - 1, unit)
+    magnitudes = _magnitudes(friction, motion, sliding, label, len(cycles.edges) - 1, unit)
     energy = _energy(friction, motion, cycles)
     folded = cycles.folded(friction)
     return Loops(
-        **found,
+        **magnitudes,
         slope=_slope(friction, motion, sliding, label, unit),
         energy_per_cycle=energy,
         frequency=cycles.frequency,
@@ -184,7 +184,7 @@ def friction_loops(
         curve=_curve(friction, motion, cycles, label, bins),
         cycles=motion.start + cycles.edges[:-1] / motion.fs,
         unit=motion.unit,
-        status=_status(cycles, found, energy),
+        status=_status(cycles, magnitudes, energy),
     )
 
 
@@ -208,8 +208,8 @@ def _magnitudes(
         "offset": ("friction offset", (forward - back) / 2),
     }
     how = "speed-weighted median, mean of cycles"
-    found = {key: mean_of_cycles(name, values, unit=unit, method=how) for key, (name, values) in wanted.items()}
-    return found | {key: found[key].within(0.0, otherwise=DRIVES) for key in ("forward", "back", "level")}
+    magnitudes = {key: mean_of_cycles(name, values, unit=unit, method=how) for key, (name, values) in wanted.items()}
+    return magnitudes | {key: magnitudes[key].within(0.0, otherwise=DRIVES) for key in ("forward", "back", "level")}
 
 
 def _levels(
@@ -232,8 +232,8 @@ def _levels(
 def _energy(friction: Array, motion: Motion, cycles: Cycles) -> Estimate:
     work = np.concatenate([[0.0], np.cumsum((friction[1:] + friction[:-1]) / 2 * np.diff(motion.displacement))])
     per_cycle = np.diff(np.interp(cycles.edges, np.arange(len(work)), work))
-    found = mean_of_cycles("energy per cycle", per_cycle, unit="J", method="closed integral of f dx, mean of cycles")
-    return found.within(0.0, otherwise=DRIVES)
+    energy = mean_of_cycles("energy per cycle", per_cycle, unit="J", method="closed integral of f dx, mean of cycles")
+    return energy.within(0.0, otherwise=DRIVES)
 
 
 def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], unit: str) -> Estimate:
@@ -253,22 +253,22 @@ def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: N
     slopes = product[power > 0] / power[power > 0]
     spread = math.sqrt(float(power.sum()) / len(speed)) / float(speed.mean())
     per_speed = "N s/m" if motion.unit == "m" else "N m s/rad"
-    found = mean_of_cycles(
+    slope = mean_of_cycles(
         "slope of friction against speed", slopes, unit=per_speed, method="least squares per cycle, mean of cycles",
         checks=(f"sliding speed varies by {100 * spread:.0f} % about its mean",),
     )  # fmt: skip
     if spread < LEAST_SPREAD:
         steady = Doubt("the sliding speed hardly varies: no slope can be told", NO_SLOPE)
-        return replace(found, status=Status(steady))
+        return replace(slope, status=Status(steady))
     ahead = np.minimum(np.arange(len(sliding)) + motion.blur, len(sliding) - 1)
     behind = np.maximum(np.arange(len(sliding)) - motion.blur, 0)
     faster = np.sign(motion.velocity) * (motion.velocity[ahead] - motion.velocity[behind]) > 0
-    return _widened(found, _branch_slopes(speed, magnitude, 2 * faster[chosen] + (motion.velocity[chosen] > 0)))
+    return _widened(slope, _branch_slopes(speed, magnitude, 2 * faster[chosen] + (motion.velocity[chosen] > 0)))
 
 
 def _branch_slopes(speed: Array, magnitude: Array, branch: NDArray[np.intp]) -> list[Estimate]:
     """Slope of each branch of the loop, its interval from how the friction strays from a line along the speed."""
-    found = []
+    slopes = []
     for number in range(4):
         chosen = np.flatnonzero(branch == number)
         bins = min(BRANCH_BINS, len(chosen) // 4)
@@ -279,8 +279,8 @@ def _branch_slopes(speed: Array, magnitude: Array, branch: NDArray[np.intp]) -> 
         counts = np.diff(np.append(starts, len(rows)))
         abscissa, ordinate = (np.add.reduceat(values[rows], starts) / counts for values in (speed, magnitude))
         line = least_squares(np.column_stack([abscissa - abscissa.mean(), np.ones(bins)]), ordinate)
-        found.append(line.estimate(0, BRANCHES[number], "", ""))
-    return found
+        slopes.append(line.estimate(0, BRANCHES[number], "", ""))
+    return slopes
 
 
 def _widened(slope: Estimate, branches: list[Estimate]) -> Estimate:
@@ -294,15 +294,15 @@ def _widened(slope: Estimate, branches: list[Estimate]) -> Estimate:
     values = np.array([branch.value for branch in branches])
     apart = student(len(values) - 1) * float(values.std(ddof=1)) / math.sqrt(len(values))
     astray = float(np.mean([branch.interval[1] - branch.value for branch in branches]))
-    told = ", ".join(f"{branch.name} {branch.value:.3g}" for branch in branches)
+    slopes = ", ".join(f"{branch.name} {branch.value:.3g}" for branch in branches)
     half = max(apart, astray)
     if half <= slope.interval[1] - slope.value:
-        return replace(slope, checks=(*slope.checks, told))
+        return replace(slope, checks=(*slope.checks, slopes))
     wide = (slope.value - half, slope.value + half)
     lost = wide[0] <= 0 <= wide[1] and not slope.includes(0.0)
-    words = "friction changes along the way as much as with speed: no slope can be told"
-    status = Status(Doubt(words, NO_SLOPE)) if lost else slope.status
-    return replace(slope, interval=wide, sd=half / NORMAL_95, status=status, checks=(*slope.checks, told))
+    sentence = "friction changes along the way as much as with speed: no slope can be told"
+    status = Status(Doubt(sentence, NO_SLOPE)) if lost else slope.status
+    return replace(slope, interval=wide, sd=half / NORMAL_95, status=status, checks=(*slope.checks, slopes))
 
 
 def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.intp], bins: int) -> Curve:
@@ -326,10 +326,10 @@ def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.in
     return Curve(((edges[1:] + edges[:-1]) / 2)[visited], middle, low, high, visits.astype(np.intp))
 
 
-def _status(cycles: Cycles, found: dict[str, Estimate], energy: Estimate) -> str:
-    words = [found["forward"].status] if found["forward"].known and found["forward"].status != "ok" else []
+def _status(cycles: Cycles, levels: dict[str, Estimate], energy: Estimate) -> str:
+    doubts = [levels["forward"].status] if levels["forward"].known and levels["forward"].status != "ok" else []
     if cycles.status != "ok":
-        words.append(cycles.status)
-    if not (found["level"].known and energy.known):
-        words.append(DRIVES)
-    return Status(*words)
+        doubts.append(cycles.status)
+    if not (levels["level"].known and energy.known):
+        doubts.append(DRIVES)
+    return Status(*doubts)

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.balance import Balance
+from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
-from stickslip.balance.load_cell import ALONE
 from stickslip.balance.motion import is_measured
 from stickslip.cycle.slips import ringing_of
 from stickslip.cycle.strokes import FAST, Stroke, Strokes, find_strokes
@@ -132,10 +131,10 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     strokes = find_strokes(record, contact=contact, question=QUESTION)
     borne = _borne(record, strokes)
     levels = [_level(borne, strokes, way, side) for way, side in SIDES]
-    sliding = float(np.median([each.level for each in borne.strokes]))
+    sliding = float(np.median([stroke.level for stroke in borne.strokes]))
     ratio = mean_of_cycles(
         "static over sliding friction",
-        [friction / each.level for each, friction in zip(borne.strokes, borne.friction, strict=True)],
+        [friction / pair.level for pair, friction in zip(borne.strokes, borne.friction, strict=True)],
         unit="1", method=f"{borne.method} over the median of the stroke, mean of strokes",
     )  # fmt: skip
     ratio = _widened(ratio, borne.below / sliding, borne.above / sliding)
@@ -147,7 +146,7 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
         )
     rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
     heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
-    swings = [_swing(record, [each for each in borne.strokes if each.way == way], side) for way, side in SIDES]
+    swings = [_swing(record, [stroke for stroke in borne.strokes if stroke.way == way], side) for way, side in SIDES]
     return Breakaway(
         _flagged(levels[0], status), _flagged(levels[1], status), _flagged(ratio, status) or ratio, *heard,
         swings[0], swings[1], len(borne.strokes), status,
@@ -157,14 +156,14 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
 def _level(borne: _Borne, strokes: Strokes, way: int, side: str) -> Estimate | None:
     values = [
         friction + way * strokes.offset
-        for each, friction in zip(borne.strokes, borne.friction, strict=True)
-        if each.way == way
+        for pair, friction in zip(borne.strokes, borne.friction, strict=True)
+        if pair.way == way
     ]
     if not values:
         return None
     how = f"{borne.method}, mean of strokes"
-    found = mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=how)
-    return _widened(found, borne.below, borne.above)
+    level = mean_of_cycles(f"static friction {side}", values, unit=strokes.unit, method=how)
+    return _widened(level, borne.below, borne.above)
 
 
 def _flagged(estimate: Estimate | None, status: str) -> Estimate | None:
@@ -185,39 +184,41 @@ class _Borne:
 
 def _borne(record: Record, strokes: Strokes) -> _Borne:
     """By the pull where the mass rests; else by the friction's peak, and, where the pull is known, from there on."""
-    pulled, rested = _by_pull(record, strokes), [each for each in strokes.strokes if each.rests]
+    pulled, rested = _by_pull(record, strokes), [stroke for stroke in strokes.strokes if stroke.rests]
     mostly = 2 * len(rested) > len(strokes.strokes)
     strays = _strays(rested, strokes, record.fs)
     if pulled is not None and mostly and strays < STRAYS:
         return pulled
     peak = _by_peak(record, strokes)
     if not mostly:
-        words = "the mass moves before the friction has come near its level: the first peak holds the ring that follows"
-        return replace(peak, status=Status(words, peak.status))
+        sentence = (
+            "the mass moves before the friction has come near its level: the first peak holds the ring that follows"
+        )
+        return replace(peak, status=Status(sentence, peak.status))
     if pulled is None:
         return peak
-    words = (
+    sentence = (
         f"the mass is not at rest while it sticks (it strays by {strays:.2g} times its displacement's noise), so that "
         "the pull is not what the contact bears: told from the pull to the balance of forces"
     )
     apart = float(np.median(peak.friction)) - float(np.median(pulled.friction))
     return replace(
         peak, below=max(peak.below, apart + pulled.below), above=max(peak.above, pulled.above - apart),
-        status=Status(words, peak.status),
+        status=Status(sentence, peak.status),
     )  # fmt: skip
 
 
 def _strays(rested: Sequence[Stroke], strokes: Strokes, fs: float) -> float:
     """How far the mass moves with its load in the middle of its sticks, in deviations of its displacement's noise."""
-    held = [each.displacement[: each.slip] for each in rested if each.slip >= 2 * LEAST]
+    held = [stroke.displacement[: stroke.slip] for stroke in rested if stroke.slip >= 2 * LEAST]
     if not held:
         return 0.0
-    quarters = [np.array_split(each, 4) for each in held]
+    quarters = [np.array_split(stretch, 4) for stretch in held]
     if np.median([last.mean() - first.mean() for first, *_, last in quarters]) < 0:
         return 0.0  # against its load something else moves, slowly
-    found = [float(np.std(each[len(each) // 4 : 3 * len(each) // 4])) for each in held]
-    reach = float(np.median([np.ptp(each.displacement) for each in rested]))
-    return float(np.median(found)) / max(noise_level(strokes.motion.displacement, fs), FINEST * reach)
+    strays = [float(np.std(stretch[len(stretch) // 4 : 3 * len(stretch) // 4])) for stretch in held]
+    reach = float(np.median([np.ptp(stroke.displacement) for stroke in rested]))
+    return float(np.median(strays)) / max(noise_level(strokes.motion.displacement, fs), FINEST * reach)
 
 
 def _by_pull(record: Record, strokes: Strokes) -> _Borne | None:
@@ -226,12 +227,12 @@ def _by_pull(record: Record, strokes: Strokes) -> _Borne | None:
     if balance is None:
         return None
     pull = balance.pull(record) - strokes.offset
-    rested = [each for each in strokes.strokes if each.rests]
-    found = [(each, *told) for each in rested if (told := _begun(each, pull, balance.mass, record.fs))]
-    if not found:
+    rested = [stroke for stroke in strokes.strokes if stroke.rests]
+    onsets = [(stroke, *onset) for stroke in rested if (onset := _begun(stroke, pull, balance.mass, record.fs))]
+    if not onsets:
         return None
-    chosen, friction, change = zip(*found, strict=True)
-    level = float(np.median([each.level for each in chosen]))
+    chosen, friction, change = zip(*onsets, strict=True)
+    level = float(np.median([onset.level for onset in chosen]))
     unsure = float(np.median(change)) + PULLED * level  # the instant is known to a sample
     return _Borne(chosen, friction, PULL, unsure, unsure)
 
@@ -239,11 +240,11 @@ def _by_pull(record: Record, strokes: Strokes) -> _Borne | None:
 def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     """The friction's largest value before each slip, with what sensors and smoothing do to it."""
     chosen = strokes.strokes
-    friction = [float(each.friction[each.slip]) for each in chosen]
+    friction = [float(stroke.friction[stroke.slip]) for stroke in chosen]
     noise = 2 * (record.channels["friction"].noise or noise_level(record["friction"], record.fs))
     if is_measured(record, "friction"):
         return _Borne(chosen, friction, PEAK, noise)
-    rows = float(np.median([each.slip for each in chosen]))
+    rows = float(np.median([stroke.slip for stroke in chosen]))
     if rows < FEW:
         raise EstimateError(
             f"{rows:g} samples from a reversal to the slip at {record.fs:g} Hz",
@@ -252,9 +253,9 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
         )
     method = "" if record.rig is None else record.rig.method
     unknown = _unstated(record, method)
-    strays = [_stray(each, wide=bool(unknown)) for each in chosen]
+    strays = [_stray(stroke, wide=bool(unknown)) for stroke in chosen]
     stray = (RINGS if unknown else 1.0) * float(np.median(strays))
-    level = float(np.median([each.level for each in chosen]))
+    level = float(np.median([stroke.level for stroke in chosen]))
     if stray > NOTHING * level:
         raise EstimateError(
             f"the friction strays by {stray:.2g} after each slip, from a level of {level:.2g}",
@@ -263,7 +264,7 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
         )
     best = next(iter(_used(record, method)), "x")
     fall = float(np.median(friction)) - level
-    corner = max(BLUNT[best] * float(np.median([_steepest(each) for each in chosen])), ROUNDED[best] * fall)
+    corner = max(BLUNT[best] * float(np.median([_steepest(stroke) for stroke in chosen])), ROUNDED[best] * fall)
     blurred = "told from the displacement alone, which blurs a peak" if best == "x" else "ok"
     status = Status(Doubt(unknown, UNSTATED) if unknown else blurred)
     return _Borne(chosen, friction, PEAK, max(noise, corner / 4) + stray, corner + stray, status)
@@ -352,7 +353,7 @@ def _start(travel: Array, pull: Array, mass: float, fs: float) -> float | None:
     pulled = np.where(since > 0, twice - twice[begins, None] - once[begins, None] * since, 0.0)
     step = every**2 / (mass * fs**2)
     held, rest = step * since**2 / 2, travel - step * pulled
-    held_about, rest_about = (each - each.mean(axis=1, keepdims=True) for each in (held, rest))
+    held_about, rest_about = (part - part.mean(axis=1, keepdims=True) for part in (held, rest))
     friction = -np.sum(held_about * rest_about, axis=1) / np.sum(held_about**2, axis=1)
     cost = np.sum((rest_about + friction[:, None] * held_about) ** 2, axis=1)
     cost[pull[begins] < friction] = np.inf
@@ -390,9 +391,13 @@ def _swing(record: Record, strokes: Sequence[Stroke], side: str) -> Estimate | N
     )  # fmt: skip
     half = UNSURE * float(np.mean(noises))
     low, high = square.interval
-    found = _root(replace(square, interval=(low - half, high + half), sd=float(np.hypot(square.sd, half / 2))))
-    swings = f"the friction swings by {100 * found.value:.0f} % of its level while it slides: a vibration of the rig"
-    return replace(found, status=f"{swings} or a faulty record, no steady friction") if found.value >= STEADY else found
+    estimate = _root(replace(square, interval=(low - half, high + half), sd=float(np.hypot(square.sd, half / 2))))
+    swings = f"the friction swings by {100 * estimate.value:.0f} % of its level while it slides: a vibration of the rig"
+    return (
+        replace(estimate, status=f"{swings} or a faulty record, no steady friction")
+        if estimate.value >= STEADY
+        else estimate
+    )
 
 
 def _noise(record: Record) -> Array:

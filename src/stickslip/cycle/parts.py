@@ -102,12 +102,12 @@ def _joined(before: Record, after: Record) -> Record:
     return joined.with_samples(samples, Step("overlapping", {}, "parts of a long record put together"))
 
 
-def join_sticks(found: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
+def join_sticks(parts: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
     """What was found in the stretches of a record, as if it had been found in the whole.
 
     Parameters
     ----------
-    found : iterable of (Stretch, Sticks)
+    parts : iterable of (Stretch, Sticks)
         In order, what :func:`find_sticks` said of each.
 
     Returns
@@ -135,35 +135,35 @@ def join_sticks(found: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
     events: list[StickEvent] = []
     kept: list[Sticks] = []
     spans: list[float] = []
-    for stretch, sticks in found:
+    for stretch, sticks in parts:
         _extend(events, sticks.events, stretch)
         kept.append(replace(sticks, events=()))
         spans.append(stretch.last - stretch.first)
     if not kept:
         raise EstimateError("no stretch of a record", "one at least is needed", "check the file")
-    microslips = [(each.microslips, span) for each, span in zip(kept, spans, strict=True) if each.microslips]
-    lost = {said: sum(said in each.lost for each in kept) for each in kept for said in each.lost}
-    kinds = [each.kind for each in kept]
-    method = "fusion" if all(each.method == "fusion" for each in kept) else "speed"
+    microslips = [(pair.microslips, span) for pair, span in zip(kept, spans, strict=True) if pair.microslips]
+    lost = {said: sum(said in part.lost for part in kept) for part in kept for said in part.lost}
+    kinds = [part.kind for part in kept]
+    method = "fusion" if all(part.method == "fusion" for part in kept) else "speed"
     return Sticks(
-        share=_pooled([each.share for each in kept], spans, shared=method == "speed"),
-        per_cycle=_pooled([each.per_cycle for each in kept], spans),
+        share=_pooled([part.share for part in kept], spans, shared=method == "speed"),
+        per_cycle=_pooled([part.per_cycle for part in kept], spans),
         microslips=_pooled(*(list(part) for part in zip(*microslips, strict=True))) if microslips else None,
         kind=max(kinds, key=lambda kind: sum(s for k, s in zip(kinds, spans, strict=True) if k == kind)),
         events=tuple(events),
-        threshold=float(np.median([each.threshold for each in kept])),
-        noise=float(np.median([each.noise for each in kept])),
-        frequency=_pooled([each.frequency for each in kept], spans),
+        threshold=float(np.median([part.threshold for part in kept])),
+        noise=float(np.median([part.noise for part in kept])),
+        frequency=_pooled([part.frequency for part in kept], spans),
         method=method,
         lost=tuple(_often(said, count, len(kept)) for said, count in lost.items()),
-        status=_together([each.status for each in kept], len(kept)),
+        status=_together([part.status for part in kept], len(kept)),
     )
 
 
 def _extend(events: list[StickEvent], more: Sequence[StickEvent], stretch: Stretch) -> None:
     """Add the events that begin in a stretch's own time; one that a stretch's end had cut goes on in the next."""
     for event in more:
-        last = next((each for each in reversed(events) if each.kind != "microslip"), None)
+        last = next((event for event in reversed(events) if event.kind != "microslip"), None)
         end = event.time + event.duration
         cut = last is not None and not last.whole and last.time + last.duration < end
         if last is not None and cut and event.kind == last.kind and event.time <= last.time + last.duration:
@@ -189,15 +189,15 @@ def _pooled(parts: list[Estimate], spans: list[float], *, shared: bool = False) 
     With `shared` all of them are unsure for one reason (a threshold), which no mean takes away.
     """
     weights = np.array(spans) / np.sum(spans)
-    values, sds = np.array([each.value for each in parts]), np.array([each.sd for each in parts])
+    values, sds = np.array([part.value for part in parts]), np.array([part.sd for part in parts])
     value = float(weights @ values)
     scatter = math.sqrt(float(weights @ (values - value) ** 2) / max(1, len(parts) - 1))
     sd = max(float(np.sqrt(weights**2 @ sds**2)), scatter)
     # that few cycles carry one stretch is healed by the others, unless there are few in all
-    few = len(parts) > 1 and not all(FEW in kinds(each.status) for each in parts)
-    status = _together([each.status for each in parts if not (few and FEW in kinds(each.status))], len(parts))
+    few = len(parts) > 1 and not all(FEW in kinds(part.status) for part in parts)
+    status = _together([part.status for part in parts if not (few and FEW in kinds(part.status))], len(parts))
     name, unit, method = parts[0].name, parts[0].unit, f"{parts[0].method}; mean of {len(parts)} stretches"
     if shared:
-        low, high = (float(weights @ ends) for ends in np.transpose([each.interval for each in parts]))
+        low, high = (float(weights @ ends) for ends in np.transpose([part.interval for part in parts]))
         return Estimate(name, value, (low, high), (high - low) / (2 * NORMAL_95), unit, method, status)
     return Estimate.normal(name, value, sd=sd, unit=unit, method=method, status=status)

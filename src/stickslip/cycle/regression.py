@@ -154,7 +154,7 @@ def regress_friction(
 def _signal(record: Record, signal: str | None, question: str) -> str:
     if signal is not None and signal not in SIGNALS:
         raise EstimateError(f"signal = '{signal}'", f"it is one of {', '.join(SIGNALS)}", "choose one, or leave it out")
-    name = signal or next((each for each in SIGNALS if each in record), "force")
+    name = signal or next((name for name in SIGNALS if name in record), "force")
     record.require_clean(name, question=question, samples=LEAST)
     if np.ptp(record[name]) == 0:
         raise EstimateError(
@@ -164,13 +164,13 @@ def _signal(record: Record, signal: str | None, question: str) -> str:
 
 
 def _position(record: Record) -> str:
-    return next((each for each in ("x", "theta") if each in record), "x")
+    return next((name for name in ("x", "theta") if name in record), "x")
 
 
 def _measured(record: Record) -> list[str]:
     """The channels of the motion that were measured, along a path or round an axis."""
     motion = ["theta"] if _position(record) == "theta" else ["x", "v", "a"]
-    return [each for each in motion if is_measured(record, each)]
+    return [name for name in motion if is_measured(record, name)]
 
 
 def _sources(record: Record, name: str, stiffness: bool, question: str) -> dict[str, tuple[Array, int]]:
@@ -181,18 +181,18 @@ def _sources(record: Record, name: str, stiffness: bool, question: str) -> dict[
         record.require(position, question=question)
     record.require_clean(*known, name, question=question, samples=LEAST)
     require_fit(record, name, length="rad" if position == "theta" else "m", question=question)
-    for each in known:
-        if np.ptp(record[each]) == 0:
+    for channel in known:
+        if np.ptp(record[channel]) == 0:
             raise EstimateError(
-                f"channel {each} never changes", f"{question} needs motion", "check the sensor and its column"
+                f"channel {channel} never changes", f"{question} needs motion", "check the sensor and its column"
             )
     velocity = (record["v"], 0) if "v" in known else (record[position], 1)
     acceleration = (record["a"], 0) if "a" in known else (velocity[0], velocity[1] + 1)
-    found = {"v": velocity, "a": acceleration}
+    sources = {"v": velocity, "a": acceleration}
     if stiffness:
         record.require(position, question=f"{question} with a stiffness")
-        found["x"] = (record[position] - record[position].mean(), 0)
-    return found
+        sources["x"] = (record[position] - record[position].mean(), 0)
+    return sources
 
 
 def _bandwidth(record: Record, name: str, sources: dict[str, tuple[Array, int]], given: float | str | None) -> float:
@@ -287,20 +287,20 @@ def _answer(
     if noisy > BIASED:
         worries.append(f"noise in the acceleration lowers the inertia by about {100 * noisy:.2g} %")
     status = Status(*worries)
-    found: dict[str, Estimate] = {}
+    known: dict[str, Estimate] = {}
     for index, term in enumerate(terms):
         word, _, side = term.partition("_")
         unit = (TURNING if turning else UNITS)[word]
-        told = fit.estimate(index, f"{WORDS[word]} {side}".strip(), unit, method, status=status, checks=checks)
-        found[term] = told.within(0.0) if word in POSITIVE else told
+        estimate = fit.estimate(index, f"{WORDS[word]} {side}".strip(), unit, method, status=status, checks=checks)
+        known[term] = estimate.within(0.0) if word in POSITIVE else estimate
     for word in ("viscous", "coulomb"):
-        if word not in found:
-            found[word] = _mean_of_both(found[f"{word}_forward"], found[f"{word}_back"], WORDS[word])
+        if word not in known:
+            known[word] = _mean_of_both(known[f"{word}_forward"], known[f"{word}_back"], WORDS[word])
     return Regression(
-        inertia=found["inertia"], viscous=found["viscous"], coulomb=found["coulomb"], offset=found.get("offset"),
-        stiffness=found.get("stiffness"), viscous_forward=found.get("viscous_forward"),
-        viscous_back=found.get("viscous_back"), coulomb_forward=found.get("coulomb_forward"),
-        coulomb_back=found.get("coulomb_back"), residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(force)),
+        inertia=known["inertia"], viscous=known["viscous"], coulomb=known["coulomb"], offset=known.get("offset"),
+        stiffness=known.get("stiffness"), viscous_forward=known.get("viscous_forward"),
+        viscous_back=known.get("viscous_back"), coulomb_forward=known.get("coulomb_forward"),
+        coulomb_back=known.get("coulomb_back"), residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(force)),
         time=record.start + rows / record.fs, measured=force, explained=force - fit.residual, bandwidth=width,
         condition=fit.condition, signal=name, status=status,
     )  # fmt: skip

@@ -116,26 +116,26 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
             "give the load cell's channel as friction",
         )  # fmt: skip
     strokes = find_strokes(record, contact=contact, question=QUESTION)
-    found = ringing_of(strokes.strokes, record.fs)
-    if found is None:
+    ringing = ringing_of(strokes.strokes, record.fs)
+    if ringing is None:
         raise EstimateError(
             f"no ringing: the friction of {len(strokes.strokes)} strokes swings about its level by less than "
             f"{LOUD:.0%} of it, or in each stroke otherwise",
             f"{QUESTION} needs {FASTER:g} cycles at least in the quarter of a stroke after the breakaway",
             "sample faster, or look at the map",
         )
-    return found
+    return ringing
 
 
 def ringing_of(strokes: Sequence[Stroke], fs: float) -> SlipRinging | None:
     """How the friction of some strokes rings; None where it does not."""
-    forward, back = (_direction([each for each in strokes if each.way == way], side, fs)
+    forward, back = (_direction([stroke for stroke in strokes if stroke.way == way], side, fs)
                      for way, side in ((1, "forward"), (-1, "back")))  # fmt: skip
     if forward is None and back is None:
         return None
     difference = None if forward is None or back is None else _difference(forward[0], back[0])
     (f, z, a), (g, y, b) = forward or (None, None, None), back or (None, None, None)
-    flags = [each.status for each in (f, g) if each is not None and each.status != "ok"]
+    flags = [part.status for part in (f, g) if part is not None and part.status != "ok"]
     verdict = ("back alone" if f is None else "forward alone") if difference is None else _verdict(difference)
     return SlipRinging(f, g, z, y, a, b, difference, verdict, flags[0] if flags else "ok")
 
@@ -153,7 +153,7 @@ def _difference(forward: Estimate, back: Estimate) -> Estimate:
         math.hypot(forward.value - low, over - back.value),
         math.hypot(high - forward.value, back.value - under),
     )
-    flags = [each.status for each in (forward, back) if each.status != "ok"]
+    flags = [estimate.status for estimate in (forward, back) if estimate.status != "ok"]
     return Estimate(
         "ringing after slip begins, forward less back", value, interval=(value - below, value + above),
         sd=math.hypot(forward.sd, back.sd), unit="Hz", method="difference of both directions",
@@ -164,15 +164,15 @@ def _difference(forward: Estimate, back: Estimate) -> Estimate:
 def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimate, Estimate, Estimate] | None:
     """Frequency, damping ratio and amplitude of the strokes of one direction; None where they do not ring alike."""
     chosen = strokes[:: len(strokes) // MOST + 1]
-    cuts = [values for each in chosen if len(values := _after(each)) >= LEAST]
+    cuts = [values for stroke in chosen if len(values := _after(stroke)) >= LEAST]
     start = _strongest([_swings(values, STIFF) for values in cuts], fs)
     if start is None or 2 * len(cuts) <= len(chosen):
         return None
     swings = [_swings(values, SLOW) for values in cuts]
     turn = 2 * math.pi * start
     mode = _mode(swings, np.array([-0.03 * turn, turn]), fs)
-    total = sum(float(each @ each) for each in swings)
-    amplitudes = [_amplitude(each, mode.x, fs) for each in swings]
+    total = sum(float(swing @ swing) for swing in swings)
+    amplitudes = [_amplitude(swing, mode.x, fs) for swing in swings]
     if (
         abs(mode.x[1] / turn - 1) > ALIKE
         or float(mode.fun @ mode.fun) > (1 - EXPLAINED) * total
@@ -181,13 +181,13 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
         return None
     parts = np.array_split(np.arange(len(swings)), min(len(swings), PARTS))
     without = [
-        _told(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
+        _ring_of(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
         for part in parts if len(parts) > 1
     ]  # fmt: skip
     degrees = np.array([
-        _told(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES
+        _ring_of(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES
     ])  # fmt: skip
-    frequency, damping = _told_surely(degrees, np.reshape(without, (-1, 2)), len(cuts), side)
+    frequency, damping = _averaged(degrees, np.reshape(without, (-1, 2)), len(cuts), side)
     amplitude = mean_of_cycles(
         f"amplitude of that ringing over the friction, {side}",
         amplitudes,
@@ -197,36 +197,36 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
     return frequency, damping, amplitude
 
 
-def _told_surely(degrees: Array, without: Array, count: int, side: str) -> list[Estimate]:
+def _averaged(degrees: Array, without: Array, count: int, side: str) -> list[Estimate]:
     """Frequency and damping ratio, as sure as the answers agree: those of the polynomials, those without some strokes.
 
     The two parts of the interval are added in squares; the second is a jackknife's.
     """
     parts = len(without)
     sd = np.sqrt((parts - 1) / parts * ((without - without.mean(axis=0)) ** 2).sum(axis=0)) if parts else [math.inf] * 2
-    told, spread = degrees.mean(axis=0), degrees.std(axis=0, ddof=1)
+    mean, spread = degrees.mean(axis=0), degrees.std(axis=0, ddof=1)
     quantile = student(max(parts - 1, 1))
     crude = f"only {count} stroke{'s' * (count > 1)} a direction: the interval is crude"
     status = Status(*([Doubt(crude, FEW, lesser=True)] if count < FEW_CYCLES else []))
     low, high = degrees[:, 0].min(), degrees[:, 0].max()
-    if spread[0] > max(sd[0], MIXED * told[0]):
+    if spread[0] > max(sd[0], MIXED * mean[0]):
         ends = f"{low:.4g} to {high:.4g} Hz by what is taken for it"
         status = Status(f"the friction's own course takes part of the ring: {ends}")
     checks = (f"{count} strokes", f"{low:.4g} to {high:.4g} Hz beside polynomials of degree {SLOW} to {STIFF}")
-    found = []
+    swings = []
     for row, (what, unit) in enumerate((("ringing after slip begins", "Hz"), ("damping ratio of that ringing", "1"))):
         half = math.hypot(quantile * sd[row], 2 * spread[row])
-        found.append(
+        swings.append(
             Estimate(
-                f"{what}, {side}", float(told[row]), interval=(told[row] - half, told[row] + half),
+                f"{what}, {side}", float(mean[row]), interval=(mean[row] - half, mean[row] + half),
                 sd=math.hypot(sd[row], spread[row]), unit=unit, status=status, checks=checks,
                 method="one decaying mode in all strokes, least squares; jackknife over strokes, and polynomials",
             )
         )  # fmt: skip
-    return found
+    return swings
 
 
-def _told(parameters: Array) -> tuple[float, float]:
+def _ring_of(parameters: Array) -> tuple[float, float]:
     """Frequency [Hz] and damping ratio of a pole."""
     decay, turn = map(float, parameters)
     return turn / (2 * math.pi), -decay / math.hypot(decay, turn)
@@ -254,7 +254,7 @@ def _strongest(swings: Sequence[Array], fs: float) -> float | None:
     if not swings:
         return None
     longest = max(map(len, swings))
-    powers = np.sum([np.abs(np.fft.rfft(each, PADDED * longest)) ** 2 for each in swings], axis=0)
+    powers = np.sum([np.abs(np.fft.rfft(swing, PADDED * longest)) ** 2 for swing in swings], axis=0)
     frequencies = np.fft.rfftfreq(PADDED * longest, 1 / fs)
     allowed = (frequencies >= FASTER * fs / longest) & (frequencies <= fs / SAMPLES)
     if not allowed.any() or powers[allowed].max() == 0:
@@ -277,7 +277,7 @@ def _mode(swings: Sequence[Array], start: Array, fs: float, degree: int = SLOW) 
 
     def left(parameters: Array) -> Array:
         bases = {count: np.linalg.qr(_waves(parameters, count, fs, degree))[0] for count in counts}
-        return np.concatenate([each - (basis := bases[len(each)]) @ (basis.T @ each) for each in swings])
+        return np.concatenate([swing - (basis := bases[len(swing)]) @ (basis.T @ swing) for swing in swings])
 
     return least_squares(left, start, x_scale=[start[1], start[1]], method="lm", max_nfev=60)
 

@@ -199,19 +199,11 @@ def find_sticks(
         share = _share(stuck, certain, cycles, rule, stated)
     sticks = [event for event in events if event.kind == "stick"]
     microslips = _microslips(events) if holds and any(event.whole for event in sticks) else None
-    return Sticks(
-        share=share,
-        per_cycle=_per_cycle_of(sticks, cycles, motion, rule),
-        microslips=microslips,
-        kind=_kind(sticks, microslips),
-        events=events,
-        threshold=limit,
-        noise=motion.noise,
-        frequency=cycles.frequency,
-        method="fusion" if holds else "speed",
-        lost=lost,
-        status=_within_noise(limit, motion) or cycles.status,
-    )
+    how = f"sticks begun in each cycle; {rule}"
+    stops = mean_of_cycles("stops per cycle", _counted(sticks, cycles, motion), unit="1", method=how).within(0.0)
+    status, used = _within_noise(limit, motion) or cycles.status, "fusion" if holds else "speed"
+    kind, forcing = _kind(sticks, microslips), cycles.frequency
+    return Sticks(share, stops, microslips, kind, events, limit, motion.noise, forcing, used, lost, status)
 
 
 def _within_noise(limit: float, motion: Motion) -> str:
@@ -219,11 +211,6 @@ def _within_noise(limit: float, motion: Motion) -> str:
     if limit >= noisy:
         return ""
     return f"the threshold is within the velocity's noise ({_words(noisy, motion)} is five deviations)"
-
-
-def _per_cycle_of(sticks: Sequence[StickEvent], cycles: Cycles, motion: Motion, rule: str) -> Estimate:
-    method = f"sticks begun in each cycle; {rule}"
-    return mean_of_cycles("stops per cycle", _counted(sticks, cycles, motion), unit="1", method=method).within(0.0)
 
 
 def _kind(sticks: Sequence[StickEvent], microslips: Estimate | None) -> str:
@@ -248,8 +235,8 @@ def _threshold(motion: Motion, cycles: Cycles, threshold: float | str | None) ->
             "slips are told from sticks where they are three times as fast as the threshold",
             "give a record with less noise or more motion",
         )
-    told = "five deviations of its noise" if noisy >= creep else f"{100 * CREEP:g} % of its peak, to pass over creep"
-    return limit, f"time with the speed below {_words(limit, motion)} ({'given' if threshold is not None else told})"
+    rule = "five deviations of its noise" if noisy >= creep else f"{100 * CREEP:g} % of its peak, to pass over creep"
+    return limit, f"time with the speed below {_words(limit, motion)} ({'given' if threshold is not None else rule})"
 
 
 def _words(speed: float, motion: Motion) -> str:
@@ -386,27 +373,27 @@ def _events_of(
         else:
             spells.append([hold])
     first, last = motion.start, motion.start + len(stuck) / motion.fs
-    begins, ends = (motion.start + each / motion.fs for each in stretches(stuck))
+    begins, ends = (motion.start + stretch / motion.fs for stretch in stretches(stuck))
     unseen = motion.blur / motion.fs
     edges = [  # a stick that the record cuts has no hold of its own
         [Hold(begin, end, unseen, unseen)]
         for begin, end in zip(begins, ends, strict=True)
         if not any(spell[0].begin < end and begin < spell[-1].end for spell in spells)
     ]
-    found: list[StickEvent] = []
+    events: list[StickEvent] = []
     free = Hold(first, first, 0.0, 0.0)
-    for spell in sorted(spells + edges, key=lambda each: each[0].begin):
-        found += _slip(free, spell[0], first, last)
+    for spell in sorted(spells + edges, key=lambda event: event[0].begin):
+        events += _slip(free, spell[0], first, last)
         begin, end = spell[0], spell[-1]
         kind = "stick" if stuck[rows(begin.begin, end.end)].any() else "microstick"
         whole = begin.begin > first and end.end < last
-        found.append(_event(kind, (begin.begin, begin.begin_sd), (end.end, end.end_sd), whole))
-        found += [
+        events.append(_event(kind, (begin.begin, begin.begin_sd), (end.end, end.end_sd), whole))
+        events += [
             _event("microslip", (one.end, one.end_sd), (next_.begin, next_.begin_sd), True)
             for one, next_ in pairwise(spell)
         ]
         free = end
-    return (*found, *_slip(free, Hold(last, last, 0.0, 0.0), first, last))
+    return (*events, *_slip(free, Hold(last, last, 0.0, 0.0), first, last))
 
 
 def _slip(before: Hold, after: Hold, first: float, last: float) -> list[StickEvent]:
@@ -446,6 +433,6 @@ def _microslips(events: tuple[StickEvent, ...]) -> Estimate:
     """How many lie in each whole stick."""
     slips = np.array([event.time for event in events if event.kind == "microslip"])
     sticks = [event for event in events if event.kind == "stick" and event.whole]
-    counts = [float(np.sum((each.time < slips) & (slips < each.time + each.duration))) for each in sticks]
+    counts = [float(np.sum((stick.time < slips) & (slips < stick.time + stick.duration))) for stick in sticks]
     method = "turns of the velocity within a stick"
     return mean_of_cycles("micro-slips per stick", counts, unit="1", method=method).within(0.0)

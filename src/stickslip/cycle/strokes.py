@@ -95,21 +95,21 @@ def find_strokes(record: Record, *, contact: str | None, question: str) -> Strok
     ways = _ways(velocity, definite_speed(motion), slow)
     ways = ways[:: len(ways) // MOST // 2 * 2 + 1]  # an odd step: both directions in turn
     offset = _middle(friction, velocity, ways)
-    found = []
+    strokes = []
     for first, last, way in ways:
         force, speed = way * (friction[first:last] - offset), way * velocity[first:last]
         level = _level(force, speed)
         broke = _breakaway(force, speed, level, slow, max(FALL * level, AUDIBLE * noise))
         if broke is not None:
-            found.append(Stroke(way, first, force, way * motion.displacement[first:last], level, *broke))
-    if not found:
+            strokes.append(Stroke(way, first, force, way * motion.displacement[first:last], level, *broke))
+    if not strokes:
         raise EstimateError(
             "no stroke from one reversal to the next in which the contact slides",
             f"{question} needs a contact that turns round and slides",
             "give a longer record, or one with more motion",
         )
-    travels = np.array([np.ptp(stroke.displacement) for stroke in found])
-    whole = [stroke for stroke, way in zip(found, travels, strict=True) if way > SHORT * np.median(travels)]
+    travels = np.array([np.ptp(stroke.displacement) for stroke in strokes])
+    whole = [stroke for stroke, way in zip(strokes, travels, strict=True) if way > SHORT * np.median(travels)]
     return Strokes(tuple(whole), motion, record.channels["friction"].unit, offset)
 
 
@@ -122,7 +122,7 @@ def _middle(friction: Array, velocity: Array, ways: list[tuple[int, int, int]]) 
     levels: dict[int, list[float]] = {1: [], -1: []}
     for first, last, way in ways:
         levels[way].append(_level(friction[first:last], way * velocity[first:last]))
-    return sum(float(np.median(each)) for each in levels.values()) / 2 if all(levels.values()) else 0.0
+    return sum(float(np.median(level)) for level in levels.values()) / 2 if all(levels.values()) else 0.0
 
 
 def _ways(velocity: Array, definite: float, slow: float) -> list[tuple[int, int, int]]:

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from stickslip.decay.release import RingDown
 from stickslip.decay.which_motion import DecayMotion
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Step
-from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
@@ -113,11 +112,11 @@ def rig_units(channel: str) -> dict[str, str]:
     return {"mass": "kg m^2", "stiffness": "N m/rad"} if channel == "theta" else {"mass": "kg", "stiffness": "N/m"}
 
 
-def constants(mass: float | str | None, stiffness: float | str | None, name: str) -> tuple[float | None, float | None]:
+def constants(mass: Constant | None, stiffness: Constant | None, name: str) -> tuple[float | None, float | None]:
     """Mass and stiffness as numbers, in the units of the channel."""
     values = []
     for (word, unit), given in zip(rig_units(name).items(), (mass, stiffness), strict=True):
-        value = None if given is None else parse_value(given, unit)
+        value = None if given is None else Estimate.stated(word, given, unit).value
         if value is not None and not (math.isfinite(value) and value > 0):
             raise EstimateError(f"{word} = {given}", f"a {word} is positive", f"correct {word}=, or leave it out")
         values.append(value)

@@ -22,7 +22,7 @@ from stickslip.decay.start import roughness
 from stickslip.decay.waveform import Array
 from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
-from stickslip.estimate import Doubt, Estimate, Status
+from stickslip.estimate import Constant, Doubt, Estimate, Status
 from stickslip.record.record import Record, Step
 from stickslip.signals.delay import without_delays
 from stickslip.statistics import student
@@ -39,8 +39,8 @@ def fit_decay(
     record: Record | Sequence[Record],
     *,
     channel: str | None = None,
-    mass: float | str | None = None,
-    stiffness: float | str | None = None,
+    mass: Constant | None = None,
+    stiffness: Constant | None = None,
     noise: str | None = None,
     restoring: Restoring = "linear",
     candidates: str | tuple[str, ...] | None = None,
@@ -80,7 +80,7 @@ def fit_decay(
         or acceleration ``a``. A stated delay is taken out first.
     channel : {"x", "theta", "v", "a"}, optional
         The channel to fit; the first of these that the record has.
-    mass, stiffness : float or str, optional
+    mass, stiffness : float, str, tuple or Estimate, optional
         Mass [kg] or stiffness [N/m] (of an angle: kg m^2, N m/rad), for the dry friction as a force.
     noise : {"white", "quantised", "coloured"}, optional
         The noise's kind; told from the record when not given.

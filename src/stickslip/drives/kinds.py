@@ -67,10 +67,11 @@ def _require(condition: bool, value: str, rule: str, next_step: str, *, of: str 
 
 def require_drive(drive: object) -> None:
     """Refuse what does not drive."""
-    _require(
-        hasattr(drive, "motion") and not isinstance(drive, type), f"drive = {drive!r}", "a drive says what moves",
-        "give one, as drive=HarmonicBase(1e-3, frequency=2.5), or leave it out", of="drive",
-    )  # fmt: skip
+    if isinstance(drive, type) or not hasattr(drive, "motion"):
+        raise ModelError(
+            f"drive = {drive!r}", "a drive says what moves",
+            "give one, as drive=HarmonicBase(1e-3, frequency=2.5), or leave it out",
+        ).of("drive")  # fmt: skip
 
 
 def _check_frequency(frequency: float) -> None:

@@ -1,4 +1,6 @@
-"""The channel grammar: ``"-200 * (F + 0.115) [N]"`` is a sum of columns times numbers, plus a number, in a unit."""
+"""The channel grammar: ``"-200 * (F + 0.115) [N] ± 1 %"`` is a sum of columns times numbers, plus a number, in a unit;
+behind it may stand how sure the gain is.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 
 from stickslip.errors import RecordError
 from stickslip.record.channels import VOCABULARY
-from stickslip.units import MISMATCH, Unit, parse_unit
+from stickslip.units import MISMATCH, PLUS_MINUS, Unit, parse_unit, parse_value
 
 ACCELERATION = re.compile(r"(^|_)acc(\d|_|[xyz]|$)|accel|beschl", re.IGNORECASE)  # names whose "g" is gravity
 LONGEST = 500  # characters; a linear combination needs fewer, and the parser's recursion stays shallow
@@ -42,24 +44,44 @@ class Linear:
 
 @dataclass(frozen=True)
 class Spec:
-    """A channel as asked for: the arithmetic, the unit of its result, the sensor's sensitivity."""
+    """A channel as asked for: the arithmetic, the unit of its result, the sensitivity, and how sure they are."""
 
     text: str
     arithmetic: str
     unit: str | None
     sensitivity: str
+    gain_sd: float = 0.0
 
 
 def split_spec(text: str) -> Spec:
-    """Take ``"ARITHMETIC [UNIT] @ SENSITIVITY"`` apart; unit and sensitivity may be missing."""
-    match = re.fullmatch(r"\s*(.*?)\s*(?:\[([^\[\]]*)\]\s*)?(?:@\s*([^@\[\]]+?)\s*)?", text, re.DOTALL)
+    """Take ``"ARITHMETIC [UNIT] @ SENSITIVITY ± PERCENT"`` apart; all but the arithmetic may be missing."""
+    before, gain_sd = _gain(text) if len(text) <= LONGEST else (text, 0.0)
+    match = re.fullmatch(r"\s*(.*?)\s*(?:\[([^\[\]]*)\]\s*)?(?:@\s*([^@\[\]]+?)\s*)?", before, re.DOTALL)
     if match is None or not match[1] or len(text) > LONGEST:
         raise RecordError(
             f"'{text[:60]}' names no column",
             "a channel is written 'COLUMN [unit]', 'COLUMN * 2.5 + 1 [unit]' or 'COLUMN [V] @ 500 mV/lbf'",
             "correct it in channels=",
         )
-    return Spec(text, match[1], match[2], match[3] or "")
+    return Spec(before, match[1], match[2], match[3] or "", gain_sd)
+
+
+def _gain(text: str) -> tuple[str, float]:
+    """What stands before the uncertainty of a gain, and that as a part of it; ``a +- b`` is arithmetic."""
+    match = re.fullmatch(rf"(.*){PLUS_MINUS}\s*([^\[\]@]*)", text, re.DOTALL)
+    if match is None or not ("%" in match[2] or re.search(r"\]\s*$|@", match[1])):
+        return text, 0.0
+    try:
+        sd = parse_value(match[2], "1") if "%" in match[2] else math.nan
+    except RecordError:
+        sd = math.nan
+    if not 0 <= sd < 1:
+        raise RecordError(
+            f"'{text[:60]}'",
+            "how sure a gain is is its standard deviation, from 0 to 100 % of it",
+            "write it like 'COLUMN [unit] ± 1 %'",
+        )
+    return match[1], sd
 
 
 def linear(arithmetic: str, keys: Mapping[str, str], constants: Mapping[str, float]) -> Linear:

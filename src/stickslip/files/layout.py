@@ -10,13 +10,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from stickslip.errors import FormatError
+from stickslip.files.select import is_unit, split_name
 from stickslip.files.table import Options, unique
-from stickslip.files.titles import is_unit, split_name
 
 NOT_NUMBERS = ("OL", "Ol", "overload", "Overload", "OVERLOAD", "over", "----", "--", "-", "?", "*", "INVALID")
 WHITESPACE = r"\s+"
 LONGEST_HEADER = 2000  # lines looked at
 
+MARKS = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
+DELIMITERS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "pipe": "|"} | dict.fromkeys(
+    ("space", " "), WHITESPACE
+)
 _EMPTY = frozenset(["", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf", "infinity", "-infinity"])
 _DECIMAL_POINT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"[-+]?(?:\d+,?\d*|,\d+)(?:[eE][-+]?\d+)?")
@@ -66,11 +70,7 @@ class Layout:
 
 def encoding_of(head: bytes) -> tuple[str, int] | None:
     """The encoding of a text and the length of its byte order mark; None where the bytes are no text."""
-    for mark, name in (
-        (codecs.BOM_UTF8, "utf-8"),
-        (codecs.BOM_UTF16_LE, "utf-16-le"),
-        (codecs.BOM_UTF16_BE, "utf-16-be"),
-    ):
+    for mark, name in MARKS.items():
         if head.startswith(mark):
             return name, len(mark)
     if b"\0" in head:
@@ -117,10 +117,10 @@ def find_layout(head: bytes, whole: bool, options: Options, name: str) -> Layout
     FormatError
         There is no row of numbers, or no text.
     """
-    found = encoding_of(head)
-    if found is None:
+    codec = encoding_of(head)
+    if codec is None:
         raise FormatError(f"'{name}' is not text", "rows of numbers are needed", "check the file")
-    encoding, mark = found
+    encoding, mark = codec
     lines = lines_of(head[mark:], encoding, whole=whole)[:LONGEST_HEADER]
     cells, delimiter, decimal = _best_split(lines, options)
     widths = Counter(len(row) for row in cells if row)
@@ -199,21 +199,12 @@ def _best_split(lines: Sequence[str], options: Options) -> tuple[list[list[str] 
 
 
 def _named_delimiter(text: str) -> str:
-    names = {
-        "tab": "\t",
-        "\\t": "\t",
-        "comma": ",",
-        "semicolon": ";",
-        "pipe": "|",
-        "space": WHITESPACE,
-        " ": WHITESPACE,
-    }
-    delimiter = names.get(text, text)
+    delimiter = DELIMITERS.get(text, text)
     if len(delimiter) != 1 and delimiter != WHITESPACE:
         raise FormatError(
             f"delimiter '{text}'",
             "cells are divided by one character",
-            f"pass one of {', '.join(repr(n) for n in names if n.isalpha())} or the character itself",
+            f"pass one of {', '.join(repr(n) for n in DELIMITERS if n.isalpha())} or the character itself",
         )
     return delimiter
 

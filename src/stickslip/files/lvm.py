@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import FormatError
-from stickslip.files.ending import judged
 from stickslip.files.table import Budget, Column, Options, Table, optional, reading, slices, unique
+from stickslip.files.text import judged
 
 NAME = "LabVIEW measurement"
 SUFFIXES = (".lvm",)

@@ -11,9 +11,8 @@ import numpy as np
 
 from stickslip.errors import FormatError, RecordError
 from stickslip.files.reading import ROWS_AT_ONCE, Reading, quietly
-from stickslip.files.select import Columns, Source, TimeColumn, Wanted
+from stickslip.files.select import Columns, Source, TimeColumn, Wanted, titled
 from stickslip.files.table import Budget, Options
-from stickslip.files.titles import titled
 from stickslip.record.record import Record
 
 # Asked in this order whether a file is theirs; each is a module beside this one, imported when it is its turn.

@@ -58,9 +58,9 @@ class Reading:
         if not self.told:
             return False
         units = {column.name: column.unit for column in self.sources[0].table.columns}
-        told = units_told(self.told)
+        stated = units_told(self.told)
         require_columns(self.told, units)
-        return len(told) == len(units) and all(units[name] in (None, unit) for name, unit in told.items())
+        return len(stated) == len(units) and all(units[name] in (None, unit) for name, unit in stated.items())
 
     def whole(self) -> Record:
         """All rows at once."""
@@ -167,7 +167,7 @@ class Reading:
         length = len(next(iter(data.values())))
         if self.fs is not None:
             return Clock(self.fs, first / self.fs)
-        found: list[tuple[Clock, float]] = []
+        clocks: list[tuple[Clock, float]] = []
         for number in range(len(self.sources)):
             rate = self._stated_rate(number)
             if number in self.times:
@@ -175,10 +175,10 @@ class Reading:
                 _require_twins(self.sources[number].path.name, time, data)
                 with np.errstate(over="ignore", invalid="ignore"):
                     fitted = fit_clock(data[time.key], time.scale, known)
-                    found.append((fitted, resolution(_finite(data[time.key])) * time.scale))
+                    clocks.append((fitted, resolution(_finite(data[time.key])) * time.scale))
             elif rate is not None:
-                found.append((Clock(rate[0], rate[1] + first / rate[0]), 0.0))
-        if not found:
+                clocks.append((Clock(rate[0], rate[1] + first / rate[0]), 0.0))
+        if not clocks:
             names = [column.name for source in self.sources for column in source.table.columns]
             raise RecordError(
                 f"{self.names} tells neither time nor sampling rate",
@@ -186,8 +186,8 @@ class Reading:
                 f"pass fs= in Hz, or the time column in time= (columns: {', '.join(names[:20])})",
                 kind=NO_RATE,
             )
-        clock, rounding = found[0]
-        for other, its_rounding in found[1:]:
+        clock, rounding = clocks[0]
+        for other, its_rounding in clocks[1:]:
             apart = float(np.nanmax(np.abs(_seconds(clock, length) - _seconds(other, length))))
             # rounding explains a difference, but not one of a tenth of a sample
             if not apart <= min(max(rounding + its_rounding, 0.01 / clock.fs), 0.1 / clock.fs):
@@ -221,15 +221,15 @@ class Reading:
         outcome += "; changed since write_record wrote it" if self.told else ""
         cut = [f"'{source.path.name}': {source.table.cut}" for source in self.sources if source.table.cut]
         step = Step(action, arguments, "; ".join([outcome, *cut, *self.notes]))
-        told = self.sources[0].table.record if len(self.sources) == 1 else {}
-        channels = {wanted.channel.name: _detailed(wanted, channels_told(told)) for wanted in self.wanted}
-        return Record(samples, channels, clock.fs, clock.start, (*history_of(told), step), clock.stamps)
+        table = self.sources[0].table.record if len(self.sources) == 1 else {}
+        channels = {wanted.channel.name: _detailed(wanted, channels_told(table)) for wanted in self.wanted}
+        return Record(samples, channels, clock.fs, clock.start, (*history_of(table), step), clock.stamps)
 
 
-def _detailed(wanted: Wanted, told: Mapping[str, Channel]) -> Channel:
+def _detailed(wanted: Wanted, channels: Mapping[str, Channel]) -> Channel:
     """The channel, with what was stated of its sensor where it is that sensor's column as it was written."""
     columns = [name for _, name in wanted.scales]
-    known = told.get(columns[0]) if len(columns) == 1 else None
+    known = channels.get(columns[0]) if len(columns) == 1 else None
     if known is None or known.unit != wanted.channel.unit or wanted.offset != 0:
         return wanted.channel
     if wanted.scale * next(iter(wanted.scales.values())) != 1:

@@ -3,20 +3,86 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import re
 from collections import Counter
-from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from stickslip.errors import RecordError
+from stickslip.errors import RecordError, StickslipError
 from stickslip.files.expression import Linear, Spec, apply_sensitivity, channel_unit, linear, split_spec, unknown
-from stickslip.files.table import Column, Table, supplied, unique
-from stickslip.files.titles import last_part
+from stickslip.files.table import Block, Column, Table, supplied, unique
 from stickslip.printing import printable
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
 from stickslip.units import LONGEST, Unit, parse_unit
+
+_SLASH = re.compile(r"[\[(][^\[(\])]*[\])]|([/\\])")  # one in brackets belongs to a unit
+
+
+def titled(table: Table) -> Table:
+    """The table with the units that stand in its columns' titles taken out of them; what the file states counts."""
+    if table.record:  # written by write_record: the names are names
+        return table
+    parts = [split_name(column.name) for column in table.columns]
+    parts = [
+        (name, unit) if column.unit is None or column.name.rstrip().endswith("]") else (column.name, None)
+        for column, (name, unit) in zip(table.columns, parts, strict=True)
+    ]
+    names = unique([name for name, _ in parts])
+    written = dict(zip(names, (column.name for column in table.columns), strict=True))
+    columns, notes = [], list(table.notes)
+    for name, (_, unit), column in zip(names, parts, table.columns, strict=True):
+        columns.append(replace(column, name=name, unit=column.unit or unit))
+        if unit and column.unit not in (None, unit):
+            notes.append(f"{name} is titled in {unit}, stated in {column.unit}")
+    if names == list(written.values()):
+        return table
+
+    def blocks(wanted: Sequence[str], size: int) -> Iterator[Block]:
+        for block in table.blocks([written[name] for name in wanted], size):
+            yield {name: block[written[name]] for name in wanted}
+
+    return replace(table, columns=tuple(columns), blocks=blocks, notes=tuple(notes))
+
+
+def split_name(text: str) -> tuple[str, str | None]:
+    """Part ``"x [mm]"``, ``"x (mm)"`` or ``"x, mm"`` into name and unit."""
+    text = text.strip()
+    name, bracket, unit = text[:-1].rpartition("[") if text.endswith("]") else ("", "", "")
+    if bracket and name.strip() and "]" not in unit:
+        return name.strip(), unit.strip()
+    # no two parts that fit the same signs: a title of any length is read in one pass
+    match = re.fullmatch(r"(.*?)(?:\(([^()]*(?:\([^()]*\)[^()]*)?)\)|,([^,]+))", text)
+    if match and match[1].strip():
+        unit = (match[2] or match[3] or "").strip()
+        if is_unit(unit):
+            return match[1].strip(), unit
+    return text, None
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that is known."""
+    if not text or len(text) > 20:
+        return False
+    try:
+        parse_unit(text)
+    except StickslipError:
+        return False
+    return True
+
+
+def last_part(name: str) -> str:
+    """The name without the path before it."""
+    return path_parts(name)[-1]
+
+
+def path_parts(name: str) -> list[str]:
+    """A name's parts between slashes of either kind."""
+    slashes = [match.start() for match in _SLASH.finditer(name) if match[1]]
+    return [name[before + 1 : after] for before, after in itertools.pairwise([-1, *slashes, len(name)])]
+
 
 TIME_WORDS = (
     "t", "time", "timestamp", "timestamps", "elapsed", "timeelapsed", "elapsedtime", "xvalue", "zeit", "times",
@@ -130,24 +196,24 @@ class Columns:
         """The arithmetic as numbers times columns."""
         first: dict[Key, str] = {}
         names = {name: first.setdefault(key, name) for name, key in self._by_name.items()}
-        found = linear(arithmetic, names, self.constants)
+        combined = linear(arithmetic, names, self.constants)
         scales: dict[Key, float] = {}
-        for name, scale in found.scales.items():
+        for name, scale in combined.scales.items():
             key = self._by_name[name]
             scales[key] = scales.get(key, 0.0) + scale
-        return scales, found
+        return scales, combined
 
     def asked(self, channels: Mapping[str, str]) -> list[Wanted]:
         """The channels of a channel map."""
         wanted = []
         for name, text in channels.items():
             spec = split_spec(str(text))
-            scales, found = self.combination(spec.arithmetic)
-            plain = next(iter(scales)) if found.plain() else None
+            scales, weights = self.combination(spec.arithmetic)
+            plain = next(iter(scales)) if weights.plain() else None
             stated = spec.unit if spec.unit is not None else self.units.get(name)
             if stated is None and plain:
                 stated = self.unit_of(plain)
-            wanted.append(Wanted(*self._channel(checked_name(name), spec, stated), scales, found.offset))
+            wanted.append(Wanted(*self._channel(checked_name(name), spec, stated), scales, weights.offset))
         return wanted
 
     def every(self, times: Mapping[int, TimeColumn]) -> tuple[list[Wanted], list[str]]:
@@ -216,7 +282,8 @@ class Columns:
         if weighed and unit.si == "kg":
             self.notes.append(f"{name}: {weighed[1]} read as a mass; call the channel a or acc if it is gravity")
         assumed = stated is None and unit.si != "1"
-        return Channel(name, unit.si, described(name, unit.si), source, spec.sensitivity, assumed=assumed), unit.scale
+        words, sensitivity = described(name, unit.si), spec.sensitivity
+        return Channel(name, unit.si, words, source, sensitivity, gain_sd=spec.gain_sd, assumed=assumed), unit.scale
 
     def _unit(self, name: str, stated: str) -> Unit:
         try:
@@ -232,13 +299,13 @@ class Columns:
         times = {}
         for number, source in enumerate(self.sources):
             if asked is not None:
-                found = self._asked_time(number, asked)
+                key = self._asked_time(number, asked)
             else:
                 named = [column for column in source.table.columns if is_time(column)]
                 best = min(named, key=_time_rank, default=None)
-                found = self._time_column(number, best, named) if best else None
-            if found:
-                times[number] = found
+                key = self._time_column(number, best, named) if best else None
+            if key:
+                times[number] = key
         if asked is not None and not times:
             raise unknown("time column", asked, [name for _, name in self.columns])
         return times

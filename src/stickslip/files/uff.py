@@ -50,14 +50,14 @@ def read(path: Path, options: Options) -> Table:
     Names come from the response (entity, or node and direction); where these repeat, from the first line.
     """
     pyuff = optional("pyuff")
-    found = list(_data_sets(path, path.read_bytes()))
-    Budget.of(path).require_columns(len(found))  # each set is opened and parsed by itself
+    sets = list(_data_sets(path, path.read_bytes()))
+    Budget.of(path).require_columns(len(sets))  # each set is opened and parsed by itself
     with reading(path, NAME):
         file = pyuff.UFF(str(path))
         numbers = [int(number) for number in file.get_set_types()]
-    if numbers != [data_set.number for data_set in found]:
+    if numbers != [data_set.number for data_set in sets]:
         raise FormatError(
-            f"'{path.name}' holds data sets {[d.number for d in found]}, of which {numbers} can be told apart",
+            f"'{path.name}' holds data sets {[d.number for d in sets]}, of which {numbers} can be told apart",
             "each data set stands between two lines of -1",
             "export the file again, in ASCII",
         )
@@ -65,7 +65,7 @@ def read(path: Path, options: Options) -> Table:
     left_out: list[str] = []
     notes: list[str] = []
     cut: list[str] = []
-    for index, data_set in enumerate(found):
+    for index, data_set in enumerate(sets):
         if data_set.number != 58:
             continue
         with reading(path, NAME):

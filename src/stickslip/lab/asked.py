@@ -82,8 +82,10 @@ class Asked:
         ours = {path.name for path in files}
         steps = [_renamed(step, self.names) for step in record.history]
         if not any(file["name"] in ours for step in record.history for file in step.arguments.get("files", ())):
-            told = [{"name": self.names[path.name]} for path in files]  # as write_record left it: it names no file
-            steps.append(ss.record.Step("read_record", {"files": told}, AS_WRITTEN))
+            files_sent = [
+                {"name": self.names[path.name]} for path in files
+            ]  # as write_record left it: it names no file
+            steps.append(ss.record.Step("read_record", {"files": files_sent}, AS_WRITTEN))
         return dataclasses.replace(record, history=tuple(steps))
 
 
@@ -100,8 +102,8 @@ def _read_as(rig: RigSettings) -> dict[str, Any]:
     return {name: getattr(rig, name) or None for name in READING}
 
 
-def on_the_page(words: str) -> str:
+def on_the_page(sentence: str) -> str:
     """A sentence with the page's fields for the arguments that it names to a Python user."""
-    text = re.sub(r'channels=\{"(\w+)": "([^"]*)"\}', r"\1 in the table of channels", words)
+    text = re.sub(r'channels=\{"(\w+)": "([^"]*)"\}', r"\1 in the table of channels", sentence)
     text = re.sub(r'\b(channel|method|restoring|contact)="(\w+)"', r"\1: \2", text)
     return re.sub(r"\b([a-z_]+)=(?=\W|$)", r'the field "\1"', text)

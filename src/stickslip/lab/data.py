@@ -283,12 +283,12 @@ async def ask(request: Request) -> Response:
     data = _of(request)
     files = [[data.uploads.get(key) for key in record] for record in asked.records]
     names = {upload.path.name: upload.label for record in files for upload in record}
-    told = {
+    question = {
         "question": asked.question, "reading": asked.reading.model_dump(exclude_defaults=True),
         "options": asked.options,
         "records": [[str(upload.path) for upload in record] for record in files],
     }  # fmt: skip
-    return JSONResponse({"id": data.jobs.start(told, names=names).key}, status_code=202)
+    return JSONResponse({"id": data.jobs.start(question, names=names).key}, status_code=202)
 
 
 async def _body(request: Request) -> bytes:
@@ -324,8 +324,8 @@ async def events(request: Request) -> Response:
     job, jobs = _job(request), _of(request).jobs
 
     async def lines() -> AsyncIterator[str]:
-        async for told in jobs.watch(job):
-            yield ": still here\n\n" if told is None else f"data: {json.dumps(told)}\n\n"
+        async for state in jobs.watch(job):
+            yield ": still here\n\n" if state is None else f"data: {json.dumps(state)}\n\n"
 
     return StreamingResponse(lines(), media_type="text/event-stream", headers={"Cache-Control": "no-store"})
 
@@ -369,11 +369,11 @@ def _job(request: Request) -> Job:
 
 def _kept(job: Job, path: Path) -> Path:
     """A file that a finished analysis left, if it is one of its own."""
-    found = job.folder / path
-    whole = job.state == "done" and found.is_file() and found.resolve() == job.folder.resolve() / path
+    file = job.folder / path
+    whole = job.state == "done" and file.is_file() and file.resolve() == job.folder.resolve() / path
     if not whole:
         raise HTTPException(404, "The analysis left nothing of that kind; see whether it is done.")
-    return found
+    return file
 
 
 routes: list[BaseRoute] = [

@@ -72,9 +72,9 @@ def run(request: Mapping[str, Any], go_on: GoOn) -> Answer:
 def tell(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """What the library says of the motion, in words and in numbers as it prints them."""
     case = read_case(request["state"])
-    found = ss.story.outcome(case, progress=go_on)
-    told = {"status": found.run.status, "sentences": found.sentences, "rows": found.rows}
-    return {**told, **_state(case)}, {}  # in SI, whatever units it was asked in
+    outcome = ss.story.outcome(case, progress=go_on)
+    answer = {"status": outcome.run.status, "sentences": outcome.sentences, "rows": outcome.rows}
+    return {**answer, **_state(case)}, {}  # in SI, whatever units it was asked in
 
 
 def wavelet(request: Mapping[str, Any], go_on: GoOn) -> Answer:
@@ -97,15 +97,15 @@ def sound(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     run = ss.simulate(case.system, start=case.start, progress=go_on, **case.run)  # type: ignore[arg-type]
     if isinstance(run.system, ss.Structure) and run.system.size > 1:
         heard = ss.squeak.sound_pressure(run, fs=HEARD)["sound"][-int(LASTS * HEARD) :]
-        words = f"sound pressure 10 cm away, in true time, {len(heard) / HEARD:.2g} s of it"
+        label = f"sound pressure 10 cm away, in true time, {len(heard) / HEARD:.2g} s of it"
     else:
         quicker = max(1.0, PITCH * _cycle(run))
         lasts = min(LASTS, run.duration / quicker)
         times = np.linspace(run.duration - lasts * quicker, run.duration, max(2, int(lasts * HEARD)))
         heard = run.sample(np.clip(times, 0, run.duration), ("friction",))[0][0]
-        words = f"friction, {float(f'{quicker:.3g}'):g} times as fast"
+        label = f"friction, {float(f'{quicker:.3g}'):g} times as fast"
     heard = heard - heard.mean()
-    return {"fs": HEARD, "words": words}, {"sound": heard / (np.abs(heard).max() or 1.0)}
+    return {"fs": HEARD, "words": label}, {"sound": heard / (np.abs(heard).max() or 1.0)}
 
 
 def preset(request: Mapping[str, Any], go_on: GoOn) -> Answer:

@@ -29,15 +29,15 @@ MOST = 2000  # points of one part
 def sweep(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """One value at each point of a grid of two parameters."""
     system, grid, options = _read(request)
-    found = ss.sweep(system, grid, measures=[request["measure"]], **options)
-    return _values(found, request["measure"])
+    atlas = ss.sweep(system, grid, measures=[request["measure"]], **options)
+    return _values(atlas, request["measure"])
 
 
 def refine(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     """The same between two values of each parameter, halved where the answer changes."""
     system, grid, options = _read(request)
-    found = ss.maps.refine(system, grid, measure=request["measure"], halvings=int(request["halvings"]), **options)
-    return _values(found, request["measure"])
+    atlas = ss.maps.refine(system, grid, measure=request["measure"], halvings=int(request["halvings"]), **options)
+    return _values(atlas, request["measure"])
 
 
 def warm(request: Mapping[str, Any], go_on: GoOn) -> Answer:
@@ -68,10 +68,10 @@ def _read(request: Mapping[str, Any]) -> tuple[Any, dict[str, list[float]], dict
     return case.system, grid, {"cycles": CYCLES, "settle": SETTLE, "start": case.start, "engine": "serial"}
 
 
-def _values(found: Any, measure: str) -> Answer:
+def _values(atlas: Any, measure: str) -> Answer:
     """Rows over the second parameter; nan where there is no answer, -1 where no such system, -2 where it rests."""
-    values = sum(found[name].values.astype(float) for name in SHOWN[measure])
-    status, words = found.status.values, found.status.attrs["flag_meanings"].split()
+    values = sum(atlas[name].values.astype(float) for name in SHOWN[measure])
+    status, meanings = atlas.status.values, atlas.status.attrs["flag_meanings"].split()
     for word, shown in (("no_such_system", NO_SYSTEM), ("at_rest", AT_REST)):
-        values = np.where(status == words.index(word) + found.status.attrs["flag_values"][0], shown, values)
+        values = np.where(status == meanings.index(word) + atlas.status.attrs["flag_values"][0], shown, values)
     return {"shape": list(values.shape)}, {"values": values.ravel()}

@@ -48,7 +48,7 @@ def _presets() -> list[dict[str, Any]]:
     """The scenarios, those together that are told alike."""
     cases = [ss.systems.scenario_case(name) for name in ss.scenarios.names()]
     alike = itertools.groupby(cases, key=lambda case: (case.about, case.parts))
-    return [{"about": about, "names": [case.name for case in each]} for (about, _), each in alike]
+    return [{"about": about, "names": [case.name for case in group]} for (about, _), group in alike]
 
 
 def _part(make: Any) -> dict[str, Any]:
@@ -62,15 +62,15 @@ def _part(make: Any) -> dict[str, Any]:
 
 def _plain(text: str) -> str:
     """A docstring's sentence without its marks."""
-    for found, shown in TEX:
-        text = re.sub(found, shown, text)
+    for mark, shown in TEX:
+        text = re.sub(mark, shown, text)
     return " ".join(text.split())
 
 
 def _parameter(field: dataclasses.Field[Any]) -> dict[str, Any]:
     declared = field.metadata["parameter"]
     default = None if field.default is dataclasses.MISSING else field.default
-    told = {
+    entry = {
         "name": field.name,
         "label": declared.name,
         "unit": "" if declared.unit == "1" else declared.unit,
@@ -81,4 +81,4 @@ def _parameter(field: dataclasses.Field[Any]) -> dict[str, Any]:
         "part": field.name in MORE and not declared.choices,
     }
     empty: dict[str, Any] = {"unit": "", "words": "", "default": None, "optional": False, "choices": [], "part": False}
-    return {name: value for name, value in told.items() if name in ("name", "label") or value != empty[name]}
+    return {name: value for name, value in entry.items() if name in ("name", "label") or value != empty[name]}

@@ -18,10 +18,10 @@ def frame(header: Mapping[str, Any], arrays: Mapping[str, Any] | None = None) ->
     kept = {name: np.ascontiguousarray(values) for name, values in (arrays or {}).items()}
     kept = {name: values.astype(KINDS[values.dtype.kind], copy=False) for name, values in kept.items()}
     table = [[name, KINDS[values.dtype.kind], values.size] for name, values in kept.items()]
-    words = json.dumps({**header, "arrays": table}, ensure_ascii=False, allow_nan=False).encode()
-    words += b" " * (-(len(words) + 4) % EDGE)
+    text = json.dumps({**header, "arrays": table}, ensure_ascii=False, allow_nan=False).encode()
+    text += b" " * (-(len(text) + 4) % EDGE)
     bodies = (values.tobytes() for values in kept.values())
-    return b"".join([struct.pack("<I", len(words)), words, *(body + bytes(-len(body) % EDGE) for body in bodies)])
+    return b"".join([struct.pack("<I", len(text)), text, *(body + bytes(-len(body) % EDGE) for body in bodies)])
 
 
 def unframed(message: bytes) -> tuple[dict[str, Any], dict[str, Any]]:

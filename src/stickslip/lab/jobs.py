@@ -95,10 +95,10 @@ class Jobs:
             raise HTTPException(503, f"{self.limits.waiting} analyses are waiting already; try again in a minute.")
         key = secrets.token_hex(16)
         job = Job(self.folder / key, names)
-        told = {"memory": self.limits.memory, "processor": self.limits.processor, "written": self.limits.written}
+        limits = {"memory": self.limits.memory, "processor": self.limits.processor, "written": self.limits.written}
         try:
             job.folder.mkdir()
-            (job.folder / ASK).write_text(json.dumps({**ask, "names": dict(names), "limits": told}), encoding="utf-8")
+            (job.folder / ASK).write_text(json.dumps({**ask, "names": dict(names), "limits": limits}), encoding="utf-8")
         except OSError as error:
             shutil.rmtree(job.folder, ignore_errors=True)
             raise HTTPException(
@@ -164,7 +164,7 @@ class Jobs:
 
     async def _run(self, job: Job) -> dict[str, Any]:
         """Run the worker to its end: what became of it."""
-        with (job.folder / "words.txt").open("wb") as words:
+        with (job.folder / "words.txt").open("wb") as log:
             job.process = process = await asyncio.create_subprocess_exec(
                 sys.executable,
                 "-P",
@@ -174,7 +174,7 @@ class Jobs:
                 env=_environment(job.folder),
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=asyncio.subprocess.PIPE,
-                stderr=words,
+                stderr=log,
                 limit=LONGEST_LINE,
                 start_new_session=True,
             )
@@ -201,10 +201,12 @@ async def _follow(job: Job, process: asyncio.subprocess.Process) -> None:
     """Take the worker's lines: each is how far it is."""
     assert process.stdout is not None
     async for line in process.stdout:
-        told = json.loads(line)
-        if not (isinstance(told, dict) and isinstance(told.get("words"), str) and _is_share(told.get("share"))):
+        progress = json.loads(line)
+        if not (
+            isinstance(progress, dict) and isinstance(progress.get("words"), str) and _is_share(progress.get("share"))
+        ):
             raise ValueError(line)
-        job.tell(words=with_names(told["words"], job.names), share=float(told["share"]))
+        job.tell(words=with_names(progress["words"], job.names), share=float(progress["share"]))
 
 
 def _is_share(value: object) -> bool:
@@ -230,13 +232,13 @@ def _read(path: Path) -> Any:
         return None
 
 
-def _why(code: int | None, words: Path, limits: Limits) -> str:
+def _why(code: int | None, log: Path, limits: Limits) -> str:
     if code == -getattr(signal, "SIGXCPU", 24):
         return f"it took more than {limits.processor:g} s of processor time"
     if code is not None and code < 0:
         return f"its process was ended by {signal.Signals(-code).name}, perhaps for want of memory"
-    with words.open("rb") as file:
-        file.seek(max(0, words.stat().st_size - KEPT_WORDS))
+    with log.open("rb") as file:
+        file.seek(max(0, log.stat().st_size - KEPT_WORDS))
         last = file.read(KEPT_WORDS).decode("utf-8", "replace").strip().splitlines()
     return f"a fault of the program ({last[-1][:200] if last else f'exit code {code}'})"
 

@@ -37,13 +37,13 @@ async def _map(socket: WebSocket) -> None:
         come.set()
 
     async def drawn(request: dict[str, Any]) -> None:
-        told = {"id": request["id"], "want": "map"}
+        reply = {"id": request["id"], "want": "map"}
         try:
             async for header, arrays in _parts(socket, request):
-                await socket.send_bytes(frame({**told, "kind": "part", **header}, arrays))
-            await socket.send_bytes(frame({**told, "kind": "done"}))
+                await socket.send_bytes(frame({**reply, "kind": "part", **header}, arrays))
+            await socket.send_bytes(frame({**reply, "kind": "done"}))
         except Unanswered as error:
-            await socket.send_bytes(frame({**told, "kind": "error", "error": str(error)}))
+            await socket.send_bytes(frame({**reply, "kind": "error", "error": str(error)}))
 
     async def work() -> None:
         while await come.wait():
@@ -123,20 +123,20 @@ async def _asked(
     header, arrays = unframed(await asked(socket.app.state.workers, asking, tell=telling(socket)))
     if header["kind"] != want:
         raise Unanswered(header.get("error", "The map was given up; draw it again."))
-    found: NDArray[np.float64] = arrays["values"].reshape(header["shape"])
-    return found
+    values: NDArray[np.float64] = arrays["values"].reshape(header["shape"])
+    return values
 
 
 def _changing(values: NDArray[np.float64]) -> list[tuple[int, int, int]]:
     """Between which neighbouring columns, and from which to before which row, the answer changes."""
     whole = np.nan_to_num(np.round(values), nan=-3.0)
     corners = np.stack([whole[:-1, :-1], whole[1:, :-1], whole[:-1, 1:], whole[1:, 1:]])
-    found = []
+    cells = []
     for i, unlike in enumerate(corners.min(axis=0) != corners.max(axis=0)):
         rows = np.flatnonzero(unlike)
         if len(rows):
-            found.append((i, int(rows[0]), int(rows[-1]) + 2))
-    return found
+            cells.append((i, int(rows[0]), int(rows[-1]) + 2))
+    return cells
 
 
 routes: list[BaseRoute] = [WebSocketRoute("/map", _map)]

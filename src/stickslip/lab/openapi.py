@@ -36,7 +36,7 @@ def described(
         if status != 204:
             given["content"] = {gives: {"schema": answer or {}}}
         said: dict[str, Any] = {"summary": summary, "responses": {str(status): given}}
-        said["parameters"] = [{"name": name, "in": "query", "schema": each} for name, each in (query or {}).items()]
+        said["parameters"] = [{"name": name, "in": "query", "schema": schema} for name, schema in (query or {}).items()]
         if body is not None:
             said["requestBody"] = {"required": True, "content": {media: {"schema": body}}}
         endpoint.openapi = said  # type: ignore[attr-defined]
@@ -58,8 +58,8 @@ def document(routes: Sequence[BaseRoute]) -> dict[str, Any]:
             for name, kind in re.findall(r"{(\w+)(?::(\w+))?}", route.path)
         ]
         refusals = {
-            str(code): {"description": words, "content": {"application/json": {"schema": ERROR}}}
-            for code, words in REFUSALS.items()
+            str(code): {"description": meaning, "content": {"application/json": {"schema": ERROR}}}
+            for code, meaning in REFUSALS.items()
         }
         for method in sorted((route.methods or set()) - {"HEAD"}):
             place[method.lower()] = {**said, "parameters": inputs, "responses": {**refusals, **said["responses"]}}

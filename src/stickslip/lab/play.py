@@ -37,18 +37,18 @@ async def asked(
     workers: Workers, request: Mapping[str, Any], *, lent: list[Worker] | None = None, tell: Tell | None = None
 ) -> bytes:
     """A worker's answer, or in one sentence what befell the worker; that it compiles is told to `tell`."""
-    told = {"id": request.get("id"), "want": request.get("want"), "kind": "error"}
+    header = {"id": request.get("id"), "want": request.get("want"), "kind": "error"}
     slow = request["want"] in SLOW
     try:
         if tell is not None and slow and workers.slow.locked() and workers.compiling:
-            await tell(frame({**told, "kind": "compiling"}))
+            await tell(frame({**header, "kind": "compiling"}))
         async with workers.slow if slow else contextlib.nullcontext():
             asking = json.dumps(request).encode()
             return await workers.ask(asking, lent=lent, tell=tell, rested=request["want"] == "warm")
     except TimeoutError:
-        return frame({**told, "error": "This takes longer than the page waits; ask for less."})
+        return frame({**header, "error": "This takes longer than the page waits; ask for less."})
     except EOFError:
-        return frame({**told, "error": "The computation ended without an answer; change what was changed last."})
+        return frame({**header, "error": "The computation ended without an answer; change what was changed last."})
 
 
 async def warmed(workers: Workers, opened: asyncio.Event) -> None:
@@ -106,9 +106,9 @@ async def conversation(
 def telling(socket: WebSocket) -> Tell:
     """What sends word to a page, if it is still there."""
 
-    async def tell(words: bytes) -> None:
+    async def tell(message: bytes) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-            await socket.send_bytes(words)
+            await socket.send_bytes(message)
 
     return tell
 
@@ -116,7 +116,7 @@ def telling(socket: WebSocket) -> Tell:
 def _require_gone(error: BaseException) -> None:
     """Work may end because the page went; anything else is raised."""
     inner = error.exceptions if isinstance(error, BaseExceptionGroup) else (error,)
-    if not all(isinstance(each, WebSocketDisconnect | RuntimeError) for each in inner):
+    if not all(isinstance(error, WebSocketDisconnect | RuntimeError) for error in inner):
         raise error
 
 

@@ -4,58 +4,250 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
+import re
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 import stickslip as ss
-from stickslip.lab.asked import Asked, on_the_page
-from stickslip.lab.describe import curve, describe
+from stickslip.lab.asked import AS_WRITTEN, PART, Asked, on_the_page
 
 if TYPE_CHECKING:
     from stickslip import Record
+    from stickslip.record import Fault
     from stickslip.story import Story
+
+Array = NDArray[np.float64]
+
+POINTS = 2000  # pairs of least and greatest value of a channel that are drawn
+MOTION, FORCES = {"x", "v"}, {"friction", "load", "force"}
+CONSTANTS = ("mass", "stiffness", "damping")
+UNTOLD = " (no unit stated, "  # how a channel's source tells it
+_REPAIRS = {
+    "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
+    "restore_clipped": "clipping", "remove_drift": "drift",
+}  # fmt: skip
+
+
+def describe(asked: Asked) -> dict[str, Any]:
+    """The channels, rate and faults of each record, and of each question what a person must still tell."""
+    records, missing = [], []
+    for number in range(len(asked.records)):
+        asked.say(f"reading {asked.name(number)}", number / len(asked.records))
+        summary, needs = _one(asked, number)
+        records.append(summary)
+        missing += needs
+    names = [{channel["name"] for channel in record["channels"]} for record in records]
+    common = set.intersection(*names)
+    return {"records": records, "needs": sorted(set(missing)), "questions": questions(common, len(records))}
+
+
+def questions(channels: set[str], records: int) -> dict[str, dict[str, Any]]:
+    """Of each question: whether the channels allow it, why not, and which constants it needs or takes."""
+    forces, moves = bool(channels & FORCES), bool(channels & MOTION)
+    rig, felt = ["mass", "stiffness"], bool(channels & {"friction", "coefficient"})
+    measured = "friction" in channels or ("load" in channels and moves) or "force" in channels
+    motion = "name the displacement x or the velocity v among the channels"
+    own, decays = ["damping", "damper", "contact"], bool(channels & {"x", "theta", "v", "a"})
+    unmeasured, unfelt = moves and not measured, not felt or "x" in channels
+    return {
+        "analyze": _question(moves or forces, motion, rig if unmeasured else [], [*rig, *own, "normal"]),
+        "decay": _question(decays, "name x, theta, v or a among the channels", [], rig),
+        "wavelet": _question(records == 1, "one record is mapped at a time", [], ["frequencies", *rig]),
+        "squeak": _question(True, "", [], ["frequencies", "normal"]),
+        "fit": _question(moves or felt, motion, rig if unfelt else [], [*own, "laws", "curve"]),
+    }
+
+
+def _question(able: bool, why: str, needs: list[str], may: list[str]) -> dict[str, Any]:
+    return {
+        "able": able,
+        "why": "" if able else why,
+        "needs": needs,
+        "may": [name for name in may if name not in needs],
+    }
+
+
+def _one(asked: Asked, number: int) -> tuple[dict[str, Any], list[str]]:
+    """A record as the page shows it, and what reading it still needs."""
+    try:
+        return shown(asked.name(number), asked.parts(number)), []
+    except ss.errors.RecordError as error:
+        if asked.reading.get("fs") or error.kind != ss.errors.NO_RATE:
+            raise
+        guess = Asked(asked.records, asked.names, {**asked.reading, "fs": 1.0}, asked.options, asked.say)
+        summary = shown(asked.name(number), guess.parts(number))
+        return {**summary, "fs": None, "duration": None, "asks": on_the_page(str(error))}, ["fs"]
+
+
+def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
+    """Channels, rate, faults and a thinned picture of a record that comes in parts."""
+    first: Record | None = None
+    rows, thin = 0, Thinned()
+    for part in parts:
+        first = part if first is None else first
+        rows += len(part)
+        thin.add(part)
+    assert first is not None
+    whole = rows == len(first)
+    faults = [_fault(fault) for fault in first.check()]
+    restored = first.history[-1].outcome == AS_WRITTEN
+    notes = [step.outcome for step in first.history if step.outcome and step.arguments.get("files")]
+    if not whole:
+        notes.append(f"the check-up looked at the first {len(first)} of {rows} rows")
+    curves = thin.curves()
+    return {
+        "name": name,
+        "rows": rows,
+        "fs": first.fs,
+        "start": first.start,
+        "duration": rows / first.fs,
+        "channels": [
+            {
+                "name": channel.name,
+                "unit": channel.unit,
+                "words": channel.quantity,
+                "column": channel.name if restored else channel.source.partition(UNTOLD)[0] or channel.name,
+                "low": plain(np.fmin.reduce(curves[channel.name])),
+                "high": plain(np.fmax.reduce(curves[channel.name])),
+            }
+            for channel in first.channels.values()
+        ],
+        "stated": {name: first.truth[name] for name in CONSTANTS if name in first.truth},
+        "faults": faults,
+        "notes": notes,
+        "unknown": [c.name for c in first.channels.values() if _untold(c)],
+        "preview": {
+            "time": numbers(first.start + thin.rows() / first.fs),
+            "channels": {name: numbers(values) for name, values in curves.items()},
+        },
+    }
+
+
+def _untold(channel: ss.record.Channel) -> bool:
+    """Whether nobody stated a unit: what it is in is then not known, unless it may well have none."""
+    return channel.assumed or (channel.unit == "1" and channel.name not in ("sound", "coefficient"))
+
+
+def _fault(fault: Fault) -> dict[str, Any]:
+    match = re.search(rf"\b({'|'.join(_REPAIRS)})\(record", fault.message)
+    repair = _REPAIRS[match[1]] if match else ""
+    return {"message": on_the_page(fault.message), "severity": fault.severity, "repair": repair}
+
+
+class Thinned:
+    """Channels that come in parts, as the least and the greatest value of ever wider stretches."""
+
+    def __init__(self) -> None:
+        self.width = 1
+        self._total = 0
+        self._kept: dict[str, list[Array]] = {}
+
+    def add(self, part: Record) -> None:
+        """Go on with the next part."""
+        self._total += len(part)
+        for name in part:
+            self._kept.setdefault(name, []).append(extremes(part[name], self.width))
+        while -(-self._total // self.width) > POINTS and self.width < PART:
+            self.width *= 2
+            for name, held in self._kept.items():
+                self._kept[name] = [_halved(np.concatenate(held))]
+
+    def rows(self) -> Array:
+        """The row of each value of :meth:`curves`: two in each stretch."""
+        starts = np.arange(0, self._total, self.width, dtype=np.float64)
+        ends = np.minimum(starts + self.width, self._total)
+        return np.column_stack([starts, (starts + ends) / 2]).ravel() if self.width > 1 else starts
+
+    def curves(self) -> dict[str, Array]:
+        """The values of each channel, least and greatest in turn."""
+        return {
+            name: np.concatenate(held).ravel() if self.width > 1 else np.concatenate(held)[:, 0]
+            for name, held in self._kept.items()
+        }
+
+
+def extremes(values: Array, width: int) -> Array:
+    """The least and the greatest value of each stretch of `width`."""
+    starts = np.arange(0, len(values), width)
+    return np.column_stack([np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)])
+
+
+def _halved(pairs: Array) -> Array:
+    starts = np.arange(0, len(pairs), 2)
+    return np.column_stack([np.fmin.reduceat(pairs[:, 0], starts), np.fmax.reduceat(pairs[:, 1], starts)])
+
+
+def curve(record: str, channel: str, unit: str, time: Array, measured: Array, fitted: Array) -> dict[str, Any]:
+    """A fitted curve over what was measured, thinned alike."""
+    width = max(1, -(-len(time) // POINTS))
+    if width > 1:
+        middles = time[::width][: -(-len(time) // width)]
+        time = np.repeat(middles, 2)
+        measured, fitted = extremes(measured, width).ravel(), extremes(fitted, width).ravel()
+    return {
+        "record": record,
+        "channel": channel,
+        "unit": unit,
+        "time": numbers(time),
+        "measured": numbers(measured),
+        "fitted": numbers(fitted),
+    }
+
+
+def numbers(values: Iterable[float]) -> list[float | None]:
+    """For JSON, with the digits that a screen shows."""
+    return [plain(value) for value in values]
+
+
+def plain(value: float) -> float | None:
+    return float(f"{value:.7g}") if math.isfinite(value) else None
+
 
 FOLDER = "results"
 
 
-def each(asked: Asked, answer: Callable[[int], Any]) -> tuple[list[Any], list[str]]:
+def results_of(asked: Asked, answer: Callable[[int], Any]) -> tuple[list[Any], list[str]]:
     """What each record answers, and why those that are left out do not; the reason where none does."""
-    found, left_out = [], []
+    results, left_out = [], []
     for number in range(len(asked.records)):
         asked.say(f"analysing {asked.name(number)}", number / (len(asked.records) + 1))
         try:
-            found.append(answer(number))
+            results.append(answer(number))
         except ss.errors.ModelError:
             raise
         except ss.StickslipError as error:
             left_out.append(error)
-    if not found:
+    if not results:
         raise left_out[0]
-    return found, [f"Left out: {on_the_page(str(error))}" for error in left_out]
+    return results, [f"Left out: {on_the_page(str(error))}" for error in left_out]
 
 
 def published(
-    asked: Asked, found: Sequence[Any], left_out: Sequence[str], compare: Callable[..., Any]
+    asked: Asked, findings: Sequence[Any], left_out: Sequence[str], compare: Callable[..., Any]
 ) -> dict[str, Any]:
     """The page, numbers and figures of one record, or of several compared; and what the lab shows of them."""
-    results = compare(found) if len(found) > 1 else found[0]
+    results = compare(findings) if len(findings) > 1 else findings[0]
     results = dataclasses.replace(results, notes=(*results.notes, *left_out))
     asked.say("drawing and writing", len(asked.records) / (len(asked.records) + 1))
     ss.publish(results, folder=FOLDER)
-    return _told(ss.summary(results))
+    return _shown(ss.summary(results))
 
 
-def _told(story: Story) -> dict[str, Any]:
+def _shown(story: Story) -> dict[str, Any]:
     """What the lab shows: the same words as the report and the command line. Also packs the folder."""
     shutil.make_archive(FOLDER, "zip", FOLDER)
     return {
         "title": story.title,
-        "headline": [on_the_page(each) for each in story.headline],
-        "cautions": [on_the_page(each) for each in story.cautions],
+        "headline": [on_the_page(sentence) for sentence in story.headline],
+        "cautions": [on_the_page(sentence) for sentence in story.cautions],
         "lines": [[line.name, line.value, line.interval, line.status] for line in story.lines],
-        "notes": [on_the_page(each) for each in story.notes],
+        "notes": [on_the_page(sentence) for sentence in story.notes],
         "overlay": [],
     }
 
@@ -69,50 +261,50 @@ def analyze(asked: Asked) -> dict[str, Any]:
         if not asked.is_long(number):
             return ss.analyze(asked.record(number), rig=rig, method=method)
 
-        def tell(words: str) -> None:
-            asked.say(f"analysing {asked.name(number)}, {words}", number / (len(asked.records) + 1))
+        def tell(sentence: str) -> None:
+            asked.say(f"analysing {asked.name(number)}, {sentence}", number / (len(asked.records) + 1))
 
         return ss.answers.analyze_blocks(asked.parts(number), rig=rig, method=method, progress=tell)
 
-    return published(asked, *each(asked, one), ss.compare)
+    return published(asked, *results_of(asked, one), ss.compare)
 
 
 def decay(asked: Asked) -> dict[str, Any]:
     """How a released mass dies away."""
-    told = {name: value for name, value in asked.options.items() if value is not None}
-    found, left_out = each(asked, lambda number: ss.analyze_decay(asked.record(number), **told))
-    answer = published(asked, found, left_out, ss.answers.compare_decays)
-    return {**answer, "overlay": [curve for each in found for curve in _decay_curves(each)]}
+    options = {name: value for name, value in asked.options.items() if value is not None}
+    results, left_out = results_of(asked, lambda number: ss.analyze_decay(asked.record(number), **options))
+    answer = published(asked, results, left_out, ss.answers.compare_decays)
+    return {**answer, "overlay": [curve for findings in results for curve in _decay_curves(findings)]}
 
 
-def _decay_curves(found: Any) -> Iterator[dict[str, Any]]:
-    fit = found.waveform
+def _decay_curves(findings: Any) -> Iterator[dict[str, Any]]:
+    fit = findings.decay.waveform
     if fit is None:
         return
-    unit = found.record.channels[fit.channel].unit
+    unit = findings.record.channels[fit.channel].unit
     for time, measured, fitted in zip(fit.time, fit.measured, fit.fitted, strict=True):
-        yield curve(found.name, fit.channel, unit, time, measured, fitted)
+        yield curve(findings.name, fit.channel, unit, time, measured, fitted)
 
 
 def squeak(asked: Asked) -> dict[str, Any]:
     """When, how loud and at which frequency it squeaks."""
-    told = {name: asked.options.get(name) for name in ("channel", "frequencies", "lever")}
+    options = {name: asked.options.get(name) for name in ("channel", "frequencies", "lever")}
 
     def one(number: int) -> Any:
         rig = asked.rig(number)
-        found = ss.analyze_squeaks(asked.record(number), contact=rig.contact, **told)
-        load = rig.normal_load(found.name)
-        return found if load is None else dataclasses.replace(found, normal=load)
+        findings = ss.analyze_squeaks(asked.record(number), contact=rig.contact, **options)
+        load = rig.normal_load(findings.name)
+        return findings if load is None else dataclasses.replace(findings, normal=load)
 
-    return published(asked, *each(asked, one), ss.answers.compare_squeaks)
+    return published(asked, *results_of(asked, one), ss.answers.compare_squeaks)
 
 
 def wavelet(asked: Asked) -> dict[str, Any]:
     """A channel over time and frequency."""
     options = {name: value for name, value in asked.options.items() if value is not None}
     asked.say(f"mapping {asked.name(0)}", 0.1)
-    found = ss.answers.time_frequency(asked.parts(), **options)
-    return published(asked, [found], [], list)
+    findings = ss.answers.time_frequency(asked.parts(), **options)
+    return published(asked, [findings], [], list)
 
 
 def fit(asked: Asked) -> dict[str, Any]:
@@ -120,7 +312,7 @@ def fit(asked: Asked) -> dict[str, Any]:
     rig = asked.rig()
     asked.say("reading", 0.0)
     records = [asked.record(number) for number in range(len(asked.records))]
-    found, records = ss.answers.fit_records(
+    result, records = ss.answers.fit_records(
         records,
         rig=rig,
         curve=asked.options.get("curve"),
@@ -128,15 +320,15 @@ def fit(asked: Asked) -> dict[str, Any]:
         calibration=asked.options.get("calibration") or 0.01,
         progress=lambda share: asked.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
     )
-    ss.publish(found, folder=FOLDER, record=records)
-    told = _told(ss.summary(found, record=records))
-    curves = [*_law_curves(asked, records, found)]
-    return {**told, "overlay": curves, "state": fitted_system(Path(FOLDER, "law", "law.toml"))}
+    ss.publish(result, folder=FOLDER, record=records)
+    answer = _shown(ss.summary(result, record=records))
+    curves = [*_law_curves(asked, records, result)]
+    return {**answer, "overlay": curves, "state": fitted_system(Path(FOLDER, "law", "law.toml"))}
 
 
-def _law_curves(asked: Asked, records: Sequence[Record], found: Any) -> Iterator[dict[str, Any]]:
+def _law_curves(asked: Asked, records: Sequence[Record], result: Any) -> Iterator[dict[str, Any]]:
     """What the best law's sensors would have read, over what was measured; nothing of a curve."""
-    for number, traces in enumerate(found.fit.traces if isinstance(found, ss.law.LawComparison) else ()):
+    for number, traces in enumerate(result.fit.traces if isinstance(result, ss.law.LawComparison) else ()):
         for name, values in traces.measured.items():
             unit = records[number].channels[name].unit
             yield curve(asked.name(number), name, unit, traces.time[name], values, traces.fitted[name])
@@ -153,8 +345,8 @@ def fitted_system(file: Path) -> dict[str, Any] | None:
     return system
 
 
-def _listed(words: str | None) -> list[str] | None:
-    return [word.strip() for word in words.split(",") if word.strip()] if words else None
+def _listed(names: str | None) -> list[str] | None:
+    return [word.strip() for word in names.split(",") if word.strip()] if names else None
 
 
 QUESTIONS: dict[str, Callable[[Asked], dict[str, Any]]] = {

@@ -75,16 +75,16 @@ class Guard:
     def _refused(self, scope: Scope) -> Response | None:
         headers = Headers(scope=scope)
         if [host.lower() for host in headers.getlist("host")] not in [[host] for host in self.hosts]:
-            return _told(400, "This lab answers at 127.0.0.1 alone; open the address that it printed.")
+            return _refusal(400, "This lab answers at 127.0.0.1 alone; open the address that it printed.")
         if not {origin.lower() for origin in headers.getlist("origin")} <= self.origins:
-            return _told(403, "Another page may not use this lab; open the address that it printed.")
+            return _refusal(403, "Another page may not use this lab; open the address that it printed.")
         return None
 
     def _welcomed(self, scope: Scope, inside: bool) -> Response | None:
         """Nothing for who knows the token; the page's address with it is exchanged for a cookie and the way inside."""
         headers = Headers(scope=scope)
-        told = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
-        if scope["type"] == "http" and scope["path"] == "/" and self._known(told):
+        token = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
+        if scope["type"] == "http" and scope["path"] == "/" and self._known(token):
             page = RedirectResponse(f"{self.inside}/", status_code=303)
             page.set_cookie(self.cookie, self.token, httponly=True, samesite="lax", path=f"{self.inside}/")
             return page
@@ -97,10 +97,10 @@ class Guard:
         sentence = "The token is missing or of another start; open the address that 'stickslip lab' printed."
         if scope["path"] == "/" and "text/html" in headers.get("accept", ""):
             return HTMLResponse(f'<!doctype html><script src="{ENTRANCE}"></script><p>{sentence}', 401)
-        return _told(401, sentence)
+        return _refusal(401, sentence)
 
-    def _known(self, told: str) -> bool:
-        return secrets.compare_digest(told.encode("utf-8", "surrogateescape"), self.token.encode())
+    def _known(self, token: str) -> bool:
+        return secrets.compare_digest(token.encode("utf-8", "surrogateescape"), self.token.encode())
 
     def _marked(self, send: Send) -> Send:
         """`send`, with the headers that hold the browser to this page."""
@@ -136,5 +136,5 @@ def _counted(scope: Scope, receive: Receive) -> Receive:
     return receiving
 
 
-def _told(status: int, sentence: str) -> Response:
+def _refusal(status: int, sentence: str) -> Response:
     return JSONResponse({"error": sentence}, status)

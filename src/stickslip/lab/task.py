@@ -54,8 +54,8 @@ def _line_by_line() -> Callable[[str, float], None]:
     line = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
 
-    def say(words: str, share: float) -> None:
-        line.write(json.dumps({"words": words, "share": min(max(share, 0.0), 1.0)}) + "\n")
+    def say(sentence: str, share: float) -> None:
+        line.write(json.dumps({"words": sentence, "share": min(max(share, 0.0), 1.0)}) + "\n")
         line.flush()
 
     return say

@@ -112,11 +112,13 @@ class Uploads:
     def _require_room(self, size: int, more: int = 0) -> None:
         """Refuse a file of `size` bytes, `more` of which have not been counted yet."""
         if size > self.largest:
-            words = f"The file is larger than {_told(self.largest)}; the lab takes no more; use the command line."
-            raise HTTPException(413, words)
+            sentence = (
+                f"The file is larger than {_in_bytes(self.largest)}; the lab takes no more; use the command line."
+            )
+            raise HTTPException(413, sentence)
         if self._size + more > self.altogether:
-            words = f"The files here would be larger than {_told(self.altogether)} together; remove some first."
-            raise HTTPException(413, words)
+            sentence = f"The files here would be larger than {_in_bytes(self.altogether)} together; remove some first."
+            raise HTTPException(413, sentence)
 
 
 async def _in_pieces(chunks: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
@@ -138,5 +140,5 @@ def _shown(label: str) -> str:
     return name[-LONGEST_LABEL:] or "file"
 
 
-def _told(size: int) -> str:
+def _in_bytes(size: int) -> str:
     return f"{size / (1 << 20):g} MiB"

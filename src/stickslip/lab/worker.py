@@ -70,21 +70,23 @@ class Patience:
 
 def answered(request: dict[str, Any], patience: Patience) -> bytes:
     """The answer to a request, whatever it is."""
-    told = {"id": request.get("id"), "want": request.get("want")}
+    reply = {"id": request.get("id"), "want": request.get("want")}
     patience.begin()
     try:
         with patience.interrupting() if request["want"] in explored.ANSWERS else nullcontext():
             header, arrays = ANSWERS[request["want"]](request, patience)
-        return frame({**told, "kind": request["want"], **header}, arrays)
+        return frame({**reply, "kind": request["want"], **header}, arrays)
     except Overtaken:
-        return frame({**told, "kind": "overtaken"})
+        return frame({**reply, "kind": "overtaken"})
     except ss.StickslipError as error:
-        return frame({**told, "kind": "error", "error": str(error)})
+        return frame({**reply, "kind": "error", "error": str(error)})
     except MemoryError:
-        return frame({**told, "kind": "error", "error": "This needs more memory than the page may take; ask for less."})
+        return frame(
+            {**reply, "kind": "error", "error": "This needs more memory than the page may take; ask for less."}
+        )
     except Exception as error:  # noqa: BLE001  # one sentence to one user; the others go on
         sentence = f"The lab can not answer this ({type(error).__name__}: {error}); change what was changed last."
-        return frame({**told, "kind": "error", "error": sentence})
+        return frame({**reply, "kind": "error", "error": sentence})
 
 
 def listen(patience: Patience, say: Callable[[], None]) -> None:

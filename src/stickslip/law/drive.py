@@ -15,7 +15,7 @@ from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
 from stickslip.signals.derivatives import LEAST, Filter, best_bandwidth
-from stickslip.signals.noise import noise_level
+from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.solve.simulate import simulate
 
 Array = NDArray[np.float64]
@@ -123,7 +123,8 @@ def face_of(given: Drive, record: Record) -> tuple[Array | float, Array | float]
 def _driven(record: Record, channel: str, on: str, contact: str) -> DriveFrom:
     values, late = record[channel], record.channels[channel].delay
     record.require_clean(channel, question="a fitted law", samples=LEAST)
-    noise = record.channels[channel].noise or noise_level(values, record.fs)
+    stated = record.channels[channel].noise  # before the counts, which are in what is measured
+    noise = math.hypot(stated, quantisation_step(values) / 12**0.5) if stated else noise_level(values, record.fs)
     time = np.arange(len(values)) / record.fs - late
     tones = _tones(values, time, noise)
     share = max(SURE, noise * np.sqrt(2 / len(values)))
@@ -184,10 +185,10 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
 
 
 def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, float]:
-    angles = 2 * np.pi * frequency * np.outer(time, np.arange(1, count + 1))
+    waves = np.cumprod(np.tile(np.exp(2j * np.pi * frequency * time)[:, None], count), axis=1)
     columns = np.ones((len(time), 2 * count + 1))
-    columns[:, 1::2], columns[:, 2::2] = np.cos(angles), np.sin(angles)
-    found, *_ = np.linalg.lstsq(columns, values, rcond=None)
+    columns[:, 1::2], columns[:, 2::2] = waves.real, waves.imag
+    found = np.linalg.solve(columns.T @ columns, columns.T @ values)
     return np.asarray(found), float(np.sqrt(np.mean((values - columns @ found) ** 2)))
 
 

@@ -70,9 +70,9 @@ def regime(orbit: SteadyState) -> str:
         return "held"
     system = orbit.orbit.system
     stops = [orbit.stops_at(c) for c in range(len(system.contacts) if isinstance(system, Structure) else 1)]
-    words = " and ".join(f"{normal} + {abnormal}" for normal, abnormal in stops)
-    words = f"{words} stops" if any(map(any, stops)) else "no stops"
-    return words if orbit.order == 1 else f"{words}, period {orbit.order}"
+    counts = " and ".join(f"{normal} + {abnormal}" for normal, abnormal in stops)
+    counts = f"{counts} stops" if any(map(any, stops)) else "no stops"
+    return counts if orbit.order == 1 else f"{counts}, period {orbit.order}"
 
 
 def settled(system: System, start: Start, *, transient: int, orders: int) -> Attractor:
@@ -165,9 +165,11 @@ def require_number(parameter: str) -> None:
 def numbers(name: str, values: ArrayLike) -> Array:
     """Different finite numbers, sorted; at least two."""
     try:
-        found = np.unique(np.asarray(values, dtype=np.float64))
+        distinct = np.unique(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError) as no_numbers:
         raise ModelError(f"{name} = {values!r}", "a range is made of numbers", "give numbers") from no_numbers
-    if len(found) < 2 or not np.all(np.isfinite(found)):
-        raise ModelError(f"{name} = {found.tolist()}", "a range has two different finite values at least", "give more")
-    return found
+    if len(distinct) < 2 or not np.all(np.isfinite(distinct)):
+        raise ModelError(
+            f"{name} = {distinct.tolist()}", "a range has two different finite values at least", "give more"
+        )
+    return distinct

@@ -62,7 +62,7 @@ class Basins:
             coords=dict(zip(self.names, self.axes, strict=True)),
             name="attractor",
             attrs={
-                "attractors": [each.regime for each in self.attractors],
+                "attractors": [attractor.regime for attractor in self.attractors],
                 "shares": [share.value for share in self.shares],
                 "system": repr(self.attractors[0].orbit.orbit.system),
             },
@@ -71,8 +71,8 @@ class Basins:
 
     def __repr__(self) -> str:
         head = f"Basins({' x '.join(self.names)}, {' x '.join(map(str, self.which.shape))} starts)"
-        told = [f"{len(self.lost)} starts could not be followed"] if self.lost else []
-        return "\n  ".join([head, *map(str, self.shares), *told])
+        lost = [f"{len(self.lost)} starts could not be followed"] if self.lost else []
+        return "\n  ".join([head, *map(str, self.shares), *lost])
 
 
 def basins(
@@ -124,22 +124,22 @@ def basins(
     require_period(system, "a basin")
     names, axes = _axes(grid)
     table = tables(system)
-    found: list[Attractor] = []
+    attractors: list[Attractor] = []
     lost: list[str] = []
     which = np.full((len(axes[0]), len(axes[1])), -1, dtype=np.int64)
     for (i, j), _ in np.ndenumerate(which):
         begin = {**(start or {}), names[0]: float(axes[0][i]), names[1]: float(axes[1][j])}
         try:
-            which[i, j] = _number(system, table, found, begin, (transient, orders))
+            which[i, j] = _number(system, table, attractors, begin, (transient, orders))
         except SolveError as stopped:
             lost.append(f"{names[0]} = {begin[names[0]]:g}, {names[1]} = {begin[names[1]]:g}: {stopped}")
-    if not found:
+    if not attractors:
         raise SolveError("no start of the grid could be followed", lost[0], "see which motion is meant")
-    counts = np.bincount(which[which >= 0], minlength=len(found))
+    counts = np.bincount(which[which >= 0], minlength=len(attractors))
     order = np.argsort(-counts, kind="stable")
-    shares = tuple(_share(found[k].regime, int(counts[k]), which.size) for k in order)
+    shares = tuple(_share(attractors[k].regime, int(counts[k]), which.size) for k in order)
     ranks = np.append(np.argsort(order), -1)  # the last for those that were not followed
-    return Basins(names, axes, tuple(found[k] for k in order), ranks[which], shares, tuple(lost))
+    return Basins(names, axes, tuple(attractors[k] for k in order), ranks[which], shares, tuple(lost))
 
 
 def _axes(grid: Mapping[str, ArrayLike]) -> tuple[tuple[str, str], tuple[Array, Array]]:
@@ -154,19 +154,19 @@ def _axes(grid: Mapping[str, ArrayLike]) -> tuple[tuple[str, str], tuple[Array, 
     return (first, second), (axes[0], axes[1])
 
 
-def _number(system: System, table: Table, found: list[Attractor], start: Start, patience: tuple[int, int]) -> int:
+def _number(system: System, table: Table, attractors: list[Attractor], start: Start, patience: tuple[int, int]) -> int:
     """Which of the attractors found so far a start leads to; a new one is added."""
     transient, orders = patience
     state, mode = lap(system, table, *opening(table, start), transient).end()
-    for number, each in enumerate(found):
-        if _belongs(system, table, state, mode, each):
+    for number, attractor in enumerate(attractors):
+        if _belongs(system, table, state, mode, attractor):
             return number
     new = settled(system, as_start(table, state, mode), transient=transient, orders=orders)
-    for number, each in enumerate(found):
-        if same(new, each):
+    for number, attractor in enumerate(attractors):
+        if same(new, attractor):
             return number
-    found.append(new)
-    return len(found) - 1
+    attractors.append(new)
+    return len(attractors) - 1
 
 
 def _belongs(system: System, table: Table, state: Array, mode: int, attractor: Attractor) -> bool:
@@ -187,11 +187,11 @@ def _belongs(system: System, table: Table, state: Array, mode: int, attractor: A
     return attractor.orbit.order > 1 or list(course.modes) == list(attractor.orbit.orbit.modes)
 
 
-def _share(words: str, count: int, total: int) -> Estimate:
+def _share(name: str, count: int, total: int) -> Estimate:
     """A share with Wilson's interval: as of starts drawn at random, which scatter more than a grid."""
     share, square = count / total, NORMAL_95**2 / total
     middle = (share + square / 2) / (1 + square)
     half = math.sqrt(square * (share * (1 - share) + square / 4)) / (1 + square)
     interval = (max(0.0, middle - half), min(1.0, middle + half))
     sd = math.sqrt(share * (1 - share) / total)
-    return Estimate(f"share of '{words}'", share, interval, sd, "1", f"count of {total} starts, Wilson's interval")
+    return Estimate(f"share of '{name}'", share, interval, sd, "1", f"count of {total} starts, Wilson's interval")

@@ -109,24 +109,24 @@ class Bifurcation:
         xarray = labelled_arrays("bifurcation diagrams")
         passes = (self.up, self.down)
         names = self.up[0].orbit.orbit.table.names[: self.up[0].points.shape[1]]
-        longest = max(len(each.points) for way in passes for each in way)
+        longest = max(len(attractor.points) for way in passes for attractor in way)
         points = np.full((2, len(self.values), longest, len(names)), np.nan)
         for number, way in enumerate(passes):
-            for j, each in enumerate(way):
-                points[number, j, : len(each.points)] = each.points
+            for j, attractor in enumerate(way):
+                points[number, j, : len(attractor.points)] = attractor.points
         place = ("direction", self.parameter)
         columns = {
-            "regime": [[each.regime for each in way] for way in passes],
-            "status": [[each.status for each in way] for way in passes],
-            "order": [[each.orbit.order for each in way] for way in passes],
-            "period": [[each.orbit.period for each in way] for way in passes],
-            "displacement": [[each.orbit.amplitude for each in way] for way in passes],
+            "regime": [[attractor.regime for attractor in way] for way in passes],
+            "status": [[attractor.status for attractor in way] for way in passes],
+            "order": [[attractor.orbit.order for attractor in way] for way in passes],
+            "period": [[attractor.orbit.period for attractor in way] for way in passes],
+            "displacement": [[attractor.orbit.amplitude for attractor in way] for way in passes],
             "attractors": [[len(self.at(j)) for j in range(len(self.values))]] * 2,
         }
         variables: dict[str, tuple[tuple[str, ...], NDArray[Any]]] = {
             name: (place, np.array(column)) for name, column in columns.items()
         }
-        multipliers = np.array([[each.orbit.multipliers for each in way] for way in passes])
+        multipliers = np.array([[attractor.orbit.multipliers for attractor in way] for way in passes])
         variables["multipliers"] = ((*place, "multiplier"), multipliers)
         variables["points"] = ((*place, "point", "state"), points)
         result: xr.Dataset = xarray.Dataset(
@@ -234,11 +234,11 @@ class _Way:
 
     def followed(self, values: Array, start: Start) -> tuple[tuple[Attractor, ...], list[Change]]:
         """The attractors at values in turn, each beginning where the one before has settled."""
-        found, changes = [self.settled(values[0], start)], []
+        attractors, changes = [self.settled(values[0], start)], []
         for before, value in pairwise(values):
-            found.append(self.settled(value, onward(found[-1])))
-            changes += self._changes(before, value, found[-2], found[-1])
-        return tuple(found), changes
+            attractors.append(self.settled(value, onward(attractors[-1])))
+            changes += self._changes(before, value, attractors[-2], attractors[-1])
+        return tuple(attractors), changes
 
     def _changes(self, first: float, last: float, before: Attractor, after: Attractor) -> list[Change]:
         """The changes between two values, in turn, each by bisection."""
@@ -259,11 +259,11 @@ class _Way:
 
 
 def _different(attractors: Sequence[Attractor]) -> tuple[Attractor, ...]:
-    found: list[Attractor] = []
-    for each in attractors:
-        if not any(same(each, other) for other in found):
-            found.append(each)
-    return tuple(found)
+    distinct: list[Attractor] = []
+    for attractor in attractors:
+        if not any(same(attractor, other) for other in distinct):
+            distinct.append(attractor)
+    return tuple(distinct)
 
 
 def _branches(parameter: str, values: Array, first: Attractor, last: Attractor) -> tuple[Branch, ...]:

@@ -40,24 +40,26 @@ def run_block(
     """
     shape = tuple(part.stop - part.start for part in plan.slices(number))
     points = plan.points(number)
-    found: Arrays = {name: np.full(len(points), v.fill, v.dtype) for name, v in plan.variables.items()}
+    columns: Arrays = {name: np.full(len(points), v.fill, v.dtype) for name, v in plan.variables.items()}
     left = set(range(len(points)))
     logs: list[list[Any]] = []
     for rows, systems, known in crowds(plan, number):
         values = known if systems is None else watched(plan, systems, known, watch)
-        for name in found.keys() & values.keys():
-            found[name][rows] = values[name]
+        for name in columns.keys() & values.keys():
+            columns[name][rows] = values[name]
         left -= set(rows.tolist())
     own = [measure for measure in plan.measures if callable(measure)]
     for row in range(len(points)) if own else sorted(left):
         steps = points[row]
-        if row in left or found["status"][row] not in (NO_SYSTEM, FAILED):
-            told: Mapping[str, Any]
-            told = (alone or _alone)(plan, steps) if row in left else {own_name(m): m(_run(plan, steps)) for m in own}
-            for name in found.keys() & told.keys():
-                found[name][row] = told[name]
-            logs += [[*steps, *event] for event in told.get("log", ())]
-    arrays = {name: values.reshape(shape) for name, values in found.items()}
+        if row in left or columns["status"][row] not in (NO_SYSTEM, FAILED):
+            answers: Mapping[str, Any]
+            answers = (
+                (alone or _alone)(plan, steps) if row in left else {own_name(m): m(_run(plan, steps)) for m in own}
+            )
+            for name in columns.keys() & answers.keys():
+                columns[name][row] = answers[name]
+            logs += [[*steps, *event] for event in answers.get("log", ())]
+    arrays = {name: values.reshape(shape) for name, values in columns.items()}
     return arrays, _columns(plan, logs) if LOG in plan.measures else None
 
 
@@ -81,23 +83,23 @@ def _alone(plan: Plan, steps: tuple[int, ...]) -> Mapping[str, Any]:
     except SolveError:
         return {"status": FAILED}
     try:
-        told = {"status": outcome(run), **measured(run, plan, plan.at(steps)[1])}
+        answers = {"status": outcome(run), **measured(run, plan, plan.at(steps)[1])}
     except SolveError:  # a measure's ModelError ends the sweep
         return {"status": FAILED}
     if LOG in plan.measures:
         log = logged(run, plan.settle)
-        told |= {LOG: len(log), "log": log}
-    return told
+        answers |= {LOG: len(log), "log": log}
+    return answers
 
 
 def measured(run: Trajectory, plan: Plan, start: Mapping[str, float | str]) -> dict[str, Any]:
     """The variables of a plan's measures, of what the run does after the periods in which it settles."""
     measures, settle, cycles = plan.measures, plan.settle, plan.cycles
     begin = settle * period(run.system, run)
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     if set(measures) & EVENTS:
         sums = counted(run, begin)
-        found |= {
+        values |= {
             "normal_stops": sums[log.NORMAL] / cycles,
             "abnormal_stops": sums[log.ABNORMAL] / cycles,
             "stick_share": sums[log.HELD] / (run.duration - begin),
@@ -105,16 +107,16 @@ def measured(run: Trajectory, plan: Plan, start: Mapping[str, float | str]) -> d
             "transition_speed": sums[log.FASTEST] if sums[log.FASTEST] > 0 else math.nan,
         }
     if "amplitude" in measures:
-        found["amplitude"] = farthest(run, begin)
+        values["amplitude"] = farthest(run, begin)
     if "energy" in measures:
-        found["energy"] = work(run, begin) / cycles
+        values["energy"] = work(run, begin) / cycles
     if "period" in measures:
-        found["order"] = order(run, settle)
+        values["order"] = order(run, settle)
     if "multipliers" in measures:
-        found["multiplier"] = multiplier(run, settle)
+        values["multiplier"] = multiplier(run, settle)
     if "lyapunov" in measures and math.isfinite(run.table.motion.period):
-        found["lyapunov"] = lyapunov(run.system, cycles=cycles, transient=settle, start=start).value
-    return found | {own_name(measure): measure(run) for measure in measures if callable(measure)}
+        values["lyapunov"] = lyapunov(run.system, cycles=cycles, transient=settle, start=start).value
+    return values | {own_name(measure): measure(run) for measure in measures if callable(measure)}
 
 
 def period(system: System, run: Trajectory) -> float:
@@ -222,5 +224,5 @@ def multiplier(run: Trajectory, settle: int) -> complex:
     end = run.states[0].copy()
     end[: table.physical] = run.section()[-1]
     orbit = lap(run.system, table, end, int(run.modes[-1]), steps)
-    found = np.linalg.eigvals(derivative(orbit, orbit.end()[1])[0])
-    return complex(found[np.argmax(np.abs(found))])
+    eigenvalues = np.linalg.eigvals(derivative(orbit, orbit.end()[1])[0])
+    return complex(eigenvalues[np.argmax(np.abs(eigenvalues))])

@@ -78,7 +78,7 @@ class Boundary:
         """Largest modulus of the orbit's multipliers on either side (n, 2): below 1 it is stable."""
         return np.array(
             [
-                [math.nan if each is None else float(np.max(np.abs(each.orbit.multipliers))) for each in pair]
+                [math.nan if motion is None else float(np.max(np.abs(motion.orbit.multipliers))) for motion in pair]
                 for pair in zip(self.low, self.high, strict=True)
             ]
         )
@@ -100,11 +100,11 @@ class Boundary:
         return result
 
     def __repr__(self) -> str:
-        found = np.isfinite(self.values)
+        known = np.isfinite(self.values)
         if not self.along:
             kinds = " | ".join(map(str, self.kinds[0]))
             return f"Boundary({self.parameter} = {self.value:.10g} +- {self.errors[0]:.1g}: {kinds})"
-        return f"Boundary({self.parameter} over {self.along}, found at {found.sum()} of {len(found)} places)"
+        return f"Boundary({self.parameter} over {self.along}, found at {known.sum()} of {len(known)} places)"
 
 
 def boundary(
@@ -231,9 +231,9 @@ def _bisected(at: Callable[[float], Attractor], low: float, high: float, ask: Ki
         middle = (low + high) / 2
         if not low < middle < high:
             break
-        found = at(middle)
-        if ask(found) == kinds[0]:
-            low, below = middle, found
+        motion = at(middle)
+        if ask(motion) == kinds[0]:
+            low, below = middle, motion
         else:
-            high, above = middle, found
+            high, above = middle, motion
     return (low + high) / 2, (high - low) / 2, below, above, (kinds[0], ask(above))

@@ -29,20 +29,11 @@ from stickslip.maps.watch import (
 )
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
-from stickslip.solve.glide import Model, Past, Pieces
+from stickslip.solve.assembly import tables_of
+from stickslip.solve.glide import Model, Past, blank_pieces
 from stickslip.solve.kernel import scratch
 from stickslip.solve.phasors import phasors_of
-from stickslip.solve.tables import (
-    Array,
-    Systems,
-    Tables,
-    by_value,
-    kind_of_drive,
-    kind_of_law,
-    opened,
-    oscillators,
-    tables_of,
-)
+from stickslip.solve.tables import Array, Systems, Tables, by_value, kind_of_drive, kind_of_law, opened, oscillators
 
 Index = NDArray[np.int64]
 Watch = Callable[[Given, Counted, int, int], None]  # march what is given into what is left; modes and physical entries
@@ -103,13 +94,13 @@ def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Any], Index]:
     shape = [plan.shape[number] for number in columns]
     keys, which = np.unique(_flat(steps[:, columns], shape), return_inverse=True)
     system: Any = plan.system
-    found: list[Any] = []
+    distinct: list[Any] = []
     for key in np.stack(np.unravel_index(keys, shape), axis=-1) if shape else [()]:
         axes = [(plan.axes[number], own[number], step) for number, step in zip(columns, key, strict=True)]
         changes = tuple((axis.names[j], axis.values[step][j]) for axis, names, step in axes for j in names)
         plain = by_value(system) and all(isinstance(value, int | float | str) for _, value in changes)
-        found.append((_known if plain else _made)(system, changes))
-    return found, which
+        distinct.append((_known if plain else _made)(system, changes))
+    return distinct, which
 
 
 def _flat(steps: Index, shape: Sequence[int]) -> Index:
@@ -170,11 +161,11 @@ def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch
         np.full((count, physical, physical), np.nan),
     )
     watch(given, out, states.shape[1], physical)
-    found = _answers(plan, out, units, table.period)
+    answers = _answers(plan, out, units, table.period)
     lost = out.statuses == FAILED
-    for name, values in found.items():
+    for name, values in answers.items():
         values[lost] = plan.variables[name].fill if name in plan.variables else 0
-    return {"status": out.statuses, **found}
+    return {"status": out.statuses, **answers}
 
 
 def _look(table: Tables, asked: set[str]) -> Look:
@@ -208,23 +199,23 @@ def _answers(plan: Plan, out: Counted, units: Array, period: Array) -> Arrays:
     """The variables from what was counted."""
     sums, sections, jacobians, cycles = out.sums, out.sections, out.jacobians, plan.cycles
     with np.errstate(invalid="ignore"):
-        found = {
+        answers = {
             "normal_stops": sums[:, log.NORMAL] / cycles, "abnormal_stops": sums[:, log.ABNORMAL] / cycles,
             "stick_share": sums[:, log.HELD] / (units * cycles), "micro_slips": sums[:, log.SHORT] / cycles,
             "transition_speed": np.where(sums[:, log.FASTEST] > 0, sums[:, log.FASTEST], np.nan),
             "amplitude": sums[:, log.REACH], "energy": sums[:, log.WORK] / cycles,
             "lyapunov": np.where(np.isfinite(period), out.growths / (units * cycles), np.nan),
         }  # fmt: skip
-    found["order"] = np.zeros(len(sums))
+    answers["order"] = np.zeros(len(sums))
     if sections.shape[1]:
-        found["order"][:] = [repeats(section) for section in sections]
+        answers["order"][:] = [repeats(section) for section in sections]
     known = np.all(np.isfinite(jacobians), axis=(1, 2))
-    found["multiplier"] = np.full(len(known), complex(np.nan, np.nan))
+    answers["multiplier"] = np.full(len(known), complex(np.nan, np.nan))
     if np.any(known):
         values = np.linalg.eigvals(jacobians[known])
         best = np.argmax(np.abs(values), axis=1)
-        found["multiplier"][known] = np.take_along_axis(values, best[:, None], axis=1)[:, 0]
-    return found
+        answers["multiplier"][known] = np.take_along_axis(values, best[:, None], axis=1)[:, 0]
+    return answers
 
 
 def on_cpu(given: Given, out: Counted, size: int, physical: int) -> None:
@@ -234,18 +225,10 @@ def on_cpu(given: Given, out: Counted, size: int, physical: int) -> None:
 
 def rooms(count: int, size: int, physical: int) -> Rooms:
     """Room for what so many motions need while they are marched."""
-    pieces = Pieces(
-        np.zeros((count, ROOM), np.int32),
-        np.zeros((count, ROOM)),
-        np.zeros((count, ROOM), np.int16),
-        np.zeros((count, ROOM)),
-        np.zeros((count, ROOM, size)),
-        np.zeros((count, ROOM), np.int16),
-    )
     return Rooms(
         np.zeros((count, *scratch(size, 17).shape)),
         pasts(count),
-        pieces,
+        blank_pieces((count, ROOM), size),
         np.zeros((count, physical, size)),
         np.zeros((count, 4, max(size + MARK + 1, log.ENTRIES))),
     )

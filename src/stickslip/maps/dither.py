@@ -195,16 +195,16 @@ def dither(
     search = _Search(system, on, (start or {}, *_moments(plain)), duration)
     friction = float(np.max(np.abs(plain.sample(np.linspace(0, plain.duration, 4001), ("friction",))[0])))
     candidates = _frequencies(frequency, transition, period, stick)
-    found = [search.smallest(f, friction, stick, precision) for f in candidates]
-    reached = [each for each in found if each is not None]
+    amplitudes = [search.smallest(f, friction, stick, precision) for f in candidates]
+    reached = [amplitude for amplitude in amplitudes if amplitude is not None]
     if not reached:
         raise SolveError(
             f"no dither of {', '.join(f'{f:g}' for f in candidates)} Hz removes the stick of {stick:.3g} s",
             "its period is shorter than the stick, and its force a thousand times the friction at most",
             f"give frequency= more than {1 / stick:.3g} Hz, or dither on= something else",
         )
-    best = min(reached, key=lambda each: each.amplitude)
-    return _designed(search, best, stick, friction, tuple(zip(candidates, found, strict=True)), transition)
+    best = min(reached, key=lambda amplitude: amplitude.amplitude)
+    return _designed(search, best, stick, friction, tuple(zip(candidates, amplitudes, strict=True)), transition)
 
 
 def _moments(plain: Trajectory) -> list[Start]:
@@ -382,7 +382,7 @@ def _designed(
         unit,
         f"bisection of exact runs of {search.duration:.4g} s, and 5 %",
     )
-    rows = tuple((f, math.nan if found is None else found.amplitude) for f, found in tried)
+    rows = tuple((f, math.nan if amplitude is None else amplitude.amplitude) for f, amplitude in tried)
     return Dither(
         best.frequency, amplitude, search.on, speed, system, (stick, with_it), rows, best.scan, averaged, tuple(checks)
     )

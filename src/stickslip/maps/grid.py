@@ -75,12 +75,12 @@ def apart(system: System, axes: tuple[Axis, ...], answers: Iterable[str]) -> tup
     taken = set(answers)
 
     def own(name: str) -> str:
-        found = _paths(system, name) if name in taken else ((name,),)
-        if name in taken and (len(found) > 1 or len(found[0]) == 1):
+        paths = _paths(system, name) if name in taken else ((name,),)
+        if name in taken and (len(paths) > 1 or len(paths[0]) == 1):
             raise ModelError(
                 f"'{name}' is a parameter and a measure", "a name stands for one of them", "rename the measure"
             )
-        return ".".join(found[0])
+        return ".".join(paths[0])
 
     named = [replace(axis, names=tuple(map(own, axis.names))) for axis in axes]
     return tuple(axis if axis.dim == "point" else replace(axis, dim="_".join(axis.names)) for axis in named)
@@ -157,13 +157,13 @@ def placed(
 
 def coordinates(system: System, axes: tuple[Axis, ...]) -> dict[str, tuple[str, NDArray[Any], str]]:
     """The coordinates of the map by name: dimension, values (numbers, or what is not one in words) and unit."""
-    found = {}
+    coordinates = {}
     for axis in axes:
         for name, column in zip(axis.names, zip(*axis.values, strict=True), strict=True):
             numbers = all(_is_number(value) for value in column)
             values = np.array(column, dtype=np.float64) if numbers else np.array([_worded(value) for value in column])
-            found[name] = (axis.dim, values, unit(system, name) if numbers else "")
-    return found
+            coordinates[name] = (axis.dim, values, unit(system, name) if numbers else "")
+    return coordinates
 
 
 def unit(system: System, name: str) -> str:

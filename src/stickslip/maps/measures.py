@@ -91,12 +91,12 @@ MEASURES: dict[str, dict[str, Variable]] = {
 
 def variables(measures: Sequence[Measure]) -> dict[str, Variable]:
     """The variables that the measures leave, by name, the status first."""
-    found = {"status": STATUS}
+    variables = {"status": STATUS}
     for measure in measures:
-        found |= (
+        variables |= (
             MEASURES[measure] if isinstance(measure, str) else {own_name(measure): Variable("1", "a user's measure")}
         )
-    return found
+    return variables
 
 
 def read_measures(measures: Sequence[Measure] | Measure) -> tuple[Measure, ...]:

@@ -121,10 +121,10 @@ class Plan:
     def checksum(self) -> str:
         """A sha256 of everything that decides the answer."""
         text = [self.attributes, self.chunks, [(axis.dim, axis.names) for axis in self.axes]]
-        found = hashlib.sha256(json.dumps(text, sort_keys=True).encode())
+        digest = hashlib.sha256(json.dumps(text, sort_keys=True).encode())
         for value in (self.system, *(axis.values for axis in self.axes), *(_source(m) for m in self.measures)):
-            found.update(_content(value).encode())
-        return found.hexdigest()
+            digest.update(_content(value).encode())
+        return digest.hexdigest()
 
 
 def chunked(shape: Sequence[int]) -> tuple[int, ...]:

@@ -287,5 +287,5 @@ def _free(path: Path) -> None:
 def _difference(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
     """Which settings of two maps differ, in words."""
     names = [name for name in sorted({*there, *here} - {"checksum"}) if there.get(name) != here.get(name)]
-    told = [f"{name} = {there.get(name)} (asked: {here.get(name)})" for name in names]
-    return "; ".join(told) if told else "other settings"
+    differences = [f"{name} = {there.get(name)} (asked: {here.get(name)})" for name in names]
+    return "; ".join(differences) if differences else "other settings"

@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from datetime import timedelta
 from pathlib import Path
-from typing import Any
+from threading import Timer
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +21,6 @@ from stickslip.maps.engines import read_engine
 from stickslip.maps.grid import Grid, apart, read_grid
 from stickslip.maps.measures import EVENTS, FAILED, REPEATS, Measure, Variable, read_measures, variables
 from stickslip.maps.plan import BLOCK, Arrays, Keep, Plan, assemble, blank, chunked, required
-from stickslip.maps.progress import told
 from stickslip.maps.store import Store
 from stickslip.oscillator import Oscillator
 from stickslip.solve.exponents import BATCHES
@@ -27,6 +29,94 @@ from stickslip.solve.refusal import Endless
 from stickslip.solve.simulate import opening, simulate
 from stickslip.solve.tables import System
 from stickslip.structure import Structure
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+PATIENCE = 2.0  # s of silence before anything is shown
+WIDTH = 30  # characters of a notebook's bar
+
+
+@contextmanager
+def reported(keep: Keep, done: int, count: int) -> Iterator[Keep]:
+    """`keep`, which also moves a bar of `count` blocks on, with the time left."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not (console.is_terminal or console.is_jupyter):
+        yield keep
+        return
+    with _in_notebook(done, count) if console.is_jupyter else _on_terminal(console, done, count) as advance:
+
+        def kept(number: int, arrays: Arrays, events: Arrays | None) -> None:
+            keep(number, arrays, events)
+            advance()
+
+        yield kept
+
+
+@contextmanager
+def _on_terminal(console: Console, done: int, count: int) -> Iterator[Callable[[], object]]:
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("blocks"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    bar = Progress(*columns, console=console, transient=True)
+    task = bar.add_task("mapping", total=count, completed=done)
+    patience = Timer(PATIENCE, bar.start)
+    patience.daemon = True
+    patience.start()
+    try:
+        yield lambda: bar.advance(task)
+    finally:
+        patience.cancel()
+        bar.stop()
+
+
+@contextmanager
+def _in_notebook(done: int, count: int) -> Iterator[Callable[[], object]]:
+    """One line of text under the cell that is written anew after each block, and cleared at the end."""
+    from IPython.display import display
+
+    begun, before, line = time.monotonic(), done, None
+
+    def show(text: str) -> Any:
+        data = {"text/plain": text}
+        return display(data, raw=True, display_id=True) if line is None else line.update(data, raw=True)
+
+    def advance() -> None:
+        nonlocal done, line
+        done, passed = done + 1, time.monotonic() - begun
+        if passed >= PATIENCE:
+            text = progress_line(done, count, passed=passed, left=passed * (count - done) / (done - before))
+            line = show(text) or line
+
+    try:
+        yield advance
+    finally:
+        if line is not None:
+            show("")
+
+
+def progress_line(done: int, count: int, *, passed: float, left: float) -> str:
+    """A bar of characters, the blocks done, and the time passed and left [s]."""
+    full = WIDTH * done // count
+    since, until = (str(timedelta(seconds=round(seconds))) for seconds in (passed, left))
+    return f"mapping {'━' * full}{'─' * (WIDTH - full)} {done}/{count} blocks {since} left {until}"
 
 
 def sweep(
@@ -112,7 +202,7 @@ def sweep(
         if store is not None and begun:
             require_disk(before * math.prod(plan.chunks), plan.variables, store)
         try:
-            with told(sensible(kept.keep, plan), len(plan.blocks) - before, len(plan.blocks)) as keep:
+            with reported(sensible(kept.keep, plan), len(plan.blocks) - before, len(plan.blocks)) as keep:
                 run(plan, kept.missing, keep, address)
         except KeyboardInterrupt:
             if len(kept.missing) == before:

@@ -23,7 +23,7 @@ from stickslip.solve.phasors import Phasors
 from stickslip.solve.tables import Array
 from stickslip.solve.tangent import carry_tangents
 
-TIRELESS = 2**62  # cells: a march of many motions is not interrupted
+TIRELESS = np.int64(2**62)  # cells: a march of many motions is not interrupted (a plain 2**62 is a type of its own)
 LAP = 64  # pieces remembered of a motion, a power of two; a lap of the drive with more has no fast path
 ROOM = 16  # pieces written before they are counted
 BUDGET = 10_000  # events in a period; more is taken for chatter
@@ -149,21 +149,21 @@ def watch_one(i, s, given, out, rooms):
     state, model = rooms.works[s, 16, :n], model_of(given.models, i)
     motion = Motion(model, state, given.units[i], past_of(rooms.pasts, s), pieces, rooms.works[s], marks)
     settled, total, rows = wants[SETTLE], wants[SETTLE] + wants[CYCLES], out.sections.shape[1]
-    each, driven = wants[GROWTH] == 1, math.isfinite(model.period)
+    growing, driven = wants[GROWTH] == 1, math.isfinite(model.period)
     mode, clock = _begin(motion, given.states[i], given.modes[i], total), Clock(0.0, 0.0, 0.0)
     tangent = tangents[:1]
     for k in range(n):
         tangent[0, k] = (1.0 - 0.5 * k / max(1, physical - 1)) / given.weights[i, k] if k < physical else 0.0
     out.growths[i] = 0.0
-    _unmarked(marks, math.ceil(total / PARTS) if driven and not each else 0.0)
-    lap, last, lasted = 0, 0, 0.0
+    _unmarked(marks, math.ceil(total / PARTS) if driven and not growing else 0.0)
+    lap, last, lasted = np.int64(0), 0, 0.0  # a plain 0 is a type of its own: all below would be compiled for it, too
     while lap < total and mode >= 0:
         until = total - max(0, rows - 1)
-        if each or lap >= until:
+        if growing or lap >= until:
             until = lap + 1
         mode, last, lasted, clock = _to(i, lap, until, motion, mode, clock, given, tangent, out.sums[i])
         lap = until
-        if each and mode >= 0 and not _grown(i, tangent[0], given.weights, lap > settled, out.growths):
+        if growing and mode >= 0 and not _grown(i, tangent[0], given.weights, lap > settled, out.growths):
             break
         if lap > total - rows:
             for k in range(physical):

@@ -186,7 +186,7 @@ class _Scene:
         self.words = ax.text(0, 1.15, "", ha="center", va="bottom", animated=True)
         self.moving = [self.marks, *([] if several else [self.wall, self.spring]), self.mass, self.words]
 
-    def draw(self, number: int, colour: str, words: str) -> None:
+    def draw(self, number: int, colour: str, label: str) -> None:
         """One instant."""
         x, base, height = self.x[number], -5.0 + self.base[number], self.height[number]
         self.mass.set_xy((x - 0.7, height))
@@ -198,7 +198,7 @@ class _Scene:
         places = np.arange(-9, 8) * 0.6 + np.mod(self.face[number], 0.6)
         hatch = np.column_stack([places, places - 0.25, np.full(len(places), np.nan)]).ravel()
         self.marks.set_data(hatch, np.tile([-0.02, -0.3, np.nan], len(places)))
-        self.words.set_text(f"{self.name}{words}")
+        self.words.set_text(f"{self.name}{label}")
         self.words.set_position((x, height + 1.15))
         for artist in self.moving:
             self.ax.draw_artist(artist)
@@ -246,7 +246,7 @@ def _background(ax: Axes, run: Trajectory, across: str, times: Array) -> list[tu
         dots.append((dot, x_factor * (times if across == "time" else x), y_factor * y, colour if count > 1 else None))
     if count > 1 and across == "time":
         legend_above(ax, columns=4)
-    names = [numbered_words(run, words, name, 0) for words, name in (("displacement", "x"), ("velocity", "v"))]
+    names = [numbered_words(run, label, name, 0) for label, name in (("displacement", "x"), ("velocity", "v"))]
     ax.set(
         xlabel=axis_label("time" if across == "time" else names[0], x_unit),
         ylabel=axis_label("displacement" if across == "time" else names[1], y_unit),
@@ -271,34 +271,15 @@ def _write_mp4(images: Iterable[Image], path: Path) -> None:
     pictures = iter(images)
     opening = next(pictures)
     height, width = (size - size % 2 for size in opening.shape[:2])
-    command = [
-        "ffmpeg",
-        "-loglevel",
-        "error",
-        "-y",
-        "-f",
-        "rawvideo",
-        "-pix_fmt",
-        "rgb24",
-        "-s",
-        f"{width}x{height}",
-        "-r",
-        str(RATE),
-        "-i",
-        "-",
-        "-an",
-        "-pix_fmt",
-        "yuv420p",
-        "-movflags",
-        "+faststart",
-        str(path),
-    ]
+    source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {RATE} -i -"
+    options = f"ffmpeg -loglevel error -y {source} -an -pix_fmt yuv420p -movflags +faststart"
+    command = [*options.split(), str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
         assert ffmpeg.stdin is not None
         assert ffmpeg.stderr is not None
         for image in (opening, *pictures):
             ffmpeg.stdin.write(image[:height, :width].tobytes())
         ffmpeg.stdin.close()
-        told = ffmpeg.stderr.read().decode(errors="replace").strip()
+        message = ffmpeg.stderr.read().decode(errors="replace").strip()
         if ffmpeg.wait():
-            raise OSError(f"ffmpeg: {told.splitlines()[-1] if told else ffmpeg.returncode}")
+            raise OSError(f"ffmpeg: {message.splitlines()[-1] if message else ffmpeg.returncode}")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.consistent.sliding_balance import Slider
 from stickslip.maps.attractor import Attractor
 from stickslip.maps.basins import Basins
 from stickslip.maps.bifurcation import Bifurcation
@@ -16,6 +15,7 @@ from stickslip.maps.boundaries import Boundary
 from stickslip.maps.dither import Dither, dithered_friction
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import unit as unit_of
+from stickslip.plot.maps import den_hartog
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -27,6 +27,7 @@ from stickslip.plot.style import (
     SKY,
     axes_of,
     axis_label,
+    coloured,
     empty_figure,
     legend_above,
     new_figure,
@@ -35,8 +36,7 @@ from stickslip.plot.style import (
     spelled,
     styled,
 )
-from stickslip.solve.tables import Array, System
-from stickslip.solve.trajectory import Trajectory
+from stickslip.solve.tables import System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,12 +47,12 @@ MOST_NAMED = 8  # attractors in a legend
 
 
 @styled
-def plot_bifurcation(found: Bifurcation) -> Figure:
+def plot_bifurcation(diagram: Bifurcation) -> Figure:
     """The diagram: where the motion is once in each period of the drive, followed up and down, with every change.
 
     Parameters
     ----------
-    found : Bifurcation
+    diagram : Bifurcation
         What :func:`stickslip.bifurcation` returned.
 
     Returns
@@ -68,70 +68,53 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
     2
     """
     figure, (top, bottom) = new_figure(2, height=4.6, heights=(3, 1))
-    motion = found.up[0].orbit.orbit
-    factor, unit = prefixed(
-        np.concatenate([each.points[:, 0] for each in (*found.up, *found.down)]), motion.units("x")[0]
-    )
-    crowded = max(len(each.points) for each in (*found.up, *found.down)) > 20
-    _follow(top, bottom, found, factor, dot=1.2 if crowded else None)
-    _beside(top, found, factor)
-    for change in found.changes:
+    motion = diagram.up[0].orbit.orbit
+    points = [attractor.points[:, 0] for attractor in (*diagram.up, *diagram.down)]
+    factor, unit = prefixed(np.concatenate(points), motion.units("x")[0])
+    crowded = max(map(len, points)) > 20
+    _follow(top, bottom, diagram, factor, dot=1.2 if crowded else None)
+    _beside(top, diagram, factor)
+    for change in diagram.changes:
         colour = BLUE if change.direction == "up" else ORANGE
         for ax in (top, bottom):
             ax.axvline(change.value, color=colour, linewidth=0.8, linestyle=":" if change.direction == "up" else "--")
-    _name_regimes(top, found)
+    _name_regimes(top, diagram)
     bottom.axhline(1.0, color=INK, linewidth=0.8)
     bottom.set_ylim(0, 1.15)
     bottom.set_ylabel("largest\nmultiplier")
     top.set_ylabel(axis_label("displacement at phase zero", unit))
-    bottom.set_xlabel(_named(motion.system, found.parameter))
+    bottom.set_xlabel(_named(motion.system, diagram.parameter))
     legend_above(top, columns=4, markerscale=3 if crowded else 1)
     return figure
 
 
-def _follow(top: Axes, bottom: Axes, found: Bifurcation, factor: float, *, dot: float | None) -> None:
+def _follow(top: Axes, bottom: Axes, diagram: Bifurcation, factor: float, *, dot: float | None) -> None:
     """The motion followed down and up: displacements, as dots of one size where they are crowded, and multipliers."""
     looks = (("down", ORANGE, "o", 5.0, "none"), ("up", BLUE, ".", 4.0, BLUE))
     for name, colour, marker, size, face in looks:
-        way = getattr(found, name)
-        places = np.repeat(found.values, [len(each.points) for each in way])
-        heights = factor * np.concatenate([each.points[:, 0] for each in way])
-        style: dict[str, Any] = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
-        top.plot(
-            places,
-            heights,
-            markersize=size if dot is None else dot,
-            markeredgewidth=0.7,
-            label=f"followed {name}",
-            zorder=3 if name == "up" else 2,
-            **style,
-        )
-        bottom.plot(found.values, [_largest(each) for each in way], markersize=size, markeredgewidth=0.7, **style)
+        way = getattr(diagram, name)
+        places = np.repeat(diagram.values, [len(attractor.points) for attractor in way])
+        heights = factor * np.concatenate([attractor.points[:, 0] for attractor in way])
+        look: Any = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
+        look |= {"markeredgewidth": 0.7, "zorder": 3 if name == "up" else 2}
+        top.plot(places, heights, markersize=dot or size, label=f"followed {name}", **look)
+        bottom.plot(diagram.values, [_largest(attractor) for attractor in way], markersize=size, **look)
 
 
-def _beside(top: Axes, found: Bifurcation, factor: float) -> None:
+def _beside(top: Axes, diagram: Bifurcation, factor: float) -> None:
     """Motions from other starts, and branches that lose their stability."""
-    others = [(float(v), each) for v, others in zip(found.values, found.beside, strict=True) for each in others]
-    for number, (value, each) in enumerate(others):
-        top.plot(
-            [value] * len(each.points),
-            factor * each.points[:, 0],
-            "x",
-            color=GREEN,
-            markersize=5,
-            label="beside, from another start" if not number else None,
-        )
-    for number, branch in enumerate(found.branches):
+    others = [
+        (value, motion) for value, several in zip(diagram.values, diagram.beside, strict=True) for motion in several
+    ]
+    for number, (value, motion) in enumerate(others):
+        label = "beside, from another start" if not number else None
+        heights = factor * motion.points[:, 0]
+        top.plot([value] * len(heights), heights, "x", color=GREEN, markersize=5, label=label)
+    for number, branch in enumerate(diagram.branches):
         unstable = np.array([orbit.status == "unstable" for orbit in branch.orbits])
         heights = factor * np.array([orbit.orbit.states[0, 0] for orbit in branch.orbits])
-        top.plot(
-            branch.values,
-            np.where(unstable, heights, np.nan),
-            "--",
-            color=INK,
-            linewidth=1.0,
-            label="unstable" if not number else None,
-        )
+        label = "unstable" if not number else None
+        top.plot(branch.values, np.where(unstable, heights, np.nan), "--", color=INK, linewidth=1.0, label=label)
 
 
 def _largest(attractor: Attractor) -> float:
@@ -139,29 +122,21 @@ def _largest(attractor: Attractor) -> float:
     return math.nan if attractor.orbit.order < 1 else float(np.max(np.abs(attractor.orbit.multipliers)))
 
 
-def _name_regimes(ax: Axes, found: Bifurcation) -> None:
+def _name_regimes(ax: Axes, diagram: Bifurcation) -> None:
     """What the motion does, written over each stretch of values: upwards at the top, downwards below."""
-    first, last = found.values[[0, -1]]
+    first, last = diagram.values[[0, -1]]
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + 0.22 * (high - low))
     for row, (direction, colour) in enumerate((("up", BLUE), ("down", ORANGE))):
-        changes = sorted(change.value for change in found.changes if change.direction == direction)
+        changes = sorted(change.value for change in diagram.changes if change.direction == direction)
         for begin, end in pairwise([first, *changes, last]):
-            inside = np.flatnonzero((found.values >= begin) & (found.values <= end))
+            inside = np.flatnonzero((diagram.values >= begin) & (diagram.values <= end))
             if not len(inside):
                 continue
-            text = getattr(found, direction)[inside[len(inside) // 2]].regime
+            text = getattr(diagram, direction)[inside[len(inside) // 2]].regime
             if end - begin > 0.012 * len(text) * (last - first):
-                ax.text(
-                    (begin + end) / 2,
-                    0.985 - 0.075 * row,
-                    text,
-                    color=colour,
-                    fontsize=7,
-                    ha="center",
-                    va="top",
-                    transform=ax.get_xaxis_transform(),
-                )
+                at: Any = {"ha": "center", "va": "top", "transform": ax.get_xaxis_transform()}
+                ax.text((begin + end) / 2, 0.985 - 0.075 * row, text, color=colour, fontsize=7, **at)
 
 
 def _named(system: System, parameter: str) -> str:
@@ -169,12 +144,12 @@ def _named(system: System, parameter: str) -> str:
 
 
 @styled
-def plot_basins(found: Basins, *, ax: Axes | None = None) -> Axes:
+def plot_basins(basins: Basins, *, ax: Axes | None = None) -> Axes:
     """The map of starts, each in the colour of the motion it leads to; crosses where the motion is at phase zero.
 
     Parameters
     ----------
-    found : Basins
+    basins : Basins
         What :func:`stickslip.basins` returned.
     ax : Axes, optional
         Where to draw; a new figure where left out.
@@ -195,63 +170,41 @@ def plot_basins(found: Basins, *, ax: Axes | None = None) -> Axes:
     from matplotlib.patches import Patch
 
     ax = axes_of(ax, height=4.2)
-    (down, across), (rows, columns) = found.names, found.axes
-    units = _state_units(found.attractors[0].orbit.orbit)
+    (down, across), (rows, columns) = basins.names, basins.axes
+    motion = basins.attractors[0].orbit.orbit
+    units = dict(zip(motion.table.names, (*motion.units("x"), *motion.units("v")), strict=False))  # rad if it turns
     across_factor, across_unit = prefixed(rows, units.get(down, "1"))
     down_factor, down_unit = prefixed(columns, units.get(across, "1"))
-    count = len(found.attractors)
+    count = len(basins.attractors)
     colours = [COLOURS[j % len(COLOURS)] for j in range(count)]
-    known = np.ma.masked_less(found.which.T, 0)
-    ax.pcolormesh(
-        across_factor * rows,
-        down_factor * columns,
-        known,
-        cmap=ListedColormap(colours),
-        vmin=-0.5,
-        vmax=count - 0.5,
-        alpha=0.55,
-        shading="nearest",
-        rasterized=True,
-        linewidth=0,
-    )
-    ax.grid(visible=False)
+    known = np.ma.masked_less(basins.which.T, 0)
+    options: Any = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": count - 0.5, "alpha": 0.55}
+    coloured(ax, across_factor * rows, down_factor * columns, known, **options)
     handles = []
-    for j, (each, share) in enumerate(zip(found.attractors, found.shares, strict=True)):
-        table = each.orbit.orbit.table
-        if set(found.names) <= set(table.names) and each.status != "rest":
-            places = [table.names.index(name) for name in found.names]
-            points = each.points[:, places] * (across_factor, down_factor)
-            inside = np.all(
-                (points >= _ends(found, 0, across_factor, down_factor))
-                & (points <= _ends(found, -1, across_factor, down_factor)),
-                axis=1,
-            )
-            ax.plot(*points[inside].T, "+", color=INK, markersize=8, markeredgewidth=1.4)
+    for j, (attractor, share) in enumerate(zip(basins.attractors, basins.shares, strict=True)):
+        table = attractor.orbit.orbit.table
+        if set(basins.names) <= set(table.names) and attractor.status != "rest":
+            places = [table.names.index(name) for name in basins.names]
+            points, factors = attractor.points[:, places], (across_factor, down_factor)
+            least, most = (np.array([axis[end] for axis in basins.axes]) for end in (0, -1))
+            inside = np.all((points >= least) & (points <= most), axis=1)
+            ax.plot(*(points[inside] * factors).T, "+", color=INK, markersize=8, markeredgewidth=1.4)
         low, high = share.interval
-        words = f"{each.regime}: {100 * share.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
-        handles.append(Patch(color=colours[j], alpha=0.55, label=words))
+        label = f"{attractor.regime}: {100 * share.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+        handles.append(Patch(color=colours[j], alpha=0.55, label=label))
     legend_above(ax, handles=handles[:MOST_NAMED], columns=2)
     ax.set_xlabel(axis_label(down, across_unit))
     ax.set_ylabel(axis_label(across, down_unit))
     return ax
 
 
-def _state_units(motion: Trajectory) -> dict[str, str]:
-    """Of the coordinates of the state: rad and rad/s where a structure turns."""
-    return dict(zip(motion.table.names, (*motion.units("x"), *motion.units("v")), strict=False))
-
-
-def _ends(found: Basins, end: int, *factors: float) -> Array:
-    return np.array([factor * axis[end] for factor, axis in zip(factors, found.axes, strict=True)])
-
-
 @styled
-def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
+def plot_boundary(boundary: Boundary, *, ax: Axes | None = None) -> Axes:
     """The boundary as a curve, with Den Hartog's closed form over it where it applies.
 
     Parameters
     ----------
-    found : Boundary
+    boundary : Boundary
         What :func:`stickslip.maps.boundary` returned with ``along=``.
     ax : Axes, optional
         Where to draw; a new figure where left out.
@@ -270,68 +223,40 @@ def plot_boundary(found: Boundary, *, ax: Axes | None = None) -> Axes:
     'Den Hartog (1931)'
     """
     ax = axes_of(ax)
-    system = next(each for each in found.low if each is not None).orbit.orbit.system
-    free = np.array([each is not None and each.status == "not unique" for each in found.low])
-    for chosen, face, words in (
+    system = next(motion for motion in boundary.low if motion is not None).orbit.orbit.system
+    free = np.array([motion is not None and motion.status == "not unique" for motion in boundary.low])
+    for chosen, face, label in (
         (~free, BLUE, "bisection of exact runs"),
         (free, "none", "of a family, from one start"),
     ):
-        if np.any(chosen & np.isfinite(found.values)):
-            ax.plot(
-                found.places[chosen],
-                found.values[chosen],
-                "o",
-                color=BLUE,
-                markerfacecolor=face,
-                markersize=4,
-                label=words,
-                zorder=3,
-            )
-    if is_den_hartog(system, found):
+        if np.any(chosen & np.isfinite(boundary.values)):
+            look: Any = {"color": BLUE, "markerfacecolor": face, "markersize": 4, "zorder": 3}
+            ax.plot(boundary.places[chosen], boundary.values[chosen], "o", label=label, **look)
+    kinds = next(pair for pair, value in zip(boundary.kinds, boundary.values, strict=True) if math.isfinite(value))
+    fine = np.linspace(boundary.places[0], boundary.places[-1], 400)
+    curve = (
+        den_hartog(system, (boundary.along, boundary.parameter), fine) if set(kinds) == {"no stops", "stops"} else None
+    )
+    if curve is not None:
         assert isinstance(system, Oscillator)
-        fine = np.linspace(found.places[0], found.places[-1], 400)
-        force = _force(system)
-        curve = [
-            force * Slider(system.mass, system.stiffness, 2 * math.pi * f, system.damping).boundary() for f in fine
-        ]
         ax.plot(fine, curve, color=ORANGE, label="Den Hartog (1931)")
         ax.axvline(system.frequency, color=FAINT, linewidth=0.8)
-    low, high = next(pair for pair, value in zip(found.kinds, found.values, strict=True) if math.isfinite(value))
     ax.margins(y=0.12)
-    for place, kind in ((0.98, high), (0.02, low)):
+    for place, kind in ((0.98, kinds[1]), (0.02, kinds[0])):
         ax.text(0.98, place, str(kind), transform=ax.transAxes, ha="right", va="top" if place > 0.5 else "bottom")
-    ax.set_xlabel(_named(system, found.along) if found.along else "place")
-    ax.set_ylabel(_named(system, found.parameter))
+    ax.set_xlabel(_named(system, boundary.along) if boundary.along else "place")
+    ax.set_ylabel(_named(system, boundary.parameter))
     legend_above(ax, columns=2)
     return ax
 
 
-def is_den_hartog(system: System, found: Boundary) -> bool:
-    """Whether the curve is that of rigid Coulomb friction under a harmonic drive, over the frequency."""
-    return (
-        isinstance(system, Oscillator)
-        and type(system.law).__name__ == "Coulomb"
-        and getattr(system.law, "static", None) in (None, getattr(system.law, "kinetic", None))
-        and type(system.drive).__name__ in ("HarmonicForce", "HarmonicBase")
-        and getattr(system.drive, "contact", "ground") == "ground"
-        and system.damper == "ground"
-        and (found.parameter, found.along) == ("kinetic", "frequency")
-        and {"no stops", "stops"} == set(next(k for k, v in zip(found.kinds, found.values, strict=True) if v == v))
-    )
-
-
-def _force(system: Oscillator) -> float:
-    amplitude = float(getattr(system.drive, "amplitude", math.nan))
-    return amplitude * (system.stiffness if type(system.drive).__name__ == "HarmonicBase" else 1.0)
-
-
 @styled
-def plot_dither(found: Dither) -> Figure:
+def plot_dither(dither: Dither) -> Figure:
     """How the longest stick goes down with the dither, and what the dither makes of the friction.
 
     Parameters
     ----------
-    found : Dither
+    dither : Dither
         What :func:`stickslip.dither` returned.
 
     Returns
@@ -349,34 +274,26 @@ def plot_dither(found: Dither) -> Figure:
     """
     figure = empty_figure(4.8)
     top, bottom = figure.subplots(2, 1)
-    factor, unit = prefixed(found.scan[:, 0], found.amplitude.unit)
-    sticks = found.scan[:, 1] * found.frequency
+    factor, unit = prefixed(dither.scan[:, 0], dither.amplitude.unit)
+    sticks = dither.scan[:, 1] * dither.frequency
     least = 0.3 * min(1.0, np.min(sticks[sticks > 0], initial=1.0))
-    top.loglog(
-        factor * found.scan[:, 0],
-        np.where(np.isfinite(sticks), np.maximum(sticks, least), np.nan),
-        ".",
-        color=BLUE,
-        label="exact runs",
-    )
+    known = np.where(np.isfinite(sticks), np.maximum(sticks, least), np.nan)
+    top.loglog(factor * dither.scan[:, 0], known, ".", color=BLUE, label="exact runs")
     for axis in (top.xaxis, top.yaxis):
         plain_decades(axis)
     top.axhline(1.0, color=INK, linewidth=0.8)
-    top.axvline(
-        factor * found.amplitude.value,
-        color=ORANGE,
-        linestyle="--",
-        label=f"smallest that does it: {factor * found.amplitude.value:.3g} {spelled(unit)}",
-    )
+    smallest = factor * dither.amplitude.value
+    label = f"smallest that does it: {smallest:.3g} {spelled(unit)}"
+    top.axvline(smallest, color=ORANGE, linestyle="--", label=label)
     if np.any(sticks == 0):
         top.text(0.99, 0.04, "lowest row: no stick at all", transform=top.transAxes, ha="right", fontsize=7)
-    top.set_xlabel(axis_label(f"dither of {found.frequency:.4g} Hz on the {found.on}", unit))
+    top.set_xlabel(axis_label(f"dither of {dither.frequency:.4g} Hz on the {dither.on}", unit))
     top.set_ylabel("longest stick\n[periods of the dither]")
     legend_above(top, columns=2)
     shares = np.linspace(0, 1, 200)
     bottom.plot(shares, dithered_friction(shares, speed=1.0), color=ORANGE, label="(2/pi) asin(v/aw)")
-    for column, colour, words in ((2, BLUE, "exact runs with this dither"), (3, GREEN, "with ten times as much")):
-        bottom.plot(found.averaged[:, 0], found.averaged[:, column], "o", color=colour, markersize=4, label=words)
+    for column, colour, text in ((2, BLUE, "exact runs with this dither"), (3, GREEN, "with ten times as much")):
+        bottom.plot(dither.averaged[:, 0], dither.averaged[:, column], "o", color=colour, markersize=4, label=text)
     bottom.axhline(1.0, color=FAINT, linewidth=0.8)
     bottom.set_xlabel("sliding speed over that of the dither, v/aw")
     bottom.set_ylabel("mean friction\nover sliding friction")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from stickslip.balance.motion import contact_motion
 from stickslip.plot.style import (
+    BARS,
     BLUE,
     FAINT,
     INK,
@@ -28,9 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip.answers.findings import Findings
-    from stickslip.answers.squeaks import SqueakFindings
     from stickslip.contact.sliding_onset import TransitionSpeed
-    from stickslip.record.record import Record
 
 MARGIN = 0.25  # of a stick's duration, drawn on either side of it
 MOST_CYCLES = 30
@@ -38,12 +37,12 @@ POINTS_A_CYCLE = 300
 
 
 @styled
-def plot_displacement_loop(findings: Findings | SqueakFindings, *, ax: Axes | None = None) -> Axes:
+def plot_displacement_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
     """Friction against displacement: the cycles thin, their mean with a band of one standard deviation.
 
     Parameters
     ----------
-    findings : Findings or SqueakFindings
+    findings : Findings
         With loops.
     ax : Axes, optional
         Where to draw.
@@ -56,12 +55,12 @@ def plot_displacement_loop(findings: Findings | SqueakFindings, *, ax: Axes | No
 
 
 @styled
-def plot_velocity_loop(findings: Findings | SqueakFindings, *, ax: Axes | None = None) -> Axes:
+def plot_velocity_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
     """Friction against velocity: the cycles thin, their mean, and the binned curve with 95 % intervals.
 
     Parameters
     ----------
-    findings : Findings or SqueakFindings
+    findings : Findings
         With loops.
     ax : Axes, optional
         Where to draw.
@@ -76,20 +75,13 @@ def plot_velocity_loop(findings: Findings | SqueakFindings, *, ax: Axes | None =
     x_factor, _ = prefixed(loops.velocity, f"{loops.unit}/s")
     y_factor, _ = prefixed(loops.friction, loops.level.unit)
     curve = loops.curve
-    ax.errorbar(
-        x_factor * curve.velocity,
-        y_factor * curve.friction,
-        yerr=y_factor * np.abs(np.array([curve.friction - curve.low, curve.high - curve.friction])),
-        fmt="o",
-        color=INK,
-        markersize=3.2,
-        linewidth=1.0,
-        label="mean in velocity bins, 95 %",
-        zorder=4,
-    )
+    away = y_factor * np.abs(np.array([curve.friction - curve.low, curve.high - curve.friction]))
+    look: Any = {"fmt": "o", "color": INK, "markersize": 3.2, "linewidth": 1.0, "zorder": 4}
+    label = "mean in velocity bins, 95 %"
+    ax.errorbar(x_factor * curve.velocity, y_factor * curve.friction, yerr=away, label=label, **look)
     for value in (loops.forward.value, -loops.back.value):
         ax.axhline(y_factor * value, color=INK, linewidth=0.9, linestyle=":", zorder=1)
-    _legend_above(ax)
+    legend_above(ax, columns=3)
     return ax
 
 
@@ -130,12 +122,12 @@ def plot_sticks(findings: Findings) -> Figure:
 
 
 @styled
-def plot_transition_speed(found: TransitionSpeed, *, ax: Axes | None = None) -> Axes:
+def plot_transition_speed(transition: TransitionSpeed, *, ax: Axes | None = None) -> Axes:
     """At which speed does sliding begin after a turn? The mean curve of friction against velocity, and each method.
 
     Parameters
     ----------
-    found : TransitionSpeed
+    transition : TransitionSpeed
         From :func:`~stickslip.contact.transition_speed`.
     ax : Axes, optional
         Where to draw.
@@ -156,27 +148,28 @@ def plot_transition_speed(found: TransitionSpeed, *, ax: Axes | None = None) -> 
     'friction [N]'
     """
     ax = axes_of(ax)
-    x_factor, x_unit = prefixed(found.velocity, "m/s")
-    y_factor, y_unit = prefixed(found.friction, found.level.unit)
-    ax.plot(x_factor * found.velocity, y_factor * found.friction, "o-", color=INK, markersize=3, label="mean of turns")
+    x_factor, x_unit = prefixed(transition.velocity, "m/s")
+    y_factor, y_unit = prefixed(transition.friction, transition.level.unit)
+    x, y = x_factor * transition.velocity, y_factor * transition.friction
+    ax.plot(x, y, "o-", color=INK, markersize=3, label="mean of turns")
     for name, colour, dashes in (("contact", BLUE, "-"), ("curve", ORANGE, "--"), ("equation", INK, ":")):
-        speed = getattr(found, name)
+        speed = getattr(transition, name)
         if speed is not None:
             ax.axvline(x_factor * speed.value, color=colour, linestyle=dashes, linewidth=1.2, label=f"by the {name}")
             ax.axvspan(*(x_factor * end for end in speed.interval), color=colour, alpha=0.15, linewidth=0)
-    reached = found.curve
+    reached = transition.curve
     if reached is not None:  # where its line meets the sliding friction, beyond what is drawn of the turns
-        ends = x_factor * np.array([found.velocity[-1], reached.value])
-        heights = y_factor * np.array([found.friction[-1], found.level.value])
+        ends = x_factor * np.array([transition.velocity[-1], reached.value])
+        heights = y_factor * np.array([transition.friction[-1], transition.level.value])
         ax.plot(ends, heights, "--", color=ORANGE, marker="o", markersize=4, markevery=[1], label="carried on")
     for side, label in ((-1, None), (1, "sliding friction")):
-        ax.axhline(side * y_factor * found.level.value, color=FAINT, linewidth=1.0, label=label)
+        ax.axhline(side * y_factor * transition.level.value, color=FAINT, linewidth=1.0, label=label)
     ax.set(xlabel=axis_label("velocity after the turn", x_unit), ylabel=axis_label("friction", y_unit))
-    _legend_above(ax)
+    legend_above(ax, columns=3)
     return ax
 
 
-def _loop(findings: Findings | SqueakFindings, abscissa: str, ax: Axes) -> Axes:
+def _loop(findings: Findings, abscissa: str, ax: Axes) -> Axes:
     loops = findings.loops
     assert loops is not None
     unit = {"displacement": loops.unit, "velocity": f"{loops.unit}/s"}[abscissa]
@@ -194,17 +187,13 @@ def _loop(findings: Findings | SqueakFindings, abscissa: str, ax: Axes) -> Axes:
     ax.plot(x_factor * x, y_factor * f, color=ORANGE, linewidth=1.8, label="mean cycle")
     ax.axhline(0, color=FAINT, linewidth=0.8)
     ax.axvline(0, color=FAINT, linewidth=0.8)
-    words = f"{abscissa} of the contact"
-    ax.set(xlabel=axis_label(words, x_unit), ylabel=axis_label("friction", y_unit))
-    _legend_above(ax)
+    text = f"{abscissa} of the contact"
+    ax.set(xlabel=axis_label(text, x_unit), ylabel=axis_label("friction", y_unit))
+    legend_above(ax, columns=3)
     return ax
 
 
-def _legend_above(ax: Axes) -> None:
-    legend_above(ax, columns=3)
-
-
-def _cycles(findings: Findings | SqueakFindings, abscissa: str) -> list[tuple[Array, Array]]:
+def _cycles(findings: Findings, abscissa: str) -> list[tuple[Array, Array]]:
     """Displacement (or velocity) across the contact and friction of at most thirty cycles, thinned."""
     record, loops, drawn = findings.record, findings.loops, []
     assert loops is not None
@@ -219,7 +208,7 @@ def _cycles(findings: Findings | SqueakFindings, abscissa: str) -> list[tuple[Ar
     return drawn
 
 
-def _across(findings: Findings | SqueakFindings, abscissa: str) -> Array:
+def _across(findings: Findings, abscissa: str) -> Array:
     """Displacement or velocity of the mass against what it slides on."""
     record, contact = findings.record, findings.settings.get("contact", "ground")
     name = {"displacement": "x", "velocity": "v"}[abscissa]
@@ -244,7 +233,8 @@ def plot_micro_slips(findings: Findings) -> Figure:
     """
     assert findings.sticks is not None
     events, record = findings.sticks.events, findings.record
-    inside = [event for event in events if event.kind == "microslip" and _seen(record, event.time)]
+    held = record.time[0], record.time[-1]
+    inside = [event for event in events if event.kind == "microslip" and held[0] < event.time < held[1]]
     middle = inside[len(inside) // 2]
     stick = max((e for e in events if e.kind == "stick" and e.time <= middle.time), key=lambda event: event.time)
     margin = MARGIN * stick.duration
@@ -252,7 +242,7 @@ def plot_micro_slips(findings: Findings) -> Figure:
     time = record.time[rows]
     figure, axes = new_figure(2, height=3.8)
     speed = contact_motion(record, contact=findings.settings.get("contact"), question="the figure").velocity
-    for ax, values, words, unit in (
+    for ax, values, quantity, unit in (
         (axes[0], record["friction"], "friction", record.channels["friction"].unit),
         (axes[1], speed, "velocity", "m/s"),
     ):
@@ -262,15 +252,10 @@ def plot_micro_slips(findings: Findings) -> Figure:
         for number, event in enumerate(e for e in inside if stick.time <= e.time < stick.time + stick.duration):
             label = "micro-slip" if number == 0 else None
             ax.axvspan(event.time, event.time + event.duration, color=ORANGE, alpha=0.4, linewidth=0, label=label)
-        ax.set_ylabel(axis_label(words, text))
+        ax.set_ylabel(axis_label(quantity, text))
     axes[1].set(xlabel="time [s]", xlim=(float(time[0]), float(time[-1])))
-    _legend_above(axes[0])
+    legend_above(axes[0], columns=3)
     return figure
-
-
-def _seen(record: Record, time: float) -> bool:
-    """Whether a record holds that instant."""
-    return bool(record.time[0] < time < record.time[-1])
 
 
 @styled
@@ -288,29 +273,22 @@ def plot_breakaway(findings: Findings, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
     """
-    loops, found = findings.loops, findings.breakaway
+    loops, breakaway = findings.loops, findings.breakaway
     assert loops is not None
-    assert found is not None
+    assert breakaway is not None
     ax = axes_of(ax, height=2.4)
     pairs = {
         "sliding": (loops.forward, loops.back, BLUE, "o"),
-        "before it slips": (found.forward, found.back, ORANGE, "^"),
+        "before it slips": (breakaway.forward, breakaway.back, ORANGE, "^"),
     }
     factor, unit = prefixed(loops.level.value, loops.level.unit)
     for shift, (label, (forward, back, colour, marker)) in zip((0.1, -0.1), pairs.items(), strict=True):
-        for place, each in enumerate((back, forward)):
-            if each is not None:
-                ends = np.abs(np.array([[each.value - each.interval[0]], [each.interval[1] - each.value]]))
-                ax.errorbar(
-                    [factor * each.value],
-                    [place + shift],
-                    xerr=factor * ends,
-                    fmt=marker,
-                    color=colour,
-                    markersize=5,
-                    capsize=3,
-                    label=label if each is (back or forward) else None,
-                )
+        drawn = [(level, place + shift) for place, level in enumerate((back, forward)) if level is not None]
+        values = factor * np.array([level.value for level, _ in drawn])
+        ends = factor * np.array([level.interval for level, _ in drawn]).reshape(-1, 2)
+        places = [place for _, place in drawn]
+        look: Any = {**BARS, "fmt": marker, "color": colour, "label": label if drawn else None}
+        ax.errorbar(values, places, xerr=np.abs(ends - values[:, None]).T, linestyle="none", **look)
     ax.set(yticks=[0, 1], yticklabels=["back", "forward"], ylim=(-0.5, 1.5), xlabel=axis_label("friction", unit))
-    _legend_above(ax)
+    legend_above(ax, columns=3)
     return ax

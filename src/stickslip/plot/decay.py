@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.decay import extremes as ex
-from stickslip.plot.plate import Plate, plate
+from stickslip.plot.plate import Plate, captioned
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -23,6 +23,7 @@ from stickslip.plot.style import (
     axis_label,
     envelope,
     legend_above,
+    named_intervals,
     new_figure,
     prefixed,
     styled,
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.answers.decay_comparison import DecayComparison
-    from stickslip.answers.decays import DecayFindings
+    from stickslip.answers.decays import Decay
+    from stickslip.answers.findings import Comparison
     from stickslip.decay.decrement import Decrement
     from stickslip.decay.release import RingDown
 
@@ -42,17 +43,16 @@ Array = NDArray[np.float64]
 WORDS = {"x": "displacement", "theta": "angle", "v": "velocity", "a": "acceleration"}
 MARGIN = 0.04  # of the motion's length, shown before and after it
 POINTS = 600  # of a smooth curve
-MOST_MARKS = 60  # extremes that are marked one by one
 
 
 @styled
-def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = None) -> Axes:
+def plot_decay(decay: Decay, *, release: int = 0, ax: Axes | None = None) -> Axes:
     """The response within the envelopes that either friction alone would give (thesis, Figure 6.1).
 
     Parameters
     ----------
-    findings : DecayFindings
-        What :func:`~stickslip.analyze_decay` returned.
+    decay : Decay
+        ``decay`` of what :func:`~stickslip.analyze_decay` returned.
     release : int
         Which of several releases, from 0.
     ax : Axes, optional
@@ -62,16 +62,16 @@ def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = N
     -------
     Axes
     """
-    ax, ring = axes_of(ax), findings.releases.ring_downs[release]
+    ax, ring = axes_of(ax), decay.releases.ring_downs[release]
     factor, unit = prefixed(ring.samples - ring.rest, ring.unit)
     rows = _shown(ring)
     ax.plot(*envelope(ring.time[rows], factor * ring.samples[rows]), color=INK, linewidth=1.0, label="recorded")
-    rest = findings.rest
-    time, viscous, dry = _envelopes(findings, ring)
+    rest = decay.rest
+    time, viscous, dry = _envelopes(decay, ring)
     alone = ((viscous, BLUE, "viscous friction alone"), (dry, ORANGE, "dry friction alone"))
-    for curve, colour, words in alone if ring.isochronous else ():  # of a linear spring
+    for curve, colour, text in alone if ring.isochronous else ():  # of a linear spring
         for side in (1, -1):
-            label = words if side == 1 else None
+            label = text if side == 1 else None
             ax.plot(time, factor * (rest + side * curve), color=colour, linestyle="--", linewidth=1.1, label=label)
     ax.axhline(factor * rest, color=FAINT, linewidth=0.8)
     _shade_rest(ax, ring, rows)
@@ -81,13 +81,13 @@ def plot_decay(findings: DecayFindings, *, release: int = 0, ax: Axes | None = N
 
 
 @styled
-def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
+def plot_identified(decay: Decay, *, release: int = 0) -> Figure:
     """Recorded and identified response over each other, and what is left between them (thesis, Figure 6.10).
 
     Parameters
     ----------
-    findings : DecayFindings
-        What :func:`~stickslip.analyze_decay` returned.
+    decay : Decay
+        ``decay`` of what :func:`~stickslip.analyze_decay` returned.
     release : int
         Which of several releases, from 0; beyond the first by the whole waveform alone.
 
@@ -95,12 +95,12 @@ def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
     -------
     Figure
     """
-    time, measured, fitted, words = _identified(findings, release)
-    ring = findings.releases.ring_downs[release]
-    factor, unit = prefixed(measured - findings.rest, ring.unit)
+    time, measured, fitted, label = _identified(decay, release)
+    ring = decay.releases.ring_downs[release]
+    factor, unit = prefixed(measured - decay.rest, ring.unit)
     figure, (above, below) = new_figure(2, height=4.6, heights=[2, 1])
     above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="recorded")
-    above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=words)
+    above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=label)
     above.set_ylabel(axis_label(WORDS[ring.channel], unit))
     legend_above(above, columns=2)
     left = measured - fitted
@@ -113,12 +113,12 @@ def plot_identified(findings: DecayFindings, *, release: int = 0) -> Figure:
 
 
 @styled
-def plot_differences(found: Decrement, *, ax: Axes | None = None) -> Axes:
+def plot_differences(decrement: Decrement, *, ax: Axes | None = None) -> Axes:
     """The amplitude differences on the exponential that viscous friction alone makes of them (thesis, Figure 6.2).
 
     Parameters
     ----------
-    found : Decrement
+    decrement : Decrement
         What :func:`~stickslip.decrement` returned.
     ax : Axes, optional
         Where to draw.
@@ -128,29 +128,23 @@ def plot_differences(found: Decrement, *, ax: Axes | None = None) -> Axes:
     Axes
     """
     ax = axes_of(ax)
-    factor, unit = prefixed(found.differences, found.ring_down.unit)
-    apart = len(found.sd) - len(found.differences)  # 2: differences of extremes two apart; 1: sums of neighbours
-    spread = np.hypot(found.sd[apart:], found.sd[:-apart])
-    number = np.arange(1, len(found.differences) + 1)
-    zeta = found.damping_ratio.value
+    factor, unit = prefixed(decrement.differences, decrement.ring_down.unit)
+    apart = len(decrement.sd) - len(
+        decrement.differences
+    )  # 2: differences of extremes two apart; 1: sums of neighbours
+    spread = np.hypot(decrement.sd[apart:], decrement.sd[:-apart])
+    number = np.arange(1, len(decrement.differences) + 1)
+    zeta = decrement.damping_ratio.value
     beta = zeta / math.sqrt(1 - zeta**2)
     along = np.linspace(number[0], number[-1], POINTS)
-    first = found.bounds.i
-    scale = abs(float(found.differences[first - 1])) * math.exp(math.pi * beta * first)
+    first = decrement.bounds.i
+    scale = abs(float(decrement.differences[first - 1])) * math.exp(math.pi * beta * first)
     for side in (1, -1):
         label = f"exponential of the damping ratio {zeta:.3g}" if side == 1 else None
         ax.plot(along, side * factor * scale * np.exp(-math.pi * beta * along), color=BLUE, linestyle="--", label=label)
-    ax.errorbar(
-        number,
-        factor * found.differences,
-        yerr=1.96 * factor * spread,
-        fmt="o",
-        color=INK,
-        markersize=3.5,
-        linewidth=0.9,
-        label=f"amplitude {'differences' if apart == 2 else 'sums'}, 95 %",
-        zorder=3,
-    )
+    label = f"amplitude {'differences' if apart == 2 else 'sums'}, 95 %"
+    look: Any = {"fmt": "o", "color": INK, "markersize": 3.5, "linewidth": 0.9, "zorder": 3, "label": label}
+    ax.errorbar(number, factor * decrement.differences, yerr=1.96 * factor * spread, **look)
     ax.axhline(0, color=FAINT, linewidth=0.8)
     ax.set(
         xlabel="number i of the extreme", ylabel=axis_label("X(i+1) - X(i-1)" if apart == 2 else "X(i-1) + X(i)", unit)
@@ -160,20 +154,20 @@ def plot_differences(found: Decrement, *, ax: Axes | None = None) -> Axes:
 
 
 @styled
-def plot_bounds(found: Decrement) -> Figure:
+def plot_bounds(decrement: Decrement) -> Figure:
     """The viscous rate and the dry friction against the number m of half cycles, each with its worst case.
 
     Parameters
     ----------
-    found : Decrement
+    decrement : Decrement
         What :func:`~stickslip.decrement` returned.
 
     Returns
     -------
     Figure
     """
-    bounds = found.bounds
-    factor, unit = prefixed(bounds.dry, found.dry_displacement.unit)
+    bounds = decrement.bounds
+    factor, unit = prefixed(bounds.dry, decrement.dry_displacement.unit)
     figure, axes = new_figure(2, height=4.6)
     rows = (
         (bounds.rate, bounds.rate_first_order, bounds.rate_worst, "viscous rate β"),
@@ -184,8 +178,8 @@ def plot_bounds(found: Decrement) -> Figure:
             bounds.m, value - worst, value + worst, color=ORANGE, alpha=0.2, linewidth=0, label="exact worst case"
         )
         for side in (1, -1):
-            words = "to first order" if side == 1 else None
-            ax.plot(bounds.m, value + side * first_order, color=BLUE, linestyle="--", linewidth=1.0, label=words)
+            text = "to first order" if side == 1 else None
+            ax.plot(bounds.m, value + side * first_order, color=BLUE, linestyle="--", linewidth=1.0, label=text)
         ax.plot(bounds.m, value, "o-", color=INK, markersize=3, linewidth=0.9, label="estimate")
         ax.axvline(bounds.best, color=GREEN, linewidth=0.9, linestyle=":")
         _within_reach(ax, value, worst, first_order)
@@ -198,19 +192,19 @@ def plot_bounds(found: Decrement) -> Figure:
 
 def _within_reach(ax: Axes, value: Array, *errors: Array) -> None:
     """Limits that show the values and the first of their errors that is finite anywhere; an axis of its own if none."""
-    bounded = next((each[np.isfinite(each)] for each in errors if np.isfinite(each).any()), np.zeros(1))
+    bounded = next((error[np.isfinite(error)] for error in errors if np.isfinite(error).any()), np.zeros(1))
     middle, reach = float(np.median(value)), 3 * float(np.median(bounded)) + float(np.ptp(value))
     if math.isfinite(middle + reach) and reach > 0:
         ax.set_ylim(middle - reach, middle + reach)
 
 
 @styled
-def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio", ax: Axes | None = None) -> Axes:
+def plot_records(comparison: Comparison, *, quantity: str = "damping_ratio", ax: Axes | None = None) -> Axes:
     """A quantity of each record with its 95 % interval, and the band that holds for all.
 
     Parameters
     ----------
-    comparison : DecayComparison
+    comparison : Comparison
         What :func:`~stickslip.answers.compare_decays` returned.
     quantity : {"damping_ratio", "dry_displacement", "frequency"}
         Which.
@@ -221,105 +215,69 @@ def plot_records(comparison: DecayComparison, *, quantity: str = "damping_ratio"
     -------
     Axes
     """
-    each = [getattr(findings.best, quantity) for findings in comparison.findings]
-    names = [
-        findings.name if len(findings.name) < 44 else f"{findings.name[:41]}..." for findings in comparison.findings
-    ]
-    values, ends = np.array([one.value for one in each]), np.array([one.interval for one in each])
-    ax, places = axes_of(ax, height=1.3 + 0.32 * len(names)), np.arange(len(names))
-    factor, unit = prefixed(ends, each[0].unit)
-    for shared in (one for one in comparison.estimates if one.name == each[0].name):
+    estimates = [getattr(findings.decay.best, quantity) for findings in comparison.findings]
+    names, label = [findings.name for findings in comparison.findings], "each record, 95 %"
+    ax, factor, unit = named_intervals(names, estimates, ax=ax, label=label)
+    for shared in (estimate for estimate in comparison.estimates if estimate.name == estimates[0].name):
         low, high = (factor * end for end in shared.interval)
         ax.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0, label="all records, 95 %")
         ax.axvline(factor * shared.value, color=ORANGE, linewidth=1.0)
-    ax.errorbar(
-        factor * values,
-        places,
-        xerr=factor * np.abs(ends - values[:, None]).T,
-        fmt="o",
-        color=BLUE,
-        capsize=3,
-        markersize=4.5,
-        label="each record, 95 %",
-    )
-    ax.set_yticks(places, names)
-    ax.set_ylim(len(names) - 0.4, -0.6)
-    ax.set_xlabel(axis_label(each[0].name, unit))
+    ax.set_xlabel(axis_label(estimates[0].name, unit))
     legend_above(ax, columns=2)
     return ax
 
 
-def plates_together(comparison: DecayComparison) -> list[Plate]:
+def plates_together(comparison: Comparison) -> list[Plate]:
     """The figures of several decays."""
-    words = (
+    sentence = (
         "The records differ by more than their own intervals allow: something changed between them that no single one "
         "shows. The band holds their scatter."
         if comparison.apart
         else "The band is what all records give together; each by itself agrees with it."
     )
-    shown = (("damping_ratio", "Damping ratio of each record"), ("dry_displacement", "Dry friction of each record"))
     return [
-        plate(quantity.replace("_", "-"), partial(plot_records, comparison, quantity=quantity), title, words)
-        for quantity, title in shown
+        captioned(
+            "decay",
+            quantity.replace("_", "-"),
+            partial(plot_records, comparison, quantity=quantity),
+            agreement=sentence,
+        )
+        for quantity in ("damping_ratio", "dry_displacement")
     ]
 
 
-def plates_of(findings: DecayFindings) -> list[Plate]:
+def plates_of(decay: Decay) -> list[Plate]:
     """The figures of a decay, in reading order."""
-    ring, thesis = findings.releases.ring_downs[0], findings.thesis
-    several = len(findings.releases.ring_downs)
-    many = f" The first of {several} releases; the others are below." if several > 1 else ""
+    ring, thesis = decay.releases.ring_downs[0], decay.thesis
+    several = len(decay.releases.ring_downs)
     envelopes = (
         "Viscous friction alone would let it die away along the curved envelope, dry friction alone along the straight "
         "one; together they are faster than either. "
     ) * ring.isochronous
-    grey = "Grey: at rest before the release or after." if ring.held or ring.stopped else ""
-    plates = [plate("decay", partial(plot_decay, findings), "How it dies away", f"{envelopes}{grey}{many}")]
-    if findings.waveform is not None or (ring.order == 0 and findings.best in (findings.motion, thesis)):
-        plates.append(
-            plate(
-                "identified",
-                partial(plot_identified, findings),
-                "Recorded and identified",
-                "Top: the motion that the identified friction gives, over the recorded one. Bottom: what is left "
-                "between them; a pattern there is friction of another kind.",
-            )
-        )
+    filled = {
+        "envelopes": envelopes,
+        "grey": "Grey: at rest before the release or after." if ring.held or ring.stopped else "",
+        "several": f" The first of {several} releases; the others are below." if several > 1 else "",
+    }
+    plates = [captioned("decay", "decay", partial(plot_decay, decay), **filled)]
+    if decay.waveform is not None or (ring.order == 0 and decay.best in (decay.motion, thesis)):
+        plates.append(captioned("decay", "identified", partial(plot_identified, decay)))
+    fitted = 0 if decay.waveform is None or decay.best is decay.motion else len(decay.waveform.time)
     for release in range(1, several):
-        words = f"Release {release + 1} of {several}"
-        fitted = 0 if findings.waveform is None else len(findings.waveform.time)
-        if release >= fitted or findings.best is findings.motion:
-            swings = partial(plot_decay, findings, release=release)
-            plates.append(plate(f"decay-{release + 1}", swings, words, envelopes.strip()))
-        else:
-            drawn = partial(plot_identified, findings, release=release)
-            plates.append(plate(f"identified-{release + 1}", drawn, words, "Recorded, identified and what is left."))
+        kind, plot = ("identified", plot_identified) if release < fitted else ("decay", plot_decay)
+        draw, number = partial(plot, decay, release=release), release + 1
+        values = {"number": number, "several": several, "envelopes": envelopes.strip()}
+        plates.append(captioned("decay", f"next-{kind}", draw, name=f"{kind}-{number}", **values))
     if thesis is not None:
-        plates.append(
-            plate(
-                "differences",
-                partial(plot_differences, thesis),
-                "Amplitude differences",
-                "Differences of every other extreme know nothing of dry friction. On the exponential, the rest of "
-                "the damping is viscous; beside it, the friction is of another kind, or an extreme was misread.",
-            )
-        )
+        plates.append(captioned("decay", "differences", partial(plot_differences, thesis)))
         if len(thesis.bounds.m) > 2:
-            plates.append(
-                plate(
-                    "bounds",
-                    partial(plot_bounds, thesis),
-                    "How far errors of the extremes can reach",
-                    f"If no extreme is off by more than {_length(thesis)}, the truth lies in the band: over few half "
-                    "cycles the differences change little, over many they become small. Dotted: the best choice.",
-                )
-            )
+            plates.append(captioned("decay", "bounds", partial(plot_bounds, thesis), error=_length(thesis)))
     return plates
 
 
-def _length(found: Decrement) -> str:
-    factor, unit = prefixed(found.bounds.error, found.ring_down.unit)
-    return f"{factor * found.bounds.error:.3g} {unit}"
+def _length(decrement: Decrement) -> str:
+    factor, unit = prefixed(decrement.bounds.error, decrement.ring_down.unit)
+    return f"{factor * decrement.bounds.error:.3g} {unit}"
 
 
 def _shown(ring: RingDown) -> slice:
@@ -337,9 +295,9 @@ def _shade_rest(ax: Axes, ring: RingDown, rows: slice) -> None:
     ax.set_xlim(first, last)
 
 
-def _envelopes(findings: DecayFindings, ring: RingDown) -> tuple[Array, Array, Array]:
+def _envelopes(decay: Decay, ring: RingDown) -> tuple[Array, Array, Array]:
     """Times, and the envelopes of either friction alone, from the first amplitude."""
-    best = findings.best
+    best = decay.best
     time = np.linspace(ring.release, ring.stop, POINTS)
     since, w = time - ring.release, 2 * math.pi * best.frequency.value
     viscous = abs(ring.amplitude) * np.exp(-max(0.0, best.damping_ratio.value) * w * since)
@@ -347,26 +305,26 @@ def _envelopes(findings: DecayFindings, ring: RingDown) -> tuple[Array, Array, A
     return time, viscous, np.maximum(0.0, abs(ring.amplitude) - fall * since)
 
 
-def _identified(findings: DecayFindings, release: int = 0) -> tuple[Array, Array, Array, str]:
+def _identified(decay: Decay, release: int = 0) -> tuple[Array, Array, Array, str]:
     """Time, recorded, identified, and by which method."""
-    if findings.best is findings.motion and release == 0:
-        chosen = findings.motion.choice.chosen.fitted
+    if decay.best is decay.motion and release == 0:
+        chosen = decay.motion.choice.chosen.fitted
         fitted, _, _ = chosen.blocks.motion(chosen.parameters, half_cycles=chosen.half_cycles)
         return chosen.blocks.times, chosen.blocks.values, fitted, "identified by the whole waveform"
-    if findings.waveform is not None:
-        fit, ring = findings.waveform, findings.releases.ring_downs[release]
+    if decay.waveform is not None:
+        fit, ring = decay.waveform, decay.releases.ring_downs[release]
         shown, time = ring.time[_shown(ring)], fit.time[release]
         near = (time >= shown[0]) & (time <= shown[-1])
         return time[near], fit.measured[release][near], fit.fitted[release][near], "identified by the whole waveform"
-    found, ring = findings.thesis, findings.releases.ring_downs[0]
-    assert found is not None
+    thesis, ring = decay.thesis, decay.releases.ring_downs[0]
+    assert thesis is not None
     rows = _shown(ring)
-    time, rest = ring.time[rows], found.bias.value
+    time, rest = ring.time[rows], thesis.bias.value
     fitted = rest + ex.motion(
-        time - float(found.time[0]),
-        float(found.extremes[0]) - rest,
-        damping_ratio=found.damping_ratio.value,
-        dry_displacement=found.dry_displacement.value,
-        frequency=found.frequency.value,
+        time - float(thesis.time[0]),
+        float(thesis.extremes[0]) - rest,
+        damping_ratio=thesis.damping_ratio.value,
+        dry_displacement=thesis.dry_displacement.value,
+        frequency=thesis.frequency.value,
     )
     return time, ring.samples[rows], fitted, "identified by the decrements"

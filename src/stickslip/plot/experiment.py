@@ -58,10 +58,9 @@ def plot_plan(plan: ExperimentPlan) -> Figure:
         unit = plan.setups[0].accuracy[question].unit
         factor, text = prefixed(np.array([setup.accuracy[question].error for setup in plan.setups]), unit)
         for number, sensors in enumerate(choices):
-            found = [(each.fs, each.accuracy[question].error) for each in plan.setups if each.sensors == sensors]
-            rates, errors = np.array(found).T
+            errors = {s.fs: s.accuracy[question].error for s in plan.setups if s.sensors == sensors}
             style = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "markersize": 7 - 1.5 * number}
-            panel.plot(rates, factor * errors, label=", ".join(sensors), **style)
+            panel.plot(list(errors), factor * np.array(list(errors.values())), label=", ".join(sensors), **style)
         panel.set(xscale="log", yscale="log", ylabel=axis_label("rms error" if plan.draws > 1 else "error", text))
         plain_decades(panel.yaxis)
         panel.set_title(question, loc="left")

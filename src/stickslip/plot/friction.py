@@ -6,47 +6,15 @@ side.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.plot.style import BLUE, INK, ORANGE, axes_of, axis_label, prefixed, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from stickslip.answers.comparison import Comparison
-
-import math
-from typing import TYPE_CHECKING
-
-from stickslip.consistent.checks import APART
-from stickslip.plot.style import FAINT
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from stickslip.consistent.contradictions import Consistency
-
-from typing import TYPE_CHECKING
-
-from stickslip.plot.style import (
-    PURPLE,
-    envelope,
-    legend_above,
-    new_figure,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip.answers.findings import Findings
-
-from functools import partial
-
-from stickslip.answers.comparison import Comparison
-from stickslip.answers.findings import Findings
+from stickslip.answers.findings import Comparison, Findings
 from stickslip.balance.force import FUSIONS
+from stickslip.consistent.checks import APART
 from stickslip.estimate import UNSTATED, kinds
 from stickslip.plot.contact import (
     plot_breakaway,
@@ -56,10 +24,44 @@ from stickslip.plot.contact import (
     plot_transition_speed,
     plot_velocity_loop,
 )
-from stickslip.plot.force import plot_force_comparison
-from stickslip.plot.plate import Plate, plate
-from stickslip.plot.traces import MOST_SHADES, close_up, force_balance, plot_force_balance, plot_traces
-from stickslip.plot.twin import plot_twin
+from stickslip.plot.plate import Plate, captioned
+from stickslip.plot.style import (
+    BARS,
+    BLUE,
+    FAINT,
+    INK,
+    ORANGE,
+    PURPLE,
+    axes_of,
+    axis_label,
+    envelope,
+    legend_above,
+    named_intervals,
+    new_figure,
+    prefixed,
+    styled,
+)
+from stickslip.plot.traces import (
+    MOST_SHADES,
+    close_up,
+    force_balance,
+    plot_force_balance,
+    plot_force_comparison,
+    plot_traces,
+    plot_twin,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from stickslip.consistent.contradictions import Consistency
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from stickslip.consistent.contradictions import Consistency
 
 COLOURS = {"holds": BLUE, "fails": ORANGE, "can not be told": FAINT}
 
@@ -70,15 +72,7 @@ def plates_of(findings: Findings) -> list[Plate]:
     sticks = [event for event in events if event.kind == "stick"]
     plates = [*_of_friction(findings), *_over_time(findings, sticks=len(sticks)), *_of_contact(findings)]
     if any(event.whole for event in sticks):
-        plates.append(
-            plate(
-                "sticks",
-                partial(plot_sticks, findings),
-                "How long it sticks and slips",
-                "Each mark is one whole stretch of sticking or slipping; the bars count how often each duration "
-                "occurred.",
-            )
-        )
+        plates.append(captioned("friction", "sticks", partial(plot_sticks, findings)))
     return plates
 
 
@@ -87,33 +81,11 @@ def _of_friction(findings: Findings) -> list[Plate]:
     plates = []
     if findings.loops is not None:
         plates += [
-            plate(
-                "friction-velocity",
-                partial(plot_velocity_loop, findings),
-                "Friction against velocity",
-                "Dry friction is a step: about the same force (dotted) at every speed, against the motion. A slope to "
-                "either side is friction that changes with speed; points between the levels at zero velocity are the "
-                "sticking contact, which bears any force up to the level.",
-            ),
-            plate(
-                "friction-displacement",
-                partial(plot_displacement_loop, findings),
-                "Friction against displacement",
-                "One turn is one cycle and its area is the work lost to friction. Flat top and bottom: sliding. Steep "
-                "sides: the contact sticks, and their slope is the contact's own stiffness. The band is the scatter "
-                "between cycles.",
-            ),
+            captioned("friction", "friction-velocity", partial(plot_velocity_loop, findings)),
+            captioned("friction", "friction-displacement", partial(plot_displacement_loop, findings)),
         ]
     if findings.regression is not None:
-        plates.append(
-            plate(
-                "regression",
-                partial(plot_regression, findings),
-                "Does the friction model explain the force?",
-                "Top: the measured force and the force that inertia, viscous and dry friction together give. Bottom: "
-                "what is left over; a pattern there is friction that the model does not hold.",
-            )
-        )
+        plates.append(captioned("friction", "regression", partial(plot_regression, findings)))
     return plates
 
 
@@ -122,97 +94,34 @@ def _over_time(findings: Findings, *, sticks: int) -> list[Plate]:
     near = close_up(findings)
     stuck = " Grey: the contact sticks." if sticks else ""
     shaded = stuck if sticks <= MOST_SHADES else ""
-    plates = [
-        plate(
-            "record", partial(plot_traces, findings), "The record", f"Every channel used, over the whole time.{shaded}"
-        )
-    ]
+    plates = [captioned("friction", "record", partial(plot_traces, findings), stuck=shaded)]
     if near is not None:
-        plates.append(
-            plate(
-                "close-up",
-                partial(plot_traces, findings, record=near),
-                "A closer look",
-                f"A few cycles from the middle of the record.{stuck}",
-            )
-        )
+        plates.append(captioned("friction", "close-up", partial(plot_traces, findings, record=near), stuck=stuck))
     if force_balance(findings.record) is not None:
-        plates.append(
-            plate(
-                "force-balance",
-                partial(plot_force_balance, findings, record=near),
-                "Where the friction force comes from",
-                f"{_how_it_adds_up(findings)}{stuck}",
-            )
-        )
+        kind = "force-balance-fused" if _is_fused(findings) else "force-balance"
+        draw = partial(plot_force_balance, findings, record=near)
+        plates.append(captioned("friction", kind, draw, name="force-balance", stuck=stuck))
     return plates
 
 
 def _of_contact(findings: Findings) -> list[Plate]:
     """What the contact does at a turn and before it slips, and what the sensors say of each other."""
-    plates, found = [], findings.breakaway
-    if found is not None and findings.loops is not None and UNSTATED not in kinds(found.ratio.status):
-        plates.append(
-            plate(
-                "breakaway",
-                partial(plot_breakaway, findings),
-                "Before it slips, and while it slides",
-                "Where the contact bears more before it slips than while it slides, its friction falls as slip "
-                "begins; bars are 95 % intervals.",
-            )
-        )
+    plates, breakaway = [], findings.breakaway
+    if breakaway is not None and findings.loops is not None and UNSTATED not in kinds(breakaway.ratio.status):
+        plates.append(captioned("friction", "breakaway", partial(plot_breakaway, findings)))
     if findings.transition is not None:
-        plates.append(
-            plate(
-                "transition",
-                partial(plot_transition_speed, findings.transition),
-                "From holding to sliding",
-                "The mean friction after a turn against the velocity: it grows with the contact's give, and slides "
-                "from the transition speed on. Bands are 95 % intervals of each way to find that speed.",
-            )
-        )
+        plates.append(captioned("friction", "transition", partial(plot_transition_speed, findings.transition)))
     events = findings.sticks.events if findings.sticks is not None else ()
     if any(event.kind == "microslip" for event in events):
-        plates.append(
-            plate(
-                "micro-slips",
-                partial(plot_micro_slips, findings),
-                "Inside one stick",
-                "The mass rings on its contact when it comes to rest, and slips a little again where the ring is "
-                "more than the contact bears.",
-            )
-        )
+        plates.append(captioned("friction", "micro-slips", partial(plot_micro_slips, findings)))
     compared = findings.comparison
     if compared is not None and (_is_fused(findings) or compared.unlike):
-        plates.append(
-            plate(
-                "force-comparison",
-                partial(plot_force_comparison, compared),
-                "The force felt and the force computed",
-                "Both forces over time, their size in each band, and their ratio: above the frequency up to which "
-                "they agree, the mounts of the sensors swing.",
-            )
-        )
+        plates.append(captioned("friction", "force-comparison", partial(plot_force_comparison, compared)))
     if findings.trial is not None:
-        plates.append(
-            plate(
-                "twin",
-                partial(plot_twin, findings.trial, record=close_up(findings)),
-                "The record and its twin",
-                "Above the displacement as measured and as the rig believed in moves; below what is left. Where that "
-                "is more than noise, the rig is not of this kind.",
-            )
-        )
+        draw = partial(plot_twin, findings.trial, record=close_up(findings))
+        plates.append(captioned("friction", "twin", draw))
     if findings.consistency is not None and findings.consistency.failed:
-        plates.append(
-            plate(
-                "consistency",
-                partial(plot_consistency, findings.consistency),
-                "What can not all be true",
-                "Two sides of each check, and how far they are apart; to the right of the dotted line they can not "
-                "be one. The sentences are above.",
-            )
-        )
+        plates.append(captioned("friction", "consistency", partial(plot_consistency, findings.consistency)))
     return plates
 
 
@@ -220,37 +129,13 @@ def _is_fused(findings: Findings) -> bool:
     return findings.settings.get("differentiation") in FUSIONS
 
 
-def _how_it_adds_up(findings: Findings) -> str:
-    """What the terms of the balance have to do with the friction that is drawn."""
-    if _is_fused(findings):
-        return (
-            "The other terms are as the sensors read them, with their noise and the ring of their mounts; the friction "
-            "is the likeliest one by all sensors together, and not their sum sample by sample."
-        )
-    return "At every moment the other terms add up to the friction."
-
-
 def plates_together(comparison: Comparison) -> list[Plate]:
     """The figures of several records."""
     plates = []
     if comparison.coefficient is not None:
-        plates.append(
-            plate(
-                "friction-load",
-                partial(plot_load_dependence, comparison),
-                "Friction against normal load",
-                "Points on a line through the origin mean one coefficient of friction for all records.",
-            )
-        )
+        plates.append(captioned("friction", "friction-load", partial(plot_load_dependence, comparison)))
     if any(findings.level is not None for findings in comparison.findings):
-        plates.append(
-            plate(
-                "levels",
-                partial(plot_levels, comparison),
-                "Friction of each record",
-                "The sliding friction found in each record, with its 95 % interval.",
-            )
-        )
+        plates.append(captioned("friction", "levels", partial(plot_levels, comparison)))
     return plates
 
 
@@ -289,12 +174,12 @@ LEAST, MOST = 0.1, 1e3  # standard deviations between which the bars are drawn
 
 
 @styled
-def plot_consistency(found: Consistency, *, ax: Axes | None = None) -> Axes:
+def plot_consistency(consistency: Consistency, *, ax: Axes | None = None) -> Axes:
     """How far are the two sides of each check apart? In standard deviations; from three on they are not one.
 
     Parameters
     ----------
-    found : Consistency
+    consistency : Consistency
         From :func:`~stickslip.consistent.consistency`.
     ax : Axes, optional
         Where to draw.
@@ -311,23 +196,15 @@ def plot_consistency(found: Consistency, *, ax: Axes | None = None) -> Axes:
     >>> [label.get_text() for label in plot_consistency(ss.consistent.consistency(row)).get_yticklabels()][0]
     'energy'
     """
-    checks = found.checks
+    checks = consistency.checks
     ax = axes_of(ax, height=0.8 + 0.26 * len(checks))
     for place, check in enumerate(checks):
         apart = check.discrepancy if not math.isnan(check.discrepancy) else 0.0
-        colour, told = COLOURS[check.verdict], check.verdict != "can not be told"
-        ax.barh(place, min(max(apart, 1.2 * LEAST), MOST) if told else 0.0, color=colour, height=0.6)
-        words = check.verdict if told else "can not be told"
-        ax.annotate(
-            words,
-            (1.0, place),
-            xycoords=("axes fraction", "data"),
-            xytext=(4, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=7,
-            color=colour if check.verdict == "fails" else INK,
-        )
+        known, colour = check.verdict != "can not be told", COLOURS[check.verdict]
+        ax.barh(place, min(max(apart, 1.2 * LEAST), MOST) if known else 0.0, color=colour, height=0.6)
+        ink: Any = {"fontsize": 7, "color": colour if check.verdict == "fails" else INK}
+        at: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
+        ax.annotate(check.verdict, (1.0, place), xytext=(4, 0), va="center", **at, **ink)
     ax.axvline(APART, color=INK, linewidth=1.0, linestyle=":")
     ax.set(xscale="log", xlim=(LEAST, MOST), xlabel="standard deviations apart")
     ax.xaxis.set_major_formatter("{x:g}")
@@ -352,23 +229,8 @@ def plot_levels(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
     """
-    rows = [(findings.name, findings.level) for findings in comparison.findings if findings.level is not None]
-    ax = axes_of(ax, height=1.2 + 0.32 * len(rows))
-    values = np.array([level.value for _, level in rows])
-    ends = np.array([level.interval for _, level in rows])
-    factor, unit = prefixed(values, rows[0][1].unit)
-    places = np.arange(len(rows))
-    ax.errorbar(
-        factor * values,
-        places,
-        xerr=factor * np.abs(ends - values[:, None]).T,
-        fmt="o",
-        color=BLUE,
-        capsize=3,
-        markersize=5,
-    )
-    ax.set_yticks(places, [name if len(name) < 44 else f"{name[:41]}..." for name, _ in rows])
-    ax.set_ylim(len(rows) - 0.4, -0.6)
+    levels = {findings.name: findings.level for findings in comparison.findings if findings.level is not None}
+    ax, _, unit = named_intervals(list(levels), list(levels.values()), ax=ax)
     ax.set(xlabel=axis_label("sliding friction, 95 %", unit))
     ax.set_xlim(left=0)
     return ax
@@ -397,33 +259,13 @@ def plot_load_dependence(comparison: Comparison, *, ax: Axes | None = None) -> A
     x_factor, x_unit = prefixed(loads, "N")
     y_factor, y_unit = prefixed(values, "N")
     if comparison.coefficient is not None:
-        reach = np.array([0.0, 1.1 * loads.max()])
-        low, high = comparison.coefficient.interval
-        ax.fill_between(
-            x_factor * reach,
-            y_factor * low * reach,
-            y_factor * high * reach,
-            color=ORANGE,
-            alpha=0.18,
-            linewidth=0,
-            label="95 % band",
-        )
-        ax.plot(
-            x_factor * reach,
-            y_factor * comparison.coefficient.value * reach,
-            color=ORANGE,
-            label=f"friction = {comparison.coefficient.value:.3g} × normal load",
-        )
-    ax.errorbar(
-        x_factor * loads,
-        y_factor * values,
-        yerr=y_factor * np.abs(ends - values[:, None]).T,
-        fmt="o",
-        color=INK,
-        capsize=3,
-        markersize=5,
-        label="records, 95 %",
-    )
+        reach, value = np.array([0.0, 1.1 * loads.max()]), comparison.coefficient.value
+        low, high = (y_factor * end * reach for end in comparison.coefficient.interval)
+        ax.fill_between(x_factor * reach, low, high, color=ORANGE, alpha=0.18, linewidth=0, label="95 % band")
+        label = f"friction = {value:.3g} × normal load"
+        ax.plot(x_factor * reach, y_factor * value * reach, color=ORANGE, label=label)
+    away = y_factor * np.abs(ends - values[:, None]).T
+    ax.errorbar(x_factor * loads, y_factor * values, yerr=away, color=INK, label="records, 95 %", **BARS)
     ax.set(xlabel=axis_label("normal load", x_unit), ylabel=axis_label("sliding friction", y_unit))
     ax.set_xlim(left=0)
     ax.set_ylim(0, 1.4 * y_factor * float(ends.max()))

@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
 from stickslip.law.which_law import LawComparison
-from stickslip.plot.plate import Plate, plate
+from stickslip.plot.plate import Plate, captioned
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -22,6 +22,7 @@ from stickslip.plot.style import (
     axes_of,
     axis_label,
     envelope,
+    legend_above,
     new_figure,
     prefixed,
     styled,
@@ -55,31 +56,31 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
     """
-    from matplotlib.ticker import FuncFormatter, NullFormatter
+    from matplotlib.ticker import NullFormatter
 
-    told = [each.standing for each in comparison.candidates]
-    ax, places = axes_of(ax, height=1.3 + 0.32 * len(told)), np.arange(len(told))
-    for kept, colour, words in ((True, BLUE, "not rejected"), (False, FAINT, "rejected")):
-        rows = [j for j, each in enumerate(told) if each.kept == kept]
+    standings = [candidate.standing for candidate in comparison.candidates]
+    ax, places = axes_of(ax, height=1.3 + 0.32 * len(standings)), np.arange(len(standings))
+    for kept, colour, label in ((True, BLUE, "not rejected"), (False, FAINT, "rejected")):
+        rows = [j for j, standing in enumerate(standings) if standing.kept == kept]
         if rows:
-            ax.plot([told[j].misfit for j in rows], places[rows], "o", color=colour, markersize=7, label=words)
+            ax.plot([standings[j].misfit for j in rows], places[rows], "o", color=colour, markersize=7, label=label)
     ax.set_xscale("log")
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter(NullFormatter())
-    ax.set_yticks(places, [each.name for each in told])
-    ax.set_ylim(len(told) - 0.4, -0.6)
+    ax.set_yticks(places, [law.name for law in standings])
+    ax.set_ylim(len(standings) - 0.4, -0.6)
     ax.set_xlabel("misfit, over the least that any law leaves")
-    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(ax, columns=2)
     return ax
 
 
 @styled
-def plot_fit(found: LawComparison | LawFit, *, record: int = 0) -> Figure:
+def plot_fit(result: LawComparison | LawFit, *, record: int = 0) -> Figure:
     """What was measured, what the fitted or best law predicts, and what is left, over the first part of a record.
 
     Parameters
     ----------
-    found : LawComparison or LawFit
+    result : LawComparison or LawFit
         What :func:`~stickslip.compare_laws` or :func:`~stickslip.fit_law` returned.
     record : int
         Which of several records, from 0.
@@ -88,8 +89,8 @@ def plot_fit(found: LawComparison | LawFit, *, record: int = 0) -> Figure:
     -------
     Figure
     """
-    fit = found.fit if isinstance(found, LawComparison) else found
-    name_of_law = found.best.name if isinstance(found, LawComparison) else type(fit.law).__name__
+    fit = result.fit if isinstance(result, LawComparison) else result
+    name_of_law = result.best.name if isinstance(result, LawComparison) else type(fit.law).__name__
     traces = fit.traces[record]
     names = list(traces.measured)
     figure, axes = new_figure(len(names) + 1, height=1.6 * len(names) + 1.8)
@@ -97,34 +98,29 @@ def plot_fit(found: LawComparison | LawFit, *, record: int = 0) -> Figure:
     for ax, name, colour in zip(axes, names, COLOURS, strict=False):
         time, measured, fitted = traces.time[name], traces.measured[name], traces.fitted[name]
         near = time <= time[0] + SHOWN
-        words, unit = WORDS.get(name, (name, ""))
+        quantity, unit = WORDS.get(name, (name, ""))
         factor, unit = prefixed(measured[near] - measured[near].mean(), unit)
         ax.plot(*envelope(time[near], factor * measured[near]), color=INK, linewidth=1.4, label="measured")
-        ax.plot(
-            *envelope(time[near], factor * fitted[near]),
-            color=ORANGE,
-            linewidth=1.0,
-            linestyle="--",
-            label=f"fitted: {name_of_law}",
-        )
-        ax.set_ylabel(axis_label(words, unit, "\n"))
+        label = f"fitted: {name_of_law}"
+        ax.plot(*envelope(time[near], factor * fitted[near]), color=ORANGE, linewidth=1.0, linestyle="--", label=label)
+        ax.set_ylabel(axis_label(quantity, unit, "\n"))
         left = (measured - fitted)[near] / fit.noise[name]
-        below.plot(*envelope(time[near], left), color=colour, linewidth=0.8, label=words)
-    axes[0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+        below.plot(*envelope(time[near], left), color=colour, linewidth=0.8, label=quantity)
+    legend_above(axes[0], columns=2)
     below.axhline(0, color=FAINT, linewidth=0.8)
     below.set(xlabel="time [s]", ylabel="left over,\ntimes the noise")
-    below.legend(ncols=len(names), loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0.1)
+    legend_above(below, columns=len(names), borderaxespad=0.1)
     figure.align_ylabels(list(axes))
     return figure
 
 
 @styled
-def plot_curve(found: CurveFit, *, ax: Axes | None = None) -> Axes:
+def plot_curve(fit: CurveFit, *, ax: Axes | None = None) -> Axes:
     """A measured friction and the fitted curve.
 
     Parameters
     ----------
-    found : CurveFit
+    fit : CurveFit
         What :func:`~stickslip.fit_curve` returned.
     ax : Axes, optional
         Where to draw.
@@ -134,45 +130,31 @@ def plot_curve(found: CurveFit, *, ax: Axes | None = None) -> Axes:
     Axes
     """
     ax = axes_of(ax)
-    words, unit = ALONG[found.along]
-    factor, unit = prefixed(found.at, unit)
-    order = np.argsort(found.at, kind="stable") if found.along == "v" else np.arange(len(found.at))
-    force, force_unit = prefixed(found.measured, found.unit)
-    ax.plot(
-        factor * found.at, force * found.measured, ".", color=FAINT, markersize=2, label="measured", rasterized=True
-    )
-    at, fitted = factor * found.at[order], force * found.fitted[order]
-    if found.along == "v" and at[0] < 0 < at[-1]:  # the curve of neither direction goes through zero
+    label, unit = ALONG[fit.along]
+    factor, unit = prefixed(fit.at, unit)
+    order = np.argsort(fit.at, kind="stable") if fit.along == "v" else np.arange(len(fit.at))
+    force, force_unit = prefixed(fit.measured, fit.unit)
+    ax.plot(factor * fit.at, force * fit.measured, ".", color=FAINT, markersize=2, label="measured", rasterized=True)
+    at, fitted = factor * fit.at[order], force * fit.fitted[order]
+    if fit.along == "v" and at[0] < 0 < at[-1]:  # the curve of neither direction goes through zero
         middle = int(np.searchsorted(at, 0.0))
         at, fitted = np.insert(at, middle, 0.0), np.insert(fitted, middle, np.nan)
-    ax.plot(at, fitted, color=ORANGE, linewidth=1.4, label=f"fitted: {found.curve}")
-    said = "coefficient of friction" if found.unit == "1" else "friction"
-    ax.set(xlabel=axis_label(words, unit), ylabel=axis_label(said, force_unit))
-    ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    ax.plot(at, fitted, color=ORANGE, linewidth=1.4, label=f"fitted: {fit.curve}")
+    quantity = "coefficient of friction" if fit.unit == "1" else "friction"
+    ax.set(xlabel=axis_label(label, unit), ylabel=axis_label(quantity, force_unit))
+    legend_above(ax, columns=2)
     return ax
 
 
 def law_plates(result: LawComparison | LawFit | CurveFit) -> list[Plate]:
     """The figures of a fit, in reading order."""
     if isinstance(result, CurveFit):
-        return [
-            plate(
-                "curve",
-                partial(plot_curve, result),
-                "Measured and fitted",
-                "The curve over all samples that were used.",
-            )
-        ]
-    told = (
-        "Mean square of what a law leaves over the least that any law leaves, the mean over channels and records. "
-        "Diamonds: each record predicted by a fit to the others, over what the best law leaves so."
-    )
+        return [captioned("law", "curve", partial(plot_curve, result))]
     plates = []
     if isinstance(result, LawComparison) and len(result.candidates) > 1:
-        plates.append(plate("laws", partial(plot_laws, result), "How the laws stand", told))
+        plates.append(captioned("law", "laws", partial(plot_laws, result)))
     count = len(result.fit.traces if isinstance(result, LawComparison) else result.traces)
     for record in range(count):
-        title = "Measured and fitted" + (f", record {record + 1} of {count}" if count > 1 else "")
-        words = "Top: each sensor, and what it would have read of the fitted law. Bottom: what is left between them."
-        plates.append(plate(f"fit-{record + 1}", partial(plot_fit, result, record=record), title, words))
+        draw, of = partial(plot_fit, result, record=record), f", record {record + 1} of {count}" if count > 1 else ""
+        plates.append(captioned("law", "fit", draw, name=f"fit-{record + 1}", of=of))
     return plates

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from stickslip.plot.style import (
     SHADE,
     SKY,
     axis_label,
+    coloured,
     legend_above,
     new_figure,
     prefixed,
@@ -67,11 +68,11 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
     sizes = np.concatenate([branches.amplitudes(way) for way in ("up", "down")])
     factor, unit = prefixed(sizes, "m")
     looks = {"up": (BLUE, ">", "going up", 5), "down": (ORANGE, "<", "going down", 8)}
-    for way, (colour, marker, words, size) in reversed(looks.items()):
+    for way, (colour, marker, text, size) in reversed(looks.items()):
         cycles = branches.up if way == "up" else branches.down
         face = colour if way == "up" else "none"
         style = {"color": colour, "marker": marker, "markersize": size, "markerfacecolor": face, "linewidth": 1.0}
-        top.plot(branches.values, factor * branches.amplitudes(way), label=words, **style)
+        top.plot(branches.values, factor * branches.amplitudes(way), label=text, **style)
         frequencies = [cycle.frequency if cycle.vibrates else np.nan for cycle in cycles]
         middle.plot(branches.values, frequencies, **style)
     separating = branches.amplitudes("between")
@@ -86,8 +87,8 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
     if branches.threshold is not None:
         for axes in (top, middle, below):
             axes.axvline(branches.threshold.value, color=INK, linewidth=0.9, linestyle="--")
-        words = f"sliding ceases to be stable at {branches.threshold.value:.4g}"
-        top.plot([], [], color=INK, linewidth=0.9, linestyle="--", label=words)
+        text = f"sliding ceases to be stable at {branches.threshold.value:.4g}"
+        top.plot([], [], color=INK, linewidth=0.9, linestyle="--", label=text)
     if branches.both is not None and branches.both[0] < branches.both[1]:
         top.axvspan(*branches.both, color=SHADE, alpha=0.5, linewidth=0, label="either may last")
     top.set_ylabel(axis_label("amplitude of sliding", unit))
@@ -145,18 +146,8 @@ def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = No
     known = list(COLOURS)
     places = np.vectorize(known.index)(stability.mechanism.values)
     y, x = (stability[name].values for name in names)
-    axes.pcolormesh(
-        x,
-        y,
-        places,
-        cmap=ListedColormap(list(COLOURS.values())),
-        vmin=-0.5,
-        vmax=len(known) - 0.5,
-        alpha=FILLED,
-        shading="nearest",
-        linewidth=0,
-        rasterized=True,
-    )
+    options: Any = {"cmap": ListedColormap(list(COLOURS.values())), "vmin": -0.5, "vmax": len(known) - 0.5}
+    coloured(axes, x, y, places, alpha=FILLED, **options)
     growth = stability.growth.values
     if growth.min() < 0 < growth.max():
         axes.contour(x, y, growth, levels=[0.0], colors=INK, linewidths=1.2)

@@ -10,18 +10,31 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.consistent.sliding_balance import Slider
+from stickslip.drives.kinds import HarmonicBase, HarmonicForce
 from stickslip.errors import ModelError
+from stickslip.laws.coulomb import Coulomb
 from stickslip.maps.measures import UNKNOWN
 from stickslip.oscillator import Oscillator
 from stickslip.plot.plate import Plate, plate
-from stickslip.plot.style import BLUE, INK, ORANGE, Array, axes_of, axis_label, plain_decades, prefixed, styled
+from stickslip.plot.style import (
+    BLUE,
+    INK,
+    ORANGE,
+    Array,
+    axes_of,
+    axis_label,
+    coloured,
+    plain_decades,
+    prefixed,
+    styled,
+)
 from stickslip.solve.tables import System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 RISING = "cividis"
-FEW = 16  # values of a count that are told apart by colour
+FEW = 16  # values of a count that are handles apart by colour
 MOSTLY = 0.95  # of the points have whole numbers of a count: on a border they may not
 WIDE, SPAN = 100.0, 1e4  # a range this wide is drawn by its logarithm, and as much of it
 
@@ -60,7 +73,7 @@ def plot_map(atlas: Any, *, variable: str | None = None, system: System | None =
     >>> plot_map(atlas, system=slider).get_xlabel()
     'frequency [Hz]'
     """
-    values, words, unit = _shown(atlas, variable)
+    values, quantity, unit = _shown(atlas, variable)
     if values.ndim not in (1, 2):
         raise ModelError(
             f"a map over {', '.join(values.dims)}", "one or two dimensions can be drawn", "choose with sel()"
@@ -79,22 +92,22 @@ def plot_map(atlas: Any, *, variable: str | None = None, system: System | None =
         if named:
             ax.set_yticks(list(named), list(named.values()))
         ax.set_xlabel(label)
-        ax.set_ylabel(axis_label(words, spelled))
+        ax.set_ylabel(axis_label(quantity, spelled))
         return ax
     up, lift, upward = _axis(atlas, values.dims[1])
-    _colour(ax, across, up, factor * values.values.T, axis_label(words, spelled), named)
+    _colour(ax, across, up, factor * values.values.T, axis_label(quantity, spelled), named)
     curve = None if system is None else den_hartog(system, values.dims, across / scale)
-    told: list[Any] = []
+    handles: list[Any] = []
     if curve is not None:
-        told += ax.plot(across, lift * curve, color=ORANGE, linewidth=1.8, label="Den Hartog (1931): no stops below")
+        handles += ax.plot(across, lift * curve, color=ORANGE, linewidth=1.8, label="Den Hartog (1931): no stops below")
         ax.set_ylim(up[0], up[-1])
     white = _white(atlas, values)
     if white:
         from matplotlib.patches import Patch
 
-        told.append(Patch(facecolor="white", edgecolor=INK, linewidth=0.6, label=white))
-    if told:
-        ax.legend(handles=told, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
+        handles.append(Patch(facecolor="white", edgecolor=INK, linewidth=0.6, label=white))
+    if handles:
+        ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
     ax.set_xlabel(label)
     ax.set_ylabel(upward)
     return ax
@@ -116,15 +129,14 @@ def _shown(atlas: Any, variable: str | None) -> tuple[Any, str, str]:
 def _white(atlas: Any, values: Any) -> str:
     """What the points without a number are; nothing where there are none."""
     unknown = ~np.isfinite(values.values)
-    many = int(np.sum(unknown))
-    if not many:
+    if not unknown.any():
         return ""
     status = atlas.get("status")
     became = {} if status is None else _outcomes(status.where(unknown, -2).astype(int).assign_attrs(status.attrs))
     lost = [word for word in became.values() if word not in ("moving", "at rest")]
     reason = atlas[values.name].attrs.get(UNKNOWN) if values.name in atlas else None
     why = " or ".join([*lost, *([reason] if reason and len(lost) < len(became) else [])])
-    return f"white: no number at {many} of {unknown.size} points{why and f' ({why})'}"
+    return f"white: no number at {np.sum(unknown)} of {unknown.size} points{why and f' ({why})'}"
 
 
 def _axis(atlas: Any, dim: str) -> tuple[Array, float, str]:
@@ -142,16 +154,16 @@ def plates_of(atlas: Any, system: System | None = None) -> tuple[Plate, ...]:
     own = [str(name) for name in atlas.data_vars if name not in {"status", *counts}]
     drawn = {**({"stops": None} if len(counts) == 2 else {}), **{name: name for name in own}}
     cycles, settle = (atlas.attrs.get(name, "some") for name in ("cycles", "settle"))
-    said = f"Each point is a motion of its own, measured over {cycles} periods after {settle} in which it settles."
+    caption = f"Each point is a motion of its own, measured over {cycles} periods after {settle} in which it settles."
     plates = []
     for name, variable in (drawn or {"status": "status"}).items():
-        ax, (values, words, _) = plot_map(atlas, variable=variable, system=system), _shown(atlas, variable)
+        ax, (values, label, _) = plot_map(atlas, variable=variable, system=system), _shown(atlas, variable)
         line = (
             " Line: Den Hartog's boundary, below which sliding does not stop." if ax.get_legend() and ax.lines else ""
         )
         white = _white(atlas, values)
         left = f" {white[0].upper()}{white[1:]}." if white else ""
-        plates.append(plate(name, partial(_itself, ax), f"{words[0].upper()}{words[1:]}", said + line + left))
+        plates.append(plate(name, partial(_itself, ax), f"{label[0].upper()}{label[1:]}", caption + line + left))
     return tuple(plates)
 
 
@@ -161,8 +173,8 @@ def _itself(drawn: Axes) -> Axes:
 
 def _outcomes(values: Any) -> dict[int, str]:
     """What the numbers of a status mean, of those that are there; nothing for other variables."""
-    codes, words = values.attrs.get("flag_values", ()), values.attrs.get("flag_meanings", "").split()
-    named = {int(code): word.replace("_", " ") for code, word in zip(codes, words, strict=True)}
+    codes, meanings = values.attrs.get("flag_values", ()), values.attrs.get("flag_meanings", "").split()
+    named = {int(code): word.replace("_", " ") for code, word in zip(codes, meanings, strict=True)}
     return {code: named[code] for code in np.unique(values.values).tolist() if code in named}
 
 
@@ -174,7 +186,7 @@ def _steps(values: Array) -> Array:
     return whole if counted else whole[:0]
 
 
-def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str, named: dict[int, str]) -> None:
+def _colour(ax: Axes, across: Array, up: Array, values: Array, label: str, named: dict[int, str]) -> None:
     """The map in colour; a count of few values in steps, which may have names."""
     import matplotlib as mpl
     from matplotlib.colors import BoundaryNorm, LogNorm
@@ -187,11 +199,8 @@ def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str, named
         options = {"cmap": mpl.colormaps[RISING].resampled(len(whole)), "norm": BoundaryNorm(edges, len(whole))}
     elif len(known) and np.min(known) > 0 and np.max(known) > WIDE * np.min(known):
         options["norm"] = LogNorm(max(np.min(known), np.max(known) / SPAN), np.max(known))
-    drawn = ax.pcolormesh(
-        across, up, np.ma.masked_invalid(values), shading="nearest", rasterized=True, linewidth=0, **options
-    )
-    ax.grid(visible=False)
-    bar = ax.figure.colorbar(drawn, ax=ax, label=words)
+    drawn = coloured(ax, across, up, np.ma.masked_invalid(values), **options)
+    bar = ax.figure.colorbar(drawn, ax=ax, label=label)
     if isinstance(options.get("norm"), LogNorm):
         plain_decades(bar.ax.yaxis)
     if isinstance(options.get("norm"), BoundaryNorm):
@@ -200,16 +209,15 @@ def _colour(ax: Axes, across: Array, up: Array, values: Array, words: str, named
     bar.outline.set_edgecolor(INK)
 
 
-def den_hartog(system: System, dims: tuple[str, ...], frequencies: Array) -> Array | None:
+def den_hartog(system: System, names: tuple[str | None, ...], frequencies: Array) -> Array | None:
     """The friction above which rigid sliding stops on its way [N], over frequencies; None where it does not apply."""
-    if dims != ("frequency", "kinetic") or not isinstance(system, Oscillator):
+    if names != ("frequency", "kinetic") or not isinstance(system, Oscillator):
         return None
     law, drive = system.law, system.drive
-    rigid = type(law).__name__ == "Coulomb" and getattr(law, "static", None) in (None, getattr(law, "kinetic", None))
+    rigid = isinstance(law, Coulomb) and law.static in (None, law.kinetic)
     grounded = getattr(drive, "contact", "ground") == "ground" and system.damper == "ground"
-    factors = {"HarmonicForce": 1.0, "HarmonicBase": system.stiffness}
-    if not (rigid and grounded and type(drive).__name__ in factors):
+    if not (rigid and grounded and isinstance(drive, HarmonicForce | HarmonicBase)):
         return None
-    force = float(getattr(drive, "amplitude", math.nan)) * factors[type(drive).__name__]
+    force = drive.amplitude * (system.stiffness if isinstance(drive, HarmonicBase) else 1.0)
     sliders = [Slider(system.mass, system.stiffness, 2 * math.pi * f, system.damping) for f in frequencies]
     return np.array([force * slider.boundary() for slider in sliders])

@@ -12,8 +12,9 @@ import numpy as np
 
 from stickslip.estimate import decimals
 from stickslip.plot.contact import plot_displacement_loop, plot_velocity_loop
-from stickslip.plot.plate import Plate, plate
+from stickslip.plot.plate import Plate, captioned
 from stickslip.plot.style import (
+    BARS,
     BLUE,
     FAINT,
     GREEN,
@@ -22,12 +23,15 @@ from stickslip.plot.style import (
     PURPLE,
     Array,
     axis_label,
+    coloured,
     empty_figure,
     envelope,
     legend_above,
     new_figure,
     prefixed,
+    shortened,
     spelled,
+    strongest,
     styled,
 )
 from stickslip.squeak.bursts import ForcedMotion
@@ -36,8 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from stickslip.answers.squeak_comparison import SqueakComparison
-    from stickslip.answers.squeaks import SqueakFindings
+    from stickslip.answers.findings import Comparison, Findings
     from stickslip.record.record import Record
     from stickslip.squeak.bursts import Squeak, Squeaks
     from stickslip.squeak.spectra import BurstSpectra
@@ -65,12 +68,12 @@ MOST_ROWS = 6
 
 
 @styled
-def plot_squeaks(found: Squeaks) -> Figure:
+def plot_squeaks(squeaks: Squeaks) -> Figure:
     """The sound over time with its bursts shaded, and its spectrogram with their dominant frequencies.
 
     Parameters
     ----------
-    found : Squeaks
+    squeaks : Squeaks
         What :func:`~stickslip.find_squeaks` returned.
 
     Returns
@@ -88,26 +91,18 @@ def plot_squeaks(found: Squeaks) -> Figure:
     """
     from matplotlib.patches import Patch
 
-    record, name = found.record, found.channel
+    record, name = squeaks.record, squeaks.channel
     figure, (above, below) = new_figure(2, height=4.8, heights=(1, 2.2))
     _trace(above, record, name)
-    drawn = _spectrogram(below, found)
-    numbered = len(found.bursts) <= MOST_NUMBERS
-    for number, burst in enumerate(found.bursts):
+    drawn = _spectrogram(below, squeaks)
+    numbered = len(squeaks.bursts) <= MOST_NUMBERS
+    for number, burst in enumerate(squeaks.bursts):
         above.axvspan(burst.start, burst.end, color=COLOURS[burst.kind], alpha=0.22, linewidth=0)
         if numbered:
-            middle = (burst.start + burst.end) / 2
-            above.annotate(
-                f"{number + 1}",
-                (middle, 1),
-                xycoords=("data", "axes fraction"),
-                xytext=(0, 1),
-                ha="center",
-                textcoords="offset points",
-                fontsize=7,
-            )
+            at: Any = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": "center"}
+            above.annotate(f"{number + 1}", ((burst.start + burst.end) / 2, 1), xytext=(0, 1), fontsize=7, **at)
         _frame(below, burst)
-    kinds = dict.fromkeys(burst.kind for burst in found.bursts)
+    kinds = dict.fromkeys(burst.kind for burst in squeaks.bursts)
     if kinds:
         handles = [Patch(color=COLOURS[kind], alpha=0.4, label=kind) for kind in kinds]
         figure.legend(handles=handles, ncols=len(handles), loc="outside upper left")
@@ -137,7 +132,7 @@ def plot_burst_spectra(spectra: BurstSpectra, *, channel: str, record: Record) -
     -------
     Figure
     """
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+    from matplotlib.ticker import LogLocator, NullLocator
 
     names = list(spectra.inside)
     figure, axes = _panels(len(names))
@@ -149,10 +144,10 @@ def plot_burst_spectra(spectra: BurstSpectra, *, channel: str, record: Record) -
         ax.semilogy(shown, spectra.inside[name][1:last], color=ORANGE, label="in the bursts")
         unit = spelled(record.channels[name].unit)
         ax.yaxis.set_major_locator(LogLocator(numticks=5))
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ax.yaxis.set_major_formatter("{x:g}")
         ax.yaxis.set_minor_locator(NullLocator())
         power = "1/Hz" if unit == "1" else f"({unit})²/Hz" if "/" in unit else f"{unit}²/Hz"
-        ax.set_ylabel(f"{_words(record, name)}\n[{power}]")
+        ax.set_ylabel(f"{_quantity(record, name)}\n[{power}]")
     legend_above(axes[0], columns=2)
     axes[-1].set(xlabel="frequency [Hz]", xlim=(0, float(spectra.frequency[last - 1])))
     figure.align_ylabels(axes)
@@ -188,7 +183,7 @@ def plot_coherence(spectra: BurstSpectra, *, channel: str, record: Record) -> Fi
         if pair in spectra.coherence_outside:
             ax.axhline(spectra.significant_outside, color=BLUE, linestyle=":", linewidth=0.9)
         other = pair[0] if pair[1] == channel else pair[1]
-        ax.set(ylim=(0, 1.02), ylabel=_words(record, other))
+        ax.set(ylim=(0, 1.02), ylabel=_quantity(record, other))
     legend_above(axes[0], columns=2)
     axes[-1].set(xlabel="frequency [Hz]", xlim=(0, float(shown[-1])))
     figure.align_ylabels(axes)
@@ -196,35 +191,32 @@ def plot_coherence(spectra: BurstSpectra, *, channel: str, record: Record) -> Fi
 
 
 @styled
-def plot_forcing_cycle(found: Squeaks) -> Figure:
+def plot_forcing_cycle(squeaks: Squeaks) -> Figure:
     """Where in the forcing cycle, and at which sliding velocity, the bursts come.
 
     Parameters
     ----------
-    found : Squeaks
+    squeaks : Squeaks
         Of a record with the forced motion.
 
     Returns
     -------
     Figure
     """
-    record, motion = found.record, ForcedMotion.of(found.record)
+    record, motion = squeaks.record, ForcedMotion.of(squeaks.record)
     assert motion.velocity is not None
     assert motion.phase is not None
     factor, unit = prefixed(motion.velocity, "m/s")
     figure, (above, below) = new_figure(2, height=4.2, heights=[1.4, 1])
     bins = np.linspace(0, 1, PHASES + 1)
     place = np.clip(np.digitize(motion.phase, bins) - 1, 0, PHASES - 1)
-    middle = [float(np.median(motion.velocity[place == each])) for each in np.unique(place)]
-    above.plot(
-        (bins[1:] + bins[:-1])[np.unique(place)] / 2,
-        factor * np.array(middle),
-        color=INK,
-        label="sliding velocity, median of the cycles",
-    )
+    filled = np.unique(place)
+    middle = factor * np.array([float(np.median(motion.velocity[place == phase])) for phase in filled])
+    label = "sliding velocity, median of the cycles"
+    above.plot((bins[1:] + bins[:-1])[filled] / 2, middle, color=INK, label=label)
     above.axhline(0, color=FAINT, linewidth=0.8)
-    thick = max(1.0, min(5.0, 100 / len(found.bursts)))
-    for number, burst in enumerate(found.bursts):
+    thick = max(1.0, min(5.0, 100 / len(squeaks.bursts)))
+    for number, burst in enumerate(squeaks.bursts):
         colour = COLOURS[burst.kind]
         above.plot(burst.phase, factor * burst.speed, "o", color=colour, markersize=4.5)
         for ends, wide in (((burst.start, burst.end), 0.3), (burst.loud, 1.0)):
@@ -236,19 +228,19 @@ def plot_forcing_cycle(found: Squeaks) -> Figure:
     legend_above(above)
     above.set_ylabel(axis_label("velocity", unit))
     below.set(xlabel="phase of the forcing cycle, 0 at the largest displacement", ylabel="burst", xlim=(0, 1))
-    below.set_ylim(len(found.bursts) + 0.7, 0.3)
+    below.set_ylim(len(squeaks.bursts) + 0.7, 0.3)
     below.yaxis.get_major_locator().set_params(integer=True)
     figure.align_ylabels([above, below])
     return figure
 
 
 @styled
-def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
+def plot_burst(findings: Findings, *, burst: Squeak) -> Figure:
     """Every channel about one burst.
 
     Parameters
     ----------
-    found : SqueakFindings
+    findings : Findings
         What :func:`~stickslip.analyze_squeaks` returned.
     burst : Squeak
         Which one.
@@ -258,8 +250,8 @@ def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
     Figure
     """
     around = min(0.5 * burst.duration, 0.1)
-    part = found.record.between(burst.start - around, burst.end + around)
-    names = [name for name in TRACED if name in part] or [found.squeaks.channel]
+    part = findings.record.between(burst.start - around, burst.end + around)
+    names = [name for name in TRACED if name in part] or [findings.squeaks.channel]
     figure, axes = _panels(len(names))
     for ax, name in zip(axes, names, strict=True):
         _trace(ax, part, name)
@@ -270,14 +262,14 @@ def plot_burst(found: SqueakFindings, *, burst: Squeak) -> Figure:
 
 
 @styled
-def plot_conditions(comparison: SqueakComparison) -> Figure:
+def plot_conditions(comparison: Comparison) -> Figure:
     """Friction and its slope against speed in each condition, with their 95 % intervals; where it squeaks is orange.
 
     Grey where that can not be told. Both over the load, where it is known in every condition.
 
     Parameters
     ----------
-    comparison : SqueakComparison
+    comparison : Comparison
         What :func:`~stickslip.answers.compare_squeaks` returned, friction in one condition at least.
 
     Returns
@@ -285,42 +277,39 @@ def plot_conditions(comparison: SqueakComparison) -> Figure:
     Figure
     """
 
-    conditions = [each for each in comparison.conditions if each.level is not None]
+    conditions = [condition for condition in comparison.conditions if condition.level is not None]
     figure = empty_figure(1.5 + 0.34 * len(conditions))
     left, right = figure.subplots(1, 2, sharey=True)
-    over_load = all(each.coefficient is not None for each in conditions)
+    over_load = all(condition.coefficient is not None for condition in conditions)
     drawn = (
         (("coefficient", "friction coefficient"), ("slope_of_coefficient", "its slope against speed"))
         if over_load
         else (("level", "sliding friction"), ("slope", "its slope against speed"))
     )
-    for ax, (name, words) in zip((left, right), drawn, strict=True):
-        estimates = [getattr(each, name) for each in conditions]
-        unit = estimates[0].unit
-        for place, (each, estimate) in enumerate(zip(conditions, estimates, strict=True)):
+    for ax, (name, label) in zip((left, right), drawn, strict=True):
+        for place, condition in enumerate(conditions):
+            estimate = getattr(condition, name)
             away = np.abs(np.array(estimate.interval)[:, None] - estimate.value)
-            colour, marker = MARKS[each.answer]
-            ax.errorbar(
-                estimate.value, place, xerr=away, fmt=marker, color=colour, capsize=3, markersize=5, label=each.answer
-            )
+            colour, marker = MARKS[condition.answer]
+            look = {**BARS, "fmt": marker, "color": colour, "label": condition.answer}
+            ax.errorbar(estimate.value, place, xerr=away, **look)
         ax.axvline(0, color=INK, linewidth=0.8)
-        ax.set_xlabel(axis_label(f"{words}, 95 %", unit, between="\n"))
-    left.set_yticks(range(len(conditions)), [_short(each.name) for each in conditions])
+        ax.set_xlabel(axis_label(f"{label}, 95 %", getattr(conditions[0], name).unit, between="\n"))
+    left.set_yticks(range(len(conditions)), [shortened(condition.name, 30) for condition in conditions])
     left.set_ylim(len(conditions) - 0.4, -0.6)
-    both: dict[str, Any] = {}
-    for handle, label in zip(*left.get_legend_handles_labels(), strict=True):
-        both.setdefault(label, handle)
+    handles, labels = left.get_legend_handles_labels()
+    both = dict(zip(labels, handles, strict=True))
     figure.legend(both.values(), both.keys(), ncols=2, loc="outside upper left")
     return figure
 
 
 @styled
-def plot_condition_loops(comparison: SqueakComparison) -> Figure:
+def plot_condition_loops(comparison: Comparison) -> Figure:
     """Friction against displacement and velocity, a row for each condition, as the thesis's figures 7.3 and 7.6.
 
     Parameters
     ----------
-    comparison : SqueakComparison
+    comparison : Comparison
         With friction loops in one condition at least; the first six are drawn.
 
     Returns
@@ -328,123 +317,64 @@ def plot_condition_loops(comparison: SqueakComparison) -> Figure:
     Figure
     """
 
-    rows = [each for each in comparison.findings if each.loops is not None][:MOST_ROWS]
+    rows = [findings for findings in comparison.findings if findings.loops is not None][:MOST_ROWS]
     figure = empty_figure(0.4 + 2.1 * len(rows))
     axes = figure.subplots(len(rows), 2, sharey="row", squeeze=False)
-    for (left, right), found in zip(axes, rows, strict=True):
-        assert found.loops is not None
+    for (left, right), condition in zip(axes, rows, strict=True):
+        assert condition.loops is not None
         for ax, draw in ((left, plot_displacement_loop), (right, plot_velocity_loop)):
-            draw(found, ax=ax)
-            legend = ax.get_legend()
-            if legend is not None:
-                legend.remove()
+            draw(condition, ax=ax)
+            ax.get_legend().remove()
         right.set_ylabel("")
-        slope = found.loops.slope
+        slope = condition.loops.slope
         low, high = slope.interval
-        left.set_title(_short(found.name), loc="left")
+        left.set_title(shortened(condition.name, 30), loc="left")
         digits = decimals(slope.spread, slope.value)
-        told = f"{slope.value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f}) {spelled(slope.unit)}"
-        right.set_title(told, loc="right", fontsize=8)
+        text = f"{slope.value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f}) {spelled(slope.unit)}"
+        right.set_title(text, loc="right", fontsize=8)
     return figure
 
 
-def plates_of(found: SqueakFindings) -> list[Plate]:
+def plates_of(findings: Findings) -> list[Plate]:
     """The figures of one record."""
-    squeaks = found.squeaks
-    plates = [
-        plate(
-            "spectrogram",
-            partial(plot_squeaks, squeaks),
-            "When it sounds, and how high",
-            "Above: the signal, its bursts shaded and numbered. Below: how strong each frequency is at each time; "
-            "bright is strong, and a white line is a burst's dominant frequency.",
-        )
-    ]
-    return plates if found.loudest is None else [*plates, *_of_spectra(found), *_of_bursts(found, found.loudest)]
+    plates = [captioned("squeak", "spectrogram", partial(plot_squeaks, findings.squeaks))]
+    if findings.squeaks.loudest is not None:
+        plates += [*_of_spectra(findings), *_of_bursts(findings, findings.squeaks.loudest)]
+    return plates
 
 
-def _of_spectra(found: SqueakFindings) -> list[Plate]:
+def _of_spectra(findings: Findings) -> list[Plate]:
     """What sounds in the bursts, and which frequencies the motions share."""
-    squeaks, plates = found.squeaks, []
-    if found.spectra is not None:
-        plates.append(
-            plate(
-                "spectra",
-                partial(plot_burst_spectra, found.spectra, channel=squeaks.channel, record=found.record),
-                "What sounds in the bursts",
-                f"Power spectra of each channel in {found.spectra.compared}; a peak that stands above the other line "
-                "belongs to the bursts.",
-            )
-        )
-        if found.spectra.coherence:
-            plates.append(
-                plate(
-                    "coherence",
-                    partial(plot_coherence, found.spectra, channel=squeaks.channel, record=found.record),
-                    f"Which frequencies the motions share with the {_words(found.record, squeaks.channel)}",
-                    "Coherence is 1 where two channels move together and 0 where they have nothing to do with each "
-                    "other; what is below the dotted line may be chance.",
-                )
-            )
-    return plates
-
-
-def _of_bursts(found: SqueakFindings, loudest: Squeak) -> list[Plate]:
-    """Where in the cycle it sounds, the loudest burst, and the friction that feeds it."""
-    squeaks, plates = found.squeaks, []
-    if not math.isnan(squeaks.forcing):
-        plates.append(
-            plate(
-                "forcing-cycle",
-                partial(plot_forcing_cycle, squeaks),
-                "Where in the cycle it sounds",
-                "Above: the sliding velocity over the forcing cycle; a mark is the loudest moment of a burst. Below: "
-                "each burst from its beginning to its end, thick where it is within ten decibel of its loudest "
-                "moment.",
-            )
-        )
-    if len(found.record) > 1:
-        plates.append(
-            plate(
-                "burst",
-                partial(plot_burst, found, burst=loudest),
-                f"Burst {squeaks.bursts.index(loudest) + 1}, the loudest",
-                "Every channel about it; shaded from its beginning to its end.",
-            )
-        )
-    if found.loops is not None:
-        plates.append(
-            plate(
-                "friction-velocity",
-                partial(plot_velocity_loop, found),
-                "Friction against velocity",
-                "Friction that falls away from zero velocity feeds a vibration, one that rises damps it. Dotted: the "
-                "sliding friction to either side.",
-            )
-        )
-    return plates
-
-
-def plates_together(comparison: SqueakComparison) -> list[Plate]:
-    """The figures of several records side by side."""
-    if all(each.loops is None for each in comparison.findings):
+    record, spectra, channel = findings.record, findings.spectra, findings.squeaks.channel
+    if spectra is None:
         return []
-    return [
-        plate(
-            "conditions",
-            partial(plot_conditions, comparison),
-            "Friction, and how it changes with speed",
-            "Left: sliding friction, over the load where all loads are known. Right: its slope against speed; left "
-            "of zero it falls with speed.",
-        ),
-        plate(
-            "loops",
-            partial(plot_condition_loops, comparison),
-            "Friction against displacement and velocity",
-            "Each condition in a row, each row with a scale of its own. Grey: cycles; orange: their mean; dots: the "
-            "mean at each velocity. The number is the slope against speed with its 95 % interval.",
-        ),
-    ]
+    draw = partial(plot_burst_spectra, spectra, channel=channel, record=record)
+    plates = [captioned("squeak", "spectra", draw, compared=spectra.compared)]
+    if spectra.coherence:
+        draw = partial(plot_coherence, spectra, channel=channel, record=record)
+        plates.append(captioned("squeak", "coherence", draw, channel=_quantity(record, channel)))
+    return plates
+
+
+def _of_bursts(findings: Findings, loudest: Squeak) -> list[Plate]:
+    """Where in the cycle it sounds, the loudest burst, and the friction that feeds it."""
+    squeaks, plates = findings.squeaks, []
+    if not math.isnan(squeaks.forcing):
+        plates.append(captioned("squeak", "forcing-cycle", partial(plot_forcing_cycle, squeaks)))
+    if len(findings.record) > 1:
+        number = squeaks.bursts.index(loudest) + 1
+        plates.append(captioned("squeak", "burst", partial(plot_burst, findings, burst=loudest), number=number))
+    if findings.loops is not None:
+        plates.append(captioned("squeak", "friction-velocity", partial(plot_velocity_loop, findings)))
+    return plates
+
+
+def plates_together(comparison: Comparison) -> list[Plate]:
+    """The figures of several records side by side."""
+    if all(findings.loops is None for findings in comparison.findings):
+        return []
+    draws = {"conditions": plot_conditions, "loops": plot_condition_loops}
+    return [captioned("squeak", kind, partial(draw, comparison)) for kind, draw in draws.items()]
 
 
 def _panels(count: int) -> tuple[Figure, Any]:
@@ -455,38 +385,25 @@ def _panels(count: int) -> tuple[Figure, Any]:
 def _trace(ax: Axes, record: Record, name: str) -> None:
     factor, unit = prefixed(record[name], record.channels[name].unit)
     ax.plot(*envelope(record.time, factor * record[name]), color=TRACED.get(name, BLUE), linewidth=0.8)
-    ax.set_ylabel(axis_label(_words(record, name), unit, between="\n"))
+    ax.set_ylabel(axis_label(_quantity(record, name), unit, between="\n"))
 
 
-def _spectrogram(ax: Axes, found: Squeaks) -> Any:
+def _spectrogram(ax: Axes, squeaks: Squeaks) -> Any:
     """Power over time and frequency in decibel, the largest of each column's frames."""
     from scipy.signal import stft
 
-    record = found.record
-    values = record[found.channel] - record[found.channel].mean()
+    record = squeaks.record
+    values = record[squeaks.channel] - record[squeaks.channel].mean()
     size = min(len(values), max(64, 2 ** round(math.log2(WINDOW * record.fs))))
     frequencies, times, waves = stft(values, record.fs, nperseg=size, noverlap=size - max(1, size // 8))
     power = np.abs(waves) ** 2
-    width = -(-power.shape[1] // COLUMNS)
-    if width > 1:
-        starts = np.arange(0, power.shape[1], width)
-        power = np.maximum.reduceat(power, starts, axis=1)
-        times = times[np.minimum(starts + width // 2, len(times) - 1)]
-    inside = (frequencies >= found.band[0] / 2) & (frequencies <= found.band[1])
-    last = _highest(frequencies[inside], {found.channel: power[inside].sum(axis=1)}, found.channel)
+    power, times = strongest(power, times, COLUMNS)
+    inside = (frequencies >= squeaks.band[0] / 2) & (frequencies <= squeaks.band[1])
+    last = _highest(frequencies[inside], {squeaks.channel: power[inside].sum(axis=1)}, squeaks.channel)
     shown = power[inside][:last]
     level = 10 * np.log10(np.maximum(shown / max(float(shown.max()), np.finfo(float).tiny), 1e-30))
-    ax.grid(visible=False)
-    return ax.pcolormesh(
-        record.start + times,
-        frequencies[inside][:last],
-        np.maximum(level, -SPAN),
-        cmap="cividis",
-        vmin=-SPAN,
-        vmax=0,
-        shading="nearest",
-        rasterized=True,
-    )
+    colours: Any = {"cmap": "cividis", "vmin": -SPAN, "vmax": 0}
+    return coloured(ax, record.start + times, frequencies[inside][:last], np.maximum(level, -SPAN), **colours)
 
 
 def _frame(ax: Axes, burst: Squeak) -> None:
@@ -513,10 +430,6 @@ def _within_one(begin: float, end: float) -> list[tuple[float, float]]:
     return [*pieces, (begin - math.floor(begin), end - math.floor(begin))]
 
 
-def _words(record: Record, name: str) -> str:
+def _quantity(record: Record, name: str) -> str:
     """What a channel measures, short enough for an axis."""
     return SHORT.get(name) or re.split("[,(]", record.channels[name].quantity or name)[0].strip()
-
-
-def _short(name: str) -> str:
-    return name if len(name) < 30 else f"{name[:27]}..."

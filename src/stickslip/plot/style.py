@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.estimate import Estimate
 from stickslip.units import prefixed as prefixed
 from stickslip.units import spelled as spelled
 
@@ -26,6 +27,7 @@ BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#b0559b", "
 INK, FAINT, SHADE = "#1f2933", "#9aa5b1", "#c8d0da"
 WIDTH = 6.2  # inch: narrow enough that the letters stay readable on a phone
 COLUMNS = 1200  # of a min-max envelope: beyond the pixels of a figure
+BARS: Any = {"fmt": "o", "capsize": 3, "markersize": 5}  # of an interval
 STYLE: Any = {
     "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"], "font.size": 9,
     "axes.labelsize": 9, "axes.titlesize": 10, "xtick.labelsize": 8, "ytick.labelsize": 8, "legend.fontsize": 8,
@@ -84,9 +86,40 @@ def plain_decades(axis: Axis) -> None:
     axis.set_minor_formatter("{x:g}" if high <= 2 * low else NullFormatter())
 
 
-def axis_label(words: str, unit: str, between: str = " ") -> str:
+def axis_label(label: str, unit: str, between: str = " ") -> str:
     """ "displacement [mm]"; no bracket for a pure number."""
-    return words if unit in ("1", "") else f"{words}{between}[{spelled(unit)}]"
+    return label if unit in ("1", "") else f"{label}{between}[{spelled(unit)}]"
+
+
+def named_intervals(
+    names: Sequence[str], estimates: Sequence[Estimate], *, ax: Axes | None, label: str = ""
+) -> tuple[Axes, float, str]:
+    """Estimates with their 95 % intervals, a named row each; the axes, and the factor and unit they are drawn in."""
+    values, ends = np.array([e.value for e in estimates]), np.array([e.interval for e in estimates])
+    ax, places = axes_of(ax, height=1.3 + 0.32 * len(names)), np.arange(len(names))
+    factor, unit = prefixed(values, estimates[0].unit)
+    away = factor * np.abs(ends - values[:, None]).T
+    ax.errorbar(factor * values, places, xerr=away, color=BLUE, label=label or None, **BARS)
+    ax.set_yticks(places, [shortened(name, 44) for name in names])
+    ax.set_ylim(len(names) - 0.4, -0.6)
+    return ax, factor, unit
+
+
+def shortened(name: str, limit: int) -> str:
+    return name if len(name) < limit else f"{name[: limit - 3]}..."
+
+
+def strongest(level: Array, times: Array, columns: int) -> tuple[Array, Array]:
+    """A map thinned to about `columns` columns, the largest of each kept, and their times."""
+    width = -(-level.shape[1] // columns)
+    starts = np.arange(0, level.shape[1], width)
+    return np.maximum.reduceat(level, starts, axis=1), times[np.minimum(starts + width // 2, len(times) - 1)]
+
+
+def coloured(ax: Axes, x: Array, y: Array, values: Any, **options: Any) -> Any:
+    """A map in colour over two axes, without the grid."""
+    ax.grid(visible=False)
+    return ax.pcolormesh(x, y, values, shading="nearest", rasterized=True, linewidth=0, **options)
 
 
 def envelope(time: Array, values: Array, columns: int = COLUMNS) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.plot.plate import Plate, plate
+from stickslip.plot.plate import Plate, captioned
 from stickslip.plot.style import (
     BLUE,
     FAINT,
@@ -29,7 +29,7 @@ from stickslip.plot.style import (
     prefixed,
     styled,
 )
-from stickslip.solve.joint import JointMode
+from stickslip.solve.tables import JointMode
 from stickslip.structure import Structure
 
 if TYPE_CHECKING:
@@ -67,11 +67,11 @@ def contacts_of(run: Trajectory) -> int:
     return len(run.system.contacts) if isinstance(run.system, Structure) else 1
 
 
-def numbered_words(run: Trajectory, words: str, name: str, row: int) -> str:
+def numbered_words(run: Trajectory, label: str, name: str, row: int) -> str:
     """What a row of an output is called: "velocity" of one mass, "velocity v2", "friction, contact 2" of several."""
     if name in ("z", "force") or len(run.labels("x" if name in ("x", "v") else "friction")) == 1:
-        return words
-    return f"{words} {name}{row + 1}" if name in ("x", "v") else f"{words}, contact {row + 1}"
+        return label
+    return f"{label} {name}{row + 1}" if name in ("x", "v") else f"{label}, contact {row + 1}"
 
 
 def kinds_of(run: Trajectory, contact: int) -> list[str]:
@@ -111,19 +111,14 @@ def last_cycles(run: Trajectory, cycles: float) -> tuple[float, float]:
 
 def sampled(run: Trajectory, wanted: Sequence[str | Quantity], times: Array) -> Array:
     """Exact values of some quantities at increasing instants, a row for each."""
-    pairs = [(each, 0) if isinstance(each, str) else each for each in wanted]
+    pairs = [(quantity, 0) if isinstance(quantity, str) else quantity for quantity in wanted]
     names = list(dict.fromkeys("x" if name == "way" else name for name, _ in pairs))
     values, _ = run.sample(times, tuple(names))
     counts = [len(run.labels(name)) for name in names]
     rows = dict(zip(names, np.split(values, np.cumsum(counts)[:-1]), strict=True))
-    return np.array(
-        [
-            run.system.tangents[row] @ rows["x"]
-            if name == "way" and isinstance(run.system, Structure)
-            else rows["x" if name == "way" else name][row]
-            for name, row in pairs
-        ]
-    )
+    if "x" in rows:
+        rows["way"] = run.system.tangents @ rows["x"] if isinstance(run.system, Structure) else rows["x"]
+    return np.array([rows[name][row] for name, row in pairs])
 
 
 def curve(run: Trajectory, wanted: Sequence[str | Quantity], *, first: float, last: float) -> tuple[Array, list[Array]]:
@@ -148,7 +143,7 @@ def curve(run: Trajectory, wanted: Sequence[str | Quantity], *, first: float, la
 def stretches(run: Trajectory, kind: str, *, first: float, last: float, contact: int = 0) -> Array:
     """Start and length of each stretch of one kind of mode at a contact ("slip", "stick", "microstick", "flight"),
     within two instants (n, 2)."""
-    chosen = np.array([found == kind for found in kinds_of(run, contact)])[run.modes]
+    chosen = np.array([mode == kind for mode in kinds_of(run, contact)])[run.modes]
     chosen &= (run.starts < last) & (run.starts + run.durations > first)
     begin, end = (np.clip(ends[chosen], first, last) for ends in (run.starts, run.starts + run.durations))
     spans: Array = np.column_stack([begin, end - begin])[end > begin]
@@ -231,22 +226,22 @@ def pressed(run: Trajectory, contact: int) -> bool:
 
 def _panel_words(run: Trajectory, wanted: list[Quantity]) -> str:
     name, row = wanted[0]
-    words = _named(run, wanted[0]) if name in ("x", "v") else numbered_words(run, _WORDS[name], name, row)
-    return words.replace(", ", "\n").replace("normal load", "load")
+    label = _named(run, wanted[0]) if name in ("x", "v") else numbered_words(run, _WORDS[name], name, row)
+    return label.replace(", ", "\n").replace("normal load", "load")
 
 
 def _line(run: Trajectory, quantity: Quantity, wanted: list[Quantity]) -> dict[str, Any]:
     """Colour, line and legend of one row of a panel."""
     name, row = quantity
     several = len(run.labels("x")) > 1
-    words = {"x": f"x{row + 1}" if several else "mass", "z": "base" if several else "spring's end"}.get(name)
+    labels = {"x": f"x{row + 1}" if several else "mass", "z": "base" if several else "spring's end"}.get(name)
     colour = MASSES[row % len(MASSES)] if several and name in ("x", "v") else _COLOURS[name]
     alone = name == "x" and not several and len(wanted) == 1
-    return {"color": colour, "linestyle": "--" if name == "z" else "-", "label": None if alone else words}
+    return {"color": colour, "linestyle": "--" if name == "z" else "-", "label": None if alone else labels}
 
 
 def _shades_alone(run: Trajectory, handle: Any) -> bool:
-    return handle.get_label() in {words for words, *_ in _KINDS.values()}
+    return handle.get_label() in {label for label, *_ in _KINDS.values()}
 
 
 @styled
@@ -300,84 +295,39 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
     kinds = {kinds_of(run, c)[mode] for c in range(contacts_of(run)) for mode in seen}
     marks = {"stick": "dark grey: it sticks", "microstick": "light grey: the contact holds and yields a little",
              "flight": "blue: the contact has lifted off"}  # fmt: skip
-    shaded = "; ".join(words for kind, words in marks.items() if kind in kinds)
+    shaded = "; ".join(label for kind, label in marks.items() if kind in kinds)
     shaded = f" {shaded[0].upper()}{shaded[1:]}." if shaded else ""
     first, last = last_cycles(run, CLOSE_CYCLES)
     plates = []
     if first > 0:
-        plates.append(
-            plate(
-                "whole-run",
-                partial(plot_motion, run),
-                "The whole run",
-                f"From the start, over all of the time.{shaded}",
-            )
-        )
-    words = "As long as it moves" if run.status == "at rest" else "The last cycles"
+        plates.append(captioned("run", "whole-run", partial(plot_motion, run), shaded=shaded))
+    span = "As long as it moves" if run.status == "at rest" else "The last cycles"
     plates.append(
-        plate(
-            "motion",
-            partial(plot_motion, run, first=first, last=last),
-            words,
-            f"Exact between events; friction jumps where a slip begins, ends or turns.{shaded}",
-        )
+        captioned("run", "motion", partial(plot_motion, run, first=first, last=last), span=span, shaded=shaded)
     )
-    several = contacts_of(run) > 1
-    for c in range(min(contacts_of(run), MOST_DRAWN)):
-        plates += _of_contact(run, c, f"-{c + 1}" if several else "", f", contact {c + 1}" if several else "")
-    masses = len(run.labels("x"))
+    contacts, masses = contacts_of(run), len(run.labels("x"))
+    for c in range(min(contacts, MOST_DRAWN)):
+        number, of = (f"-{c + 1}", f", contact {c + 1}") if contacts > 1 else ("", "")
+        for name, against in (("displacement", "x"), ("velocity", "slip"), ("load", "load")):
+            if against == "load" and not pressed(run, c):
+                continue
+            draw = partial(plot_loop, run, against=against, contact=c)
+            plates.append(captioned("run", f"friction-{name}", draw, name=f"friction-{name}{number}", of=of))
+    holds = " Marked: where the contact holds." if contacts == 1 else ""
     for j in range(min(masses, MOST_DRAWN)):
-        name, which = (f"-x{j + 1}", f" of x{j + 1}") if masses > 1 else ("", "")
-        holds = "" if several or not contacts_of(run) else " Marked: where the contact holds."
-        plates.append(
-            plate(
-                f"phase-portrait{name}",
-                partial(plot_phase, run, mass=j),
-                f"Phase portrait{which}",
-                f"Velocity against displacement, run through clockwise.{holds}",
-            )
-        )
+        number, of = (f"-x{j + 1}", f" of x{j + 1}") if masses > 1 else ("", "")
+        draw, name = partial(plot_phase, run, mass=j), f"phase-portrait{number}"
+        plates.append(captioned("run", "phase-portrait", draw, name=name, of=of, holds=holds))
     return tuple(plates)
-
-
-def _of_contact(run: Trajectory, contact: int, name: str, which: str) -> list[Plate]:
-    """Loops of one contact; `name` and `which` tell it from others."""
-    plates = [
-        plate(
-            f"friction-displacement{name}",
-            partial(plot_loop, run, contact=contact),
-            f"Friction against displacement{which}",
-            "The area of a loop is the work that friction takes in a cycle. Flat top and bottom: sliding. Sides: the "
-            "contact holds, upright where it is rigid, sloping where it gives way.",
-        ),
-        plate(
-            f"friction-velocity{name}",
-            partial(plot_loop, run, against="slip", contact=contact),
-            f"Friction against sliding velocity{which}",
-            "The law as the motion passes through it. A contact that holds bears whatever the other forces ask for: "
-            "the upright at zero.",
-        ),
-    ]
-    if pressed(run, contact):
-        plates.append(
-            plate(
-                f"friction-load{name}",
-                partial(plot_loop, run, against="load", contact=contact),
-                f"Friction against normal load{which}",
-                "Sliding lies on the two edges of a wedge, whose slope is the coefficient of friction; holding lies "
-                "between them; at its tip the contact lifts off.",
-            )
-        )
-    return plates
 
 
 def _shade(ax: Axes, run: Trajectory, first: float, last: float, contact: int) -> None:
     low, high = ax.get_ylim()
-    for kind, (words, colour, opacity) in _KINDS.items():
+    for kind, (label, colour, opacity) in _KINDS.items():
         spans = stretches(run, kind, first=first, last=last, contact=contact)
         if 0 < len(spans) <= MOST_SHADES:
             ax.broken_barh(
-                spans.tolist(), (low, high - low), color=colour, alpha=opacity, linewidth=0, zorder=0, label=words
+                spans.tolist(), (low, high - low), color=colour, alpha=opacity, linewidth=0, zorder=0, label=label
             )
     ax.set_ylim(low, high)
 
@@ -398,7 +348,7 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
     label = "last cycle" if split > 0 else "the motion"
     ax.plot(x_factor * values[0], y_factor * values[1], color=ORANGE if up[0] == "friction" else GREEN, label=label)
     marks = (("microstick", SKY, "microstick"), ("stick", BLUE, "stick"), ("flight", PURPLE, "lifted off"))
-    for kind, colour, words in marks if contact is not None and contacts_of(run) else ():
+    for kind, colour, text in marks if contact is not None and contacts_of(run) else ():
         held = np.zeros(len(times), dtype=bool)
         for begin, length in stretches(run, kind, first=split, last=last, contact=contact or 0):
             held |= (times >= begin) & (times < begin + length)
@@ -408,7 +358,7 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
         # at rest, a stick is a point of the portrait
         point = up[0] == "v" and kind == "stick" and not run.table.motion.face and len(run.labels("x")) == 1
         dot = "o" if point else ""
-        ax.plot(x, y, marker=dot, markevery=_middles(held), color=colour, linewidth=3, markersize=6, label=words)
+        ax.plot(x, y, marker=dot, markevery=_middles(held), color=colour, linewidth=3, markersize=6, label=text)
     for line, row in ((ax.axvline, before[0]), (ax.axhline, before[1])):
         if row.min() < 0 < row.max():  # an axis far from the motion would only squeeze it
             line(0, color=FAINT, linewidth=0.8, zorder=0.5)

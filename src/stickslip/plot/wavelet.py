@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.contact.mechanisms import UNTOLD
 from stickslip.errors import RecordError
-from stickslip.plot.plate import Plate, plate
+from stickslip.plot.plate import Plate, captioned
 from stickslip.plot.style import (
     BLUE,
     INK,
@@ -18,13 +18,15 @@ from stickslip.plot.style import (
     SHADE,
     Array,
     axis_label,
+    coloured,
     empty_figure,
     envelope,
     legend_above,
     prefixed,
+    strongest,
     styled,
 )
-from stickslip.signals.pieces import RING
+from stickslip.signals.cutting import RING
 from stickslip.signals.wavelet import ends, wavelet_map
 from stickslip.signals.wavelet_grid import CENTRE
 
@@ -119,19 +121,19 @@ def plot_wavelet(
 
 
 @styled
-def plot_stick(found: TimeFrequency) -> Figure:
+def plot_stick(findings: TimeFrequency) -> Figure:
     """One stick from the middle of the record: its acceleration in pieces, and the map up to high frequencies.
 
     Parameters
     ----------
-    found : TimeFrequency
+    findings : TimeFrequency
         With ringing.
 
     Returns
     -------
     Figure
     """
-    ringing = found.ringing
+    ringing = findings.ringing
     assert ringing is not None
     record, window = ringing.record, ringing.windows[len(ringing.windows) // 2]
     margin = len(window.values) // 2
@@ -139,11 +141,11 @@ def plot_stick(found: TimeFrequency) -> Figure:
     lowest = 0.4 * ringing.pole.imag / (2 * np.pi)
     reach = int(2 * CENTRE / (2 * np.pi * lowest) * ringing.fs) + 1
     around = record.rows(max(0, first - reach), min(len(record), last + reach))
-    wavelets = wavelet_map(around, found.channel, frequencies=(lowest, 0.4 * ringing.fs))
+    wavelets = wavelet_map(around, findings.channel, frequencies=(lowest, 0.4 * ringing.fs))
     shown = wavelets.sel(time=slice(record.time[first], record.time[last - 1]))
     figure = plot_wavelet(shown, record=record)
-    top, heard = figure.axes[0], found.transition is not None and not ringing.silent
-    slips = heard and found.microslips is not None and found.microslips.kind != UNTOLD
+    top, heard = figure.axes[0], findings.transition is not None and not ringing.silent
+    slips = heard and findings.microslips is not None and findings.microslips.kind != UNTOLD
     for number, piece in enumerate(window.pieces if heard else ()):
         begin, end = ringing.time(window, piece.first), ringing.time(window, piece.last)
         if piece.kind == RING:
@@ -155,27 +157,16 @@ def plot_stick(found: TimeFrequency) -> Figure:
     return figure
 
 
-def plates_of(found: TimeFrequency) -> list[Plate]:
+def plates_of(findings: TimeFrequency) -> list[Plate]:
     """The figures of a channel over time and frequency."""
-    reached = found.record.start + found.record.duration >= float(found.wavelets.time.max())
-    record = found.record if reached else None  # one that came in parts is there no more
-    words = (
-        f"{'Above: the signal. Below: how' if reached else 'How'} strong each frequency is at each time, in decibel "
-        "below the strongest; bright is strong. Hatched: an end of the record is felt there. A band that runs along is "
-        "a vibration; an upright spike is a jump or a kink."
-    )
-    plates = [plate("map", partial(plot_wavelet, found.wavelets, record=record), "Time and frequency", words)]
-    if found.ringing is not None:
-        rings = (
-            "A closed island is a contact that rings while the mass sticks; the spikes around it are where it "
-            "sticks, slips by a little, and slips. The map reads lower than the mode where micro-slips cut in."
-        )
-        rests = "No ringing of a contact is told in it; the spikes are where the mass sticks and slips."
-        told = rings if found.transition is not None else rests
-        plates.append(plate("stick", partial(plot_stick, found), "A stick, looked at closely", told))
-    lines = partial(plot_wavelet, found.wavelets, record=record, style="lines")
-    plates.append(plate("contours", lines, "The same map in contour lines", f"{LEVELS} lines span {SPAN:g} dB."))
-    return plates
+    reached = findings.record.start + findings.record.duration >= float(findings.wavelets.time.max())
+    record = findings.record if reached else None  # one that came in parts is there no more
+    draw = partial(plot_wavelet, findings.wavelets, record=record)
+    plates = [captioned("map", "map" if reached else "map-alone", draw, name="map")]
+    if findings.ringing is not None:
+        kind = "stick-that-rings" if findings.transition is not None else "stick"
+        plates.append(captioned("map", kind, partial(plot_stick, findings), name="stick"))
+    return [*plates, captioned("map", "contours", partial(draw, style="lines"), lines=LEVELS, span=SPAN)]
 
 
 def decibels(wavelets: xr.DataArray, span: float = SPAN) -> Array:
@@ -192,17 +183,15 @@ def _signal(axes: Axes, record: Record, channel: str, times: Array) -> None:
     values = record[channel][inside]
     factor, unit = prefixed(values, record.channels[channel].unit)
     axes.plot(*envelope(record.time[inside], factor * values), color=BLUE, linewidth=0.8)
-    words = re.split("[,(]", record.channels[channel].quantity or channel)[0].strip()  # the axis is short
-    axes.set_ylabel(axis_label(words, unit, between="\n"))
+    quantity = re.split("[,(]", record.channels[channel].quantity or channel)[0].strip()  # the axis is short
+    axes.set_ylabel(axis_label(quantity, unit, between="\n"))
 
 
 def _grid(axes: Axes, wavelets: xr.DataArray, steps: Array, style: str) -> Any:
+    import matplotlib as mpl
+
     level, times = decibels(wavelets, -steps[0]), wavelets.time.values
-    width = -(-level.shape[1] // COLUMNS)  # samples a column: the largest of them is drawn
-    if width > 1:
-        starts = np.arange(0, level.shape[1], width)
-        level = np.maximum.reduceat(level, starts, axis=1)
-        times = times[np.minimum(starts + width // 2, len(times) - 1)]
+    level, times = strongest(level, times, COLUMNS)
     frequencies = wavelets.frequency.values
     shown = frequencies > 0
     axes.set_yscale("log" if "scale" in wavelets.coords else "linear")
@@ -210,18 +199,9 @@ def _grid(axes: Axes, wavelets: xr.DataArray, steps: Array, style: str) -> Any:
         return None
     if style == "lines":
         return axes.contour(times, frequencies[shown], level[shown], steps[1:-1], cmap=RISING, linewidths=0.7)
-    drawn = axes.pcolormesh(
-        times,
-        frequencies[shown],
-        np.ma.masked_less_equal(level[shown], steps[0]),
-        cmap=_stepped(len(steps) - 1),
-        vmin=steps[0],
-        vmax=0,
-        shading="nearest",
-        rasterized=True,
-    )
-    axes.grid(visible=False)
-    return drawn
+    known = np.ma.masked_less_equal(level[shown], steps[0])
+    colours = mpl.colormaps[RISING].resampled(len(steps) - 1)
+    return coloured(axes, times, frequencies[shown], known, cmap=colours, vmin=steps[0], vmax=0)
 
 
 def _points(axes: Axes, points: xr.DataArray, steps: Array, style: str) -> Any:
@@ -241,16 +221,8 @@ def _cone(axes: Axes, wavelets: xr.DataArray) -> None:
     first, last = ends(wavelets)
     frequencies, cone = wavelets.frequency.values, np.minimum(wavelets.cone.values, (last - first) / 2)
     for edge, sign in ((first, 1.0), (last, -1.0)):
-        axes.fill_betweenx(
-            frequencies,
-            edge,
-            edge + sign * cone,
-            facecolor="white",
-            alpha=0.45,
-            hatch="////",
-            edgecolor=INK,
-            linewidth=0.0,
-        )
+        hatching: Any = {"facecolor": "white", "alpha": 0.45, "hatch": "////", "edgecolor": INK, "linewidth": 0.0}
+        axes.fill_betweenx(frequencies, edge, edge + sign * cone, **hatching)
         axes.plot(edge + sign * cone, frequencies, color=INK, linewidth=0.8)
     if len(frequencies) > 1:
         axes.set_ylim(frequencies[0], frequencies[-1])
@@ -258,20 +230,14 @@ def _cone(axes: Axes, wavelets: xr.DataArray) -> None:
 
 def _plain_ticks(axes: Axes) -> None:
     """Frequencies as plain numbers: 20, 50, 100, 1000."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+    from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
     low, high = axes.get_ylim()
     wide = high / low > 300
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    if not wide:
-        axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter("{x:g}")
+    if wide:
+        axes.yaxis.set_minor_formatter(NullFormatter())
     else:
-        axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: ""))
+        axes.yaxis.set_minor_locator(NullLocator())
     axes.set_ylim(low, high)
-
-
-def _stepped(count: int) -> Any:
-    import matplotlib as mpl
-
-    return mpl.colormaps[RISING].resampled(count)

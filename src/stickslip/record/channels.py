@@ -41,7 +41,7 @@ class Channel:
     """What is known of one channel beside its samples.
 
     What makes no sense is refused with a RecordError: words that are no text, a delay that is not finite, a noise
-    below zero, a unit that does not fit the vocabulary.
+    or a deviation below zero, a unit that does not fit the vocabulary.
 
     Attributes
     ----------
@@ -66,6 +66,8 @@ class Channel:
         Mass [kg] between the contact and a load cell, whose inertia the cell feels too.
     discharge : float or None
         Time constant [s] with which a piezoelectric sensor forgets; None: it does not.
+    gain_sd : float
+        Standard deviation of its gain, relative to it: 0.01 of a calibration good to 1 %; 0 is exact.
     assumed : bool
         Whether nobody stated its unit, and the usual one of its kind was taken.
     """
@@ -80,6 +82,7 @@ class Channel:
     mount: tuple[float, float] | None = None
     inertia: float = 0.0
     discharge: float | None = None
+    gain_sd: float = 0.0
     assumed: bool = False
 
     def __post_init__(self) -> None:
@@ -99,6 +102,12 @@ class Channel:
                 f"noise = {self.noise!r} of channel {self.name}",
                 f"noise is a standard deviation in {self.unit}, zero or more",
                 "pass a number, or None where it is not known",
+            )
+        if not (_is_finite(self.gain_sd) and 0 <= self.gain_sd < 1):
+            raise RecordError(
+                f"gain_sd = {self.gain_sd!r} of channel {self.name}",
+                "the standard deviation of a gain is a part of it, from 0 to 1",
+                "pass a number: 0.01 is 1 %",
             )
         self._check_dynamics()
 

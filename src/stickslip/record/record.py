@@ -32,9 +32,9 @@ DETAILS = (
     "mount",
     "inertia",
     "discharge",
+    "gain_sd",
 )  # of a channel, that a user may know better than the file
-
-
+RIG_UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 MEASURABLE = 1e60  # in SI, as its inverse: beyond, the fourth power of a reading is no number any more
 
 
@@ -94,6 +94,8 @@ class StatedRig:
         Of the smoother [Hz].
     lost : tuple of str
         What a sensor could not tell, in words.
+    sd : mapping of str to float
+        Standard deviation of mass, stiffness and damping, in their units, where one was stated; the others are exact.
     """
 
     method: str
@@ -104,6 +106,16 @@ class StatedRig:
     damper: str = "ground"
     bandwidth: float | None = None
     lost: tuple[str, ...] = ()
+    sd: Mapping[str, float] = field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        for name, sd in self.sd.items():
+            if name not in RIG_UNITS or not 0 <= sd < math.inf:
+                raise RecordError(
+                    f"sd = {sd!r} of {name}",
+                    f"of {', '.join(RIG_UNITS)} the standard deviation is finite and not negative",
+                    "correct it",
+                )
 
     @property
     def constants(self) -> dict[str, Any]:

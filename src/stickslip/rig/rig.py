@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -240,8 +240,8 @@ class Rig:
                 continue
             samples[sensor.channel] = _read(sensor, signals, run.starts, times, own)
             unit = signals[sensor.source].unit
-            words = described(sensor.channel, unit)
-            channels[sensor.channel] = Channel(sensor.channel, unit, words, "Rig", sensor.sensitivity)
+            label = described(sensor.channel, unit)
+            channels[sensor.channel] = Channel(sensor.channel, unit, label, "Rig", sensor.sensitivity)
         if not samples:
             raise ModelError(
                 f"sensors of {', '.join(s.source for s in self.sensors)}",
@@ -256,8 +256,7 @@ class Rig:
         return Record(samples, channels, float(fs), 0.0, history, None, _truth(run, begin, float(times[-1])))
 
 
-@dataclass(frozen=True)
-class _Signal:
+class _Signal(NamedTuple):
     """One thing a sensor may sit on: its values at increasing instants, and its unit."""
 
     values: Callable[[Array], Array]

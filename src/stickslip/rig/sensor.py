@@ -87,13 +87,8 @@ class Noise:
     high: float = math.inf
 
     def __post_init__(self) -> None:
-        for name, unit in (
-            ("white", "(channel's unit)"),
-            ("corner", "Hz"),
-            ("band", "(channel's unit)"),
-            ("low", "Hz"),
-        ):
-            finite(name, getattr(self, name), unit=unit)
+        for name in ("white", "corner", "band", "low"):
+            finite(name, getattr(self, name), unit="Hz" if name in ("corner", "low") else "(channel's unit)")
         if not self.low < self.high:
             raise ModelError(
                 f"a band from {self.low} to {self.high} Hz", "a band has a low and a high edge", "swap them"

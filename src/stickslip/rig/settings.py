@@ -8,8 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import BaseModel, BeforeValidator, Field, PlainSerializer, PlainValidator
 
+from stickslip.errors import ModelError
+from stickslip.estimate import Estimate
+from stickslip.printing import printable
+from stickslip.record.record import RIG_UNITS
 from stickslip.settings import STRICT, checked, quantity, read_toml
 
 REPAIRS = ("clock", "gaps", "missing", "spikes", "clipping", "drift")
@@ -32,6 +36,26 @@ def _one_or_many(value: object) -> object:
     return value if isinstance(value, Mapping) else {"*": value}
 
 
+def _constant(name: str, *, positive: bool = False) -> PlainValidator:
+    """A constant of the rig: a number where it is exact, an Estimate where its uncertainty is stated."""
+
+    def read(value: Any) -> float | Estimate:
+        if isinstance(value, bool):
+            raise ValueError(f"a number in {RIG_UNITS[name]}, or text like '2.5 {RIG_UNITS[name]}', is needed")
+        try:
+            constant = Estimate.stated(name, value, RIG_UNITS[name])
+        except ModelError as error:
+            raise ValueError(printable(f"{error.value}; {error.rule}")) from error
+        if constant.value < 0 or (positive and constant.value == 0):
+            raise ValueError(f"it should be greater than {'' if positive else 'or equal to '}0")
+        return constant if constant.sd else constant.value
+
+    return PlainValidator(read)
+
+
+AS_PAIR = PlainSerializer(lambda value: (value.value, value.sd) if isinstance(value, Estimate) else value)
+
+
 class SensorSettings(BaseModel):
     """What is known of one sensor; see :class:`Channel`.
 
@@ -47,6 +71,8 @@ class SensorSettings(BaseModel):
         Mass [kg] between the contact and a load cell.
     discharge : float or None
         Time constant [s] with which a piezoelectric sensor forgets.
+    gain_sd : float
+        Standard deviation of its gain, relative to it: "1 %".
     """
 
     model_config = STRICT
@@ -56,6 +82,7 @@ class SensorSettings(BaseModel):
     mount: tuple[Annotated[float, quantity("Hz"), Field(gt=0)], Annotated[float, Field(ge=0)]] | None = None
     inertia: Annotated[float, quantity("kg"), Field(ge=0)] = 0.0
     discharge: Annotated[float, quantity("s"), Field(gt=0)] | None = None
+    gain_sd: Annotated[float, quantity("1"), Field(ge=0, lt=1)] = 0.0
 
 
 class RigSettings(BaseModel):
@@ -63,8 +90,9 @@ class RigSettings(BaseModel):
 
     Attributes
     ----------
-    mass, stiffness, damping : float or None
-        Oscillating mass [kg], spring [N/m], viscous damping [N s/m] of the suspension (not of the contact).
+    mass, stiffness, damping : float, Estimate or None
+        Oscillating mass [kg], spring [N/m], viscous damping [N s/m] of the suspension (not of the contact); an Estimate
+        where how sure it is is stated, as in "3.08 ± 0.01 kg".
     damper : {"ground", "base"}
         What the viscous damper ends on: the ground, or the moving base beside the spring.
     contact : {"ground", "base"}
@@ -98,9 +126,9 @@ class RigSettings(BaseModel):
 
     model_config = STRICT
 
-    mass: Annotated[float, quantity("kg"), Field(gt=0)] | None = None
-    stiffness: Annotated[float, quantity("N/m"), Field(ge=0)] | None = None
-    damping: Annotated[float, quantity("N s/m"), Field(ge=0)] | None = None
+    mass: Annotated[float | Estimate, _constant("mass", positive=True), AS_PAIR] | None = None
+    stiffness: Annotated[float | Estimate, _constant("stiffness"), AS_PAIR] | None = None
+    damping: Annotated[float | Estimate, _constant("damping"), AS_PAIR] | None = None
     damper: Literal["ground", "base"] = "ground"
     contact: Literal["ground", "base"] = "ground"
     channels: dict[str, str] = Field(default_factory=dict)
@@ -122,7 +150,7 @@ class RigSettings(BaseModel):
         A name with folders before it fits by its last part too.
         """
         names = (name, name.rpartition("/")[2])
-        fits = (load for pattern, load in self.normal.items() if any(fnmatch.fnmatch(each, pattern) for each in names))
+        fits = (load for pattern, load in self.normal.items() if any(fnmatch.fnmatch(name, pattern) for name in names))
         return next(fits, None)
 
     def row_range(self) -> tuple[int, int | None] | None:
@@ -170,7 +198,7 @@ def read_rig(path: str | Path) -> RigSettings:
     path : path
         A file such as::
 
-            mass = "3.08 kg"          # a bare number is SI
+            mass = "3.08 ± 0.01 kg"   # with its standard uncertainty; a bare number is exact, and SI
             stiffness = 1191
             damper = "base"
             [channels]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,11 @@ EXACT = 1e-10  # of the largest curvature: a smaller one is none
 FARTHEST = 0.25  # s: longer delays are not looked for
 TRIED = 5  # delays from which a fit begins, of two kinds
 ROUNDS = 3  # in which the windows are moved to the delay and the noise is found anew
+# Of the least-squares fits of 43 pairs (the demonstration, 13 real ones, 29 of virtual rigs) these leave delays within
+# 0.005 deviations of where steps by differences ended after up to 1600 trials; a flat valley takes up to 95 steps.
+STEPS = 100  # of a fit
+DAMPED = 1e-3  # of the slopes' products, the first damping of a step that made it worse
+SETTLED = 1e-4  # by which a step betters the misfit, in units of its chance, when nothing more matters
 CHANCE = 3.0  # deviations by which noise alone may leave more than its power
 SAME = 6.0  # deviations of a misfit by which another delay's may be worse and still not be told from the best
 
@@ -147,6 +152,28 @@ class Lines:
         spread = np.abs(factor) ** 2 * self.noise[1] + gain**2 * self.noise[0]
         return np.asarray((left - gain * np.exp(-1j * self.turn * delay) * self.first) / np.sqrt(spread))
 
+    def expansion(self, theta: Array) -> tuple[float, Array, Array, Array]:
+        """Sum of squares of :meth:`residual`, half its slopes and curvatures by theta, and the slopes' products."""
+        delay, gain, damped, squared = theta
+        w, (of_first, of_second), none = self.turn, self.noise, np.zeros_like(self.turn)
+        stiff, turned = 1 - squared * w**2, np.exp(-1j * w * delay) * self.first
+        left = self.second[0] + damped * self.second[1] + squared * self.second[2] - gain * turned
+        spread = (stiff**2 + (damped * w) ** 2) * of_second + gain**2 * of_first
+        by_theta = np.array([1j * w * gain * turned, -turned, self.second[1], self.second[2]])
+        widened = np.array([none, gain * of_first, damped * w**2 * of_second, -stiff * w**2 * of_second]) / spread
+        power = np.abs(left) ** 2 / spread
+        slopes = (left.conj() * by_theta).real / spread
+        mixed = 2 * slopes @ widened.T
+        curvature = ((by_theta.conj() / spread) @ by_theta.T).real - mixed - mixed.T + 4 * (power * widened) @ widened.T
+        twice = np.array([gain * w**2, 1j * w]) * turned * left.conj() / spread  # delay and delay, delay and gain
+        curvature[0, 0] += np.sum(twice[0].real)
+        curvature[[0, 1], [1, 0]] += np.sum(twice[1].real)
+        widest = np.array([none, of_first, w**2 * of_second, w**4 * of_second]) / spread
+        curvature -= np.diag(widest @ power)
+        of_residual = (by_theta - left * widened) / np.sqrt(spread)
+        products = (of_residual.conj() @ of_residual.T).real
+        return float(np.sum(power)), np.sum(slopes - power * widened, axis=1), curvature, products
+
     def noise_slopes(self, theta: Array) -> tuple[Array, Array]:
         """What noise alone adds to the products of the residual's slopes by theta, and how much of that only turns.
 
@@ -160,7 +187,7 @@ class Lines:
         of_first, of_second = self.noise / (np.abs(factor) ** 2 * self.noise[1] + gain**2 * self.noise[0])
         along = left * factor.conj() * of_second + right * gain * of_first
         products = np.real(left * of_second @ left.conj().T + right * of_first @ right.conj().T)
-        return 2 * (products - along.real @ along.real.T), 2 * along.imag @ along.imag.T
+        return products - along.real @ along.real.T, along.imag @ along.imag.T
 
     def weighed(self, theta: Array) -> Lines:
         """The same with the noise that is found around each line, between the clear ones."""
@@ -253,9 +280,6 @@ def align(
     EstimateError
         No line stands above the noise.
     """
-    from scipy.optimize import least_squares
-
-    minimise: Any = least_squares
     theta = np.array([0.0, math.nan, *_terms(mount)])
     used = [0, 1, 2, 3] if free else [0, 1]
     for done in range(rounds):
@@ -263,37 +287,71 @@ def align(
             theta[1] = told([next(pairs[0].stretches(delay, room))]).gain or 1.0
         parts = (part.without_offset(theta[1]) for pair in pairs for part in pair.stretches(delay, room))
         lines = told(part.weighed(theta) if done and rounds > 2 else part for part in parts)
-        unit = 1 / lines.rate
-        scale = np.array([unit, abs(theta[1]), unit, unit**2])[used]
-
-        def residuals(values: Array, lines: Lines = lines, scale: Array = scale) -> Array:
-            tried = theta.copy()
-            tried[used] = values * scale
-            found = lines.residual(tried) * math.sqrt(2)  # real and imaginary part have half of the power each
-            return np.concatenate([found.real, found.imag])
-
-        answer = minimise(residuals, theta[used] / scale, method="lm")
-        theta[used] = answer.x * scale
+        theta, misfit = _likeliest(lines, theta, used)
         delay, theta[0] = float(np.clip(delay + theta[0], -FARTHEST, FARTHEST)), 0.0
-    covariance = np.zeros((4, 4))
-    noise, turned = (each[np.ix_(used, used)] * np.outer(scale, scale) for each in lines.noise_slopes(theta))
-    covariance[np.ix_(used, used)] = _covariance(answer.jac, noise, turned) * np.outer(scale, scale)
     square = window(1 << 12) ** 2
     overlap = float(np.mean(square**2) / np.mean(square) ** 2)  # neighbouring lines share some noise
-    return Alignment(np.array([delay, *theta[1:]]), covariance * overlap, float(2 * answer.cost), lines)
+    covariance = np.zeros((4, 4))
+    covariance[np.ix_(used, used)] = misfit.covariance(*lines.noise_slopes(theta)) * overlap
+    return Alignment(np.array([delay, *theta[1:]]), covariance, misfit.value, lines)
 
 
-def _covariance(slopes: Array, noise: Array, turned: Array) -> Array:
-    """Of the parameters: the curvature of the misfit is what the slopes have beyond those of noise alone.
+class Misfit(NamedTuple):
+    """The misfit of lines to second order about a theta whose entries `free` are fitted, those in units of `scale`."""
 
-    Noise adds to the spread of the slope of the misfit, but for what only turns, and nothing to its curvature.
-    """
-    products = slopes.T @ slopes
-    curvature = products - noise
-    if np.linalg.eigvalsh(curvature)[0] < EXACT * np.linalg.eigvalsh(products)[-1]:  # the lines do not tell all of them
-        return np.asarray(np.linalg.pinv(products))
-    inverse = np.linalg.inv(curvature)
-    return np.asarray(inverse @ (products - turned) @ inverse)
+    value: float
+    gradient: Array
+    curvature: Array
+    products: Array
+    free: list[int]
+    scale: Array
+
+    @classmethod
+    def of(cls, lines: Lines, theta: Array, free: list[int]) -> Misfit:
+        """About this theta; real and imaginary part of a residual have half of its power each."""
+        unit = 1 / lines.rate
+        scale = np.array([unit, abs(theta[1]), unit, unit**2])[free]
+        value, gradient, *matrices = lines.expansion(theta)
+        curvature, products = (2 * matrix[np.ix_(free, free)] * np.outer(scale, scale) for matrix in matrices)
+        return cls(2 * value, 2 * gradient[free] * scale, curvature, products, free, scale)
+
+    def step(self, damping: float) -> Array:
+        """Newton's, or Gauss's where the misfit is no bowl, held short by Marquardt's damping."""
+        size = 1 / np.sqrt(np.diag(self.products))
+        bent, along = np.linalg.eigh(self.curvature * np.outer(size, size))
+        if bent[0] <= 0:
+            bent, along = np.linalg.eigh(self.products * np.outer(size, size))
+        return np.asarray(-size * (along @ (along.T @ (size * self.gradient) / (np.maximum(bent, EXACT) + damping))))
+
+    def covariance(self, noise: Array, turned: Array) -> Array:
+        """Of the parameters: the curvature of the misfit is what the slopes have beyond those of noise alone.
+
+        Noise adds to the spread of the slope of the misfit, but for what only turns, and nothing to its curvature.
+        """
+        units = np.outer(self.scale, self.scale)
+        noise, turned = (2 * matrix[np.ix_(self.free, self.free)] * units for matrix in (noise, turned))
+        curvature = self.products - noise
+        if np.linalg.eigvalsh(curvature)[0] < EXACT * np.linalg.eigvalsh(self.products)[-1]:  # not all of them are told
+            return np.asarray(np.linalg.pinv(self.products) * units)
+        inverse = np.linalg.inv(curvature)
+        return np.asarray(inverse @ (self.products - turned) @ inverse * units)
+
+
+def _likeliest(lines: Lines, theta: Array, free: list[int]) -> tuple[Array, Misfit]:
+    """The theta of the least misfit, found downhill, and the misfit about it."""
+    misfit, damping = Misfit.of(lines, theta, free), 0.0
+    for _ in range(STEPS):
+        step, tried = misfit.step(damping), theta.copy()
+        tried[free] += step * misfit.scale
+        found, gain = Misfit.of(lines, tried, free), float(-step @ misfit.gradient)
+        if found.value < misfit.value:
+            gain = min(gain, misfit.value - found.value)
+            theta, misfit, damping = tried, found, damping / 10 if damping > DAMPED else 0.0
+        else:
+            damping = max(10 * damping, DAMPED)
+        if gain < SETTLED * max(1.0, misfit.value / (2 * len(lines.turn))):
+            break
+    return theta, misfit
 
 
 def _terms(mount: tuple[float, float] | None) -> tuple[float, float]:

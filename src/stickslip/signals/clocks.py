@@ -59,7 +59,7 @@ def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] | None = Non
     >>> round(clock_offset(a, b).value, 6)
     0.1
     """
-    return _match(a, b, on).offset
+    return _match(a, b, on)[0]
 
 
 def clock_rate(a: Record, b: Record, *, on: str | tuple[str, str] | None = None) -> Estimate:
@@ -90,7 +90,7 @@ def clock_rate(a: Record, b: Record, *, on: str | tuple[str, str] | None = None)
     >>> round(clock_rate(a, b).value, 4)
     1.001
     """
-    return _match(a, b, on).rate
+    return _match(a, b, on)[1]
 
 
 def synchronise(
@@ -137,8 +137,8 @@ def synchronise(
     a.require_clean(*a, question="synchronise")
     b.require_clean(*b, question="synchronise")
     names = _shared_motion(a, b, on) if offset is None or on is not None else None
-    found = clock_offset(a, b, on=names) if offset is None else offset
-    seconds = found.value if isinstance(found, Estimate) else float(found)
+    estimate = clock_offset(a, b, on=names) if offset is None else offset
+    seconds = estimate.value if isinstance(estimate, Estimate) else float(estimate)
     ratio = rate.value if isinstance(rate, Estimate) else float(rate)
     middle = float(b.time[0]) + 0.5 * b.duration
     rows = ((a.time - seconds - middle) / ratio + middle - b.start) * b.fs
@@ -156,25 +156,19 @@ def synchronise(
         mine = f"{name}_b" if name in samples else name
         samples[mine] = band_limited(b[name], rows[shared], cutoff=cutoff)
         channels[mine] = replace(b.channels[name], name=mine, noise=None)  # the filter took part of it
-    interval = list(found.interval) if isinstance(found, Estimate) else [seconds, seconds]
+    interval = list(estimate.interval) if isinstance(estimate, Estimate) else [seconds, seconds]
     known = f"found on {' and '.join(dict.fromkeys(names))}" if names and offset is None else "given"
     outcome = (
         f"b's clock moved by {seconds:.6g} s ({known}; 95 %: {interval[0]:.6g} to {interval[1]:.6g}), "
         f"{len(b)} samples at {b.fs:g} Hz interpolated onto {len(shared)} at {a.fs:g} Hz"
     )
-    if isinstance(found, Estimate) and found.status != "ok":
-        outcome += f"; {found.status}"
+    if isinstance(estimate, Estimate) and estimate.status != "ok":
+        outcome += f"; {estimate.status}"
     step = Step("synchronise", {"on": names, "offset": seconds, "offset_interval": interval, "rate": ratio}, outcome)
     theirs = tuple(Step(s.action, {**s.arguments, "record": "b"}, s.outcome) for s in b.history)
     return Record(
         samples, channels, a.fs, part.start, (*part.history, *theirs, step), None, {**b.truth, **a.truth}, part.rig
     )
-
-
-@dataclass(frozen=True)
-class _Match:
-    offset: Estimate
-    rate: Estimate
 
 
 def _shared_motion(a: Record, b: Record, on: str | tuple[str, str] | None) -> tuple[str, str]:
@@ -191,7 +185,8 @@ def _shared_motion(a: Record, b: Record, on: str | tuple[str, str] | None) -> tu
     )
 
 
-def _match(a: Record, b: Record, on: str | tuple[str, str] | None) -> _Match:
+def _match(a: Record, b: Record, on: str | tuple[str, str] | None) -> tuple[Estimate, Estimate]:
+    """Offset and rate of b's clock against a's."""
     names = _shared_motion(a, b, on)
     a.require_clean(names[0], question="clock_offset", samples=64)
     b.require_clean(names[1], question="clock_offset", samples=64)
@@ -283,7 +278,7 @@ def _coarse(a: _Motion, b: _Motion) -> tuple[float, float, list[float]]:
     return float(offsets[chosen]), float(likeness[chosen]), [float(offsets[k]) for k in near if k != chosen]
 
 
-def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> _Match:
+def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> tuple[Estimate, Estimate]:
     from scipy.interpolate import CubicSpline
 
     motion = CubicSpline(b.time, b.values)
@@ -305,7 +300,7 @@ def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> _Matc
     design, data, along = linearised(offset)
     fit = least_squares(design, data)
     gain, residual = float(fit.coefficients[0]), fit.residual
-    found = Estimate.normal(
+    estimate = Estimate.normal(
         "clock offset",
         offset,
         sd=float(fit.sd[2]) / abs(gain),
@@ -323,22 +318,22 @@ def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> _Matc
         method="least squares of the stretch between the smoothed motions",
     )
     rest = float(np.std(residual) / np.std(data))
-    return _Match(_judged(found, gain, rest, rate, len(data) * a.step, others), rate)
+    return _judged(estimate, gain, rest, rate, len(data) * a.step, others), rate
 
 
 def _judged(
     offset: Estimate, gain: float, rest: float, rate: Estimate, overlap: float, others: list[float]
 ) -> Estimate:
     """The offset with what was checked, and in words why it may be wrong."""
-    words = []
+    doubts = []
     if others:
         nearest = ", ".join(f"{other:.4g} s" for other in sorted(others, key=abs)[:3])
-        words.append(f"the motion repeats: {nearest} fit about as well, and the longest overlap was taken")
+        doubts.append(f"the motion repeats: {nearest} fit about as well, and the longest overlap was taken")
     if not rate.includes(1.0) and abs(rate.value - 1) * overlap > 4 * offset.sd:
-        words.append(f"the clocks run at different rates, {rate.value:.6f} to 1: pass rate=clock_rate(a, b)")
+        doubts.append(f"the clocks run at different rates, {rate.value:.6f} to 1: pass rate=clock_rate(a, b)")
     checks = (
         f"residual {100 * rest:.2g} % of the motion over {overlap:.3g} s",
         f"gain {gain:.4f}",
         f"rate ratio {rate.value:.6f} (95 %: {rate.interval[0]:.6f} to {rate.interval[1]:.6f})",
     )
-    return replace(offset, status=Status(*words), checks=checks)
+    return replace(offset, status=Status(*doubts), checks=checks)

@@ -54,12 +54,12 @@ def derivative_spectra(values: Array, *, fs: float, orders: Sequence[int], shift
     transformed = [np.fft.rfft(window * values) for window in windows[: max(orders) + 1]]
     turn = 2j * math.pi * np.fft.rfftfreq(count, 1 / fs)
     later = np.exp(-turn * shift)
-    found = np.empty((len(orders), len(turn)), dtype=complex)
-    for row, order in zip(found, orders, strict=True):
+    spectra = np.empty((len(orders), len(turn)), dtype=complex)
+    for row, order in zip(spectra, orders, strict=True):
         row[:] = later * sum(
             math.comb(order, j) * (-1) ** j * turn ** (order - j) * transformed[j] for j in range(order + 1)
         )
-    return found
+    return spectra
 
 
 def window(count: int) -> Array:

@@ -140,10 +140,13 @@ class Filter:
         zone = min(reach, size // 2)
         rows = np.unique(np.round(np.geomspace(1, zone + 1, 80)).astype(int) - 1)
         rows = rows[rows < zone]
-        for side in (slice(None), slice(None, None, -1)):
-            # a record reversed in time turns the odd derivatives round
-            turned = terms if side.step is None else {order: c * (-1) ** order for order, c in terms.items()}
-            gain[side][:zone] = np.interp(np.arange(zone), rows, self._row_norms(min(size, 2 * reach), turned, rows))
+        # A record reversed in time turns the odd derivatives round: where all are odd, or all even, the ends are alike.
+        turned = {order: c * (-1) ** order for order, c in terms.items()}
+        alike = len({order % 2 for order, c in terms.items() if c}) < 2
+        begin = self._row_norms(min(size, 2 * reach), terms, rows)
+        end = begin if alike else self._row_norms(min(size, 2 * reach), turned, rows)
+        for side, norms in ((gain, begin), (gain[::-1], end)):
+            side[:zone] = np.interp(np.arange(zone), rows, norms)
         return gain
 
     def _derivative(self, values: Array, order: int) -> Array:

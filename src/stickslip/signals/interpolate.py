@@ -18,7 +18,7 @@ ORDER = 32  # of the autoregression that bridges lost samples
 
 
 def band_limited(values: Array, times: Array, *, cutoff: float = 1.0) -> Array:
-    """The band-limited signal through uniform samples, at other times.
+    """The band-limited signals through uniform samples, at other times.
 
     ``y(t) = sum_k x_k c sinc(c (t - k)) w((t - k) c / 32)`` with Kaiser's window w and cut-off c, normalised to unit
     gain at zero frequency (Smith and Gossett 1984, "A flexible sampling-rate conversion method", ICASSP). Beyond its
@@ -26,16 +26,16 @@ def band_limited(values: Array, times: Array, *, cutoff: float = 1.0) -> Array:
 
     Parameters
     ----------
-    values : ndarray, shape (n,)
-        Uniform samples.
+    values : ndarray, shape (..., n)
+        Uniform samples, of one signal or of several.
     times : ndarray, shape (m,)
-        Where the signal is wanted, in samples from the first; within 0 and n - 1.
+        Where the signals are wanted, in samples from the first; within 0 and n - 1.
     cutoff : float
         Upper end of the band relative to the samples' Nyquist frequency, at most 1.
 
     Returns
     -------
-    ndarray, shape (m,)
+    ndarray, shape (..., m)
 
     Examples
     --------
@@ -44,26 +44,27 @@ def band_limited(values: Array, times: Array, *, cutoff: float = 1.0) -> Array:
     True
     """
     reach = int(np.ceil(LOBES / cutoff))
-    n = len(values)
+    n = values.shape[-1]
     if n <= reach:
         raise RecordError(
             f"a channel of {n} samples", f"interpolation at this rate needs {reach + 1}", "give a longer record"
         )
-    padded = np.concatenate([2 * values[0] - values[reach:0:-1], values, 2 * values[-1] - values[-2 : -reach - 2 : -1]])
-    result = np.empty(len(times))
+    before = 2 * values[..., :1] - values[..., reach:0:-1]
+    after = 2 * values[..., -1:] - values[..., -2 : -reach - 2 : -1]
+    around = np.lib.stride_tricks.sliding_window_view(np.concatenate([before, values, after], axis=-1), 2 * reach, -1)
+    result = np.empty((*values.shape[:-1], len(times)))
     taps = np.arange(-reach + 1, reach + 1)
     for first in range(0, len(times), BLOCK):
         block = times[first : first + BLOCK]
         base = np.minimum(np.floor(block).astype(int), n - 1)
         past = block - base
         if np.ptp(past) < SAME and np.all(np.diff(base) == 1):  # a plain delay: the same weights everywhere
-            weights = _weights(past[:1, None] - taps, cutoff)[0]
-            samples = padded[base[0] + 1 : base[-1] + 2 * reach + 1]
-            result[first : first + BLOCK] = np.correlate(samples, weights, mode="valid") / np.sum(weights)
-            continue
-        weights = _weights(past[:, None] - taps, cutoff)
-        samples = padded[np.minimum(base[:, None] + taps + reach, len(padded) - 1)]
-        result[first : first + BLOCK] = np.sum(weights * samples, axis=1) / np.sum(weights, axis=1)
+            weights = _weights(past[0] - taps, cutoff)
+            found = around[..., base[0] + 1 : base[-1] + 2, :] @ weights
+        else:
+            weights = _weights(past[:, None] - taps, cutoff)
+            found = np.einsum("...ij,ij->...i", around[..., base + 1, :], weights)
+        result[..., first : first + BLOCK] = found / np.sum(weights, axis=-1)
     return result
 
 

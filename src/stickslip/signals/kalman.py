@@ -126,12 +126,12 @@ def smooth_motion(motion: Motion, seen: Seen, *, unknown: Array, forms: Array) -
     """
     motion, kept, likelihood = _filtered(motion, seen, unknown)
     count, size = len(unknown), len(motion.start)
-    told = Smoothed(
+    smoothed = Smoothed(
         np.empty((len(forms), count)), np.empty((len(forms), count)), np.empty(count), np.empty(count), likelihood
     )
     work = Work(np.zeros(size), np.zeros((size, size)), np.empty(size), np.empty((size, size)))
-    _backward(motion, seen, kept, forms, told, work)
-    return told
+    _backward(motion, seen, kept, forms, smoothed, work)
+    return smoothed
 
 
 def log_likelihood(motion: Motion, seen: Seen, *, unknown: Array) -> float:
@@ -256,19 +256,19 @@ def _predict(t, motion, seen, unknown, work):
 
 
 @compiled(**FAST)
-def _backward(motion, seen, kept, forms, told, work):
+def _backward(motion, seen, kept, forms, smoothed, work):
     """The way back; what it carries are slope r and curvature m of the likelihood by the state."""
     for t in range(seen.readings.shape[0] - 1, -1, -1):
-        _score(t, motion, seen, told, work)
+        _score(t, motion, seen, smoothed, work)
         _step_back(motion.transition[seen.regime[t]], work)
         for k in range(seen.readings.shape[1] - 1, -1, -1):
             if kept.variances[t, k] != 0.0:
                 _give_back(t, k, motion, kept, work)
-        _tell(t, kept, forms, told, work)
+        _tell(t, kept, forms, smoothed, work)
 
 
 @compiled(**FAST, forceinline=True)
-def _score(t, motion, seen, told, work):
+def _score(t, motion, seen, smoothed, work):
     """Slope and curvature by the unknown of a step."""
     r, m, spread = work.vector, work.matrix, motion.spread[seen.regime[t]]
     n, first, second = r.shape[0], 0.0, 0.0
@@ -278,7 +278,7 @@ def _score(t, motion, seen, told, work):
         for j in range(n):
             total += m[i, j] * spread[j]
         second += spread[i] * total
-    told.score[t], told.information[t] = first, second
+    smoothed.score[t], smoothed.information[t] = first, second
 
 
 @compiled(**FAST, forceinline=True)
@@ -326,7 +326,7 @@ def _give_back(t, k, motion, kept, work):
 
 
 @compiled(**FAST, forceinline=True)
-def _tell(t, kept, forms, told, work):
+def _tell(t, kept, forms, smoothed, work):
     """The linear forms that are wanted, at a sample."""
     r, m, line, n = work.vector, work.matrix, work.line, work.vector.shape[0]
     for o in range(forms.shape[0]):
@@ -342,4 +342,4 @@ def _tell(t, kept, forms, told, work):
         for i in range(n):
             for j in range(n):
                 doubt -= line[i] * m[i, j] * line[j]
-        told.values[o, t], told.variance[o, t] = value, max(doubt, least)
+        smoothed.values[o, t], smoothed.variance[o, t] = value, max(doubt, least)

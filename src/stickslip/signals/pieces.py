@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.signals.cutting import GLIDE, Sums, cut
+
 Array = NDArray[np.float64]
 
-GLIDE, RING = 0, 1
-SHORTEST = 4  # samples of a glide: a parabola has three coefficients
 TOLD = 1e-13  # variance of the squared time within a stretch, below which a line explains it
 
 
@@ -47,8 +47,7 @@ class Splitter:
         self.values = np.zeros((len(signals), self.lengths.max()))
         for row, values in zip(self.values, signals, strict=True):
             row[: len(values)] = values
-        self.squares = _between(self.values**2)
-        self.glides = _glide_costs(self.values, self.squares) / variance
+        self.glides = _glide_costs(self.values) / variance
 
     def cost(self, pole: complex, shortest: int) -> Array:
         """The least cost of each signal; `pole` per sample, rings of at least `shortest` samples."""
@@ -62,32 +61,13 @@ class Splitter:
 
     def _programme(self, pole: complex, shortest: int) -> tuple[Array, NDArray[np.intp]]:
         many, count = self.values.shape
-        costs, least = (self.glides, self._ring_costs(pole)), (SHORTEST, shortest)
-        best = np.full((many, 2, count + 1), np.inf)
-        came = np.zeros((many, 2, count + 1), dtype=np.intp)
-        best[:, RING, 0] = 0.0  # so that a glide comes first
-        each = np.arange(many)
-        for last in range(SHORTEST, count + 1):
-            for kind in (GLIDE, RING):
-                firsts = last - least[kind] + 1
-                if firsts > 0:
-                    total = best[:, 1 - kind, :firsts] + costs[kind][:, :firsts, last]
-                    where = total.argmin(axis=1)
-                    came[:, kind, last] = where
-                    best[:, kind, last] = total[each, where] + self.penalty
-        return best, came
-
-    def _ring_costs(self, pole: complex) -> Array:
-        """Sum of squares, in variances, that the best ring leaves of each stretch [i, j)."""
-        if pole == 0:
-            return self.squares / self.variance
-        wave = np.exp(pole * np.arange(self.values.shape[1]))
+        wave = np.exp(pole * np.arange(count)) if pole else np.zeros(count, dtype=complex)
         c, s = wave.real, wave.imag
-        cc, cs, ss = _between(c * c), _between(c * s), _between(s * s)
-        cy, sy = _between(c * self.values), _between(s * self.values)
-        determinant = np.maximum(cc * ss - cs * cs, 1e-12 * cc * ss + 1e-300)
-        explained = (ss * cy * cy - 2 * cs * cy * sy + cc * sy * sy) / determinant
-        return np.asarray(np.maximum(self.squares - explained, 0.0) / self.variance)
+        best, came = np.full((many, 2, count + 1), np.inf), np.zeros((many, 2, count + 1), dtype=np.intp)
+        products = np.array([c * self.values, s * self.values])
+        sums = Sums(_sums(self.values**2), _sums(np.array([c * c, c * s, s * s])), _sums(products))
+        cut(self.lengths, self.glides, sums, shortest, self.variance, self.penalty, best, came)
+        return best, came
 
 
 def _traced(came: NDArray[np.intp], length: int) -> tuple[Piece, ...]:
@@ -99,13 +79,18 @@ def _traced(came: NDArray[np.intp], length: int) -> tuple[Piece, ...]:
     return tuple(pieces[::-1])
 
 
+def _sums(values: Array) -> Array:
+    """Sums over the samples up to, not including, each: shape (..., n + 1)."""
+    return np.concatenate([np.zeros((*values.shape[:-1], 1)), np.cumsum(values, axis=-1)], axis=-1)
+
+
 def _between(values: Array) -> Array:
     """Sums over the samples i up to, not including, j: shape (..., n + 1, n + 1), of use where i < j."""
-    total = np.concatenate([np.zeros((*values.shape[:-1], 1)), np.cumsum(values, axis=-1)], axis=-1)
+    total = _sums(values)
     return np.asarray(total[..., None, :] - total[..., :, None])
 
 
-def _glide_costs(values: Array, squares: Array) -> Array:
+def _glide_costs(values: Array) -> Array:
     """Sum of squares that the best parabola leaves of each stretch [i, j)."""
     time = np.linspace(-1, 1, values.shape[-1])
     n = np.maximum(_between(np.ones(len(time))), 1.0)
@@ -116,6 +101,6 @@ def _glide_costs(values: Array, squares: Array) -> Array:
     tt = np.maximum(m[1] - m[0] ** 2, 1e-15)
     tq, qq = m[2] - m[0] * m[1], m[3] - m[1] ** 2
     rest = qq - tq**2 / tt
-    told = rest > TOLD
-    extra = np.where(told, (tty - tq * ty / tt) ** 2 / np.where(told, rest, 1.0), 0.0)
-    return np.asarray(np.maximum(squares - n * (y**2 + ty**2 / tt + extra), 0.0))
+    resting = rest > TOLD
+    extra = np.where(resting, (tty - tq * ty / tt) ** 2 / np.where(resting, rest, 1.0), 0.0)
+    return np.asarray(np.maximum(_between(values**2) - n * (y**2 + ty**2 / tt + extra), 0.0))

@@ -102,9 +102,9 @@ def _relabelled(record: Record, line: Line, fs: float | None, reason: str) -> Re
     interval = line.fs_interval if fs is None else (rate, rate)
     arguments = {"fs": rate, "fs_interval": list(interval), "trust": "samples"}
     late = 1e3 * float(np.ptp(line.late))
-    found = f"{rate:.5g} Hz (95 %: {interval[0]:.5g} to {interval[1]:.5g})"
+    quoted = f"{rate:.5g} Hz (95 %: {interval[0]:.5g} to {interval[1]:.5g})"
     outcome = (
-        f"{len(record)} samples put on a uniform clock of {found}; "
+        f"{len(record)} samples put on a uniform clock of {quoted}; "
         f"the stamps lay within {late:.3g} ms of each other about it ({reason})"
     )
     return record.with_samples(record.samples, Step("repair_clock", arguments, outcome), fs=rate, start=line.start)
@@ -495,6 +495,6 @@ def _mended(record: Record, samples: Mapping[str, Array], step: Step) -> Record:
     stale = derived if changed & set(SOURCES) - derived else set()
     kept = {name: values for name, values in samples.items() if name not in stale}
     if stale:
-        words = f"{step.outcome}; dropped, being derived from what was mended: {', '.join(sorted(stale))}"
-        step = replace(step, outcome=words)
+        outcome = f"{step.outcome}; dropped, being derived from what was mended: {', '.join(sorted(stale))}"
+        step = replace(step, outcome=outcome)
     return record.with_samples(kept, step, stamps=record.stamps)

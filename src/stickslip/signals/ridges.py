@@ -130,14 +130,14 @@ def find_ridges(wavelets: xr.DataArray, *, span: float = 40.0, cycles: float = 3
     crest &= (level > level.max() - span * math.log(10) / 20) & ~_near_ends(wavelets, times)
     if not crest.any():
         return ()
-    found = []
+    ridges = []
     for rows, columns in _chains(crest, level):
         place, height = _refined(level, rows, columns)
         frequency = np.exp(np.interp(place, np.arange(len(frequencies)), np.log(frequencies)))
         ridge = Ridge(times[columns], frequency, np.exp(height))
         if ridge.duration * float(np.median(frequency)) >= cycles:
-            found.append(ridge)
-    return tuple(sorted(found, key=lambda ridge: -float((ridge.modulus**2).sum())))
+            ridges.append(ridge)
+    return tuple(sorted(ridges, key=lambda ridge: -float((ridge.modulus**2).sum())))
 
 
 def local_maxima(wavelets: xr.DataArray, *, prominence: float = 3.0, span: float = 60.0) -> tuple[LocalMaximum, ...]:
@@ -199,13 +199,13 @@ def local_maxima(wavelets: xr.DataArray, *, prominence: float = 3.0, span: float
         stands[cut] = np.minimum(stands[cut], heights[cut] - floor)
     stands = np.minimum(stands, heights + span)  # lower, nothing is known of the map
     kept = [n for n in range(len(rows)) if stands[n] >= prominence]
-    found = [
+    maxima = [
         LocalMaximum(
             float(times[columns[n]]), float(frequencies[rows[n]]), float(modulus[rows[n], columns[n]]), float(stands[n])
         )
         for n in kept
     ]
-    return tuple(sorted(found, key=lambda each: each.time))
+    return tuple(sorted(maxima, key=lambda ridge: ridge.time))
 
 
 def find_spikes(

@@ -69,9 +69,9 @@ def extreme(values, first, last, side):
         span = max(span, abs(values[row] - level))
     for row in range(first - reach, first + reach + 1):
         total += side * (values[min(max(row, first), last)] - level)
-    best, found = total, first
+    best, best_row = total, first
     for row in range(first + 1, last + 1):
         total += side * (values[min(row + reach, last)] - values[max(row - reach - 1, first)])
         if total > best + EQUAL * width * span:
-            best, found = total, row
-    return found
+            best, best_row = total, row
+    return best_row

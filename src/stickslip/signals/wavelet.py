@@ -107,14 +107,7 @@ def wavelet_map(
             "cut the record, ask for fewer voices, or go through it with wavelet_blocks or wavelet_overview",
         )
     mean = float(record[channel].mean())
-    values = transform(
-        record[channel] - mean,
-        record.fs,
-        grid.scales,
-        centre=grid.centre,
-        normalisation=normalisation,
-        precision=precision,
-    )
+    values = grid.transform(record[channel] - mean, record.fs, precision=precision)
     return labelled(values, record.time, grid, record, channel, mean)
 
 
@@ -243,8 +236,8 @@ def wavelet_overview(
     if rest.shape[1]:
         shown = np.hstack([shown, rest.max(axis=1, keepdims=True)])
     times = first.time.values[0] + (np.arange(shown.shape[1]) + 0.5) * width / first.attrs["fs"]
-    found = last.isel(time=np.zeros(shown.shape[1], dtype=int)).assign_coords(time=("time", times, {"units": "s"}))
-    result: xr.DataArray = found.copy(data=shown)
+    overview = last.isel(time=np.zeros(shown.shape[1], dtype=int)).assign_coords(time=("time", times, {"units": "s"}))
+    result: xr.DataArray = overview.copy(data=shown)
     return result.assign_attrs(start=float(first.time.values[0]), end=float(last.time.values[-1]))
 
 
@@ -404,8 +397,8 @@ def inverse_wavelet(wavelets: xr.DataArray) -> Array:
         # a real part has both sides of the spectrum
         cover += step * (np.exp(-0.5 * (scale * turn - centre) ** 2) + np.exp(-0.5 * (scale * turn + centre) ** 2))
     share = cover / cover.max()
-    told = _smooth_step((share - COVERED[0]) / (COVERED[1] - COVERED[0]))
-    restored = np.divide(told, cover, out=np.zeros_like(cover), where=told > 0)
+    weight = _smooth_step((share - COVERED[0]) / (COVERED[1] - COVERED[0]))
+    restored = np.divide(weight, cover, out=np.zeros_like(cover), where=weight > 0)
     return np.asarray(irfft(restored * rfft(total, size), size)[:count] + float(wavelets.attrs["mean"]))
 
 
@@ -417,18 +410,16 @@ def _smooth_step(values: Array) -> Array:
 
 def _inner(values: Array, begin: int, count: int, fs: float, grid: Grid) -> NDArray[np.complexfloating]:
     """The map of some samples amid others: a few rows at once, each with as much around as its wavelet reaches."""
-    found = np.empty((len(grid.scales), count), dtype=complex)
+    products = np.empty((len(grid.scales), count), dtype=complex)
     row = 0
-    while row < len(found):
+    while row < len(products):
         reach = math.ceil(REACH["double"] * float(grid.scales[row]) * fs)  # the later ones reach less far
         low, high = max(0, begin - reach), min(len(values), begin + count + reach)
         some = slice(row, row + max(1, BLOCK_BYTES // 2 // (16 * (high - low))))
-        around = transform(
-            values[low:high], fs, grid.scales[some], centre=grid.centre, normalisation=grid.normalisation
-        )
-        found[some] = around[:, begin - low : begin - low + count]
+        around = grid.transform(values[low:high], fs, some)
+        products[some] = around[:, begin - low : begin - low + count]
         row = some.stop
-    return found
+    return products
 
 
 def _windows(

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import RecordError
 from stickslip.record.exchange import labelled_arrays
 from stickslip.record.record import Record
-from stickslip.signals.morlet import ridge_centre
+from stickslip.signals.morlet import ridge_centre, transform
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,8 +39,15 @@ class Grid:
     @property
     def scales(self) -> Array:
         """Dilation [s] of each frequency."""
-        told = ridge_centre(self.centre, self.normalisation) if self.corrected else self.centre
-        return np.asarray(told / (2 * np.pi * self.frequencies))
+        centre = ridge_centre(self.centre, self.normalisation) if self.corrected else self.centre
+        return np.asarray(centre / (2 * np.pi * self.frequencies))
+
+    def transform(
+        self, values: Array, fs: float, rows: slice = slice(None), precision: str = "double"
+    ) -> NDArray[np.complexfloating]:
+        """The wavelets of some samples, of all frequencies or some."""
+        options: Any = {"centre": self.centre, "normalisation": self.normalisation, "precision": precision}
+        return transform(values, fs, self.scales[rows], **options)
 
 
 def grid_of(
@@ -58,8 +65,8 @@ def grid_of(
         raise RecordError(f"normalisation = '{normalisation}'", f"there are {', '.join(NORMALISATIONS)}", "choose one")
     if isinstance(voices, bool) or not isinstance(voices, (int, np.integer)) or not 1 <= voices <= 512:
         raise RecordError(f"voices = {voices}", "an octave has 1 to 512 frequencies, a whole number", "choose one")
-    told = ridge_centre(centre, normalisation) if corrected else centre
-    lowest = told * math.sqrt(2) / (2 * math.pi * duration)  # where the cones of both ends meet at half of it
+    ridge = ridge_centre(centre, normalisation) if corrected else centre
+    lowest = ridge * math.sqrt(2) / (2 * math.pi * duration)  # where the cones of both ends meet at half of it
     if frequencies is None:
         wanted = np.array([lowest / LONGEST, HIGHEST * fs])
     else:

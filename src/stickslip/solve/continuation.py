@@ -132,9 +132,9 @@ def continue_orbit(orbit: SteadyState, parameter: str, *, to: float, step: float
         raise ModelError(f"the orbit at {first}", "does not close where a branch starts", "find it anew")
     tangent = _tangent(begin, _along(orbit), 0.0)
     side = _side(begin, tangent)
-    found, folds, status, length, clean = [begin], [], "unfinished", step, True
-    while len(found) < most:
-        last = found[-1]
+    orbits, folds, status, length, clean = [begin], [], "unfinished", step, True
+    while len(orbits) < most:
+        last = orbits[-1]
         rest = (float(tangent[-1] > 0) - last.point[-1]) / tangent[-1] if tangent[-1] else math.inf
         ahead = _step(map_, last, tangent, min(length, rest), _along(orbit) if rest <= length else tangent)
         if ahead is None and length <= FLOOR:
@@ -153,21 +153,21 @@ def continue_orbit(orbit: SteadyState, parameter: str, *, to: float, step: float
         if turned and same:
             fold = _fold(map_, last, tangent, length)
             if fold is not None:
-                folds.append(len(found))
-                found.append(fold)
-        found.append(ahead)
+                folds.append(len(orbits))
+                orbits.append(fold)
+        orbits.append(ahead)
         if rest <= length:
             status = "complete" if tangent[-1] > 0 else "returned"
             break
         tangent = _tangent(ahead, tangent, side)
         length, clean = min(step, 1.4 * length if clean else length), True
-    cycles = [cycle_of(look.orbit) for look in found]
+    cycles = [cycle_of(look.orbit) for look in orbits]
     return Branch(
         parameter,
-        np.array([first + look.point[-1] * (to - first) for look in found]),
-        tuple(look.orbit for look in found),
+        np.array([first + look.point[-1] * (to - first) for look in orbits]),
+        tuple(look.orbit for look in orbits),
         tuple(folds),
-        tuple(j for j in range(1, len(found)) if cycles[j] != cycles[j - 1]),
+        tuple(j for j in range(1, len(orbits)) if cycles[j] != cycles[j - 1]),
         status,
     )
 
@@ -274,12 +274,12 @@ def _step(map_: _Map, last: _Look, tangent: Array, length: float, normal: Array)
     """The orbit one step along the tangent, if it is near where the tangent leads."""
     aim = last.point + length * tangent
     try:
-        found = _correct(map_, aim, last.after, normal)
+        orbit = _correct(map_, aim, last.after, normal)
     except ModelError:
         return None  # the parameter has no meaning there: a shorter step does
-    if found is None or np.linalg.norm(found.point - aim) > max(0.5 * length, SLACK):
+    if orbit is None or np.linalg.norm(orbit.point - aim) > max(0.5 * length, SLACK):
         return None
-    return found
+    return orbit
 
 
 def _side(look: _Look, tangent: Array) -> float:
@@ -297,9 +297,9 @@ def _corner(map_: _Map, last: _Look, tangent: Array, side: float, step: float) -
     """The way on from a corner: with the tangent that the order of events just ahead has."""
     for length in (1e-9, 1e-6, step / 16):
         beyond = _tangent(map_(last.point + length * tangent, last.after, None), tangent, side)
-        found = _step(map_, last, beyond, step / 16, beyond)
-        if found is not None:
-            return beyond, found
+        orbit = _step(map_, last, beyond, step / 16, beyond)
+        if orbit is not None:
+            return beyond, orbit
     return tangent, None
 
 

@@ -46,35 +46,20 @@ class CurvedTrajectory(Trajectory):
 
     Attributes
     ----------
-    step_starts, step_lengths : ndarray (S,)
-        Start and length of each step [s].
-    step_modes : ndarray (S,)
-        Number of each step's mode.
-    step_states : ndarray (S, N)
-        State at the start of each step.
-    step_leaps : ndarray (S,)
-        Number of the step among the leaps; -1 for a Taylor step.
-    leaps : ndarray (L, N, 10)
-        Each leap's state as polynomials of w, -1 at its start and 1 after `reach`.
-    reach : ndarray (L,)
-        Time from w = -1 to w = 1 [s].
+    steps : Dense
+        Start and length [s], mode and state at the start of each step, its number among the leaps (-1: a Taylor step);
+        of each leap its state as polynomials of w, -1 at its start and 1 after its `reach` [s].
     order : int
         Degree of the Taylor polynomials.
     """
 
-    step_starts: Array
-    step_lengths: Array
-    step_modes: NDArray[np.int64]
-    step_states: Array
-    step_leaps: NDArray[np.int64]
-    leaps: Array
-    reach: Array
+    steps: Dense
     order: int
 
     @property
     def corners(self) -> Array:
         """State at the start of each step (S, N)."""
-        return self.step_states
+        return self.steps.states
 
     def end(self) -> tuple[Array, int]:
         """State and mode at the end; returns as of :meth:`Trajectory.end`."""
@@ -86,34 +71,19 @@ class CurvedTrajectory(Trajectory):
     @property
     def cells(self) -> tuple[Array, Array]:
         """Start and length [s] of the steps."""
-        return self.step_starts, self.step_lengths
+        return self.steps.starts, self.steps.lengths
 
     def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, NDArray[np.int64]]:
         """Values at increasing instants; parameters and returns as of :meth:`Trajectory.sample`."""
-        times = np.ascontiguousarray(times, dtype=np.float64)
-        if len(times) and not (times[0] >= 0 and times[-1] <= self.duration * (1 + 1e-12)):
-            raise SolveError(
-                f"instants from {times[0]:g} to {times[-1]:g} s",
-                f"the motion is known from 0 to {self.duration:g} s",
-                "simulate longer, or ask within it",
-            )
+        times = self.instants(times)
         table: Any = self.table
         names = [n for name in outputs for n in (table.names[: table.physical] if name == "state" else (name,))]
         nodes = np.column_stack([table.places[name] for name in names])
         out, step = np.empty((len(names), len(times))), np.empty(len(times), dtype=np.int64)
         count = table.watched.most
-        steps = Dense(
-            self.step_starts,
-            self.step_lengths,
-            self.step_modes,
-            self.step_states,
-            self.step_leaps,
-            self.leaps,
-            self.reach,
-        )
-        work = np.empty(count * (self.order + 1)), np.empty(self.step_states.shape[1]), np.empty(count)
-        march.sample(_shown(table, self.order), steps, times, nodes, out, step, work)
-        piece = np.searchsorted(self.starts, self.step_starts[step], side="right") - 1
+        work = np.empty(count * (self.order + 1)), np.empty(self.steps.states.shape[1]), np.empty(count)
+        march.sample(_shown(table, self.order), self.steps, times, nodes, out, step, work)
+        piece = np.searchsorted(self.starts, self.steps.starts[step], side="right") - 1
         return out, piece
 
     def labels(self, name: str) -> tuple[str, ...]:
@@ -292,6 +262,7 @@ def _assembled(table: Tape, kept: list[Steps], total: float, status: str, order:
     first = np.flatnonzero(np.concatenate([[True], steps.ends[:-1] >= 0]))
     last = np.append(first[1:], len(steps.ends)) - 1
     period = table.motion.period
+    starts = steps.offsets + (steps.laps * period if math.isfinite(period) else 0.0)
     return CurvedTrajectory(
         system=table.system,
         table=table,  # type: ignore[arg-type]
@@ -303,12 +274,6 @@ def _assembled(table: Tape, kept: list[Steps], total: float, status: str, order:
         exits=steps.ends[last],
         duration=total,
         status=status,
-        step_starts=steps.offsets + (steps.laps * period if math.isfinite(period) else 0.0),
-        step_lengths=steps.lengths,
-        step_modes=steps.modes,
-        step_states=steps.states,
-        step_leaps=steps.leaps,
-        leaps=steps.polys,
-        reach=steps.reach,
+        steps=Dense(starts, steps.lengths, steps.modes, steps.states, steps.leaps, steps.polys, steps.reach),
         order=order,
     )

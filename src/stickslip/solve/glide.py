@@ -84,14 +84,7 @@ class Pieces(NamedTuple):
 
     def part(self, begin: int, end: int) -> Pieces:
         """Some of them."""
-        return Pieces(
-            self.laps[begin:end],
-            self.offsets[begin:end],
-            self.modes[begin:end],
-            self.durations[begin:end],
-            self.states[begin:end],
-            self.exits[begin:end],
-        )
+        return Pieces._make(column[begin:end] for column in self)
 
 
 class Here(NamedTuple):
@@ -127,6 +120,12 @@ def blank_past() -> Past:
     """The ring of pieces before the first one."""
     none = np.full((2, HISTORY), -1, np.int64)
     return Past(none[0], none[1], np.zeros(HISTORY), np.ones(HISTORY, np.int64), np.zeros(3, np.int64))
+
+
+def blank_pieces(shape: tuple[int, ...], size: int) -> Pieces:
+    """Room for pieces of a state of so many entries."""
+    laps, modes, exits = (np.zeros(shape, kind) for kind in (np.int32, np.int16, np.int16))
+    return Pieces(laps, np.zeros(shape), modes, np.zeros(shape), np.zeros((*shape, size)), exits)
 
 
 @compiled(**OPTIONS, forceinline=True)

@@ -252,7 +252,7 @@ def _crossed(model, mode, clock, left, patience, work):
     """Take the state `work.held` through a mode until an exit ends it, the time that is left is over, or `patience`
     cells are gone through: the time [s], the exit (-1: none) and the cells."""
     linear, held, tail = model.linear, work.held, work.tail
-    cell, gone, armed, cells = linear.cell[mode], 0.0, 0, 0
+    cell, gone, armed, cells = linear.cell[mode], 0.0, np.int64(0), 0
     while True:
         span = left - gone
         dt, leaving, armed = next_exit(linear, mode, cells == 0, armed, span, work)
@@ -312,7 +312,8 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
     tuple of (int, int, int, Clock)
         Status, number of pieces, mode, and the clock.
     """
-    n, linear, count, spent = state.shape[0], model.linear, 0, 0
+    n, linear, spent = state.shape[0], model.linear, 0
+    count = np.int64(0)  # a plain 0 is a type of its own to numba: what it is handed to would be compiled once more
     room, held = parts_of(work, n), parts_of(work, n).held
     capacity, quick = out.laps.shape[0], model.fast.nodes.shape[0] > 0
     while True:

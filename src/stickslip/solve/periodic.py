@@ -92,11 +92,11 @@ def steady_state(
         sizes.append(size)
         if size > RUNAWAY * first:
             break
-        found = _closed(system, table, state, mode, orders)
-        if found is None and _repeats_freely(table):
-            found = _family(system, table, state, mode, size, orders)
-        if found is not None:
-            return found
+        orbits = _closed(system, table, state, mode, orders)
+        if orbits is None and _repeats_freely(table):
+            orbits = _family(system, table, state, mode, size, orders)
+        if orbits is not None:
+            return orbits
         count = laps
     orbit = lap(system, table, state, mode, 1)
     growing = sizes[-1] > RUNAWAY * first or (
@@ -135,12 +135,12 @@ def attractors(
     >>> [orbit.status for orbit in attractors(slider, starts=[{}, {"x": 3.0}])]
     ['rest', 'unique']
     """
-    found: list[SteadyState] = []
+    attractors: list[SteadyState] = []
     for start in starts:
         orbit = steady_state(system, start=start, transient=transient, orders=orders)
-        if not any(alike(orbit, other) for other in found):
-            found.append(orbit)
-    return tuple(found)
+        if not any(alike(orbit, other) for other in attractors):
+            attractors.append(orbit)
+    return tuple(attractors)
 
 
 def _iterate(system: System, table: Table, state: Array, mode: int, laps: int) -> tuple[Array, int, float]:
@@ -207,9 +207,9 @@ def _family(system: System, table: Table, state: Array, mode: int, size: float, 
         pushed = state.copy()
         pushed[0] += math.copysign(push * size, state[0])
         point, where, _ = _iterate(system, table, pushed, mode, 32)
-        found = _closed(system, table, point, where, orders)
-        if found is not None and found.status == "not unique":
-            return found
+        orbit = _closed(system, table, point, where, orders)
+        if orbit is not None and orbit.status == "not unique":
+            return orbit
     return None
 
 

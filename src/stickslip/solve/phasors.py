@@ -62,15 +62,8 @@ class Phasors(NamedTuple):
     def of(self, number: int) -> Phasors:
         """The tables of one system."""
         begin, end = self.span[number]
-        return Phasors(
-            self.drive[number],
-            self.mode[number],
-            self.level[number],
-            self.exit[number],
-            self.rest[number],
-            self.nodes[begin:end],
-            np.array([0, end - begin]),
-        )
+        own = (part[number] for part in (self.drive, self.mode, self.level, self.exit, self.rest))
+        return Phasors._make([*own, self.nodes[begin:end], np.array([0, end - begin])])
 
 
 class Turn(NamedTuple):
@@ -201,36 +194,18 @@ def _slides(flow: Array, omega: Array, able: NDArray[np.bool_]) -> tuple[NDArray
     stiffness, response = np.where(able, stiffness, 1.0), np.where(able, response, 1.0)
     free = -damping / 2 + 1j * np.sqrt(np.where(able, turn, 1.0))
     forced = (flow[:, 1, -2] - 1j * flow[:, 1, -1]) / response
-    fast, none = np.abs(free), np.zeros((len(flow), 2))
-    columns = np.column_stack(
-        [
-            np.full(len(flow), SLIDING),
-            free.real,
-            free.imag,
-            forced.real,
-            forced.imag,
-            1 / stiffness,
-            fast,
-            1 / free.imag,
-            fast / (2 * HALF_STEP),
-            none,
-            np.abs(forced.real) + np.abs(forced.imag),
-        ]
-    )
+    fast, columns = np.abs(free), np.zeros((len(flow), 12))
+    columns[:, 0] = SLIDING
+    columns[:, 1:5] = np.transpose([free.real, free.imag, forced.real, forced.imag])
+    columns[:, 5:9] = np.transpose([1 / stiffness, fast, 1 / free.imag, fast / (2 * HALF_STEP)])
+    columns[:, 11] = np.abs(forced.real) + np.abs(forced.imag)
     return free, forced, stiffness, columns
 
 
 def without(count: int) -> Phasors:
     """The tables of systems without a fast path."""
-    return Phasors(
-        np.zeros((count, 4)),
-        np.zeros((count, 1, 12)),
-        np.zeros((count, 1, 1)),
-        np.zeros((count, 1, 9)),
-        np.zeros((count, 1, 1)),
-        np.zeros((0, 3)),
-        np.zeros((count, 2), np.int64),
-    )
+    tables = (np.zeros((count, *shape)) for shape in ((4,), (1, 12), (1, 1), (1, 9), (1, 1)))
+    return Phasors._make([*tables, np.zeros((0, 3)), np.zeros((count, 2), np.int64)])
 
 
 def _all_nodes(turns: NDArray[np.complex128], able: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array, Array]:

@@ -15,10 +15,11 @@ from stickslip.errors import ModelError
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
+from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import CurvedTrajectory, run_curved
 from stickslip.solve.glide import Pieces
 from stickslip.solve.simulate import run, stops_of
-from stickslip.solve.tables import Array, System, Tables, table_of
+from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.tangent import carry_tangents
 from stickslip.solve.tape import Tape, tape
 from stickslip.solve.trajectory import Trajectory
@@ -82,19 +83,15 @@ def derivative(orbit: Trajectory, after: int) -> tuple[Array, float]:
         return jacobian, float(np.max(np.abs(gap)) <= TORN * max(1.0, np.max(np.abs(slope))))
     size = len(table.names)
     tangents = np.eye(size)[:physical].copy()
-    slowest = carry_tangents(
-        table.linear,
-        table.leap,
-        _pieces(orbit),
-        after,
-        tangents,
-        np.empty((9, size)),
-    )
+    slowest = _carry(orbit, after, tangents)
     return tangents[:, :physical].T, slowest
 
 
-def _pieces(orbit: Trajectory) -> Pieces:
-    return Pieces(orbit.laps, orbit.offsets, orbit.modes, orbit.durations, orbit.states, orbit.exits)
+def _carry(orbit: Trajectory, after: int, tangents: Array) -> float:
+    """Carry small differences along an orbit; the slowest crossing of an exit."""
+    table, pieces = orbit.table, (orbit.laps, orbit.offsets, orbit.modes, orbit.durations, orbit.states, orbit.exits)
+    work = np.empty((9, len(table.names)))
+    return float(carry_tangents(table.linear, table.leap, Pieces(*pieces), after, tangents, work))
 
 
 def carried(orbit: Trajectory, after: int, difference: Array) -> Array:
@@ -106,14 +103,7 @@ def carried(orbit: Trajectory, after: int, difference: Array) -> Array:
     size = len(orbit.table.names)
     tangents = np.zeros((1, size))
     tangents[0, : len(difference)] = difference
-    carry_tangents(
-        orbit.table.linear,
-        orbit.table.leap,
-        _pieces(orbit),
-        after,
-        tangents,
-        np.empty((9, size)),
-    )
+    _carry(orbit, after, tangents)
     return tangents[0, : len(difference)]
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
@@ -64,14 +64,14 @@ def require_budget(events: int, *, passed: float, scale: float, budget: int, sta
 
 
 @contextmanager
-def held_back() -> Iterator[None]:
-    """A first Ctrl-C waits until the block is done; a second comes at once.
+def held_back() -> Iterator[Callable[[], None]]:
+    """A first Ctrl-C waits until the block is done, or calls what it is given; a second comes at once.
 
     While numba hands one compiled function to another it takes an interrupt for an error of its own.
     """
     handler = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(handler):
-        yield
+        yield lambda: None
         return
     heard: list[tuple[int, FrameType | None]] = []
 
@@ -80,10 +80,13 @@ def held_back() -> Iterator[None]:
             handler(number, frame)
         heard.append((number, frame))
 
+    def heed() -> None:
+        if heard:
+            handler(*heard.pop())
+
     signal.signal(signal.SIGINT, hear)
     try:
-        yield
+        yield heed
     finally:
         signal.signal(signal.SIGINT, handler)
-    if heard:
-        handler(*heard[0])
+    heed()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import SolveError
 from stickslip.solve.curved import CurvedTrajectory
+from stickslip.solve.march import Dense
 from stickslip.solve.orbit import SteadyState
 from stickslip.solve.poincare import Table, closes, derivative, stretch
 from stickslip.solve.simulate import opening
@@ -54,9 +55,9 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
             if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, own]), axis=0)):
                 return _between(motion, first, last)
         if not isinstance(table, Tape) and (not ends or motion.starts[ends[-1]] < duration / 2):
-            found = _without_sticks(motion)
-            if found is not None:
-                return found
+            orbit = _without_sticks(motion)
+            if orbit is not None:
+                return orbit
         duration *= 2
     none = np.full(table.physical, np.nan, dtype=np.complex128)
     steady = len(motion.modes) == 1 or motion.durations[-1] > 0.5 * duration
@@ -67,10 +68,10 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
 
 def _without_sticks(motion: Trajectory) -> SteadyState | None:
     """The orbit that a motion of linear modes ends in; between events nothing bounds it, so it has some."""
-    found = settled_cycle(motion, 2 * math.pi * float(np.min(motion.table.cell)))
-    if found is None or len(found[0].modes) == 1:
+    cycle = settled_cycle(motion, 2 * math.pi * float(np.min(motion.table.cell)))
+    if cycle is None or len(cycle[0].modes) == 1:
         return None
-    orbit, across = found
+    orbit, across = cycle
     multipliers = np.append(across, 0.0)  # along the orbit nothing grows: its phase is free
     return SteadyState("unique" if abs(across[0]) < 1 else "unstable", orbit.duration, 1, orbit, multipliers)
 
@@ -87,7 +88,7 @@ def _between_turns(system: System, table: Tape, state: Array, mode: int, duratio
         values, pieces = motion.sample(turns, ("state",))
         state, mode = state.copy(), int(motion.modes[pieces[1]])
         state[:physical] = values[:, 1]
-        sizes = np.max(np.abs(motion.step_states[motion.step_starts > turns[0], :physical]), axis=0)
+        sizes = np.max(np.abs(motion.steps.states[motion.steps.starts > turns[0], :physical]), axis=0)
         if np.all(np.abs(values[:, 1] - values[:, 0]) <= 1e-9 * sizes):
             period = turns[1] - turns[0]
             orbit = stretch(system, table, state, mode, span=(0.0, period))
@@ -103,7 +104,7 @@ def _turns(motion: CurvedTrajectory) -> list[float]:
     """The last two instants at which the velocity rises through zero."""
     from scipy.optimize import brentq
 
-    v, ends = motion.step_states[:, 1], motion.step_starts
+    v, ends = motion.steps.states[:, 1], motion.steps.starts
     rises = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0))[-2:]
     return [
         float(brentq(lambda t: motion.sample([t], ("v",))[0][0, 0], ends[j], ends[j + 1], xtol=1e-15 * ends[j + 1]))
@@ -116,9 +117,10 @@ def _between(motion: Trajectory, first: int, last: int) -> SteadyState:
     part, begin, end = slice(first, last), motion.starts[first], motion.starts[last]
     own: dict[str, Any] = {}
     if isinstance(motion, CurvedTrajectory):
-        steps = slice(*np.searchsorted(motion.step_starts, [begin, end]))
-        own = {name: getattr(motion, name)[steps] for name in ("step_lengths", "step_modes", "step_states")}
-        own["step_starts"] = motion.step_starts[steps] - begin
+        steps = motion.steps
+        inside = slice(*np.searchsorted(steps.starts, [begin, end]))
+        columns = [column[inside] for column in steps[:-2]]
+        own = {"steps": Dense._make([columns[0] - begin, *columns[1:], steps.polys, steps.reach])}
     orbit = replace(
         motion,
         laps=np.zeros(last - first, np.int32),
@@ -145,9 +147,9 @@ def settled_cycle(motion: Trajectory, shortest: float) -> tuple[Trajectory, NDAr
         state, _ = opening(motion.table, {})
         values, piece = motion.sample([begin], ("state",))
         state[:physical] = values[:, 0]
-        found = closed(motion.system, motion.table, state, int(motion.modes[piece[0]]), period)
-        if found is not None:
-            return _shortest(*found)
+        orbit = closed(motion.system, motion.table, state, int(motion.modes[piece[0]]), period)
+        if orbit is not None:
+            return _shortest(*orbit)
     return None
 
 

@@ -15,9 +15,10 @@ import numpy as np
 
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.oscillator import Oscillator
+from stickslip.solve.assembly import tables_of
 from stickslip.solve.cells import DEGREE
 from stickslip.solve.kernel import multiply
-from stickslip.solve.tables import Array, Tables, systems_of, tables_of
+from stickslip.solve.tables import Array, Tables, systems_of
 from stickslip.solve.trajectory import Trajectory
 
 TERMS = 40  # of a Taylor series over a cell at most

@@ -271,8 +271,8 @@ def _difference(a: str | None, b: str | None) -> str | None:
 
 def _sum(terms: Iterable[str | None]) -> str | None:
     """A sum in brackets; a long one in two halves that need not wait for each other."""
-    found = [term for term in terms if term]
-    if len(found) > 5:
-        early = found[:-2]
-        found = [f"({' + '.join(early[::2])})", f"({' + '.join(early[1::2])})", *found[-2:]]
-    return f"({' + '.join(found)})" if found else None
+    addends = [term for term in terms if term]
+    if len(addends) > 5:
+        early = addends[:-2]
+        addends = [f"({' + '.join(early[::2])})", f"({' + '.join(early[1::2])})", *addends[-2:]]
+    return f"({' + '.join(addends)})" if addends else None

@@ -16,12 +16,13 @@ from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.solve import kernel
+from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import degree, run_curved
 from stickslip.solve.delayed import delayed_tape, run_delayed
-from stickslip.solve.glide import Clock, Model, Pieces, blank_past, until
+from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
-from stickslip.solve.tables import Array, System, Tables, table_of
+from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
 
@@ -215,32 +216,35 @@ def run(
     scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
     pieces = _Log(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
+    # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just then;
+    # the first call may compile for long, and is left to it
+    compiled = getattr(kernel.march, "overloads", True)
     try:
-        for at, (signals, values) in stops_of(table, laps, offset):
-            state[signals] = values
-            mode = kernel.begin(model.linear, mode, state, total, 1.0, work)
-            _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
-            outcome = kernel.FULL
-            while outcome == kernel.FULL:
-                before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
-                # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just then;
-                # the first call may compile for long, and is left to it
-                with held_back() if getattr(kernel.march, "signatures", True) else nullcontext():
+        with held_back() if compiled else nullcontext(lambda: None) as heed:
+            for at, (signals, values) in stops_of(table, laps, offset):
+                state[signals] = values
+                mode = kernel.begin(model.linear, mode, state, total, 1.0, work)
+                _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
+                outcome = kernel.FULL
+                while outcome == kernel.FULL:
+                    before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
                     outcome, count, mode, clock = kernel.march(
                         model, before, state, mode, goal, past, pieces.room(), work, CELLS
                     )
-                passed = until(before, clock, period)
-                pieces.keep(count, passed, total)
-                _refuse(outcome, table, state, clock)
-                require_budget(
-                    count - (outcome == kernel.DONE),
-                    passed=passed,
-                    scale=scale,
-                    budget=budget,
-                    state=named(table.names[: table.physical], state),
-                )
-                if tell:
-                    tell(pieces.passed / total)
+                    heed()
+                    passed = until(before, clock, period)
+                    pieces.keep(count, passed, total)
+                    _refuse(outcome, table, state, clock)
+                    if count > budget:
+                        require_budget(
+                            count - (outcome == kernel.DONE),
+                            passed=passed,
+                            scale=scale,
+                            budget=budget,
+                            state=named(table.names[: table.physical], state),
+                        )
+                    if tell:
+                        tell(pieces.passed / total)
     except KeyboardInterrupt:
         if tell is None or not pieces.count:
             raise
@@ -261,7 +265,7 @@ class _Log:
 
     def __init__(self, size: int, room: int) -> None:
         self.count, self.passed, self.least = 0, 0.0, room
-        self.columns = _columns(256, size)
+        self.columns = blank_pieces((256,), size)
 
     def room(self) -> Pieces:
         """The part that is free, at most one chunk."""
@@ -274,7 +278,8 @@ class _Log:
         if self.count < len(self.columns.laps):
             return
         foretold = self.count * min(64.0, 1.05 * total / self.passed) if self.passed > 0 else 0.0
-        grown = _columns(max(int(foretold), self.count + self.least), self.columns.states.shape[1])
+        room = max(int(foretold), self.count + self.least)
+        grown = blank_pieces((room,), self.columns.states.shape[1])
         for name in Pieces._fields:
             getattr(grown, name)[: self.count] = getattr(self.columns, name)[: self.count]
         self.columns = grown
@@ -282,17 +287,6 @@ class _Log:
     def done(self) -> Pieces:
         """The pieces alone."""
         return self.columns.part(0, self.count)
-
-
-def _columns(room: int, size: int) -> Pieces:
-    return Pieces(
-        np.empty(room, np.int32),
-        np.empty(room),
-        np.empty(room, np.int16),
-        np.empty(room),
-        np.empty((room, size)),
-        np.empty(room, np.int16),
-    )
 
 
 def stops_of(table: Tables | Tape, laps: float, offset: float) -> Any:
@@ -319,6 +313,8 @@ def _at_rest(table: Tables, state: Array, mode: int) -> bool:
 
 
 def _refuse(outcome: int, table: Tables, state: Array, clock: Clock) -> None:
+    if outcome in (kernel.DONE, kernel.FULL) and math.isfinite(state.sum()):
+        return
     place = f"lap {clock.laps:g}, {clock.time:g} s, at {named(table.names[: table.physical], state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
         raise chatter(place)

@@ -18,7 +18,7 @@ from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
 from stickslip.oscillator import Oscillator
 from stickslip.solve import taylor
 from stickslip.solve.series import Nodes
-from stickslip.solve.tables import by_value
+from stickslip.solve.tables import by_value, mode_number
 from stickslip.solve.taylor import Array, Exits, Guards, Sums
 
 Form = tuple[dict[int, float], float]  # weights of nodes, and a constant
@@ -98,10 +98,7 @@ class Tape:
 
     def index(self, mode: str) -> int:
         """Number of the mode of that name."""
-        names = [m.name for m in self.modes]
-        if mode not in names:
-            raise ModelError(f"no mode is called '{mode}'", f"the law has {', '.join(names)}", "choose one of them")
-        return names.index(mode)
+        return mode_number(self.modes, mode)
 
 
 class _Operations:
@@ -369,9 +366,9 @@ def _flat(modes: list[_Operations]) -> tuple[NDArray[Any], ...]:
 def _guards(modes: list[_Operations]) -> Guards:
     """The nodes whose series may know nothing of what is ahead: what they are, and of what; and the first by mode."""
     kinds = (taylor.EXP, taylor.TANH, taylor.POWER)
-    found = [[row[:2] for row in mode.rows if row[0] in kinds] for mode in modes]
-    pairs = np.array([row for rows in found for row in rows], dtype=np.int64).reshape(-1, 2)
-    return Guards(pairs[:, 0].copy(), pairs[:, 1].copy(), np.cumsum([0, *map(len, found)]))
+    guarded = [[row[:2] for row in mode.rows if row[0] in kinds] for mode in modes]
+    pairs = np.array([row for rows in guarded for row in rows], dtype=np.int64).reshape(-1, 2)
+    return Guards(pairs[:, 0].copy(), pairs[:, 1].copy(), np.cumsum([0, *map(len, guarded)]))
 
 
 def _sums(modes: list[_Operations], rates: Any, exits: Any) -> Sums:

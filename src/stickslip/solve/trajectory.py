@@ -145,9 +145,9 @@ class Trajectory:
         Event
         """
         ends, codes = self._changes
-        words = {code: self._words(code) for code in np.unique(codes).tolist()}
+        texts = {code: self._words(code) for code in np.unique(codes).tolist()}
         for j, code in zip(ends.tolist(), codes.tolist(), strict=True):
-            for word in words[code]:
+            for word in texts[code]:
                 yield Event(float(self.starts[j]), *word)
 
     def event_counts(self) -> Counter[str]:
@@ -203,6 +203,17 @@ class Trajectory:
         named = dict(zip(names, map(float, values[:, 0]), strict=True))
         return {**named, "mode": int(self.modes[piece[0]])}
 
+    def instants(self, times: ArrayLike) -> Array:
+        """Instants as an array, if the motion is known at the first and at the last."""
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        if len(times) and not (times[0] >= 0 and times[-1] <= self.duration * (1 + 1e-12)):
+            raise SolveError(
+                f"instants from {times[0]:g} to {times[-1]:g} s",
+                f"the motion is known from 0 to {self.duration:g} s",
+                "simulate longer, or ask within it",
+            )
+        return times
+
     def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, NDArray[np.int64]]:
         """Exact values at increasing instants.
 
@@ -226,13 +237,7 @@ class Trajectory:
         SolveError
             Instants out of order or outside the simulated time, or an output that the system does not have.
         """
-        times = np.ascontiguousarray(times, dtype=np.float64)
-        if len(times) and not (times[0] >= 0 and times[-1] <= self.duration * (1 + 1e-12)):
-            raise SolveError(
-                f"instants from {times[0]:g} to {times[-1]:g} s",
-                f"the motion is known from 0 to {self.duration:g} s",
-                "simulate longer, or ask within it",
-            )
+        times = self.instants(times)
         if np.any(np.diff(times) < 0):
             raise SolveError("instants that run back", "they are looked up in the order of time", "sort them")
         rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
@@ -341,7 +346,7 @@ class Trajectory:
             for name in names
             for label, unit in zip(self.labels(name), self.units(name), strict=True)
         ]
-        channels = {label: Channel(label, unit, words, source="simulate") for label, unit, words in labels}
+        channels = {label: Channel(label, unit, title, source="simulate") for label, unit, title in labels}
         step = Step("simulate", {"system": repr(self.system), "fs": fs}, f"{len(self.modes)} pieces, {self.status}")
         samples: Mapping[str, Array] = dict(zip(channels, values, strict=True))
         return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(self.system)})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,25 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Status
+from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record
-from stickslip.squeak.hearing import Hearing, Span, clipped_rows, filtered, pulse_train
+from stickslip.squeak.hearing import LASTS, PARTIALS, Hearing, Span, clipped_rows, filtered
 from stickslip.squeak.sound import REFERENCES, level
+from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]
 
 HEARD = ("sound", "normal_acceleration", "a", "friction", "ch1")  # the first of these, unless told
 LOWEST = 50.0  # Hz
+OF_MEDIAN = math.sqrt(math.pi / 2)  # its standard deviation over that of the mean
 GROWN = 12.0  # cycles of growth to the peak: what is struck is there within fewer
 EVEN = 0.35  # of a burst's length at which half of its energy has come: a ring that dies away has it earlier
 SUSTAINED = 0.25  # s: a squeak is shorter
 LOCKED, WEAK = 2, -35.0  # overtones that a contact's limit cycle has, and dB below the fundamental at which they count
-TOLD = 100.0  # cycles in which partials at whole ratios are told from those of a bell
+PLAYED = 2100.0  # Hz: C7, up to which voices and instruments reach; higher notes are struck, and die away
+# Set on seeds 1000 to 5100 of tests/sound_sources.py, where beeps glide by 0.3 % in noise and clocks wander by 1.1:
+GLIDES = 0.01  # of the pitch: what is switched on electrically keeps it
+VOICED = 60.0  # pulses in a second, from which on they may be those of a voice
+WANDERS = 1.2  # factor by which the rate of stick-slip changes as it goes on; that of a machine or a clock does not
 FREE, FED = 0.21, 0.3  # of the friction's level: it swings less beneath a free ringing, and more beneath a squeak
 THROUGH = 1.5  # periods of the forced motion: what sounds longer goes on through reversals
 QUIET = 45.0  # dB re 20 uPa: less is not heard beside a running rig
 RINGS = 30.0  # cycles around a burst that a filter about its tone needs
-PARTIALS = 0.1  # of the power in steady lines
 RISEN = 0.1  # of the largest sliding speed: slower is no sliding
 MOSTLY = 0.5  # of a burst that the contact slides through
 ALIKE = 0.1  # of a rate: two that differ by less are the same
@@ -111,7 +116,7 @@ class Squeak:
 
 
 @dataclass(frozen=True, eq=False)
-class Squeaks:
+class Squeaks(Result):
     """The bursts of a record.
 
     Attributes
@@ -132,6 +137,9 @@ class Squeaks:
         Those of the notes that all of the numbers rest on.
     band : tuple of float
         Lowest and highest frequency that were listened to [Hz].
+    threshold : float
+        Level [dB] from which on a squeak of a tenth of a second and a hundred cycles would have been heard, at any
+        frequency in the band (19 in 20); NaN where the channel is clipped.
     """
 
     bursts: tuple[Squeak, ...]
@@ -142,6 +150,7 @@ class Squeaks:
     notes: tuple[str, ...] = ()
     band: tuple[float, float] = (0.0, math.inf)
     cautions: tuple[str, ...] = ()
+    threshold: float = math.nan
 
     @property
     def kind(self) -> str:
@@ -156,8 +165,8 @@ class Squeaks:
 
     @property
     def untold(self) -> tuple[Squeak, ...]:
-        """The tonal bursts of which it can not be told whether friction makes them."""
-        return tuple(burst for burst in self.of("tonal") if burst.friction == "not told")
+        """The bursts of which it can not be told whether friction makes them."""
+        return tuple(burst for burst in self.bursts if burst.friction == "not told")
 
     @property
     def answer(self) -> str:
@@ -167,6 +176,30 @@ class Squeaks:
         if self.of("creak"):
             return "creaks"
         return "can not be told" if self.untold else "does not squeak"
+
+    @property
+    def loudest(self) -> Squeak | None:
+        """The loudest of the squeaks and squeals, or of all bursts where there are none; if clipped, the longest."""
+        bursts = self.of("squeak", "squeal") or self.bursts
+        return max(bursts, key=lambda each: (np.nan_to_num(each.level, nan=-math.inf), each.duration), default=None)
+
+    @property
+    def frequency(self) -> Estimate | None:
+        """Median frequency of the squeaks and squeals [Hz], its interval from the scatter between them.
+
+        One burst that is told at a multiple of its pitch moves only the interval.
+        """
+        heard = [burst.frequency for burst in self.of("squeak", "squeal")]
+        if not heard:
+            return None
+        mean = mean_of_cycles("frequency of the squeaks", heard, unit="Hz", method="median of the bursts", of="burst")
+        median, reach = float(np.median(heard)), OF_MEDIAN * (mean.interval[1] - mean.value)
+        return replace(mean, value=median, interval=(median - reach, median + reach), sd=OF_MEDIAN * mean.sd)
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """The median frequency, where anything squeaks."""
+        return () if self.frequency is None else (self.frequency,)
 
     def of(self, *kinds: str) -> tuple[Squeak, ...]:
         """The bursts of some kinds."""
@@ -183,6 +216,7 @@ class Squeaks:
             "squeaking": self.squeaking,
             "reference": self.reference,
             "forcing": None if math.isnan(self.forcing) else self.forcing,
+            "threshold": None if math.isnan(self.threshold) else self.threshold,
             "bursts": [burst.to_dict() for burst in self.bursts],
             "notes": list(self.notes),
             "history": [str(step) for step in self.record.history],
@@ -203,15 +237,19 @@ def find_squeaks(
     """Does it squeak: when, at which frequency, how loudly, and does friction make the sound?
 
     A burst is tonal where one line of the short-time spectrum stands out and goes on without a jump; it is cut where
-    its level falls by ten decibel and rises again. What remains is a creak where pulses follow each other at even
-    intervals, else broad band. Which tonal bursts are friction's is told by what is recorded beside them:
+    its level falls by ten decibel and rises again. What remains is a creak where pulses follow each other at
+    intervals that change slowly, else broad band. Which tonal bursts are friction's is told by what is recorded beside
+    them:
 
     - motion and friction: those in which the contact slides and the friction force swings by 30 % of its level or more
       at that frequency; from 21 % on it can not be told, as near the load or speed at which squeaking begins;
     - motion alone: those that are not struck (they grow for twelve cycles, or half of their energy comes later than a
       third of their length) while the contact slides;
-    - sound alone: those that moreover last for a hundred cycles and have two overtones at least in whole ratios, as the
-      limit cycle of a contact has. A reed or a voice has them too; the evidence says so.
+    - sound alone: those of a hundred cycles with two overtones at least in whole ratios, as the limit cycle of a
+      contact has, above the 2.1 kHz that voices and instruments reach, that grow for twelve cycles or glide by 1 %,
+      which what is switched on electrically does not. A creak's rate wanders, and that of a clock does not.
+
+    Of everything else it can not be told; `threshold` says how loud a squeak would have been heard.
 
     Parameters
     ----------
@@ -266,7 +304,12 @@ def find_squeaks(
     bursts = sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start)
     cautions = tuple(listener.cautions(unit))
     notes = (*cautions, *listener.notes(unit))
-    return Squeaks(tuple(bursts), name, _reference(unit), motion.frequency, record, notes, (low, high), cautions)
+    heard = (
+        math.nan
+        if listener.clipped
+        else 10 * math.log10(max(hearing.threshold, 1e-300) / REFERENCES.get(unit, 1.0) ** 2)
+    )
+    return Squeaks(tuple(bursts), name, _reference(unit), motion.frequency, record, notes, (low, high), cautions, heard)
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,8 +365,7 @@ class _Listener:
         values, unit = record[self.name][rows] - record[self.name].mean(), record.channels[self.name].unit
         spoilt = any(first < part.last and last >= part.first for first, last in self.clipped)
         frequency, harmonics, tonality = hearing.tones(part)
-        rate = pulse_train(hearing.values[rows], record.fs) if not part.tonal else math.nan
-        kind, friction, evidence = self._kind(part, rate, () if spoilt else harmonics)
+        kind, friction, evidence = self._kind(part, () if spoilt else harmonics)
         loudest, loud = hearing.loudest(part)
         reference = REFERENCES.get(unit, 1.0)
         calibrated = unit == "Pa" and not spoilt
@@ -339,7 +381,7 @@ class _Listener:
             levels=self._levels(rows),
             harmonics=() if spoilt else harmonics,
             tonality=tonality,
-            rate=rate,
+            rate=part.rate if kind == "creak" else math.nan,
             phase=float(motion.phase[loudest]) if motion.phase is not None else math.nan,
             speed=float(motion.velocity[loudest]) if motion.velocity is not None else math.nan,
             loud=(float(record.time[loud[0]]), float(record.time[loud[1] - 1])),
@@ -362,13 +404,13 @@ class _Listener:
             name: level(values[rows], references[name], fs=self.record.fs) for name, values in self.vibrations.items()
         }
 
-    def _kind(self, part: Span, rate: float, harmonics: tuple[tuple[float, float], ...]) -> tuple[str, str, str]:
+    def _kind(self, part: Span, harmonics: tuple[tuple[float, float], ...]) -> tuple[str, str, str]:
         """Its kind, whether friction makes it, and why."""
         duration = (part.last - part.first) / self.record.fs
         sliding = self.motion.sliding(part.first, part.last)
         slides = sliding > MOSTLY
         if not part.tonal:
-            return self._broad(part, rate, slides=slides)
+            return self._broad(part, slides=slides)
         if self.motion.velocity is not None and not slides:
             much = (
                 f"the contact slides (faster than {1e3 * self.motion.slowest:.2g} mm/s) for {100 * sliding:.0f} % of it"
@@ -381,6 +423,8 @@ class _Listener:
             return "tonal", "not told", "cut by the record: whether it grew or was struck can not be told"
         if self.record.channels[self.name].unit == "Pa" and self._loudness(part) < QUIET:
             return "tonal", "no", f"quieter than {QUIET:g} dB: it would not be heard"
+        if part.growth < GROWN and part.middle < EVEN and part.hidden:
+            return "tonal", "not told", "what sounds before it hides whether it grew or was struck"
         if part.growth < GROWN and part.middle < EVEN:
             return "tonal", "no", f"it is there after {part.growth:.1f} cycles and dies away: it is struck, not fed"
         if self.motion.velocity is not None:
@@ -392,14 +436,22 @@ class _Listener:
     ) -> tuple[str, str, str]:
         """Of a tone that is heard alone: a rubbing contact repeats, so that its overtones stand in whole ratios."""
         locked, cycles = sum(strength > WEAK for _, strength in harmonics), duration * part.line
-        if cycles < TOLD:
+        if cycles < LASTS:
             short = (
-                f"of sound alone: it lasts {cycles:.0f} cycles of its tone; {TOLD:g} are needed to tell overtones in"
+                f"of sound alone: it lasts {cycles:.0f} cycles of its tone; {LASTS:g} are needed to tell overtones in"
             )
             return "tonal", "not told", f"{short} whole ratios, as a rubbing contact has, from those of a bell"
         if locked < LOCKED:
             many = "one overtone" if locked else "no overtone"
             return "tonal", "not told", f"of sound alone: {many} in a whole ratio, and a rubbing contact has {LOCKED}"
+        deepest = self.hearing.deeper(part)
+        if deepest < PLAYED:
+            reach = (
+                f"of sound alone: at {deepest:.0f} Hz it may be a voice, an instrument or a machine, which reach up to"
+            )
+            return "tonal", "not told", f"{reach} {PLAYED:g} Hz"
+        if self.hearing.glide(part) < GLIDES and (why := self._steady(part)):
+            return "tonal", "not told", f"of sound alone: it keeps one pitch, and {why}"
         return (
             "squeal" if duration > SUSTAINED else "squeak",
             "likely",
@@ -408,6 +460,16 @@ class _Listener:
                 "friction: a reed or a voice has them too"
             ),
         )
+
+    def _steady(self, part: Span) -> str:
+        """Why a tone that keeps one pitch may be a machine's; empty where it is seen to grow, and stays."""
+        if part.first <= self.hearing.hop:
+            return "how it began is not recorded"
+        if part.swells:
+            return "it swells and fades, as two tones that beat do"
+        if part.growth < GROWN:
+            return f"is there after {part.growth:.1f} cycles, as what is switched on electrically is"
+        return ""
 
     def _swinging(self, part: Span, kind: str) -> tuple[str, str, str]:
         """Of a tone while the contact slides: whether the friction force swings with it as it must to feed it."""
@@ -420,16 +482,24 @@ class _Listener:
         between = f"more than beneath a free ringing, {FREE:.0%}, and less than beneath a squeak, {FED:.0%}"
         return "tonal", "not told", f"{words}: {between}; near the threshold it can not be told"
 
-    def _broad(self, part: Span, rate: float, *, slides: bool) -> tuple[str, str, str]:
+    def _broad(self, part: Span, *, slides: bool) -> tuple[str, str, str]:
+        rate = part.rate
         if not math.isnan(rate) and self.name in TANGENTIAL and self._at_reversals(rate):
             return "noise", "no", f"its {rate:.3g} jumps in a second are the reversals of the motion"
-        if not math.isnan(rate):
-            words = f"pulses follow each other at even intervals, {rate:.3g} in a second, as in stick-slip"
+        if not math.isnan(rate) and (slides or (rate < VOICED and part.wander > WANDERS)):
+            words = (
+                f"pulses follow each other at intervals that change slowly, {rate:.3g} in a second, as in stick-slip"
+            )
             return "creak", "shown" if slides else "likely", words
         if slides:
             return "scrape", "shown", "broad band while the contact slides"
         if self.hearing.partials(part) > PARTIALS:
             return "tonal", "not told", "several partials that do not glide, as those of a bell"
+        if not math.isnan(rate):
+            words = f"of sound alone: {rate:.3g} pulses in a second"
+            if rate >= VOICED:
+                return "scrape", "not told", f"{words}, as a voice has from {VOICED:g} on"
+            return "scrape", "not told", f"{words} keep their rate, as those of a machine or a clock do"
         if part.throughout:
             return "noise", "not told", "broad band from end to end: what makes it can not be told"
         words = "broad band, and it begins and ends; of sound alone it can not be told whether anything rubs"

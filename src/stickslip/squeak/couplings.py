@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
 from stickslip.parameters import finite
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
@@ -104,7 +104,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Coupling:
+class Coupling(Result):
     """How the motions of a squeak hang together.
 
     Attributes

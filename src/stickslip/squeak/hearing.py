@@ -15,6 +15,7 @@ from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Waves = NDArray[np.complex128]
 
 WINDOW = 0.0232  # s
 OVERLAP = 4  # windows that share a sample
@@ -24,15 +25,22 @@ LOBE = 2  # bins to either side of a line that are its own
 AROUND = 15  # bins to either side that are its neighbours
 JUMP = 1 / 8  # octaves from frame to frame that a gliding tone makes at most
 DIP = 10.0  # dB: two bursts of one tone have a valley between them
-SHORTEST = 10  # cycles
+SHORTEST, LASTS = 10, 100.0  # cycles of a tone, and of one that is told from what is broad about it
 AUDIBLE = 30.0  # dB below the loudest moment
 ABOVE = 6.0  # dB above the quiet level
 TOGETHER = 0.08  # s: broad bursts nearer are one
 HARMONICS = 6
 PULSE, DEEP, APART = 2e-3, 6.0, 0.25  # s, dB, and the change of the logarithm of an interval
 PULSES, SLIM = 8, 0.5  # pulses at least, and their width against their interval
-WIDE, BROAD = 3.0, 0.3  # rates, and share of the middle frequency, that a pulse's spectrum is wide: beats are narrow
 STEADY = 5  # frames of the median that a level is taken over: no dip of two frames cuts a burst
+PARTIALS = 0.1  # of the power in steady lines
+# DROWNED to FLOOR were set on seeds 1000 to 5100 of tests/sound_sources.py and on the scrapes among the real sounds.
+DROWNED = 0.05  # s that a tone may be lost in noise for, and be the same
+WHOLE, COMMON = 0.03, 0.1  # how near a whole ratio is to it, and of the frames that have the fundamental as their line
+DEEPER = -20.0  # dB below its line from which a deeper partial is a burst's own
+GLIDING = 32  # cycles over which a pitch is told: in fewer, noise moves it
+FLOOR = 4.0  # times the noise before it, from which on a tone is seen to grow
+LEAK, BETWEEN = 0.75, 1.38  # of Hann's window: sum over bins of a mean square, and what a line between two bins loses
 STILL = 0.4  # s: the window in which steady partials are told from each other
 FORCES = ("N", "N m")
 HELD, LEAP = 3, 1e-3  # samples at the extreme, how often, and the jump beside them, of the span
@@ -41,7 +49,12 @@ TONAL = 0.5  # of a stretch that tones fill
 
 @dataclass(frozen=True)
 class Span:
-    """Rows of a burst, its line [Hz] where tonal, cycles of growth, and its share before half of its energy."""
+    """Rows of a burst.
+
+    Of a tonal one its line [Hz], cycles of growth, share before half of its energy, whether it fades and comes
+    again, and whether what sounds before it hides how it began; of pulses their rate [Hz], and by which factor it
+    wanders.
+    """
 
     first: int
     last: int
@@ -49,6 +62,10 @@ class Span:
     line: float = math.nan
     growth: float = math.nan
     middle: float = math.nan
+    swells: bool = False
+    hidden: bool = False
+    rate: float = math.nan
+    wander: float = math.nan
     throughout: bool = False
 
 
@@ -83,9 +100,10 @@ class Hearing:
         peak = np.argmax(power, axis=0)
         columns = np.arange(power.shape[1])
         strong = power[peak, columns]
-        offsets = np.r_[-AROUND:-LOBE, LOBE + 1 : AROUND + 1]
-        around = np.clip(peak + offsets[:, None], 0, count - 1)
-        beside = np.median(power[around, columns], axis=0)
+        lowest = int(np.searchsorted(self.frequencies, self.band[0]))
+        around = np.clip(peak, lowest + AROUND, count - 1 - AROUND) + np.arange(-AROUND, AROUND + 1)[:, None]
+        around = np.clip(around, 0, count - 1)
+        beside = np.nanmedian(np.where(np.abs(around - peak) > LOBE, power[around, columns], np.nan), axis=0)
         own = sum(
             power[np.clip(order * peak + step, 0, count - 1), columns]
             for order in range(1, HARMONICS + 1)
@@ -99,19 +117,33 @@ class Hearing:
     @cached_property
     def spans(self) -> tuple[Span, ...]:
         """The bursts: creaks and broad ones where the sound is not tonal, tonal ones elsewhere."""
-        active = self._active()
-        tonal = [part for part in self._tonal_spans() if active[self._frame(part.first) : self._frame(part.last)].any()]
+        active, throughout = self._active()
+        least = 2 * self.size if throughout else 0  # in noise, two windows that share no sample have to agree
+        tonal = [
+            part
+            for part in self._tonal_spans()
+            if active[self._frame(part.first) : self._frame(part.last)].any() and part.last - part.first >= least
+        ]
         covered = np.zeros(len(active), dtype=bool)
         for part in tonal:
             covered[self._frame(part.first) : self._frame(part.last) + 1] = True
         broad = []
         for first, last in _joined(_runs(active), round(TOGETHER * self.fs / self.hop)):
             rows = self._rows(first, last)
-            creaks = not math.isnan(pulse_train(self.values[rows[0] : rows[1]], self.fs))
-            if creaks or (covered[first:last].mean() < TONAL and last - first > OVERLAP):
-                broad.append(Span(*rows, False, throughout=bool(active.mean() > 0.97)))
-        outside = [p for p in tonal if not any(b.first <= (p.first + p.last) / 2 < b.last for b in broad)]
-        return (*outside, *broad)
+            rate, wander = pulse_train(self.values[rows[0] : rows[1]], self.fs)
+            background = throughout and bool(covered.any())  # what stands out of it is told, and not the noise itself
+            loud = self.power[:, first:last].sum(axis=0)
+            if loud[self.lines[2][first:last]].sum() > TONAL * loud.sum():  # pulses of tones are beeps or notes
+                rate = wander = math.nan
+            pulses, long = not math.isnan(rate), last - first > OVERLAP
+            if covered[first:last].mean() < TONAL and (pulses or (long and not background)):
+                broad.append(Span(*rows, False, rate=rate, wander=wander, throughout=bool(active.mean() > 0.97)))
+        return (*(part for part in tonal if self._stands(part, broad)), *broad)
+
+    def _stands(self, part: Span, broad: list[Span]) -> bool:
+        """Whether a tone is a burst by itself: it lasts, or no broad burst holds it."""
+        lasts = (part.last - part.first) * part.line > LASTS * self.fs
+        return lasts or not any(each.first <= (part.first + part.last) / 2 < each.last for each in broad)
 
     def tones(self, part: Span) -> tuple[float, tuple[tuple[float, float], ...], float]:
         """Dominant frequency [Hz], the harmonics that stand out, and the share of the power in both."""
@@ -134,15 +166,39 @@ class Hearing:
                 inside += power[place].sum()
         return frequency, tuple(found), float(min(1.0, (own + inside) / max(power.sum(), np.finfo(float).tiny)))
 
-    def partials(self, part: Span) -> float:
-        """Share of the power in lines that stay where they are: those of a long window that stand out."""
+    def glide(self, part: Span) -> float:
+        """Range of the pitch over its median: of nine tenths of the burst's power, in stretches of many cycles."""
+        from scipy.signal import hilbert
+
+        before, after = max(0, part.first - self.size), part.last + self.size
+        near = filtered(self.values[before:after], self.fs, (0.85 * part.line, min(1.15 * part.line, 0.49 * self.fs)))
+        wave = hilbert(near)[part.first - before : part.last - before]
+        size = max(2, round(GLIDING * self.fs / part.line))
+        count = len(wave) // size
+        if count < 3:
+            return 0.0
+        turns = (wave[1:] * np.conj(wave[:-1]))[: count * size - 1]
+        parts = np.array([piece.sum() for piece in np.array_split(turns, count)])
+        loud = np.abs(parts) > 0.1 * np.abs(parts).max()
+        pitch = np.angle(parts[loud]) * self.fs / (2 * np.pi)
+        low, middle, high = np.quantile(pitch, [0.05, 0.5, 0.95])
+        return float((high - low) / middle)
+
+    def deeper(self, part: Span) -> float:
+        """The lowest frequency [Hz] that stands out in a tonal burst: its line, where nothing lies below."""
         from scipy.ndimage import median_filter
-        from scipy.signal import welch
 
         values = self.values[part.first : part.last]
-        _, power = welch(values, self.fs, nperseg=min(len(values), round(STILL * self.fs)))
-        apart = power > 10 ** (STANDS_OUT / 10) * median_filter(power, 2 * AROUND + 1)
-        return float(power[apart].sum() / max(power.sum(), np.finfo(float).tiny))
+        power = np.abs(np.fft.rfft(values * np.hanning(len(values)))) ** 2
+        step = self.fs / len(values)
+        below = power[: max(1, int(part.line / step) - 2 * LOBE)]
+        beside = median_filter(power, 2 * AROUND + 1)[: len(below)]
+        out = (below > power.max() * 10 ** (DEEPER / 10)) & (below > 10 ** (STANDS_OUT / 10) * beside)
+        return float(np.argmax(out) * step) if out.any() else part.line
+
+    def partials(self, part: Span) -> float:
+        """Share of its power in lines that stay where they are."""
+        return steady_share(self.values[part.first : part.last], self.fs)
 
     def loudest(self, part: Span) -> tuple[int, tuple[int, int]]:
         """Row of its loudest moment, and the rows about it that are within ten decibel of it."""
@@ -152,24 +208,41 @@ class Hearing:
         first, last = soft[soft < peak].max(initial=-1) + 1, soft[soft > peak].min(initial=len(energy))
         return part.first + peak, (part.first + int(first), part.first + int(last))
 
-    def _active(self) -> Flags:
-        """Frames in which something sounds."""
+    @cached_property
+    def threshold(self) -> float:
+        """Power from which on a tone of any frequency would be told as one, in 95 of 100 frames.
+
+        It has to stand out of its neighbours, to be stronger than any line there, to hold its share of the power, and
+        not to be hidden by what is loudest. A line has half of its power in one bin, and up to 1.4 dB less between two.
+        """
+        from scipy.ndimage import median_filter
+
+        power, inside = self.power[:, ::OVERLAP], self.frequencies >= self.band[0]
+        rest = power.sum(axis=0) / LEAK  # of all that sounds, as a mean square
+        beside = median_filter(power, (2 * AROUND + 1, 1))[inside].max(axis=0)
+        line = 2 * BETWEEN * np.maximum(10 ** (STANDS_OUT / 10) * beside, power.max(axis=0))
+        needed = np.maximum(line, OF_POWER / (1 - OF_POWER) * rest)
+        _, throughout = self._active()
+        if not throughout:
+            least = max(rest.max() * 10 ** (-AUDIBLE / 10), float(np.quantile(rest, 0.1)) * 10 ** (ABOVE / 10))
+            needed = np.maximum(needed, least)
+        return float(np.quantile(needed, 0.95))
+
+    def _active(self) -> tuple[Flags, bool]:
+        """Frames in which something sounds, and whether it does from end to end."""
         loud = _decibel(self.power.sum(axis=0))
         quiet = float(np.quantile(loud, 0.1))
-        if loud.max() - quiet < 2 * ABOVE + 3:  # it sounds from end to end
-            return np.ones(len(loud), dtype=bool)
-        return np.asarray(loud > max(loud.max() - AUDIBLE, quiet + ABOVE))
+        if loud.max() - quiet < 2 * ABOVE + 3:
+            return np.ones(len(loud), dtype=bool), True
+        return np.asarray(loud > max(loud.max() - AUDIBLE, quiet + ABOVE)), False
 
     def _tonal_spans(self) -> list[Span]:
         from scipy.ndimage import median_filter
         from scipy.signal import find_peaks
 
         line, strength, tonal = self.lines
-        octaves = np.abs(np.diff(np.log2(np.maximum(line, 1e-9))))
-        bins = np.abs(np.diff(line)) / self.frequencies[1]
-        joined = tonal[1:] & tonal[:-1] & ((octaves < JUMP) | (bins < 2))
         found = []
-        for first, last in _runs(joined):
+        for first, last in self._one_pitch(line, tonal):
             stretch = median_filter(strength[first : last + 1], STEADY, mode="nearest")
             padded = np.concatenate([[stretch.min() - DIP], stretch, [stretch.min() - DIP]])
             peaks, _ = find_peaks(padded, prominence=DIP)
@@ -180,23 +253,51 @@ class Hearing:
                 begin = int(max(near[near < peak].max(initial=-1) + 1, begin))
                 end = int(min(near[near > peak].min(initial=len(stretch)), end))
                 part = slice(first + begin, first + end)
-                found.append(self._tonal(part.start, part.stop, _middle(line[part], strength[part])))
+                sounding = tonal[part]
+                if sounding.any():
+                    middle = _fundamental(line[part][sounding], strength[part][sounding])
+                    found.append(self._tonal(part.start, part.stop, middle, swells=len(peaks) > 1))
         return [part for part in found if (part.last - part.first) * part.line > SHORTEST * self.fs]
 
-    def _tonal(self, begin: int, end: int, middle: float) -> Span:
+    def _one_pitch(self, line: Array, tonal: Flags) -> list[tuple[int, int]]:
+        """Runs of frames of one tone: it may glide, leap to a multiple, or be drowned for a moment."""
+        octaves = np.abs(np.diff(np.log2(np.maximum(line, 1e-9))))
+        bins = np.abs(np.diff(line)) / self.frequencies[1]
+        near = (octaves < JUMP) | (bins < 2) | _multiples(line[1:], line[:-1])
+        joined: list[tuple[int, int]] = []
+        for first, last in _runs(tonal[1:] & tonal[:-1] & near):
+            if joined and self._same(line, joined[-1], (first, last)):
+                joined[-1] = (joined[-1][0], last)
+            else:
+                joined.append((first, last))
+        return joined
+
+    def _same(self, line: Array, one: tuple[int, int], other: tuple[int, int]) -> bool:
+        """Whether two runs of frames are one tone with a gap shorter than what sounds on either side."""
+        ended, begun = line[one[1]], line[other[0]]
+        gap, shorter = other[0] - one[1], min(one[1] - one[0], other[1] - other[0])
+        pitch = abs(math.log2(begun / ended)) < JUMP or bool(_multiples(begun, ended))
+        return pitch and gap <= min(shorter, DROWNED * self.fs / self.hop)
+
+    def _tonal(self, begin: int, end: int, middle: float, *, swells: bool) -> Span:
         """A stretch of frames about a line [Hz] as a burst, with how it grew."""
         first, last = self._rows(begin, end)
         before = max(0, first - self.size)
         near = self.values[before : last + self.size]
-        around = filtered(near, self.fs, (0.7 * middle, min(1.4 * middle, 0.49 * self.fs)))[first - before :]
-        around = around[: last - first]
-        energy = _smooth(around**2, max(3, round(2 * self.fs / middle)))
+        around = filtered(near, self.fs, (0.7 * middle, min(1.4 * middle, 0.49 * self.fs)))
+        smooth = _smooth(around**2, max(3, round(2 * self.fs / middle)))
+        energy_before, energy = smooth[: (first - before) // 2], smooth[first - before :][: last - first]
         peak = int(np.argmax(energy))
-        low = np.flatnonzero(energy[:peak] < energy[peak] / 100)
-        grown = (np.flatnonzero(energy[: peak + 1] > 0.8 * energy[peak])[0] - low.max(initial=0)) * middle / self.fs
+        usual = float(np.quantile(energy, 0.75))  # of the burst: in noise the peak itself comes anywhere
+        floor = FLOOR * float(np.mean(energy_before)) if len(energy_before) else 0.0
+        low = np.flatnonzero(energy[:peak] < max(energy[peak] / 100, floor))
+        grown = (np.flatnonzero(energy[: peak + 1] > 0.8 * usual)[0] - low.max(initial=0)) * middle / self.fs
         total = np.cumsum(energy)
         half = float(np.searchsorted(total, total[-1] / 2) / max(1, len(total)))
-        return Span(first, last, True, middle, float(max(grown, 0.0)), half)
+        loud = np.flatnonzero(energy > usual / 2)
+        dips = bool(energy[loud[0] : loud[-1] + 1].min() < usual * 10 ** (-DIP / 10))
+        hidden = bool(floor > energy[peak] / 100)
+        return Span(first, last, True, middle, float(max(grown, 0.0)), half, swells or dips, hidden)
 
     def _rows(self, begin: int, end: int) -> tuple[int, int]:
         """Samples of frames: each is centred on a multiple of the hop."""
@@ -214,24 +315,41 @@ class Hearing:
         return np.asarray((inner + np.clip(shift, -0.5, 0.5)) * self.frequencies[1])
 
 
-def pulse_train(values: Array, fs: float) -> float:
-    """Rate [Hz] of pulses that follow each other at intervals that change slowly; NaN where they do not."""
+def pulse_train(values: Array, fs: float) -> tuple[float, float]:
+    """Rate [Hz] of pulses at intervals that change slowly, and by which factor it wanders; NaN where there are none.
+
+    Two partials beat at even intervals, too: what consists of lines that stay where they are has no pulses.
+    """
+    from scipy.ndimage import median_filter
     from scipy.signal import find_peaks, peak_widths
 
+    none = (math.nan, math.nan)
     if len(values) < 64:
-        return math.nan
+        return none
     level = short_time_level(values, fs)
     peaks, _ = find_peaks(level, prominence=DEEP, height=level.max() - AUDIBLE)
     if len(peaks) < PULSES:
-        return math.nan
+        return none
     intervals = np.diff(peaks) / fs
     change = np.abs(np.diff(np.log(intervals)))
     width = float(np.median(peak_widths(10 ** (level / 10), peaks, rel_height=0.5)[0][:-1] / fs / intervals))
     rate = float(1 / np.median(intervals))
-    share = np.cumsum(np.abs(np.fft.rfft(values)) ** 2)
-    low, middle, high = np.searchsorted(share, np.array([0.1, 0.5, 0.9]) * share[-1]) * fs / len(values)
-    broad = high - low > max(WIDE * rate, BROAD * middle)
-    return rate if broad and np.median(change) < APART and width < SLIM else math.nan
+    uneven = float(np.median(change))
+    if uneven > APART or width > SLIM or steady_share(values, fs) > PARTIALS:
+        return none
+    single = intervals / np.maximum(1, np.rint(rate * intervals))  # where one is not heard the next comes later
+    shortest, longest = np.quantile(median_filter(single, STEADY, mode="nearest"), [0.1, 0.9])
+    return rate, float(longest / shortest) * math.exp(-uneven)  # what one differs from the next is no wandering
+
+
+def steady_share(values: Array, fs: float) -> float:
+    """Share of the power in lines that stay where they are: those of a long window that stand out."""
+    from scipy.ndimage import median_filter
+    from scipy.signal import welch
+
+    _, power = welch(values, fs, nperseg=min(len(values), round(STILL * fs)))
+    apart = power > 10 ** (STANDS_OUT / 10) * median_filter(power, 2 * AROUND + 1)
+    return float(power[apart].sum() / max(power.sum(), np.finfo(float).tiny))
 
 
 def clipped_rows(record: Record, channel: str) -> list[tuple[int, int]]:
@@ -286,6 +404,20 @@ def _middle(values: Array, levels: Array) -> float:
     order = np.argsort(values)
     share = np.cumsum(10 ** ((levels[order] - levels.max()) / 10))
     return float(values[order][np.searchsorted(share, share[-1] / 2)])
+
+
+def _multiples(one: Array | float, other: Array | float) -> Flags:
+    """Whether one frequency is two to six times another."""
+    ratio = np.maximum(one, other) / np.maximum(np.minimum(one, other), 1e-9)
+    whole = np.rint(ratio)
+    return np.asarray((whole >= 2) & (whole <= HARMONICS) & (np.abs(ratio / whole - 1) < WHOLE))
+
+
+def _fundamental(lines: Array, levels: Array) -> float:
+    """Median by power of the lines, those at multiples of the lowest one that is common brought down to it."""
+    base = float(np.quantile(lines, COMMON))
+    orders = np.maximum(1, np.rint(lines / base))
+    return _middle(lines / np.where(np.abs(lines / base / orders - 1) < JUMP, orders, 1.0), levels)
 
 
 def _decibel(power: Array | float) -> Array:

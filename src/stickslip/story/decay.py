@@ -5,121 +5,160 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from stickslip.answers.decay_comparison import DecayComparison
-from stickslip.answers.decays import CLEAR, DecayFindings
+from stickslip.answers.decays import CLEAR, Decay
+from stickslip.answers.findings import Comparison, Findings
 from stickslip.decay.answer import beginning, rig_units
 from stickslip.decay.choice import SIZE
+from stickslip.decay.decrement import Decrement
 from stickslip.decay.fit_decay import LEFT_OVER
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate, kinds
 from stickslip.plot.decay import plates_of, plates_together
-from stickslip.story.story import Line, Story, tried
-from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, leading, number, value_of
+from stickslip.story.story import Line, Story, Table, tried
+from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, number, value_of
 
 MOST = 0.5  # of the power of what is left over
 OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
 LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
-WAVEFORM = "The whole waveform: "
 FAR = 0.2  # rad: a pendulum's swing that a straight spring does not follow
 METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
 
 
-def of_findings(findings: DecayFindings) -> Story:
+def of_findings(findings: Findings) -> Story:
     """One record."""
-    beside = [replace(each, status="for comparison") for each in findings.comparisons]
-    motions = () if findings.motion is None else [told[1:] for told in findings.motion.candidates]
-    return Story.of_record(
-        findings.name, findings.record, headline=[*leading(findings.faults), *headline(findings)],
-        cautions=cautions(findings),
-        lines=[Line.of(each, findings.true_value(each)) for each in (*findings.estimates, *beside)],
-        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
-        tables=[tried("motion", motions)] if motions else [],
-        draw=lambda: plates_of(findings), data=findings.to_dict,
+    decay, chosen = findings.decay, findings.settings
+    beside = [replace(each, status="for comparison") for each in decay.comparisons]
+    motions = () if decay.motion is None else [told[1:] for told in decay.motion.candidates]
+    units = rig_units(chosen["channel"])
+    settings = {"methods": METHODS[chosen["method"]], "channel": chosen["channel"], "spring": chosen["restoring"]}
+    stated = {key: number(value, 0.0, units[key]) for key, value in chosen.items() if key in units}
+    return Story(
+        findings.name, list(_headline(findings)), cautions(findings),
+        settings={**settings, **stated},
+        tables=[*_by_other_ways([*decay.beside, *beside]), *([tried("motion", motions)] if motions else [])],
+        draw=lambda: plates_of(decay), data=lambda: _data(decay),
     )  # fmt: skip
 
 
-def of_comparison(comparison: DecayComparison) -> Story:
+def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:
+    """What is not quoted, folded away."""
+    headings = ("quantity", "value", "95 % interval", "how sure")
+    rows = [(each.name, value_of(each), interval_of(each), each.status) for each in estimates]
+    if rows:
+        yield Table("The same by other ways", headings, rows, folded=True)
+
+
+def of_comparison(comparison: Comparison) -> Story:
     """Several records together."""
     own = [
         Line.of(number, each.true_value(number), name=f"{number.name}, {each.name}")
         for each in comparison.findings
-        for number in (each.best.damping_ratio, each.best.dry_displacement, each.best.frequency)
+        for number in (each.decay.best.damping_ratio, each.decay.best.dry_displacement, each.decay.best.frequency)
     ]
+    joint = comparison.joint
+    half_cycles = None if joint is None else joint.half_cycles
     return Story(
         f"{len(comparison.findings)} records together", list(_together(comparison)), doubts(comparison.estimates),
-        lines=[*map(Line.of, comparison.estimates), *own], notes=comparison.notes,
-        parts=[of_findings(each) for each in comparison.findings],
-        draw=lambda: plates_together(comparison), data=comparison.to_dict,
+        lines=own, draw=lambda: plates_together(comparison),
+        data=lambda: {"joint": joint is not None, "apart": comparison.apart, "half_cycles": half_cycles},
     )  # fmt: skip
 
 
-def _settings(findings: DecayFindings) -> dict[str, str]:
-    """Choices and constants, as text."""
-    units = rig_units(findings.settings["channel"])
-    told = {key: number(value, 0.0, units[key]) for key, value in findings.settings.items() if key in units}
-    record = findings.record
+def _data(decay: Decay) -> dict[str, Any]:
+    """Releases, motions tried, older methods and bounds, for JSON."""
+    keys = ("release", "stop", "held", "stopped", "channel", "unit", "amplitude", "rest", "noise", "step", "status")
+    tried = () if decay.motion is None else decay.motion.candidates
     return {
-        "methods": METHODS[findings.settings["method"]],
-        "channel": findings.settings["channel"],
-        "spring": findings.settings["restoring"],
-        **told,
-        "sampling rate": f"{record.fs:g} Hz",
-        "length": f"{len(record)} samples, {record.duration:g} s",
+        "model": decay.best.model,
+        "status": decay.best.status,
+        "releases": [
+            {**{key: getattr(each, key) for key in keys}, "extremes": len(each.turns)}
+            for each in decay.releases.ring_downs
+        ],
+        "motions": [{"name": name, "words": words, "verdict": verdict} for name, words, verdict in tried],
+        "viscous_residual": decay.viscous_residual,
+        "comparisons": [estimate.to_dict() for estimate in decay.comparisons],
+        "decrements": None if decay.thesis is None else _decrements(decay.thesis),
     }
 
 
-def headline(findings: DecayFindings) -> Iterator[str]:
+def _decrements(found: Decrement) -> dict[str, Any]:
+    """Extremes, and the table of the bounds."""
+    bounds = found.bounds
+    rows = ("m", "rate", "rate_first_order", "rate_worst", "dry", "dry_first_order", "dry_worst")
+    return {
+        "extremes": {"time": found.time, "value": found.extremes, "sd": found.sd},
+        "differences": found.differences,
+        "bounds": {
+            "i": bounds.i, "best_m": bounds.best, "error": bounds.error,
+            **{name: getattr(bounds, name) for name in rows},
+        },
+        "scatter": {
+            name: {"mean": values.mean(), "sd": values.std()}
+            for name, values in vars(found.scatter).items() if len(values)
+        },
+    }  # fmt: skip
+
+
+def _headline(findings: Findings) -> Iterator[str]:
     """What was found, in a few sentences."""
+    decay = findings.decay
     yield from _frictions(findings)
-    yield from _left_over(findings)
-    for note in findings.notes:
-        if findings.waveform is None and findings.best is not findings.motion and note.startswith(WAVEFORM):
-            yield f"It is read from its extremes alone, for of the whole waveform {note.removeprefix(WAVEFORM)}"
-    force = findings.dry_force
+    yield from _left_over(decay)
+    if decay.refusal is not None and decay.best is not decay.motion:
+        yield f"It is read from its extremes alone, for of the whole waveform {decay.refusal}"
+    force = decay.dry_force
     word = "torque" if findings.settings["channel"] == "theta" else "force"
-    if force is not None:
+    if force is not None and decay.rubs:
         yield f"That is a dry friction {word} of {value_of(force)} (95 % sure: {interval_of(force)})."
-    elif findings.best.dry_displacement.interval[0] > 0:
+    elif decay.rubs:
         yield f"The dry friction {word} is that displacement times the spring's stiffness; state stiffness= or mass=."
-    yield from _motion(findings)
-    yield from _chosen(findings)
-    yield from _compared(findings)
+    yield from _motion(decay)
+    yield from _chosen(decay)
+    yield from _compared(decay)
 
 
-def _frictions(findings: DecayFindings) -> Iterator[str]:
+def _frictions(findings: Findings) -> Iterator[str]:
     """What makes it die away, and what the record says against that."""
-    yield _dying(findings)
-    if CLEAR <= findings.against < SIZE:
+    decay = findings.decay
+    yield _dying(decay)
+    if CLEAR <= decay.against < SIZE:
         yield (
-            f"The motions tried speak against viscous and dry friction, but weakly (p = {findings.against:.1g}): of "
+            f"The motions tried speak against viscous and dry friction, but weakly (p = {decay.against:.1g}): of "
             "true ones too one in twenty does so."
         )
-    swings = findings.releases.ring_downs
+    swings = decay.releases.ring_downs
     far = max(abs(each.amplitude) for each in swings)
     straight = findings.settings["channel"] == "theta" and findings.settings["restoring"] == "linear"
-    if straight and far > FAR and (findings.against < CLEAR or not swings[0].isochronous):
+    if straight and far > FAR and (decay.against < CLEAR or not swings[0].isochronous):
         yield f'A swing of {far:.2g} rad is far for a straight spring: of a pendulum ask with restoring="pendulum".'
 
 
-def _dying(findings: DecayFindings) -> str:
+def _dying(decay: Decay) -> str:
     """By which frictions it dies away, and how large they are."""
-    ratio, dry = findings.best.damping_ratio, findings.best.dry_displacement
-    viscous, rubs = ratio.interval[0] > 0, dry.interval[0] > 0
+    ratio, dry = decay.best.damping_ratio, decay.best.dry_displacement
+    viscous, rubs = ratio.interval[0] > 0, decay.rubs
     shown = _both(ratio, dry)
-    curved = findings.best is findings.thesis and not findings.releases.ring_downs[0].isochronous
-    if findings.motion is not None and findings.best is findings.motion:
-        words = findings.motion.choice.chosen.fitted.motion.words
-        return f"The motion dies away by {words}: {_listed([_told(each) for each in findings.motion.terms])}."
-    if findings.against < CLEAR or dry.interval[1] < 0 or curved:
+    curved = decay.best is decay.thesis and not decay.releases.ring_downs[0].isochronous
+    if decay.motion is not None and decay.best is decay.motion:
+        words = decay.motion.choice.chosen.fitted.motion.words
+        return f"The motion dies away by {words}: {_listed([_told(each) for each in decay.motion.terms])}."
+    if decay.denied and decay.whichever:
+        ratio, dry = decay.whichever
+        reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
+        return f"Whichever motion it was, {reach}: read as viscous and dry friction, which the record speaks against."
+    if decay.denied or curved:
         return f"Read as viscous and dry friction, which the record speaks against, it shows {shown}."
     if viscous and rubs:
-        model = findings.best.model
+        model = decay.best.model
         return f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
     if viscous:
-        return f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(dry, 'dry friction')}"
+        widest = max((dry, *decay.whichever[1:]), key=lambda each: each.interval[1])
+        return f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(widest, 'dry friction')}"
     if rubs:
         return f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
     return "Neither viscous nor dry friction can be told from zero."
@@ -129,9 +168,9 @@ def _listed(parts: list[str]) -> str:
     return " and ".join([", ".join(parts[:-1])] * (len(parts) > 1) + parts[-1:])
 
 
-def _chosen(findings: DecayFindings) -> Iterator[str]:
+def _chosen(decay: Decay) -> Iterator[str]:
     """Which motions the record leaves possible, and what counting them does to the dry friction."""
-    motion = findings.motion
+    motion = decay.motion
     if motion is None:
         return
     kept = [each.fitted.motion.words for each in motion.choice.candidates if each.kept]
@@ -148,12 +187,14 @@ def _chosen(findings: DecayFindings) -> Iterator[str]:
             f"The record speaks against each of the {tried} motions tried, least against "
             f"{nearest.fitted.motion.words} (p = {nearest.p_value:.1g}), which may be chance."
         )
-    more = findings.viscous_residual
+    more = decay.viscous_residual
     if more is not None and more > LEAVES_MORE:
         yield f"Viscous damping alone leaves {more:.3g} times the residual that it leaves together with dry friction."
-    dry = findings.whichever[1]
-    force = findings.as_force(dry, "")
+    dry = decay.whichever[1]
+    force = decay.as_force(dry, "")
     also = f", its {'torque' if force.unit == 'N m' else 'force'} {_reach(force)}" if force is not None else ""
+    if decay.denied:
+        return
     which = "Whichever of them it is" if kept else "By all that leave at most twice the least residual"
     yield f"{which}, the dry friction displacement is {_reach(dry)}{also}."
 
@@ -177,13 +218,14 @@ def _told(estimate: Estimate) -> str:
 
 
 def _hidden(estimate: Estimate, words: str) -> str:
+    """What is not told from zero, and up to how much of it would not be."""
     least = value_of(estimate, max(0.0, estimate.interval[1]))
-    return f"That there is {words} too can not be told: a {estimate.name} below {least} would not be seen."
+    return f"That there is {words} too can not be told: less than {least} of it would not be seen."
 
 
-def _left_over(findings: DecayFindings) -> Iterator[str]:
+def _left_over(decay: Decay) -> Iterator[str]:
     """Where the fit leaves more than noise: whether that drifts, or swings at a frequency of its own."""
-    fit = findings.waveform
+    fit = decay.waveform
     if fit is None or LEFT_OVER not in kinds(fit.status):
         return
     time, left = max(zip(fit.time, fit.residual, strict=True), key=lambda each: float(np.std(each[1])))
@@ -202,22 +244,22 @@ def _left_over(findings: DecayFindings) -> Iterator[str]:
         )
 
 
-def _motion(findings: DecayFindings) -> Iterator[str]:
-    rings = findings.releases.ring_downs
+def _motion(decay: Decay) -> Iterator[str]:
+    rings = decay.releases.ring_downs
     many = f"{len(rings)} releases were found; the first" if len(rings) > 1 else "The motion"
     first = rings[0]
     end = f"comes to rest at {first.stop:.4g} s" if first.stopped else "is still going on at the end"
     end = f"is caught at {first.stop:.4g} s" if CAUGHT in first.marks else end
-    begin, far = _begin(findings)
+    begin, far = _begin(decay)
     yield (
-        f"{many} {begin}, swings at {value_of(findings.best.frequency)} through {len(first.turns)} extremes from "
+        f"{many} {begin}, swings at {value_of(decay.best.frequency)} through {len(first.turns)} extremes from "
         f"{far}, and {end}."
     )
 
 
-def _begin(findings: DecayFindings) -> tuple[str, str]:
+def _begin(decay: Decay) -> tuple[str, str]:
     """When the motion begins, and from how far; as it is fitted, where it is."""
-    first, fit = findings.releases.ring_downs[0], findings.waveform
+    first, fit = decay.releases.ring_downs[0], decay.waveform
     begin = f"begins at {first.release:.4g} s" if first.held else "is under way when the record begins"
     if fit is None:
         return begin, number(abs(first.amplitude), abs(first.amplitude) / 1000, first.unit)
@@ -228,13 +270,13 @@ def _begin(findings: DecayFindings) -> tuple[str, str]:
     return f"{begin} ({less}it is fitted from its turn at {at})", far
 
 
-def _compared(findings: DecayFindings) -> Iterator[str]:
+def _compared(decay: Decay) -> Iterator[str]:
     """Where two methods answer: whether they agree."""
-    if findings.waveform is None or findings.thesis is None or findings.best is findings.motion:
+    if decay.waveform is None or decay.thesis is None or decay.best is decay.motion:
         return
     apart = []
     for name in ("damping_ratio", "dry_displacement"):
-        mine, theirs = getattr(findings.waveform, name), getattr(findings.thesis, name)
+        mine, theirs = getattr(decay.waveform, name), getattr(decay.thesis, name)
         gap = abs(mine.value - theirs.value)
         reach = max(abs(end - theirs.value) for end in theirs.interval) + max(
             abs(end - mine.value) for end in mine.interval
@@ -250,10 +292,9 @@ def _compared(findings: DecayFindings) -> Iterator[str]:
         yield "The decrements of the extremes agree within their intervals."
 
 
-def _together(comparison: DecayComparison) -> Iterator[str]:
+def _together(comparison: Comparison) -> Iterator[str]:
     many = len(comparison.findings)
-    found = {each.name: each for each in comparison.estimates}
-    ratio, dry = found.get("damping ratio"), found.get("dry friction displacement")
+    ratio, dry = comparison.damping_ratio, comparison.dry_displacement
     if comparison.apart:
         gaps = ", ".join(f"{name} by {gap:.{1 if gap < 10 else 0}f} times" for name, gap in comparison.apart.items())
         yield f"The {many} records are not alike: they differ in {gaps} what their own intervals allow."
@@ -266,12 +307,12 @@ def _together(comparison: DecayComparison) -> Iterator[str]:
     if comparison.dry_force is not None:
         force = comparison.dry_force
         yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
-    either = found.get("dry friction displacement, whichever motion")
+    either, static = comparison.dry_displacement_any, comparison.static_displacement
     if either is not None:
         yield f"Whichever motion it was, the dry friction displacement is {_reach(either)}."
-    static = found.get("static friction displacement")
     if static is not None:
-        alone = [each.waveform.static_displacement for each in comparison.findings if each.waveform is not None]
+        waveforms = [each.decay.waveform for each in comparison.findings]
+        alone = [each.static_displacement for each in waveforms if each is not None]
         least = min(alone, key=lambda each: each.interval[1] - each.interval[0])
         yield (
             f"The static friction displacement lies within {_reach(static).removeprefix('within ')}; the surest record "

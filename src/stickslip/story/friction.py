@@ -4,35 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
-from stickslip.answers.comparison import Comparison
-from stickslip.answers.findings import Findings
+from stickslip.answers.findings import Comparison, Findings
 from stickslip.balance.pull import Pull
 from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
 from stickslip.estimate import Estimate, stands
 from stickslip.plot.friction import plates_of, plates_together
+from stickslip.record.record import RIG_UNITS
 from stickslip.story.story import Line, Story
-from stickslip.story.words import cautions, interval_of, leading, number, sentence, value_of
+from stickslip.story.words import cautions, interval_of, number, sentence, value_of
 
 NEVER = "The contact never sticks."
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
 TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
-UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 
 
 def of_findings(findings: Findings) -> Story:
     """One record."""
     headed = () if findings.contradiction else (findings.breakaway, findings.presliding)
     said = [estimate for answer in headed if answer is not None for estimate in answer.estimates]
-    return Story.of_record(
-        findings.name, findings.record, headline=[*leading(findings.faults), *_headline(findings)],
-        cautions=cautions(findings, said),
-        lines=[Line.of(each, findings.true_value(each)) for each in findings.estimates],
-        faults=[str(fault) for fault in findings.faults], notes=findings.notes, settings=_settings(findings),
-        draw=lambda: plates_of(findings), data=findings.to_dict,
+    return Story(
+        findings.name, list(_headline(findings)), cautions(findings, said), notes=list(_exact(findings)),
+        settings=_settings(findings), draw=lambda: plates_of(findings), data=lambda: _data(findings),
     )  # fmt: skip
 
 
@@ -41,23 +38,42 @@ def of_comparison(comparison: Comparison) -> Story:
     levels = [(each, each.level) for each in comparison.findings if each.level is not None]
     return Story(
         f"{len(comparison.findings)} records compared", list(_together(comparison)),
-        lines=[
-            *map(Line.of, comparison.estimates),
-            *(Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels),
-        ],
-        notes=comparison.notes, parts=[of_findings(each) for each in comparison.findings],
-        draw=lambda: plates_together(comparison), data=comparison.to_dict,
+        lines=[Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels],
+        draw=lambda: plates_together(comparison),
     )  # fmt: skip
 
 
 def _settings(findings: Findings) -> dict[str, str]:
-    told = {
-        key: number(value, 0.0, UNITS[key]) if key in UNITS else str(value) for key, value in findings.settings.items()
+    told = {key: str(value) for key, value in findings.settings.items() if key != "sd"}
+    sd = findings.settings.get("sd", {})
+    for key in told.keys() & RIG_UNITS.keys():
+        told[key] = _constant(findings.settings[key], sd.get(key, 0.0), RIG_UNITS[key])
+    return told
+
+
+def _data(findings: Findings) -> dict[str, Any]:
+    regression, trial = findings.regression, findings.trial
+    return {
+        "contradiction": findings.contradiction,
+        "normal_load": findings.normal,
+        "regression_residual": None if regression is None else regression.residual,
+        **({} if trial is None else {"twins": trial.to_dict()}),
     }
-    if findings.normal is not None:
-        told["normal load"] = number(findings.normal, 0.0, "N")
+
+
+def _constant(value: float, sd: float, unit: str) -> str:
+    return number(value, sd, unit) + (f", standard uncertainty {number(sd, sd, unit)}" if sd else "")
+
+
+def _exact(findings: Findings) -> Iterator[str]:
+    """Of a trial, that its intervals leave out how sure constants and gains are, where nobody stated that."""
     record = findings.record
-    return {**told, "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}
+    stated = bool(record.rig and record.rig.sd) or any(channel.gain_sd for channel in record.channels.values())
+    if findings.trial is not None and not stated:
+        yield (
+            "The intervals hold with your constants exact, and with the sensors' gains: how sure they are is not "
+            'stated. Write it as in "2.42 ± 0.02 kg", and of a channel as in "COLUMN [g] ± 1 %".'
+        )
 
 
 def _headline(findings: Findings) -> Iterator[str]:

@@ -367,7 +367,7 @@ def _listed(parts: Sequence[str]) -> str:
 def _fastest_contact(run: Trajectory) -> float:
     """The highest frequency at which a mode rings [Hz]; under a curved law, as its steps tell."""
     if isinstance(run, CurvedTrajectory):
-        return 1 / (2 * math.pi * float(np.median(run.step_lengths)))
+        return 1 / (2 * math.pi * float(np.median(run.steps.lengths)))
     return max(float(np.abs(np.linalg.eigvals(flow).imag).max()) for flow in run.table.flow) / (2 * math.pi)
 
 

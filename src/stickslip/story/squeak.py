@@ -4,71 +4,97 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from stickslip.answers.squeak_comparison import Condition, SqueakComparison
-from stickslip.answers.squeaks import SqueakFindings, trend_of
+from stickslip.answers.findings import Comparison, Findings
+from stickslip.answers.squeak_comparison import Condition
+from stickslip.answers.squeaks import trend_of
 from stickslip.estimate import Estimate, decimals, doubts_of
 from stickslip.plot.squeak import plates_of, plates_together
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
 from stickslip.squeak.couplings import Coupling, Pair
 from stickslip.squeak.listening import burst_clips
-from stickslip.story.story import Line, Story, Table
-from stickslip.story.words import doubts, interval_of, leading, number, value_of
+from stickslip.story.story import Story, Table
+from stickslip.story.words import cautions, interval_of, number, value_of
 from stickslip.units import prefixed
 
 MOST = 40  # bursts in a table
 NONE = "–"
 
 
-def of_findings(found: SqueakFindings) -> Story:
+def of_findings(findings: Findings) -> Story:
     """One record."""
-    record, (low, high) = found.record, found.squeaks.band
-    return Story.of_record(
-        found.name, record, headline=[*leading(found.faults), *_headline(found)],
-        cautions=[*_cautions(found), *doubts(found.estimates)], lines=list(map(Line.of, found.estimates)),
-        faults=[str(fault) for fault in found.faults], notes=found.notes, tables=list(_tables(found)),
-        settings={
-            "heard in": found.squeaks.channel, "between": f"{low:g} and {high:g} Hz",
-            **({} if found.normal is None else {"normal load": number(found.normal, 0.0, "N")}),
-            "sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s",
-        },
-        draw=lambda: plates_of(found), listen=lambda: burst_clips(found.squeaks), data=found.to_dict,
+    low, high = findings.squeaks.band
+    return Story(
+        findings.name, list(_headline(findings)), [*_cautions(findings), *cautions(findings)],
+        settings={"heard in": findings.squeaks.channel, "between": f"{low:g} and {high:g} Hz"},
+        tables=list(_tables(findings)), draw=lambda: plates_of(findings),
+        listen=lambda: burst_clips(findings.squeaks), data=lambda: _data(findings),
     )  # fmt: skip
 
 
-def of_comparison(comparison: SqueakComparison) -> Story:
+def of_comparison(comparison: Comparison) -> Story:
     """Several conditions; each by itself on the page, and in a line of the terminal."""
     return Story(
-        f"{len(comparison.conditions)} conditions compared", comparison.verdicts, notes=comparison.notes,
-        tables=[Table("Conditions", *_condition_table(comparison))],
-        parts=[of_findings(each) for each in comparison.findings], brief=True,
-        draw=lambda: plates_together(comparison), data=comparison.to_dict,
+        f"{len(comparison.conditions)} conditions compared", comparison.verdicts,
+        tables=[Table("Conditions", *_condition_table(comparison))], brief=True,
+        draw=lambda: plates_together(comparison), data=lambda: _together(comparison),
     )  # fmt: skip
 
 
-def _headline(found: SqueakFindings) -> Iterator[str]:
+def _data(found: Findings) -> dict[str, Any]:
+    """Bursts, coupling and how it is heard, for JSON."""
+    heard = found.squeaks.to_dict()
+    parts = {"coupling": found.coupling, "sound_quality": found.quality, "impulses": found.impulses}
+    return {
+        "normal_load": found.normal,
+        "squeaks": {key: value for key, value in heard.items() if key not in ("notes", "history")},
+        "beside": {
+            each.channel: {
+                "kind": each.kind, "reference": each.reference, "bursts": [burst.to_dict() for burst in each.bursts],
+            }
+            for each in found.beside
+        },
+        **{name: None if part is None else part.to_dict() for name, part in parts.items()},
+    }  # fmt: skip
+
+
+def _together(comparison: Comparison) -> dict[str, Any]:
+    """The conditions and what they say together, for JSON."""
+    rows = [
+        {key: value.to_dict() if isinstance(value, Estimate) else value for key, value in vars(each).items()}
+        for each in comparison.conditions
+    ]
+    told = [{**row, "trend": each.trend} for row, each in zip(rows, comparison.conditions, strict=True)]
+    return {"conditions": told, "verdicts": comparison.verdicts}
+
+
+def _headline(found: Findings) -> Iterator[str]:
     """What was heard, in a few sentences."""
     squeaks, record = found.squeaks, found.record
     heard = squeaks.of("squeak", "squeal")
     where = "" if squeaks.channel == "sound" else f" in the channel {squeaks.channel}"
     if not squeaks.bursts:
         yield f"Nothing sounds{where}: no burst in {record.duration:.4g} s."
+        yield from _power(squeaks)
         return
     creaks = [f"{burst.rate:.3g}" for burst in squeaks.of("creak")]
     if not heard and creaks:
         yield f"It creaks{where}: stick-slip pulses, {' and '.join(creaks)} in a second."
     elif squeaks.answer == "can not be told":
         yield f"Whether it squeaks{where} can not be told: {_untold(squeaks)}."
+        yield from _power(squeaks)
     elif not heard:
         kinds = [(squeaks.of(kind), words) for kind, words in WORDS.items()]
         yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {words}' for of, words in kinds if of)}."
-    elif found.frequency is not None:
+        yield from _power(squeaks)
+    else:
         many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"
-        tone = found.frequency.value
+        tone = squeaks.frequency.value
         yield f"It {squeaks.answer}{where} {many}, at {number(tone, tone / 500, 'Hz')}."
-    loudest = found.loudest
+    loudest = squeaks.loudest
     if loudest is not None:
         yield _of_one(loudest, squeaks)
     if found.coupling is not None:
@@ -122,16 +148,22 @@ def _spoken_name(channel: str) -> str:
 
 
 def _untold(squeaks: Squeaks) -> str:
-    """Of how many bursts it can not be told whether friction makes them."""
-    every, asked = len(squeaks.of("tonal")), len(squeaks.untold)
+    """Of how many bursts it can not be told whether friction makes them: of tonal ones, where there are any."""
+    tonal = [burst for burst in squeaks.untold if burst.kind == "tonal"]
+    kind, asked = ("tonal", len(tonal)) if tonal else ("broad", len(squeaks.untold))
+    every = len(squeaks.of("tonal")) if tonal else asked
+    if every == asked == 1:
+        return f"one {kind} burst may be friction's, or not"
     if every == asked:
-        return (
-            "one tonal burst may be friction's, or not"
-            if every == 1
-            else (f"each of {every} tonal bursts may be friction's, or not")
-        )
+        return f"each of {every} {kind} bursts may be friction's, or not"
     rest = "the other one is not" if every - asked == 1 else f"the other {every - asked} are not"
-    return f"of {every} tonal bursts {asked} may be friction's, or not; {rest}"
+    return f"of {every} {kind} bursts {asked} may be friction's, or not; {rest}"
+
+
+def _power(squeaks: Squeaks) -> Iterator[str]:
+    """How loud a squeak would have been heard, where no tone may be one."""
+    if not math.isnan(squeaks.threshold) and not any(burst.kind == "tonal" for burst in squeaks.untold):
+        yield f"A squeak of {squeaks.threshold:.0f} dB re {squeaks.reference} or more would have been heard."
 
 
 def _of_one(burst: Squeak, squeaks: Squeaks) -> str:
@@ -155,7 +187,7 @@ def _counted(bursts: Sequence[Squeak]) -> str:
     return f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}"
 
 
-def _cautions(found: SqueakFindings) -> list[str]:
+def _cautions(found: Findings) -> list[str]:
     """What should keep the reader from trusting it."""
     told = list(found.squeaks.cautions)
     if any(fault.kind == "spike" for fault in found.faults):
@@ -171,7 +203,7 @@ def _cautions(found: SqueakFindings) -> list[str]:
     ]
 
 
-def _tables(found: SqueakFindings) -> Iterator[Table]:
+def _tables(found: Findings) -> Iterator[Table]:
     """The bursts, the channels, how it is heard, and what moves together."""
     bursts, joined = found.squeaks.bursts, found.coupling
     if bursts:
@@ -187,7 +219,7 @@ def _tables(found: SqueakFindings) -> Iterator[Table]:
         yield Table(title, *_coupling_table(joined), _coupling_note(joined))
 
 
-def _burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+def _burst_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each burst."""
     squeaks = found.squeaks
     moves, calibrated = not math.isnan(squeaks.forcing), any(not math.isnan(b.weighted_level) for b in squeaks.bursts)
@@ -207,19 +239,19 @@ def _burst_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]
     return headings, rows
 
 
-def _channel_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+def _channel_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each channel that vibrates."""
     rows = []
     for squeaks in (found.squeaks, *found.beside):
         heard = squeaks.of("squeak", "squeal")
-        frequency = f"{np.mean([burst.frequency for burst in heard]):.1f}" if heard else NONE
+        frequency = f"{np.median([burst.frequency for burst in heard]):.1f}" if heard else NONE
         levels = [burst.level for burst in heard or squeaks.bursts if not math.isnan(burst.level)]
         level = f"{max(levels):.1f} re {squeaks.reference}" if levels else NONE
         rows.append([squeaks.channel, squeaks.kind, str(len(heard)), frequency, level])
     return ["channel", "what it is", "squeaks", "Hz", "loudest, dB"], rows
 
 
-def _hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]]]:
+def _hearing_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each measure of how it is heard."""
     rows, quality, impulses = [], found.quality, found.impulses
     if quality is not None:
@@ -241,7 +273,7 @@ def _hearing_table(found: SqueakFindings) -> tuple[Sequence[str], list[list[str]
     return ["", "value", "what it is"], rows
 
 
-def _hearing_note(found: SqueakFindings) -> str:
+def _hearing_note(found: Findings) -> str:
     """By what, and that no conformity is claimed."""
     by = "" if found.quality is None else f"Loudness, sharpness and roughness by {found.quality.method}. "
     return f"{by}No conformity to a standard is claimed; the pulses follow none."
@@ -297,7 +329,7 @@ def _pair(pair: Pair, *, rest: bool) -> list[str]:
     return [*told, phase, f"{factor * delay:.{digits}f} ± {factor * half:.{digits}f} {unit}"]
 
 
-def _condition_table(comparison: SqueakComparison) -> tuple[Sequence[str], list[list[str]]]:
+def _condition_table(comparison: Comparison) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each condition; a column that is known of none is left out."""
     headings = ["condition", "load", "driven, stroke", "friction", "slope against speed (95 %)", "heard", "Hz", "dB"]
     rows = [_condition(each) for each in comparison.conditions]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 
 # Of each kind of result the function that tells it, in a file of this room, which is imported when it is needed.
 TELLERS = {
-    "Findings": "friction.of_findings", "Comparison": "friction.of_comparison",
+    "Findings": "findings.of_findings", "Comparison": "findings.of_comparison",
     "TimeFrequency": "frequencies.of_map",
-    "DecayFindings": "decay.of_findings", "DecayComparison": "decay.of_comparison",
-    "SqueakFindings": "squeak.of_findings", "SqueakComparison": "squeak.of_comparison",
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
     "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
@@ -81,12 +79,15 @@ class Table:
         Its cells.
     note : str
         How to read it.
+    folded : bool
+        Whether a page shows it when it is asked to, and a terminal says only that it is there.
     """
 
     title: str
     headings: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
+    folded: bool = False
 
 
 def tried(what: str, verdicts: Sequence[Sequence[str]]) -> Table:
@@ -140,7 +141,7 @@ class Story:
     lines: Sequence[Line] = ()
     faults: Sequence[str] | None = None
     notes: Sequence[str] = ()
-    settings: Mapping[str, str] | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
     tables: Sequence[Table] = ()
     channels: Sequence[Channel] = ()
     history: Sequence[Step] = ()

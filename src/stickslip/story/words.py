@@ -13,7 +13,6 @@ from stickslip.record.check import Fault
 from stickslip.units import NOTHING, prefixed
 
 if TYPE_CHECKING:
-    from stickslip.answers.decays import DecayFindings
     from stickslip.answers.findings import Findings
 
 WITHIN_DIGIT = "within its last digit"  # an interval narrower than the digits shown
@@ -68,12 +67,11 @@ def interval_of(estimate: Estimate) -> str:
     return between if between == UNKNOWN else f"{between}{text}"
 
 
-def cautions(findings: Findings | DecayFindings, said: Iterable[Estimate] = ()) -> list[str]:
+def cautions(findings: Findings, said: Iterable[Estimate] = ()) -> list[str]:
     """What should keep the reader from trusting a number, but what the headline has `said` of those without a value."""
     untold = {estimate.name for estimate in said if not estimate.known}
     flagged = _flags([estimate for estimate in findings.estimates if estimate.name not in untold])
-    wholes = getattr(findings, "doubts", ())
-    flagged += [sentence(f"{name}: {status}.") for name, status in wholes if not _only_few(status)]
+    flagged += [sentence(f"{name}: {status}.") for name, status in findings.doubts if not _only_few(status)]
     flagged += _of_few([estimate.status for estimate in findings.estimates])
     if findings.faults:
         many = len(findings.faults)

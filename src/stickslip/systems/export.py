@@ -67,7 +67,7 @@ def _tables(case: Case) -> dict[str, Any]:
     system = case.system
     held: dict[str, Any] = {"about": case.about, "system": _values(system)}
     if isinstance(system, Structure):
-        held["contacts"] = [{**_values(each), "law": _part(each.law, LAWS)} for each in system.contacts]
+        held["contacts"] = [{**_values(contact), "law": _part(contact.law, LAWS)} for contact in system.contacts]
     else:
         held["law"] = _part(system.law, LAWS)
     held["drive"] = _part(system.drive, DRIVES)
@@ -101,23 +101,23 @@ def _plain(value: Any) -> Any:
         raise ModelError("a law that holds a Python function", "a file holds text", "write the curve as a Formula")
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _toml(held: Mapping[str, Any]) -> Iterator[str]:
     if held["about"]:
         yield f"about = {_toml_value(held['about'])}"
     for name, table in held.items():
-        for each in table if isinstance(table, list) else [table]:
-            if name != "about" and each:
+        for table_row in table if isinstance(table, list) else [table]:
+            if name != "about" and table_row:
                 yield ""
                 yield f"[[{name}]]" if isinstance(table, list) else f"[{name}]"
-                yield from (f"{key} = {_toml_value(value)}" for key, value in each.items())
+                yield from (f"{key} = {_toml_value(value)}" for key, value in table_row.items())
 
 
 def _toml_value(value: Any) -> str:
     if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{key} = {_toml_value(each)}' for key, each in value.items())} }}"
+        return f"{{ {', '.join(f'{key} = {_toml_value(item)}' for key, item in value.items())} }}"
     if isinstance(value, list):
         return f"[{', '.join(map(_toml_value, value))}]"
     return quoted(value) if isinstance(value, str) else json.dumps(value)
@@ -147,8 +147,8 @@ def _system(held: Mapping[str, Any]) -> Iterator[str]:
     yield f"drive = {_call(held['drive'])}"
     if "contacts" in held:
         yield "contacts = ["
-        for each in held["contacts"]:
-            yield f"    ss.Contact({_call(each['law'])}, {_arguments(each, without=('law',))}),"
+        for contact in held["contacts"]:
+            yield f"    ss.Contact({_call(contact['law'])}, {_arguments(contact, without=('law',))}),"
         yield "]"
         yield f"system = ss.Structure({_arguments(held['system'])}, contacts=contacts, drive=drive)"
     else:

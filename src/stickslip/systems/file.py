@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import typing
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,8 +27,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.parameters import PARTS, changed, declared, find, places
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
-from stickslip.solve.joint import numbered
-from stickslip.solve.tables import System
+from stickslip.solve.tables import System, numbered
 from stickslip.structure import Contact, Structure
 
 CYCLES = 20.0  # of a run where nothing is said
@@ -72,12 +72,10 @@ class Case:
     @property
     def parts(self) -> str:
         """What it is made of, in a few words: its laws and its drive."""
-        laws = [each.law for each in self.system.contacts] if isinstance(self.system, Structure) else [self.system.law]
-        counts = {
-            name: sum(type(law).__name__ == name for law in laws) for name in (type(law).__name__ for law in laws)
-        }
-        told = [f"{count} x {name}" if count > 1 else name for name, count in counts.items()]
-        return f"{' and '.join(told)}, {type(self.system.drive).__name__}"
+        laws = [c.law for c in self.system.contacts] if isinstance(self.system, Structure) else [self.system.law]
+        counts = Counter(type(law).__name__ for law in laws)
+        counted = [f"{count} x {name}" if count > 1 else name for name, count in counts.items()]
+        return f"{' and '.join(counted)}, {type(self.system.drive).__name__}"
 
     def having(self, **changes: Any) -> Case:
         """The same case with other values of its system, as text with units or SI numbers; nothing is known of it then.
@@ -225,8 +223,10 @@ def scenario_case(name: str) -> Case:
             "a file of a system ends in .toml",
             alike if alike.startswith("perhaps") else "'stickslip simulate --list' names the scenarios",
         )
-    found = scenarios.get(name)
-    return Case(name, found.about, found.system, found.start, found.run or {"cycles": CYCLES}, None, found.known)
+    scenario = scenarios.get(name)
+    return Case(
+        name, scenario.about, scenario.system, scenario.start, scenario.run or {"cycles": CYCLES}, None, scenario.known
+    )
 
 
 def read_system(path: str | Path | Mapping[str, Any]) -> Case:
@@ -363,8 +363,8 @@ def _checked_change(model: type[BaseModel], name: str, value: Any) -> Any:
     try:
         return checked(model, {"value": value}, source="the change").value  # type: ignore[attr-defined]
     except ModelError as error:
-        told = (text.replace(" value", f" {name}", 1) for text in (error.value, error.rule, error.next_step))
-        raise ModelError(*told) from error
+        texts = (text.replace(" value", f" {name}", 1) for text in (error.value, error.rule, error.next_step))
+        raise ModelError(*texts) from error
 
 
 def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mapping[str, Any], source: _Source) -> Any:
@@ -372,9 +372,11 @@ def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mappi
     name = values.get("name")
     if not isinstance(name, str) or name not in register:
         where = f"{source.name}{line_of([*table.split('.'), 'name'], source.lines)}"
-        told = f"sets {table}.name = {name!r}" if "name" in values else f"has no {table}.name"
+        sentence = f"sets {table}.name = {name!r}" if "name" in values else f"has no {table}.name"
         next_step = nearest(str(name), register) if "name" in values else "add name = NAME"
-        raise ModelError(f"{where} {told}", f"a {table.rpartition('.')[2]} is one of {', '.join(register)}", next_step)
+        raise ModelError(
+            f"{where} {sentence}", f"a {table.rpartition('.')[2]} is one of {', '.join(register)}", next_step
+        )
     factory = register[name]
     parameters = {key: value for key, value in values.items() if key != "name"}
     for part, known in (("law", LAWS), ("drive", DRIVES)):  # a law on a law, a tone on a drive

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,22 +14,32 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
 from stickslip.statistics import student
-from stickslip.twin.belief import Belief
+from stickslip.twin.belief import CHANCE, EXCESS, GIVE, KINETIC, SLOPE, Belief
 
 Array = NDArray[np.float64]
 Answers = Mapping[str, Estimate]
 
-LEVELS = ("sliding friction", "sliding friction forward", "sliding friction back")
-STATIC = ("static friction forward", "static friction back", "static over sliding friction")
-SLOPE, SHARE, STOPS, RATIO = (
-    "slope of friction against speed", "stuck share of the time", "stops per cycle", "static over sliding friction"
+LEVEL, FALL, RATIO, GIVES = (
+    "sliding friction", "slope of friction against speed", "static over sliding friction", "presliding stiffness"
 )  # fmt: skip
-GIVES = "presliding stiffness"
-TRIED = (*LEVELS, *STATIC, SLOPE, SHARE, STOPS)
-NULL = 0.01  # of the null twins, that may show as much as is claimed
+DIRECTIONS = ("sliding friction forward", "sliding friction back")
+STATIC = ("static friction forward", "static friction back", RATIO)
+SHARE, STOPS, FREQUENCY = "stuck share of the time", "stops per cycle", "forcing frequency"
+# What the displacement tells through the equation of motion; below, what is asked of the twins as of the record.
+FITTED: dict[str, Callable[[Belief], float]] = {
+    LEVEL: lambda rig: rig.kinetic,
+    FALL: lambda rig: rig.slope,
+    STATIC[0]: lambda rig: rig.static,
+    STATIC[1]: lambda rig: rig.static,
+    RATIO: lambda rig: rig.ratio,
+    GIVES: lambda rig: rig.contact,
+}
+ASKED = (*DIRECTIONS, SHARE, STOPS)
+SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the motion: parts looked for, to two fifths
+STICKS = ("stick", "microstick")  # kinds of event
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
-UNLIKE = 1.5  # times what noise and the twins' spread explain, by which x may stray from its twin before that is said
-ASTRAY = "unlike its twins"  # the kind of doubt
+UNLIKE = 1.3  # times what noise explains, by which x may stray from its twin before that is said
+ASTRAY, UNFELT = "unlike its twins", "not felt"  # kinds of doubt
 
 
 @dataclass(frozen=True)
@@ -41,9 +51,9 @@ class Power:
     shown : float
         The record's answer.
     null : float
-        The mean answer of twins without the effect.
+        The mean answer of rigs without the effect.
     felt : float
-        The least answer that fewer than one in a hundred of such twins would have given.
+        The least answer that fewer than one in a hundred of such rigs would have given.
     """
 
     shown: float
@@ -52,7 +62,7 @@ class Power:
 
     @property
     def claimed(self) -> bool:
-        """Whether twins without the effect would not have shown as much."""
+        """Whether rigs without the effect would not have shown as much."""
         return self.shown > self.felt
 
 
@@ -69,11 +79,11 @@ class Trial:
     estimates : mapping of str to Estimate
         The answers after the trial, by name.
     static : Power or None
-        Static above sliding friction: what is felt of it; None where the question had no answer.
+        Static over sliding friction: what the displacement tells of it; None where it tells nothing.
     yields : Power or None
         How far the contact gives way before it slips, as a compliance [m/N]: what is felt of it.
     strays : float
-        Root mean square by which x strays from the quiet twin, over what noise and the twins' spread explain.
+        Root mean square by which x strays from its nearest rig, over that of twins from theirs.
     """
 
     count: int
@@ -89,12 +99,11 @@ class Trial:
         return self.strays > UNLIKE
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON: how many, the law believed in, what is felt, and how far x strays."""
-        law = self.belief.law
-        felt = {"static over sliding friction": self.static, "compliance": self.yields}
+        """Plain data for JSON: how many, the law believed in, what would be felt, and how far x strays."""
+        felt = {RATIO: self.static, "compliance": self.yields}
         return {
             "count": self.count,
-            "law": {"kinetic": law.kinetic, "slope": law.slope},
+            "law": {"name": type(self.belief.law).__name__, **_numbers(self.belief)},
             "felt": {name: None if power is None else vars(power) for name, power in felt.items()},
             "strays": self.strays,
         }
@@ -113,10 +122,11 @@ def try_on_twins(
 
     Each answer is held against those of `count` twins of the record: with :math:`e_i` an answer less its own twin's
     truth, a pivot, the record's answer becomes :math:`q - \bar e` and its 95 % interval
-    :math:`\pm t\,s_e \sqrt{1 + 1/K}` about it. That static friction is above the sliding one is claimed only where
-    fewer than one in a hundred of twins without it would have shown as much, by the same distribution; the twins then
-    have it too. Where x strays from the quiet twin by several times what noise and the twins' spread explain, the
-    record is not of their kind: intervals hold both the quick and the tried one, and the status says so.
+    :math:`\pm t\,s_e \sqrt{1 + 1/K}` about it. What the displacement tells through the equation of motion (sliding and
+    static friction, their slope, a contact's stiffness) is the answer of the fit to it, tried in the same way; a part
+    that is not believed in is bounded by what would have been felt of it. Where x strays from the nearest rig further
+    than twins do from theirs, the record is not of their kind: intervals hold both the quick and the tried one, and the
+    status says so.
 
     Parameters
     ----------
@@ -144,38 +154,38 @@ def try_on_twins(
     """
     if count < 8:
         raise EstimateError(f"{count} twins", "an interval needs eight at least", "ask for 40")
-    twins = _asked(belief, ask, count, rng, lambda share: progress(share / 2))
-    static = _power(answers.get(RATIO), [twin.answers.get(RATIO) for twin in twins])
-    yields = None
-    if GIVES in answers and answers[GIVES].known:  # the twins are rigid: what they show of it is not there
-        shown_by = [1 / twin.answers[GIVES].value if GIVES in twin.answers else 0.0 for twin in twins]
-        yields = _beyond(1 / answers[GIVES].value, np.array(shown_by))
-    unstated = RATIO in answers and UNSTATED in kinds(answers[RATIO].status)  # twins share what was not stated
-    if static is not None and static.claimed:
-        belief = belief.bearing(1 + static.shown - static.null)
-        twins = _asked(belief, ask, count, rng, lambda share: progress((1 + share) / 2))
-    progress(1.0)
+    frequency = answers[FREQUENCY].value if FREQUENCY in answers else math.nan
+    twins = _asked(belief, ask, count, rng, frequency, progress)
     strays = _strays(belief, [twin.record for twin in twins])
     tried = {}
-    falls = belief.law.slope < 0  # as a line, where a real one is a curve
-    for name in TRIED:
+    for name in ASKED:
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
-            tried[name] = _tried(answers[name], pairs, strays, both=falls or UNSTATED in kinds(answers[name].status))
-    if static is not None and (unstated or not static.claimed):
-        tried |= {name: _not_felt(answers[name], static, count) for name in STATIC if name in answers}
-    return Trial(count, belief, tried, static, yields, strays)
+            both = belief.falls or UNSTATED in kinds(answers[name].status)
+            tried[name] = _tried(answers[name], pairs, strays, both=both)
+    if GIVE in belief.values:
+        answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
+    for name, value in FITTED.items():
+        if name in answers and (name != GIVES or GIVE in belief.values):
+            tried[name] = _fitted(answers[name], value, belief, twins, strays)
+    return Trial(count, belief, tried, *_powers(belief), strays)
 
 
 @dataclass(frozen=True, eq=False)
 class _Twin:
+    rig: Belief
     record: Record
     answers: Answers
     truth: Mapping[str, float]
 
 
 def _asked(
-    belief: Belief, ask: Callable[[Record], Answers], count: int, rng: int, progress: Callable[[float], None]
+    belief: Belief,
+    ask: Callable[[Record], Answers],
+    count: int,
+    rng: int,
+    frequency: float,
+    progress: Callable[[float], None],
 ) -> list[_Twin]:
     """The twins' records, answers and truths."""
     twins: list[_Twin] = []
@@ -185,7 +195,7 @@ def _asked(
         drawn = belief.drawn(chance)
         try:
             record = drawn.twin(chance)
-            twins.append(_Twin(record, ask(record), _truth(drawn, record)))
+            twins.append(_Twin(drawn, record, ask(record), _truth(drawn, record, frequency)))
         except StickslipError as error:  # a twin that can not be followed tells nothing; most of them must be
             refusal = error
         progress((number + 1) / count)
@@ -198,38 +208,37 @@ def _asked(
     return twins
 
 
-def _truth(belief: Belief, record: Record) -> dict[str, float]:
+def _truth(rig: Belief, record: Record, frequency: float) -> dict[str, float]:
     """What is true of a twin, by the name of the answer."""
-    law = belief.law
-    static = law.breakaway
-    frequency = record.truth.get("forcing frequency", 0.0)
-    cycles = math.floor(record.duration * frequency)
-    stops = sum(kind == "stick" and time * frequency < cycles for time, kind in record.truth["events"])
+    cycles = math.floor(record.duration * frequency) if frequency > 0 else 0
+    stops = sum(kind in STICKS and time * frequency < cycles for time, kind in record.truth["events"])
     return {
-        # a slope that rises is a damper's and no dry friction; one that falls is the friction's own
-        **dict.fromkeys(LEVELS, law.kinetic + min(0.0, law.slope) * belief.sliding_speed),
-        **dict.fromkeys(STATIC, static),
-        RATIO: static / law.kinetic if law.kinetic else math.nan,
-        SLOPE: law.slope,
+        **dict.fromkeys(DIRECTIONS, rig.kinetic),
         SHARE: float(record.truth[SHARE]),
         STOPS: stops / cycles if cycles else math.nan,
     }
 
 
-def _power(shown: Estimate | None, null: list[Estimate | None]) -> Power | None:
-    """Whether twins without an effect show as much of it."""
-    values = np.array([each.value for each in null if each is not None and each.known])
-    if shown is None or not shown.known or len(values) < max(8, ANSWERED * len(null)):
-        return None
-    return _beyond(shown.value, values)
-
-
-def _beyond(shown: float, null: Array) -> Power:
-    """An answer beside those of twins without the effect, of which one in a hundred would lie beyond what is felt."""
+def _powers(belief: Belief) -> tuple[Power | None, Power | None]:
+    """What x would have shown of static above sliding friction, and of a contact that gives way [m/N]."""
+    kinetic, fit = belief.values.get(KINETIC, 0.0), belief.fit
+    if kinetic <= 0 or fit is None:
+        return None, None
     from scipy.special import stdtrit  # half a second, where nothing else of an analysis loads it
 
-    reach = float(stdtrit(len(null) - 1, 1 - NULL)) * float(null.std(ddof=1)) * math.sqrt(1 + 1 / len(null))
-    return Power(shown, float(null.mean()), float(null.mean()) + reach)
+    chance = float(stdtrit(fit.freedom, 1 - CHANCE))
+    static = yields = None
+    if EXCESS in belief.values:
+        static = Power(belief.ratio, 1.0, 1.0 + chance * fit.sd(EXCESS) / kinetic)
+    elif felt := belief.first_felt(({EXCESS: size * kinetic} for size in SIZES), chance):
+        static = Power(1.0, 1.0, 1.0 + felt[EXCESS] / kinetic)
+    furthest = float(np.max(np.abs(belief.record["x"])))
+    softer = ({GIVE: math.log(kinetic / (size * furthest))} for size in SIZES)
+    if GIVE in belief.values:
+        yields = Power(1 / belief.contact, 0.0, chance * fit.sd(GIVE) / belief.contact)
+    elif felt := belief.first_felt(softer, chance):
+        yields = Power(0.0, 0.0, math.exp(-felt[GIVE]))
+    return static if static and math.isfinite(static.felt) else None, yields
 
 
 def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], strays: float, *, both: bool) -> Estimate:
@@ -238,43 +247,90 @@ def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], strays: 
     if len(errors) < max(8, ANSWERED * len(pairs)):
         words = f"{len(errors)} of {len(pairs)} twins could answer it, so that it is not tried on them"
         return replace(quick, status=Status(words, quick.status))
-    bias = float(errors.mean())
+    value, interval = _less_bias(quick.value, errors, strays)
+    doubts = [doubt for doubt in doubts_of(quick.status) if doubt.kind != FEW]
+    if strays > UNLIKE or both:  # the twins share what is not so, or was not stated
+        interval = _hull(value, interval, quick)
+    checks = (*quick.checks, f"a bias of {errors.mean():.3g} {quick.unit} is taken off")
+    return _estimate(quick, value, interval, f"{quick.method}; tried on {len(errors)} twins", doubts, strays, checks)
+
+
+def _fitted(
+    quick: Estimate, value: Callable[[Belief], float], belief: Belief, twins: list[_Twin], strays: float
+) -> Estimate:
+    """What the displacement tells through the equation of motion; a bound where the part is not believed in."""
+    part = {LEVEL: KINETIC, FALL: SLOPE, GIVES: GIVE}.get(quick.name, EXCESS)
+    reach = 0.0
+    if part not in belief.values:
+        if strays > UNLIKE:  # of a contact of another kind nothing is bounded
+            return _estimate(quick, quick.value, quick.interval, quick.method, [quick.status], strays)
+        reach = _reach(belief, part, value)
+    if not math.isfinite(value(belief) + reach):
+        words = Doubt("the motion does not depend on it, so that the record tells nothing of it", UNFELT)
+        return replace(quick.unknown(Status(words)), method=f"fit to x, {len(twins)} twins")
+    errors = np.array([value(belief.told_by(twin.record)) - value(twin.rig) for twin in twins])
+    least, (low, high) = _less_bias(value(belief), errors, strays)
+    interval = (low - reach if part == SLOPE else low, high + reach)
+    if quick.known and (strays > UNLIKE or belief.falls):  # a line, where a real one is a curve
+        interval = _hull(least, interval, quick)
+    tried = _estimate(quick, least, interval, f"fit to x, {len(twins)} twins", [], strays)
+    return tried if quick.name != RATIO else tried.within(1.0, math.inf)
+
+
+def _reach(belief: Belief, part: str, value: Callable[[Belief], float]) -> float:
+    """By how much a part that is not believed in may move an answer; infinite where the motion does not show it."""
+    if belief.fit is None:
+        return math.inf
+    larger = ({part: size * belief.size(part)} for size in SIZES)
+    felt = belief.first_felt(larger, student(belief.fit.freedom))
+    return math.inf if felt is None else value(belief.at(**felt)) - value(belief)
+
+
+def _less_bias(value: float, errors: Array, strays: float) -> tuple[float, tuple[float, float]]:
+    """A value and its 95 % interval by its errors on twins."""
     # what the law leaves unexplained moves an answer as much as noise does: as in Birge's ratio
     half = student(len(errors) - 1) * float(errors.std(ddof=1)) * math.sqrt(1 + 1 / len(errors)) * max(1.0, strays)
-    value = quick.value - bias
-    interval, doubts = (value - half, value + half), [d for d in doubts_of(quick.status) if d.kind != FEW]
-    if strays > UNLIKE or both:  # the twins share what is not so, or was not stated
-        low, high = quick.interval
-        interval = (min(low, interval[0], quick.value), max(high, interval[1], quick.value))
+    value -= float(errors.mean())
+    return value, (value - half, value + half)
+
+
+def _hull(value: float, interval: tuple[float, float], quick: Estimate) -> tuple[float, float]:
+    """An interval that holds the quick one too."""
+    return min(interval[0], quick.interval[0], quick.value), max(interval[1], quick.interval[1], quick.value)
+
+
+def _estimate(
+    quick: Estimate,
+    value: float,
+    interval: tuple[float, float],
+    method: str,
+    doubts: Sequence[Doubt | str],
+    strays: float,
+    checks: tuple[str, ...] = (),
+) -> Estimate:
+    """The answer as tried, with a doubt where the record is not of its twins' kind."""
     if strays > UNLIKE:
         words = (
-            f"x strays {strays:.2g} times as far from its twins as noise explains: the contact is no rigid one with "
-            "dry and viscous friction, or a constant is not as stated"
+            f"x strays {strays:.2g} times as far from its twins as noise explains: the contact is of no kind that was "
+            "tried, or a constant is not as stated"
         )
-        doubts.append(Doubt(words, ASTRAY))
-    tried = Estimate(
-        quick.name, value, interval, (interval[1] - interval[0]) / (2 * NORMAL_95), quick.unit,
-        f"{quick.method}; tried on {len(errors)} twins", Status(*doubts),
-        (*quick.checks, f"a bias of {bias:.3g} {quick.unit} is taken off"),
-    )  # fmt: skip
-    return tried if quick.name == SLOPE else tried.within(0.0, 1.0 if quick.name == SHARE else math.inf)
-
-
-def _not_felt(quick: Estimate, power: Power, count: int) -> Estimate:
-    """A static friction that twins without any show too."""
-    words = (
-        f"twins without any static friction above the sliding one show {power.null:.3g} times as well, and "
-        f"{power.felt:.3g} times would be needed"
-    )
-    if power.claimed:  # on sensors that the twins have as they were found, and that may be otherwise
-        words = quick.status
-    return replace(quick.unknown(Status(Doubt(words, "not felt"))), method=f"{quick.method}; tried on {count} twins")
+        doubts = [*doubts, Doubt(words, ASTRAY)]
+    sd = (interval[1] - interval[0]) / (2 * NORMAL_95)
+    tried = Estimate(quick.name, value, interval, sd, quick.unit, method, Status(*doubts), checks or quick.checks)
+    return tried if quick.name == FALL else tried.within(0.0, 1.0 if quick.name == SHARE else math.inf)
 
 
 def _strays(belief: Belief, twins: list[Record]) -> float:
-    """How far x strays from the quiet twin, over what noise and the twins' spread explain."""
-    measured, quiet = belief.record["x"], belief.moved()
-    apart = measured - quiet
-    spread = np.array([twin["x"] - quiet for twin in twins])
-    explained = float(np.mean((spread - spread.mean(axis=1, keepdims=True)) ** 2))
-    return math.sqrt(float(np.var(apart)) / explained) if explained > 0 else math.inf
+    """How much more x strays from its nearest rig than a twin's does from its own, which noise alone parts."""
+    if belief.fit is None:
+        return math.inf
+    apart = np.array([twin["x"] - belief.moved for twin in twins]).T
+    apart -= apart.mean(axis=0)
+    apart -= belief.fit.jacobian @ (belief.fit.gain @ apart)
+    explained = float(np.mean(apart**2))
+    return float(np.std(belief.residual)) / math.sqrt(explained) if explained > 0 else math.inf
+
+
+def _numbers(belief: Belief) -> dict[str, float]:
+    """The law's parameters that are numbers, by name."""
+    return {name: float(value) for name, value in vars(belief.law).items() if isinstance(value, (int, float))}

@@ -1,0 +1,84 @@
+"""Findings told: what stands on every page of a record, around what its own family of answers says."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.answers.findings import Comparison, Findings
+from stickslip.story.story import Line, Story
+from stickslip.story.words import leading, number
+
+# The file that tells findings which hold a result of this name; friction.py tells all others.
+FAMILIES = {"decay": "decay", "squeaks": "squeak"}
+
+
+def of_findings(findings: Findings) -> Story:
+    """One record."""
+    record = findings.record
+    own: Story = _family(findings).of_findings(findings)
+    load = {} if findings.normal is None else {"normal load": number(findings.normal, 0.0, "N")}
+    length = {"sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}
+    return replace(
+        own,
+        headline=[*leading(findings.faults), *own.headline],
+        lines=[*(Line.of(each, findings.true_value(each)) for each in findings.quoted), *own.lines],
+        faults=[str(fault) for fault in findings.faults],
+        notes=[*findings.notes, *own.notes],
+        settings={**own.settings, **load, **length},
+        channels=list(record.channels.values()),
+        history=record.history,
+        data=lambda: _data(findings, own),
+    )
+
+
+def of_comparison(comparison: Comparison) -> Story:
+    """Several records side by side."""
+    own: Story = _family(comparison.findings[0]).of_comparison(comparison)
+    parts = [of_findings(each) for each in comparison.findings]
+    estimates = comparison.estimates
+
+    def data() -> dict[str, Any]:
+        told = {**own.data(), "estimates": [each.to_dict() for each in estimates], "notes": comparison.notes}
+        return {"comparison": plain(told), "records": [part.data() for part in parts]}
+
+    return replace(own, lines=[*map(Line.of, estimates), *own.lines], notes=comparison.notes, parts=parts, data=data)
+
+
+def _family(findings: Findings) -> Any:
+    file = next((file for name, file in FAMILIES.items() if name in findings.results), "friction")
+    return importlib.import_module(f"stickslip.story.{file}")
+
+
+def _data(findings: Findings, own: Story) -> dict[str, Any]:
+    told = {
+        "name": findings.name,
+        "faults": [str(fault) for fault in findings.faults],
+        "settings": findings.settings,
+        **own.data(),
+        "estimates": [estimate.to_dict() for estimate in findings.estimates],
+        "truth": findings.record.truth,
+        "notes": findings.notes,
+        "history": [step.to_dict() for step in findings.record.history],
+    }
+    return {key: plain(value) for key, value in told.items()}
+
+
+def plain(value: Any) -> Any:
+    """Plain JSON data of anything that settings, truth or history may hold; a number not finite becomes None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, (bool, int, str)) else str(value)

@@ -1,0 +1,103 @@
+"""Sounds drawn without anything of the package: squeaks are found, and nothing else is said to rub."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from scripts import loaded
+from sound_sources import FS, KINDS, RUBS, background
+
+ELSE = sorted(set(KINDS) - set(RUBS))
+
+
+@pytest.fixture(scope="module")
+def benchmark() -> ModuleType:
+    return loaded("benchmarks/sounds.py")
+
+
+def heard(values: np.ndarray) -> ss.squeak.Squeaks:
+    return ss.find_squeaks(ss.Record.of({"sound": values}, fs=FS, units={"sound": "1"}))
+
+
+def test_squeaks_are_found_from_nine_decibel_on(benchmark: ModuleType) -> None:
+    score = benchmark.measured("squeaks", 12, 90_000)
+    assert score.found >= score.squeaks - 1 > 10  # of so few one may be missed
+    assert score.pitched == score.found
+    assert not score.answers["does not squeak"]
+
+
+@pytest.mark.parametrize("kind", ELSE)
+def test_nothing_else_is_said_to_rub(benchmark: ModuleType, kind: str) -> None:
+    score = benchmark.measured(kind, 8, 90_000)
+    assert score.claims == 0
+    assert score.answers["can not be told"] == 8 or kind == "clicks"  # what is struck and dies away does not squeak
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", ELSE)
+def test_of_many_sounds_hardly_any_is_said_to_rub(benchmark: ModuleType, kind: str) -> None:
+    assert benchmark.measured(kind, 200, 91_000).claims <= 2
+
+
+@pytest.mark.soak
+def test_of_many_squeaks_hardly_any_is_missed(benchmark: ModuleType) -> None:
+    score = benchmark.measured("squeaks", 200, 91_000)
+    assert score.found >= 0.95 * score.squeaks
+
+
+def test_three_faint_squeaks_above_every_instrument_squeak_three_times() -> None:
+    t = np.arange(int(2 * FS)) / FS
+    shapes = [1 / (1 + np.exp(-(t - at) / 0.004) + np.exp((t - at - 0.12) / 0.004)) for at in (0.3, 0.9, 1.5)]
+    wave = sum(np.sin(2 * np.pi * order * 3000 * t) / order for order in (1, 2, 3))
+    noise = 10 ** (-9 / 20) * np.std(wave) * np.random.default_rng(5).standard_normal(len(t))
+    found = heard(sum(shapes) * wave + noise)
+    assert found.answer == "squeaks"
+    assert [burst.start for burst in found.of("squeak")] == pytest.approx([0.3, 0.9, 1.5], abs=0.02)
+
+
+def test_two_partials_that_beat_are_no_creak() -> None:
+    t = np.arange(int(2 * FS)) / FS
+    pairs = [(400, 415), (1100, 1115), (2600, 2615)]
+    beating = sum(np.sin(2 * np.pi * f * t) for pair in pairs for f in pair)
+    assert heard(beating).answer == "can not be told"
+
+
+def test_a_clock_is_no_creak_and_a_tick_that_is_missed_changes_nothing() -> None:
+    t = np.arange(int(2 * FS)) / FS
+    ticks = (
+        np.exp(-np.mod(t, 0.1) / 2e-3) * np.random.default_rng(1).standard_normal(len(t)) * (np.abs(t - 0.75) > 0.05)
+    )
+    found = heard(ticks)
+    assert found.answer == "can not be told"
+    assert not found.of("creak")
+
+
+def test_a_tone_that_leaps_to_its_overtones_is_one_squeak() -> None:
+    t = np.arange(int(FS)) / FS
+    shape = 1 / (1 + np.exp(-(t - 0.3) / 0.004) + np.exp((t - 0.6) / 0.004))
+    louder = [1 + 3 * (np.abs(t - at) < 0.03) for at in (0.2, 0.4, 0.5)]  # overtones come to the fore in turn
+    wave = sum(share * np.sin(2 * np.pi * order * 2500 * t) / order for order, share in enumerate(louder, start=1))
+    (found,) = heard(shape * wave + 1e-3 * np.random.default_rng(2).standard_normal(len(t))).bursts
+    assert found.kind == "squeal"
+    assert found.frequency == pytest.approx(2500, rel=1e-3)
+
+
+def test_a_squeak_of_the_threshold_would_have_been_heard() -> None:
+    found = []
+    for seed in range(20):
+        rng = np.random.default_rng([7, seed])
+        noise = background(rng, int(1.5 * FS))
+        quiet = heard(noise)
+        assert quiet.answer == "can not be told"
+        pitch = rng.uniform(1000, 4000)
+        at = np.arange(round(0.1 * FS)) / FS
+        tone = np.sqrt(2) * 10 ** (quiet.threshold / 20) * np.sin(2 * np.pi * pitch * at)
+        first = rng.integers(3000, 20_000)
+        noise[first : first + len(tone)] += tone
+        bursts = heard(noise).of("tonal", "squeak", "squeal")
+        found.append(any(abs(burst.frequency / pitch - 1) < 0.02 for burst in bursts))
+    assert np.mean(found) >= 0.9  # 95 %, of twenty
