@@ -195,7 +195,7 @@ def test_the_work_on_torsion_and_normal_motion_is_that_of_the_closed_form() -> N
 
 
 def found_bursts(channels: dict[str, np.ndarray], fs: float) -> tuple[ss.squeak.Squeak, ...]:
-    return ss.find_squeaks(ss.Record.of(channels, fs=fs)).of("squeak", "squeal")
+    return ss.find_squeaks(ss.Record.of(channels, fs=fs)).bursts
 
 
 def test_friction_feeds_the_torsion_of_the_virtual_rig() -> None:

@@ -331,8 +331,8 @@ def test_stiff_bristles_move_as_an_implicit_solver_says() -> None:
     stiffness, damping = 1e9, math.sqrt(1e9 * 2.42)
     law = ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=stiffness, damping=damping, viscous=0.4)
     run = ss.simulate(THESIS.having(law=law), cycles=1, rtol=1e-9)
-    assert len(run.reach) > 20
-    assert len(run.step_starts) < 5000  # a million for an explicit method
+    assert len(run.steps.reach) > 20
+    assert len(run.steps.starts) < 5000  # a million for an explicit method
 
     def slope(t: float, s: np.ndarray) -> list[float]:
         x, v, z = s
@@ -358,8 +358,8 @@ def test_leaps_change_no_event(law: object, monkeypatch: pytest.MonkeyPatch) -> 
     run = ss.simulate(THESIS.having(law=law), cycles=1, rtol=1e-9)
     monkeypatch.setattr(march, "PATIENCE", math.inf)
     small = ss.simulate(THESIS.having(law=law), cycles=1, rtol=1e-9)
-    assert len(small.reach) == 0 < len(run.reach)
-    assert len(run.step_starts) < 0.5 * len(small.step_starts)
+    assert len(small.steps.reach) == 0 < len(run.steps.reach)
+    assert len(run.steps.starts) < 0.5 * len(small.steps.starts)
     assert [event.mode for event in run.events] == [event.mode for event in small.events]
     assert [e.time for e in run.events] == pytest.approx([e.time for e in small.events], rel=1e-9)
     times = np.linspace(0, 0.4, 301)
@@ -371,7 +371,7 @@ def test_a_stiff_creep_comes_to_steady_sliding() -> None:
     light = ss.Oscillator(mass=1.0, stiffness=2.6e9, law=ROCK, drive=ss.drives.Belt(1e-6))
     rest = ss.solve.steady_sliding(light).state
     run = ss.simulate(light, duration=100, start={**rest, "v": 1e-8}, rtol=1e-9)
-    assert len(run.step_starts) < 5000
+    assert len(run.steps.starts) < 5000
     assert run.state(100)["x"] == pytest.approx(rest["x"], rel=1e-12)
     assert run.state(100)["age"] == pytest.approx(rest["age"], rel=1e-9)
 
@@ -386,7 +386,7 @@ def test_two_crossings_within_a_step_are_two(short: float, crossings: int) -> No
     if crossings:
         apart = run.events[1].time - run.events[0].time
         assert apart == pytest.approx(math.acos(1 - short) / math.pi, rel=1e-4)
-        assert np.median(run.step_lengths) > 20 * apart
+        assert np.median(run.steps.lengths) > 20 * apart
         assert [event.mode for event in run.events] == ["back", "forward"]
 
 

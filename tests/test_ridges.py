@@ -10,7 +10,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import RecordError
-from stickslip.signals.pieces import GLIDE, RING, Splitter
+from stickslip.signals.cutting import GLIDE, RING
+from stickslip.signals.pieces import Splitter
 
 RNG = np.random.default_rng(11)
 FS = 1000.0

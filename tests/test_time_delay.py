@@ -211,8 +211,8 @@ def test_the_answer_does_not_hang_on_tolerance_samples_or_units() -> None:
 def test_a_long_run_keeps_its_pace_and_its_past() -> None:
     """Breaks of the past fade: the number of steps stays in proportion to the time, whatever chunk they fall in."""
     short, long = (ss.simulate(SHAKEN, cycles=cycles) for cycles in (20, 200))
-    assert len(long.step_starts) < 11 * len(short.step_starts)
-    assert len(long.step_starts) > 3 * 4096
+    assert len(long.steps.starts) < 11 * len(short.steps.starts)
+    assert len(long.steps.starts) > 3 * 4096
     again = ss.simulate(SHAKEN, duration=200 * 0.4 - 1e-3)
     assert long.state(79.9) == pytest.approx(again.state(79.9), rel=1e-10, abs=1e-15)
     period = [long.state(time)["x"] for time in (79.2, 79.6)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -216,11 +216,9 @@ def run(
     scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
     pieces = _Log(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
-    # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just then;
-    # the first call may compile for long, and is left to it
-    compiled = getattr(kernel.march, "overloads", True)
+    heed: Callable[[], None] | None = None
     try:
-        with held_back() if compiled else nullcontext(lambda: None) as heed:
+        with ExitStack() as holding:
             for at, (signals, values) in stops_of(table, laps, offset):
                 state[signals] = values
                 mode = kernel.begin(model.linear, mode, state, total, 1.0, work)
@@ -228,10 +226,15 @@ def run(
                 outcome = kernel.FULL
                 while outcome == kernel.FULL:
                     before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
+                    # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just
+                    # then; the first call may compile for long, and is left to it
+                    if heed is None and getattr(kernel.march, "overloads", True):
+                        heed = holding.enter_context(held_back())
                     outcome, count, mode, clock = kernel.march(
                         model, before, state, mode, goal, past, pieces.room(), work, CELLS
                     )
-                    heed()
+                    if heed is not None:
+                        heed()
                     passed = until(before, clock, period)
                     pieces.keep(count, passed, total)
                     _refuse(outcome, table, state, clock)

@@ -221,7 +221,8 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None, lever: float | s
     True
     """
     squeaks = find_squeaks(record) if squeaks is None else squeaks
-    bursts = squeaks.of("squeak", "squeal")
+    # what is tonal may squeak, too, where nothing but the sound would tell: it couples all the same
+    bursts = squeaks.of("squeak", "squeal") or squeaks.of("tonal")
     if not bursts:
         raise EstimateError("no squeak was found", "coupling is told inside of squeaks", "see find_squeaks(record)")
     names = [name for name in MOTIONS if name in record and np.ptp(record[name]) > 0]
