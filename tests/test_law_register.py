@@ -115,10 +115,11 @@ def test_it_is_swept_on_every_engine(engine: str) -> None:
 
 def test_it_is_fitted() -> None:
     found = ss.fit_law(measured(), slider(AsymmetricCoulomb(1.0, back=1.0)))
-    assert {name: each.name for name, each in found.parameters.items()} == {
+    own = {name: each for name, each in found.parameters.items() if name in ("forward", "back")}
+    assert {name: each.name for name, each in own.items()} == {
         "forward": "sliding friction forward", "back": "sliding friction back",
     }  # fmt: skip
-    assert {each.unit for each in found.parameters.values()} == {"N"}
+    assert {each.unit for each in own.values()} == {"N"}
     # an offset of x is the same as a difference between the two, so that the records tell their mean
     assert (found.law.forward + found.law.back) / 2 == pytest.approx(1.0, rel=5e-3)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -69,7 +68,6 @@ def test_a_compliant_contact_is_told_from_a_rigid_one() -> None:
     assert found.confidence > 0.95
     assert found.status == "ok"
     assert found.candidates[1].standing.misfit > 10
-    assert found.candidates[0].standing.prediction == 1.0
     assert found.fit.parameters["law.stiffness"].value == pytest.approx(192000, rel=0.03)
     assert "compliant contact" in found.verdict
     assert shares == sorted(shares)
@@ -88,6 +86,19 @@ def test_a_family_is_found_through_wrong_gains(name: str) -> None:
     assert (found.law, found.family) == (name, name)
     assert found.candidates[1].standing.misfit > 5
     assert found.status == "ok"
+
+
+def test_a_damper_that_is_understated_makes_no_other_law() -> None:
+    """Held at a tenth of its value it passed for a compliant contact, at a confidence of 0.999."""
+    drive = ss.drives.HarmonicBase(1.1e-3, frequency=5.0)
+    damped = ss.Oscillator(law=TRUE["Coulomb"], drive=drive, **{**RIG, "damping": 6.0})
+    rig = ss.Rig.perfect("x", "z").having("x", white=1e-6).having("z", white=1e-6)
+    runs = [ss.simulate(damped.having(frequency=each), duration=2.0) for each in (4.0, 6.5)]
+    told = [rig.measure(run, fs=500, rng=seed, start=1.0) for seed, run in enumerate(runs)]
+    found = ss.compare_laws(told, slider().having(damping=0.6), laws=["Coulomb", "compliant"])
+    assert "Coulomb" in found.kept
+    assert found.fit.parameters["damping"].value == pytest.approx(6.0, rel=0.05)
+    assert "where 0.6 N s/m is stated" in found.verdict
 
 
 def test_a_comparison_is_cancelled_by_its_progress() -> None:
@@ -144,14 +155,6 @@ def test_a_rigid_law_may_leave_more_on_a_rough_surface() -> None:
     assert kept(misfit("Coulomb", 1, 2.5), misfit("compliant", 3, 1.0))[0] == {"compliant"}
     assert kept(misfit("Coulomb", 1, 1.6), misfit("compliant", 3, 1.0))[0] == {"Coulomb", "compliant"}
     assert kept(misfit("compliant", 3, 1.6), misfit("Coulomb", 1, 1.0))[0] == {"Coulomb"}
-
-
-def test_a_family_that_predicts_better_is_not_rejected() -> None:
-    ahead = {("x", 0): 0.8e-10, ("load", 0): 0.8e-4}
-    best = Misfit("compliant", 3, misfit("", 3, 1.0).squares, {key: 2 * value for key, value in ahead.items()})
-    rival = Misfit("Coulomb", 1, misfit("", 1, 3.0).squares, ahead)
-    assert kept(best, rival)[0] == {"compliant", "Coulomb"}
-    assert kept(replace(rival, squares=best.squares), replace(best, squares=rival.squares))[0] == {"Coulomb"}
 
 
 def test_confidence_grows_with_the_misfit_of_the_others() -> None:
@@ -297,15 +300,18 @@ def test_a_base_that_was_not_recorded_is_asked_for() -> None:
 def test_fewer_strokes_than_parameters_are_told() -> None:
     short = record("LuGre").rows(0, int(FS / 8.7))
     found = ss.fit_law(short, slider().having(law=TRUE["LuGre"]), free=["kinetic", "static", "speed"], intervals=False)
-    assert "for 3 parameters: give a record of more cycles" in found.status
+    assert "for 4 parameters: give a record of more cycles" in found.status  # the damper is one
 
 
 def test_forces_are_no_surer_than_the_bases_calibration() -> None:
-    """All motion scales with it: a base that reads 1 % too much makes the friction 1 % too large."""
+    """All motion scales with it: a base that reads 1 % too much makes the friction 1 % too large.
+
+    A spring of 1 % more does so, too, and is told from the gain of x no better than both are stated.
+    """
     found = ss.compare_laws(record("Coulomb"), slider(), laws=["Coulomb"], calibration=0.02)
     level = found.fit.parameters["kinetic"]
-    assert level.sd == pytest.approx(0.02 * level.value, rel=0.05)
-    assert found.fit.parameters["x.gain"].sd < 0.01
+    assert 0.02 * level.value <= level.sd <= 0.02 * 2**0.5 * level.value
+    assert found.fit.parameters["x.gain"].sd < 0.02 / 2**0.5 * 1.1
 
 
 def test_a_nuisance_of_no_channel_is_refused() -> None:

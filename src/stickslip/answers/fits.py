@@ -9,7 +9,8 @@ from stickslip.balance.force import friction_force
 from stickslip.drives.kinds import HarmonicBase, Release
 from stickslip.errors import ModelError, RecordError
 from stickslip.law.fit_curve import CurveFit, fit_curve
-from stickslip.law.which_law import CALIBRATION, LawComparison, compare_laws
+from stickslip.law.start import CALIBRATION
+from stickslip.law.which_law import LawComparison, compare_laws
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import RIG_UNITS, Record

@@ -38,7 +38,7 @@ CURVES = (
     help="The laws to compare, with commas: Coulomb, static, Stribeck, compliant, state variable, LuGre; all of them "
     "unless given.",
 )
-@click.option("--calibration", type=float, default=0.01, show_default=True, help="By what part gains may be wrong.")
+@click.option("--calibration", type=float, default=0.005, show_default=True, help="By what part gains may be wrong.")
 @click.option(
     "--curve",
     type=click.Choice(CURVES),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,8 @@ FEIGNED = 1.5  # times, geometric mean over the stories, that a rough surface ma
 CALIBRATIONS = 3.0  # times the calibration's error, below which an effect is not to be told from it
 CERTAIN = 0.999  # the most that is said: nobody knows what was not tried
 BLUNT = 4.0  # of the criterion, by which the odds between families fall e-fold; 2 were the stories Gaussian
-SHARPNESS = 4.0  # power of the ratio of predictions' misfits that the odds between families follow
+NOISY = 2.5  # times the noise's variance, geometric mean over the stories, that a law may leave and yet explain all
+SUPPORTED = 0.95  # beyond it: on 11 drawn rigs like that the truth was left out twice, with more said
 UNLIKELY = 0.05  # odds to the best law, below which another is rejected
 
 
@@ -41,17 +42,17 @@ class Misfit:
         Its parameters.
     squares : mapping of (str, int) to float
         Mean square of what is left of each channel of each record [unit of the channel, squared].
-    predicted : mapping of (str, int) to float, or None
-        The same where each record is predicted by a fit to the others.
     stiff : bool
         Whether its contact gives way so little that it is a rigid one's limit.
+    moved : float
+        Sum of squares of how far it moved what was stated, in units of how unsure that is.
     """
 
     name: str
     count: int
     squares: Mapping[Key, float]
-    predicted: Mapping[Key, float] | None = None
     stiff: bool = False
+    moved: float = 0.0
 
     @property
     def family(self) -> str:
@@ -71,8 +72,6 @@ class Standing:
         Mean square of what it leaves over the least that any law leaves, the mean over channels and records: 1 or more.
     criterion : float
         Schwarz's information criterion less that of the best law; more is worse.
-    prediction : float
-        As the misfit, where each record is predicted by a fit to the others; nan where it was not asked.
     kept : bool
         Whether the records leave it possible.
     verdict : str
@@ -85,7 +84,6 @@ class Standing:
     family: str
     misfit: float
     criterion: float
-    prediction: float
     kept: bool
     verdict: str
     limit: bool = False
@@ -93,15 +91,37 @@ class Standing:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """How much each channel counts: samples that tell a story of their own, and the noise [unit of the channel]."""
+    """How much each channel counts: samples that tell a story of their own, and the noise [unit of the channel].
+
+    `squares` is what the nearest law has left so far.
+    """
 
     counts: Mapping[Key, float]
     noise: Mapping[Key, float]
+    squares: Mapping[Key, float] = field(default_factory=dict)
 
-    def criterion(self, squares: Mapping[Key, float], count: int) -> float:
-        """Schwarz's, the variance of each channel unknown but for its noise: ``sum n log S + p log(sum n)``."""
-        likely = math.fsum(n * math.log(max(squares[name], self.noise[name] ** 2)) for name, n in self.counts.items())
-        return likely + count * math.log(max(2.0, math.fsum(self.counts.values())))
+    def weight(self, key: Key, samples: int) -> float:
+        """The deviation by which so many samples of a channel count as its stories do."""
+        variance = max(self.squares.get(key, 0.0), self.noise[key] ** 2)
+        return math.sqrt(variance * max(1.0, samples / self.counts[key])) if key in self.counts else math.inf
+
+    def criterion(self, law: Misfit) -> float:
+        """Schwarz's, the variance of each channel unknown but for its noise: ``sum n log S + p log(sum n)``.
+
+        With it counts how far the law had to move what was stated of springs and sensors.
+        """
+        left = law.squares
+        likely = math.fsum(n * math.log(max(left[name], self.noise[name] ** 2)) for name, n in self.counts.items())
+        return likely + law.moved + law.count * math.log(max(2.0, math.fsum(self.counts.values())))
+
+    @property
+    def supported(self) -> float:
+        """The most that may be said: where the nearest law leaves more than noise, what else moved is not known."""
+        total = math.fsum(self.counts.values())
+        beyond = math.fsum(
+            n * math.log(max(1.0, self.squares[name] / self.noise[name] ** 2)) for name, n in self.counts.items()
+        )
+        return SUPPORTED if beyond > total * math.log(NOISY) else CERTAIN
 
     @property
     def allowance(self) -> float:
@@ -126,7 +146,7 @@ def standings(
 
     `likely` is how probable each rigid law is by the friction around rest.
     """
-    order = sorted(misfits, key=lambda each: evidence.criterion(each.squares, each.count))
+    order = sorted(misfits, key=lambda each: evidence.criterion(each))
     limits = _limits(order, evidence)
     order.sort(key=lambda each: each.name in limits)
     inner, sure = _within([each for each in order if each.family == order[0].family], evidence, likely)
@@ -134,48 +154,39 @@ def standings(
     order.sort(key=lambda each: each is not best)
     least = {key: min(each.squares[key] for each in order) for key in evidence.noise}
     ratios = {each.name: evidence.over(each.squares, least) for each in order}
-    forecasts = _forecasts(order, evidence)
-    odds = _odds([each for each in order if each.name not in limits], best, evidence, forecasts)
+    odds = _odds([each for each in order if each.name not in limits], best, evidence)
     near = {name for name, each in odds.items() if each > UNLIKELY}
-    level = evidence.criterion(best.squares, best.count)
+    level = evidence.criterion(best)
     told = []
     for each in order:
-        worse = evidence.criterion(each.squares, each.count) - level
+        worse = evidence.criterion(each) - level
         kept = each.name in inner or each.name in near
         words = inner.get(each.name) or ("not rejected" if kept else f"rejected: {_why(each, best, ratios, worse)}")
         limit = each.name in limits
         if limit:
             words = "so stiff that it is a rigid contact, and explains nothing more"
-        told.append(
-            Standing(each.name, each.family, ratios[each.name], worse, forecasts[each.name], kept, words, limit)
-        )
+        told.append(Standing(each.name, each.family, ratios[each.name], worse, kept, words, limit))
     families = [max(odds[each.name] for each in order if each.family == name and each.name in odds)
                 for name in dict.fromkeys(each.family for each in order if each.name in odds)]  # fmt: skip
     right = sure + math.fsum(each for each in families if each > UNLIKELY)
     return told, min(CERTAIN, right / (1 + math.fsum(families)))
 
 
-def _odds(
-    order: Sequence[Misfit], best: Misfit, evidence: Evidence, forecasts: Mapping[str, float]
-) -> dict[str, float]:
-    """Of the laws of other families against the best law's family.
-
-    By the criterion; a law no richer that predicts records left out better is likely for that.
-    """
-    worth = {each.name: evidence.criterion(each.squares, each.count) for each in order}
+def _odds(order: Sequence[Misfit], best: Misfit, evidence: Evidence) -> dict[str, float]:
+    """Of the laws of other families against the best law's family, by the criterion."""
+    worth = {each.name: evidence.criterion(each) for each in order}
     least = min(worth[each.name] for each in order if each.family == best.family)
     found = {}
     for each in order:
         if each.family != best.family:
             worse = max(0.0, worth[each.name] - least - (evidence.allowance if each.family == "rigid" else 0.0))
-            ahead = forecasts[each.name] if each.count <= best.count else math.nan
-            found[each.name] = max(math.exp(-worse / BLUNT), ahead**-SHARPNESS if ahead < 1 else 0.0)
+            found[each.name] = math.exp(-worse / BLUNT)
     return found
 
 
 def _limits(order: Sequence[Misfit], evidence: Evidence) -> set[str]:
     """Laws whose contact is next to rigid, where a rigid law leaves as little: what they say is said by that."""
-    worth = {each.name: evidence.criterion(each.squares, each.count) for each in order}
+    worth = {each.name: evidence.criterion(each) for each in order}
     rigid = min((worth[each.name] for each in order if each.family == "rigid"), default=math.inf)
     return {each.name for each in order if each.stiff and rigid - worth[each.name] <= evidence.allowance}
 
@@ -194,15 +205,6 @@ def times(ratio: float) -> str:
     return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.0f} times"
 
 
-def _forecasts(order: Sequence[Misfit], evidence: Evidence) -> dict[str, float]:
-    """What the predictions of each law leave over those of the best one."""
-    best = order[0].predicted
-    return {
-        each.name: math.nan if each.predicted is None or best is None else evidence.over(each.predicted, best)
-        for each in order
-    }
-
-
 def _within(
     family: Sequence[Misfit], evidence: Evidence, likely: Mapping[str, float] | None
 ) -> tuple[dict[str, str], float]:
@@ -210,7 +212,7 @@ def _within(
 
     How likely each is by what else was seen; its misfit counts where it is larger than a rough surface makes it.
     """
-    worse = {each.name: evidence.criterion(each.squares, each.count) for each in family}
+    worse = {each.name: evidence.criterion(each) for each in family}
     beyond = min(worse.values()) + evidence.allowance
     worth = {
         name: (likely or {}).get(name, 1.0) * math.exp(-max(0.0, each - beyond) / BLUNT) for name, each in worse.items()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result, Status
-from stickslip.law.search import TRUSTED, Knob, Point, Problem, descend
+from stickslip.law.search import OF_SENSORS, Knob, Point, Problem, descend
 from stickslip.law.start import (
     Shown,
     best_start,
@@ -20,10 +20,13 @@ from stickslip.law.start import (
     bounded,
     free_names,
     knob,
+    nuisance_knobs,
     require_apart,
+    seen_damping,
     seen_profile,
     thinned_out,
     too_few,
+    usual_nuisance,
     value_of,
 )
 from stickslip.law.stretch import channels_of
@@ -41,6 +44,7 @@ Array = NDArray[np.float64]
 METHOD = "least squares of what the sensors read, the motion simulated"
 MISFIT = 1.2  # times its noise that a channel's residual may be
 STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
+UNEVEN = 0.1  # of its mean, that a surface strays
 WORK = 60.0  # calls of progress that a fit is taken for
 
 
@@ -70,7 +74,8 @@ class LawFit(Result):
     oscillator : Oscillator
         The oscillator with the fitted values.
     parameters : mapping of str to Estimate
-        What was fitted, by the names of :meth:`Oscillator.having`; of a sensor ``x.gain`` and ``x.delay``.
+        What was fitted, by the names of :meth:`Oscillator.having`; of a sensor ``x.gain`` and ``x.delay``, of several
+        records ``x.gain.1``, ``x.gain.2`` ...
     correlations : ndarray (p, p)
         Between the parameters, in their order; of a rough surface without its sliding friction.
     noise : mapping of str to float
@@ -139,7 +144,7 @@ def fit_law(
     oscillator: Oscillator,
     *,
     free: Sequence[str] | None = None,
-    nuisance: Sequence[str] = (),
+    nuisance: Sequence[str] | None = None,
     channels: Sequence[str] | None = None,
     surface: str = "even",
     intervals: bool = True,
@@ -168,8 +173,10 @@ def fit_law(
     free : sequence of str, optional
         Parameters to fit, as :meth:`Oscillator.having` names them; all the law's that are not zero where left out.
         Empty: only the starts are fitted, to predict another record.
-    nuisance : sequence of str
-        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay".
+    nuisance : sequence of str, optional
+        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay". Where left out:
+        the damper, which may be anything from zero on, the spring and all gains, which are trusted to 0.5 %, and the
+        delay of x, to 50 us; with nothing free, nothing. Empty: all is as stated.
     channels : sequence of str, optional
         Channels to explain; all that were measured where left out.
     surface : {"even", "rough"}
@@ -214,6 +221,8 @@ def fit_law(
     tell = _teller(progress)
     names = free_names(oscillator, free)
     shown = [Shown.of(each, channels_of(each, channels), oscillator) for each in records]
+    if nuisance is None:
+        nuisance = usual_nuisance(oscillator, names, shown) if names else ()
     require_apart(oscillator, names, nuisance, shown)
     stretches = []
     for number, each in enumerate(shown):
@@ -223,13 +232,16 @@ def fit_law(
     fastest = max(each.fastest for each in shown)
     oscillator, profile = better_start(oscillator, names, shown), None
     if names:
-        oscillator = best_start(oscillator, names, stretches, fastest, tell)
+        dampers = [oscillator.damping, *([seen_damping(oscillator, shown).damping] if "damping" in nuisance else [])]
+        oscillator = best_start(oscillator, names, stretches, fastest, dampers, tell)
     if surface == "rough":
         profile = seen_profile(shown, value_of(oscillator, "kinetic"))
         names = tuple(name for name in names if name != "kinetic")
-    knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in (*names, *nuisance)]
+    knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in names]
+    knobs += nuisance_knobs(oscillator, nuisance, stretches)
     if profile:
-        knobs += [Knob(f"profile {j}", "profile", value, 0.01) for j, value in enumerate(profile.values)]
+        knobs += [Knob(f"profile {j}", "profile", value, 0.01, prior=UNEVEN / 0.01)
+                  for j, value in enumerate(profile.values)]  # fmt: skip
     problem = Problem.of(oscillator, stretches, knobs, profile)
     point = problem.begin(np.zeros(len(knobs)))
     if profile:
@@ -265,10 +277,10 @@ def _teller(progress: Callable[[float], object] | None) -> Callable[[], None]:
 def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequence[Shown]) -> LawFit:
     """What a search has found, as it is told."""
     system = replace(problem, profile=None).system(point.u)
-    gains = problem.sensor_knobs(point.u, "gain")
     traces, sums, counts, noise = [], dict[str, float](), dict[str, int](), dict[str, float]()
     for j, stretch in enumerate(problem.stretches):
         time, measured, fitted = {}, {}, {}
+        gains = problem.sensor_knobs(point.u, "gain", j)
         for sensor, raw in zip(stretch.sensors, point.raw[j], strict=True):
             name = sensor.channel.name
             left = sensor.readings - gains.get(name, 1.0) * raw
@@ -288,7 +300,7 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
         system = system.having(kinetic=level.value)
     checks = tuple(f"{name} is left with {residual[name] / noise[name]:.3g} times its noise" for name in residual)
     worst = max(residual, key=lambda name: residual[name] / noise[name])
-    worries = [too_few(shown, sum(knob.kind not in TRUSTED for knob in problem.knobs))]
+    worries = [too_few(shown, sum(math.isinf(knob.prior) for knob in problem.knobs))]
     if residual[worst] > MISFIT * noise[worst]:
         times = residual[worst] / noise[worst]
         worries.append(
@@ -328,15 +340,17 @@ def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Osc
         unit = {"gain": "1", "delay": "s"}.get(each.kind) or unit_of(system, each.name)
         sd = abs(_value(each, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
         interval = (values[1], values[2]) if sure else (math.nan, math.nan)
-        word = _words(each.name, system)
-        found[each.name] = Estimate(word, values[0], interval, sd, unit, METHOD, _told(each, word, values, unit, sure))
+        word = _words(each, system)
+        key = each.name if each.stretch is None else f"{each.name}.{each.stretch + 1}"
+        found[key] = Estimate(word, values[0], interval, sd, unit, METHOD, _told(each, word, values, unit, sure))
     return found
 
 
-def _words(name: str, system: Oscillator) -> str:
+def _words(knob: Knob, system: Oscillator) -> str:
     """What a parameter is called."""
-    head, _, tail = name.rpartition(".")
-    return f"{tail} of {head}" if tail in ("gain", "delay") else named(system, name).name or name
+    if knob.kind not in OF_SENSORS:
+        return named(system, knob.name).name or knob.name
+    return f"{knob.kind} of {knob.channel}" + (f" in record {knob.stretch + 1}" if knob.stretch is not None else "")
 
 
 def _value(knob: Knob, u: float, system: Oscillator) -> float:

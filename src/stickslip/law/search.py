@@ -12,9 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
+from stickslip.law.drive import Sampled
 from stickslip.law.stretch import Sensor, Stretch, attempted, remembered
 from stickslip.laws.rough import RoughSurface
 from stickslip.oscillator import Oscillator
+from stickslip.solve.sensitivity import sensitivity
+from stickslip.solve.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Start = Mapping[str, float | str]
@@ -24,9 +27,10 @@ PASSES = 40
 DAMPED, MOST_DAMPED = 1e-3, 1e8
 SETTLED = 1e-2  # of chi squared, and of its share, by which a step that is the last one lowers it
 SHARE = 1e-6
+KEPT = 0.5  # of what a step was to lower: by less the derivatives are found anew
 BOLDEST, FURTHEST = 0.7, 7.0  # of a logarithm, in one step and in all
 BOLDER = 2.0  # of static friction's tenths, in one step
-TRUSTED = {"gain": 0.02, "delay": 5e-5, "profile": 0.1}  # how far off a calibration is, or a surface from its mean
+OF_SENSORS = ("gain", "delay")
 ABOVE = 0.1  # static friction counts by its excess over the kinetic, in tenths of that
 
 
@@ -34,22 +38,29 @@ class Knob(NamedTuple):
     """A parameter that is turned: its name, how a coordinate makes its value, and from where."""
 
     name: str
-    kind: str  # "log", "linear", "above" (the kinetic level), a sensor's "gain" or "delay", or of the "profile"
+    kind: str  # "log", "linear", "positive", "above" (the kinetic level), a sensor's "gain" or "delay", or "profile"
     origin: float
     scale: float = 1.0
     most: float = math.inf  # of a coordinate
+    prior: float = math.inf  # standard deviation of a coordinate, as far as it is known beforehand
+    stretch: int | None = None  # the one that it holds for; all where left out
 
     def value(self, u: float) -> float:
         """The parameter at a coordinate; of an "above" the excess over the kinetic level, as a share of it."""
         if self.kind == "log":
             return self.origin * math.exp(max(-200.0, min(200.0, u)))
         moved = self.origin + self.scale * u
-        return max(0.0, moved) if self.kind == "above" else moved
+        return max(0.0, moved) if self.kind in ("above", "positive") else moved
+
+    @property
+    def channel(self) -> str:
+        """Of a gain or delay, whose."""
+        return self.name.partition(".")[0]
 
     @property
     def least(self) -> float:
         """The least coordinate that has a meaning."""
-        return -self.origin / self.scale if self.kind == "above" else -math.inf
+        return -self.origin / self.scale if self.kind in ("above", "positive") else -math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +92,8 @@ class Point:
         What each sensor of each stretch would read with a gain of one.
     pieces : tuple
         The pieces of its run that each row falls in, where its reading may jump.
+    runs : tuple of Trajectory
+        The motion of each stretch.
     residuals : tuple of ndarray
         Of each stretch, measured less predicted in units of the noise, less what is free in any reading; then how far
         the drive is off, and after the first how far sensors are off their calibration, in units of how unsure that is.
@@ -92,6 +105,7 @@ class Point:
     starts: tuple[Array, ...]
     raw: tuple[tuple[Array, ...], ...]
     pieces: tuple[tuple[NDArray[np.int64] | None, ...], ...]
+    runs: tuple[Trajectory, ...]
     residuals: tuple[Array, ...]
     chi2: float
 
@@ -135,7 +149,8 @@ class Problem:
 
     def system(self, u: Array) -> Oscillator:
         """The oscillator at coordinates of the knobs."""
-        changes = {k.name: k.value(c) for k, c in zip(self.knobs, u, strict=True) if k.kind not in TRUSTED}
+        inner = (*OF_SENSORS, "profile")
+        changes = {k.name: k.value(c) for k, c in zip(self.knobs, u, strict=True) if k.kind not in inner}
         for knob in self.knobs:
             if knob.kind == "above":
                 excess = changes.pop(knob.name)
@@ -147,9 +162,12 @@ class Problem:
         values = [knob.value(c) for knob, c in zip(self.knobs, u, strict=True) if knob.kind == "profile"]
         return replace(system, law=self.profile.under(system.law, values or self.profile.values))
 
-    def sensor_knobs(self, u: Array, kind: str) -> dict[str, float]:
-        """Gains or delays by channel."""
-        return {k.name.rpartition(".")[0]: k.value(c) for k, c in zip(self.knobs, u, strict=True) if k.kind == kind}
+    def sensor_knobs(self, u: Array, kind: str, j: int) -> dict[str, float]:
+        """Gains or delays by channel, in stretch j."""
+        return {
+            knob.channel: knob.value(c) for knob, c in zip(self.knobs, u, strict=True)
+            if knob.kind == kind and knob.stretch in (None, j)
+        }  # fmt: skip
 
     def begin(self, u: Array) -> Point:
         """The point with the starts as estimated."""
@@ -169,17 +187,18 @@ class Problem:
 
     def at(self, u: Array, starts: tuple[Array, ...]) -> Point:
         """Simulate all stretches; chi squared is infinite where the engine refuses."""
-        raw, pieces, residuals = [], [], []
+        raw, pieces, runs, residuals = [], [], [], []
         try:
             system = self.system(u)
         except ModelError:
-            return Point(u, starts, (), (), (), math.inf)
-        delays, gains = self.sensor_knobs(u, "delay"), self.sensor_knobs(u, "gain")
+            return Point(u, starts, (), (), (), (), math.inf)
         for j, stretch in enumerate(self.stretches):
+            delays, gains = (self.sensor_knobs(u, kind, j) for kind in OF_SENSORS[::-1])
             off = starts[j][len(self.scales[j]) :]
             run = attempted(stretch, system, self.start(j, starts[j]), off)
             if run is None:
-                return Point(u, starts, (), (), (), math.inf)
+                return Point(u, starts, (), (), (), (), math.inf)
+            runs.append(run)
             told = stretch.told(run, delays)
             raw.append(tuple(values for values, _ in told))
             pieces.append(tuple(piece for _, piece in told))
@@ -190,16 +209,13 @@ class Problem:
             residuals.append(np.concatenate([*left, -off / stretch.drive.unsure]))
         residuals[0] = np.append(residuals[0], -self._trust() @ u)
         chi2 = sum(float(r @ r) for r in residuals)
-        return Point(u, starts, tuple(raw), tuple(pieces), tuple(residuals), chi2 if math.isfinite(chi2) else math.inf)
+        chi2 = chi2 if math.isfinite(chi2) else math.inf
+        return Point(u, starts, tuple(raw), tuple(pieces), tuple(runs), tuple(residuals), chi2)
 
     def _trust(self) -> Array:
-        """Rows that hold sensors to their calibration, over the coordinates."""
-        rows = [
-            k.scale / TRUSTED[k.kind] * (np.arange(len(self.knobs)) == j)
-            for j, k in enumerate(self.knobs)
-            if k.kind in TRUSTED
-        ]
-        return np.array(rows).reshape(len(rows), len(self.knobs))
+        """Rows that hold what is known beforehand to it, over the coordinates."""
+        known = [j for j, knob in enumerate(self.knobs) if math.isfinite(knob.prior)]
+        return np.asarray(np.eye(len(self.knobs))[known] / np.array([self.knobs[j].prior for j in known])[:, None])
 
     def start(self, j: int, coordinates: Array) -> Start:
         """The state at the start of stretch j."""
@@ -208,71 +224,86 @@ class Problem:
         return {**dict(zip(names, map(float, values), strict=True)), "mode": self.entries[j]["mode"]}
 
     def slopes(self, point: Point) -> list[Slopes] | None:
-        """Forward differences; None where the engine refuses a neighbour."""
-        gains = self.sensor_knobs(point.u, "gain")
-        shared: list[list[Array]] = [[] for _ in self.stretches]
-        own: list[list[Array]] = [[] for _ in self.stretches]
-        for k, knob in enumerate(self.knobs):
-            if knob.kind == "gain":
-                for j, stretch in enumerate(self.stretches):
-                    told = [
-                        sensor.freed(values * knob.scale * (sensor.channel.name == knob.name.rpartition(".")[0]))
-                        for sensor, values in zip(stretch.sensors, point.raw[j], strict=True)
-                    ]
-                    shared[j].append(np.concatenate([*told, np.zeros(len(stretch.drive.unsure))]))
-                continue
-            if knob.kind == "delay":
-                for j in range(len(self.stretches)):
-                    shared[j].append(self._later(point, j, knob, gains))
-                continue
-            moved = point.u.copy()
-            moved[k] += STEP
-            near = self.at(moved, point.starts)
-            if not near.raw:
+        """Derivatives by the knobs and by each stretch's own start; None where the engine refuses a neighbour."""
+        moving = [k for k, knob in enumerate(self.knobs) if knob.kind not in OF_SENSORS]
+        system, found = self.system(point.u), []
+        for j, stretch in enumerate(self.stretches):
+            changed = self._changed(point, j, moving, system)
+            if changed is None:
                 return None
-            for j in range(len(self.stretches)):
-                shared[j].append(self._difference(point, near, j, gains))
-        for m in range(max(map(len, point.starts))):
-            starts = tuple(s + STEP * (np.arange(len(s)) == m) for s in point.starts)
-            near = self.at(point.u, starts)
-            if not near.raw:
-                return None
-            for j, start in enumerate(point.starts):
-                if m < len(start):
-                    own[j].append(self._difference(point, near, j, gains))
+            gains = self.sensor_knobs(point.u, "gain", j)
+            size, rows = len(point.starts[j]), rows_of(stretch.sensors)
+            count = rows[-1].stop + len(stretch.drive.unsure)
+            shared, own = np.zeros((count, len(self.knobs))), np.zeros((count, size))
+            for s, (sensor, part) in enumerate(zip(stretch.sensors, rows, strict=True)):
+                gain = gains.get(sensor.channel.name, 1.0)
+                columns = sensor.freed(gain * changed[s])
+                shared[part, moving], own[part] = columns[:, : len(moving)], columns[:, len(moving) :]
+                for k, knob in enumerate(self.knobs):
+                    if knob.kind in OF_SENSORS and knob.channel == sensor.channel.name and knob.stretch in (None, j):
+                        raw, piece = point.raw[j][s], point.pieces[j][s]
+                        slope = raw if knob.kind == "gain" else -gain * _rate(raw, piece, sensor.time)
+                        shared[part, k] = sensor.freed(knob.scale * slope)
+            own[rows[-1].stop :, len(self.scales[j]) :] = np.diag(1 / np.array(stretch.drive.unsure))
+            found.append(Slopes(shared, own))
         trust = self._trust()
-        found = []
-        for j, (a, b) in enumerate(zip(shared, own, strict=True)):
-            size = len(b[0])
-            left, right = np.column_stack(a) if a else np.zeros((size, 0)), np.column_stack(b)
-            if j == 0:
-                left, right = np.vstack([left, trust]), np.vstack([right, np.zeros((len(trust), right.shape[1]))])
-            found.append(Slopes(left, right))
+        shared, own = found[0]
+        found[0] = Slopes(np.vstack([shared, trust]), np.vstack([own, np.zeros((len(trust), own.shape[1]))]))
         return found
 
-    def _later(self, point: Point, j: int, knob: Knob, gains: Mapping[str, float]) -> Array:
-        """What a delay changes: the slope over time, where the reading does not jump."""
-        columns = []
-        for sensor, values, piece in zip(self.stretches[j].sensors, point.raw[j], point.pieces[j], strict=True):
-            name, slope = sensor.channel.name, np.zeros(len(values))
-            if name == knob.name.rpartition(".")[0]:
-                slope = -knob.scale * gains.get(name, 1.0) * np.gradient(values, sensor.time)
-                if piece is not None:
-                    slope[np.gradient(piece) != 0] = 0.0
-            columns.append(sensor.freed(slope))
-        return np.concatenate([*columns, np.zeros(len(self.stretches[j].drive.unsure))])
+    def _changed(self, point: Point, j: int, moving: Sequence[int], system: Oscillator) -> list[Array] | None:
+        """Derivatives of what the sensors of stretch j would read: by the knobs that move the mass, and its start."""
+        nearby = []
+        for k in moving:
+            moved = point.u.copy()
+            moved[k] += STEP
+            try:
+                nearby.append(self.system(moved))
+            except ModelError:
+                return None
+        if hasattr(system.law, "rates"):
+            return self._differences(point, j, nearby, system)
+        stretch, size = self.stretches[j], len(self.scales[j])
+        off = point.starts[j][size:]
+        neighbours, scaled = [stretch.driven(each, off) for each in nearby], []
+        if isinstance(stretch.drive, Sampled):
+            scaled = [1 / (1 + float(share)) for share in off]
+        else:
+            neighbours += [stretch.driven(system, off + STEP * unit) for unit in np.eye(len(off))]
+        names = ("x", "v", *(name for name in self.entries[j] if name != "mode"))
+        starts = dict(zip(names, map(float, self.scales[j]), strict=True))
+        motion = sensitivity(
+            point.runs[j], neighbours, step=STEP, starts=starts, scaled=scaled, outputs=stretch.outputs
+        )
+        order = [*range(len(nearby)), *range(len(nearby) + len(off), len(motion.flow)),
+                 *range(len(nearby), len(nearby) + len(off))]  # fmt: skip
+        delays = self.sensor_knobs(point.u, "delay", j)
+        return [sensor.changed(motion, delays.get(sensor.channel.name, 0.0))[:, order] for sensor in stretch.sensors]
 
-    def _difference(self, point: Point, near: Point, j: int, gains: Mapping[str, float]) -> Array:
-        columns = []
-        for s, sensor in enumerate(self.stretches[j].sensors):
-            change = (near.raw[j][s] - point.raw[j][s]) / STEP
-            here, there = point.pieces[j][s], near.pieces[j][s]
-            if here is not None and there is not None:
-                change = np.where(here == there, change, 0.0)  # a jump that has crossed a sample has no slope
-            columns.append(sensor.freed(gains.get(sensor.channel.name, 1.0) * change))
-        unsure = self.stretches[j].drive.unsure
-        off = (near.starts[j] - point.starts[j])[len(self.scales[j]) :] / STEP
-        return np.concatenate([*columns, off / unsure])
+    def _differences(
+        self, point: Point, j: int, nearby: Sequence[Oscillator], system: Oscillator
+    ) -> list[Array] | None:
+        """As `_changed`, of a curved law: forward differences of its motion."""
+        stretch, start, size = self.stretches[j], point.starts[j], len(self.scales[j])
+        beside = [(each, start) for each in nearby] + [(system, start + STEP * unit) for unit in np.eye(len(start))]
+        delays, columns = self.sensor_knobs(point.u, "delay", j), []
+        for moved, begun in beside:
+            run = attempted(stretch, moved, self.start(j, begun), begun[size:])
+            if run is None:
+                return None
+            told = stretch.told(run, delays)
+            columns.append([
+                # a jump that has crossed a sample has no slope
+                (near - raw) / STEP * (1.0 if here is None or there is None else here == there)
+                for (near, there), raw, here in zip(told, point.raw[j], point.pieces[j], strict=True)
+            ])  # fmt: skip
+        return [np.column_stack(parts) for parts in zip(*columns, strict=True)]
+
+
+def _rate(values: Array, piece: NDArray[np.int64] | None, time: Array) -> Array:
+    """The slope of a reading over time, where it does not jump."""
+    slope = np.gradient(values, time)
+    return slope if piece is None else np.where(np.gradient(piece) == 0, slope, 0.0)
 
 
 def descend(
@@ -284,26 +315,73 @@ def descend(
     share: float = SHARE,
     tell: Callable[[], None] | None = None,
 ) -> Point:
-    """Levenberg and Marquardt's descent, each stretch's start eliminated from the common step."""
-    damping = DAMPED
+    """Levenberg and Marquardt's descent, each stretch's start eliminated from the common step.
+
+    Those of a curved law cost ten steps: after one that brought what was foretold they are mended by it (Broyden's
+    secants) instead of found anew, but for the last step.
+    """
+    damping, slopes, fresh, curved = DAMPED, None, False, hasattr(problem.oscillator.law, "rates")
     for _ in range(passes):
         if tell:
             tell()
-        slopes = problem.slopes(point) if point.raw else None
+        if slopes is None:
+            slopes, fresh = problem.slopes(point) if point.raw else None, True
         if slopes is None:
             return point
-        before = point.chi2
         while damping < MOST_DAMPED:
-            shared, own = step(slopes, point.residuals, damping)
+            shared, own = _bounded(problem.knobs, point, slopes, damping)
             moved = tuple(s + d for s, d in zip(point.starts, own, strict=True))
             tried = problem.at(_inside(problem.knobs, point.u, shared), moved)
-            if tried.chi2 < point.chi2:
-                damping, point = max(1e-9, damping / 10), tried
+            if tried.chi2 < point.chi2 or not fresh:
                 break
             damping *= 10
-        if before - point.chi2 < max(settled, share * before):
-            return point
+        lowered = point.chi2 - tried.chi2
+        mended, foretold = secant(slopes, point, tried) if lowered > 0 else (None, math.inf)
+        trusted = curved and lowered > KEPT * foretold
+        if (fresh or (trusted and share > SHARE)) and lowered < max(settled, share * point.chi2):
+            return tried if lowered > 0 else point
+        slopes, fresh = mended if trusted else None, False
+        if lowered > 0:
+            damping, point = max(1e-9, damping / 10), tried
     return point
+
+
+def secant(slopes: Sequence[Slopes], point: Point, tried: Point) -> tuple[list[Slopes], float]:
+    """Derivatives mended by what a step has changed, the larger ones the more; and by how much chi squared was to fall.
+
+    Where a jump has crossed a sample the change tells nothing of them.
+    """
+    found, foretold, moved = [], point.chi2, tried.u - point.u
+    for j, (a, b) in enumerate(slopes):
+        went = tried.starts[j] - point.starts[j]
+        guessed = a @ moved + b @ went
+        wrong = point.residuals[j] - tried.residuals[j] - guessed
+        foretold -= float(np.sum((point.residuals[j] - guessed) ** 2))
+        row = 0
+        for here, there, values in zip(point.pieces[j], tried.pieces[j], point.raw[j], strict=True):
+            if here is not None and there is not None:
+                wrong[row : row + len(values)][here != there] = 0.0
+            row += len(values)
+        weights = np.sum(a * a, axis=0) * moved, np.sum(b * b, axis=0) * went
+        power = float(weights[0] @ moved + weights[1] @ went) or 1.0
+        found.append(Slopes(a + np.outer(wrong, weights[0] / power), b + np.outer(wrong, weights[1] / power)))
+    return found, foretold
+
+
+def _bounded(
+    knobs: Sequence[Knob], point: Point, slopes: Sequence[Slopes], damping: float
+) -> tuple[Array, list[Array]]:
+    """The step of what is free to move: a knob that is to go beyond its limit goes up to it, and the rest with it."""
+    least, most = (np.array([getattr(knob, end) for knob in knobs]) - point.u for end in ("least", "most"))
+    free, fixed = np.ones(len(knobs), dtype=bool), np.zeros(len(knobs))
+    while True:
+        left = [r - a @ fixed for (a, _), r in zip(slopes, point.residuals, strict=True)]
+        shared, own = step([Slopes(a * free, b) for a, b in slopes], left, damping)
+        beyond = free & ((shared < least) | (shared > most))
+        if not beyond.any():
+            return np.where(free, shared, fixed), own
+        fixed = np.where(beyond, np.clip(shared, least, most), fixed)
+        free &= ~beyond
 
 
 def _inside(knobs: Sequence[Knob], u: Array, step: Array) -> Array:

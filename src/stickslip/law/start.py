@@ -20,7 +20,7 @@ from stickslip.parameters import find
 from stickslip.record.record import Record
 from stickslip.settings import nearest
 from stickslip.signals.derivatives import LEAST, differentiate
-from stickslip.signals.noise import noise_level
+from stickslip.signals.noise import noise_level, quantisation_step
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,9 @@ UNTURNED, STEADY = 0.005, 0.1  # of the samples that noise may carry through zer
 EDGE = 0.02  # of the record at its ends, where a derivative is poor
 FINEST = 1e-5  # of a channel's range: noise below it is not asked for
 AUDIBLE = 2.0  # times its noise that a motion must stray
+CALIBRATION = 0.005  # by which gains and springs are wrong, if nothing is known
+DELAYED = 5e-5  # s by which a stated delay is wrong
+VISCOUS = {"viscous", "slope"}  # parameters of laws that a viscous damper can not be told from
 GRID = {
     "stiffness": (0.25, 1.0, 4.0, 64.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0),
 }  # fmt: skip
@@ -131,10 +134,11 @@ class Shown:
         return Stretch(number, span, sensors, self.drive, start, scales)
 
     def noise(self, name: str) -> float:
-        """Standard deviation of a channel's noise, as stated or as found."""
+        """Standard deviation of a channel's noise, as stated or as found, its counts' included."""
         stated, values = self.record.channels[name].noise, self.record[name]
-        found = noise_level(values, self.record.fs) if stated is None else stated
-        return max(found, FINEST * float(np.ptp(values)), 1e-300)
+        counts = quantisation_step(values) / math.sqrt(12)
+        found = noise_level(values, self.record.fs) if stated is None else math.hypot(stated, counts)
+        return max(found, counts, FINEST * float(np.ptp(values)), 1e-300)
 
 
 def too_few(shown: Sequence[Shown], count: int) -> str:
@@ -163,12 +167,39 @@ def _middle(record: Record, values: Array, velocity: Array) -> float:
 
 def _felt(record: Record, velocity: Array, oscillator: Oscillator) -> Array:
     """Friction [N] as a sensor feels it, or as the balance of forces has it."""
-    if "load" in record or "friction" in record:
-        return record["load" if "load" in record else "friction"]
+    measured = _friction_of(record)
+    return _balance(record, velocity, oscillator) - oscillator.damping * velocity if measured is None else measured
+
+
+def _friction_of(record: Record) -> Array | None:
+    """Friction [N] as a sensor feels it, where there is one."""
+    return next((record[name] for name in ("load", "friction") if name in record), None)
+
+
+def _balance(record: Record, velocity: Array, oscillator: Oscillator) -> Array:
+    """What spring and inertia leave for friction and damper [N]."""
     acceleration = record["a"] if "a" in record else differentiate(velocity, record.fs).values
     place = record["x"] if "x" in record else np.cumsum(velocity) / record.fs
     pull = oscillator.stiffness * (record.samples.get("z", 0.0) - place) + record.samples.get("force", 0.0)
-    return np.asarray(pull - oscillator.damping * velocity - oscillator.mass * acceleration)
+    return np.asarray(pull - oscillator.mass * acceleration)
+
+
+def seen_damping(oscillator: Oscillator, shown: Sequence[Shown]) -> Oscillator:
+    """With the damper that the balance of forces shows in fast sliding, beside a friction of one level."""
+    columns, values = [], []
+    for number, each in enumerate(shown):
+        record, rows = as_driven(each.record, oscillator.drive), each.slides()
+        left, measured = _balance(record, each.velocity, oscillator)[rows], _friction_of(record)
+        stretched = each.velocity[rows]
+        if oscillator.damper == "base" and "z" in record:
+            stretched = stretched - np.gradient(record["z"])[rows] * record.fs
+        level = np.sign(each.velocity[rows]) if measured is None else np.zeros(len(rows))
+        offsets = np.zeros((len(rows), len(shown)))
+        offsets[:, number] = 1.0
+        columns.append(np.column_stack([stretched, level, offsets]))
+        values.append(left if measured is None else left - measured[rows])
+    found = np.linalg.lstsq(np.vstack(columns), np.concatenate(values), rcond=None)[0]
+    return oscillator.having(damping=max(0.0, float(found[0])))
 
 
 def _level(felt: Array, velocity: Array) -> float:
@@ -242,11 +273,57 @@ def value_of(oscillator: Oscillator, name: str) -> float:
     return float(part)  # type: ignore[arg-type]
 
 
+def usual_nuisance(oscillator: Oscillator, names: Sequence[str], shown: Sequence[Shown]) -> tuple[str, ...]:
+    """What nobody knows well beside a law's parameters `names`: the damper, the spring, and how sensors are calibrated.
+
+    The damper stays as stated where the law itself has a viscous part to fit.
+    """
+    channels = dict.fromkeys(name for each in shown for name in each.channels)
+    viscous = VISCOUS & {name.rpartition(".")[2] for name in names}
+    usual = [
+        *(["damping"] if not viscous else []),
+        *(["stiffness"] if oscillator.stiffness > 0 else []),
+        *(f"{name}.gain" for name in channels),
+        *(["x.delay"] if "x" in channels and len(channels) > 1 else []),
+    ]
+    return tuple(name for name in usual if name not in names)
+
+
+def nuisance_knob(
+    oscillator: Oscillator, name: str, stretches: Sequence[Stretch], calibration: float = CALIBRATION
+) -> Knob:
+    """How what is not known well is turned: a damper anywhere from zero on, all else near what is stated."""
+    tail = name.rpartition(".")[2]
+    if _of_sensor(name):
+        calibrated = Knob(name, tail, 1.0, 0.01, prior=max(calibration, 1e-9) / 0.01)
+        return calibrated if tail == "gain" else Knob(name, tail, 0.0, 1e-4, prior=DELAYED / 1e-4)
+    if name == "damping":
+        fastest = max(float(each.scales[1]) for each in stretches)
+        return Knob(name, "positive", oscillator.damping, _level_of(oscillator) / fastest)
+    turned = knob(oscillator, name)
+    return turned._replace(prior=calibration) if name == "stiffness" and turned.kind == "log" else turned
+
+
+def nuisance_knobs(
+    oscillator: Oscillator, names: Sequence[str], stretches: Sequence[Stretch], calibration: float = CALIBRATION
+) -> list[Knob]:
+    """Those of what is not known well; an amplifier is set anew for each record, so that each has gains of its own."""
+    knobs = [nuisance_knob(oscillator, name, stretches, calibration) for name in names]
+    if len(stretches) == 1:
+        return knobs
+    gains = [turned for turned in knobs if turned.kind == "gain"]
+    own = [turned._replace(stretch=j) for turned in gains for j in range(len(stretches))]
+    return [turned for turned in knobs if turned.kind != "gain"] + own
+
+
+def _level_of(oscillator: Oscillator) -> float:
+    """A force [N] of the size of the friction."""
+    return float(getattr(oscillator.law, "kinetic", 0.0)) or 1.0
+
+
 def knob(oscillator: Oscillator, name: str) -> Knob:
     """How a parameter is turned."""
     head, _, tail = name.rpartition(".")
-    if _of_sensor(name):
-        return Knob(name, tail, 1.0, 0.01) if tail == "gain" else Knob(name, tail, 0.0, 1e-4)
     value = value_of(oscillator, name)
     if tail == "static":
         kinetic = value_of(oscillator, f"{head}.kinetic" if head else "kinetic")
@@ -268,7 +345,7 @@ def bounded(turned: Knob, oscillator: Oscillator, stretches: Sequence[Stretch], 
     most = stiffest(oscillator, stretches, share)
     if turned.name == "law.damping":
         most = 2 * math.sqrt(most * oscillator.mass)
-    return turned._replace(most=max(0.0, math.log(most / turned.origin)))
+    return turned._replace(origin=min(most, turned.origin), most=max(0.0, math.log(most / turned.origin)))
 
 
 def _slides_at(oscillator: Oscillator) -> bool:
@@ -328,12 +405,15 @@ def best_start(
     names: Sequence[str],
     stretches: Sequence[Stretch],
     fastest: float,
+    dampers: Sequence[float],
     tell: Callable[[], None],
 ) -> Oscillator:
-    """The values from which the search descends lowest, on a part of the readings."""
+    """The values from which the search descends lowest, on a part of the readings; of the damper, where several are
+    given, it is turned too."""
     few = [thinned(stretch) for stretch in stretches]
     looked: list[tuple[float, int, Problem, Point]] = []
-    for number, trial in enumerate(trials(oscillator, names, fastest)):
+    begun = [trial for damping in dampers for trial in trials(oscillator.having(damping=damping), names, fastest)]
+    for number, trial in enumerate(begun):
         tell()
         problem = Problem.of(trial, few, ())
         point = descend(problem, problem.begin(np.zeros(0)), passes=2)
@@ -341,8 +421,10 @@ def best_start(
     looked.sort(key=lambda each: each[:2])
     ends = []
     for _, number, problem, point in looked[:FINALISTS]:
-        turned = replace(problem, knobs=tuple(knob(problem.oscillator, name) for name in names))
-        end = descend(turned, replace(point, u=np.zeros(len(names))), passes=12, tell=tell)
+        knobs = [knob(problem.oscillator, name) for name in names]
+        knobs += [nuisance_knob(problem.oscillator, "damping", few)] * (len(dampers) > 1)
+        turned = replace(problem, knobs=tuple(knobs))
+        end = descend(turned, replace(point, u=np.zeros(len(knobs))), passes=12, tell=tell)
         ends.append((end.chi2, number, turned, end))
     _, _, problem, point = min(ends, key=lambda each: each[:2])
     return problem.system(point.u)

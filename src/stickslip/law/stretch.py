@@ -17,6 +17,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record
 from stickslip.signals.response import Response, leak, resonance, respond
+from stickslip.solve.sensitivity import Sensitivity
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
 
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 SENSED = {"x": "x", "v": "v", "a": "a", "friction": "friction", "load": "friction"}  # of a channel, in the run
 JUMPS = ("a", "friction")
 RTOL = 1e-9  # of curved laws
+JUMPED = 1e-6  # of the largest jump, below which one is rounding
 NODES = 3  # of the quadrature through a mount, which turns little between two samples
 GLIDE, HEAVY = 0.5, 1e9  # s and kg: a mass that slides on at a steady speed until the law has no memory of before
 
@@ -106,6 +108,29 @@ class Sensor:
             return respond(sensed, breaks=run.breaks, times=at, response=self.response, nodes=NODES), None
         return sensed(at), run(at)[1] if source in JUMPS else None
 
+    def changed(self, motion: Sensitivity, late: float) -> Array:
+        """Derivatives of what it would read (n, K): a jump that comes later has left out its own impulse."""
+        source, inertia = SENSED[self.channel.name], self.channel.inertia
+
+        def sensed(at: Array) -> Array:
+            inside = np.clip(at, 0.0, motion.run.duration)
+            felt = motion.sample(inside, source)
+            return felt + inertia * motion.sample(inside, "a") if inertia else felt
+
+        at = self.time - late
+        if not self.response.poles:
+            return sensed(at).T
+        changed = respond(sensed, breaks=motion.run.starts, times=at, response=self.response, nodes=NODES)
+        jumps = motion.jumps(source) + (inertia * motion.jumps("a") if inertia else 0.0)
+        jumped = np.flatnonzero(np.abs(jumps) > JUMPED * np.abs(jumps).max(initial=0.0))
+        after = at[:, None] - motion.run.starts[1:][jumped]
+        rung = np.zeros(after.shape)
+        for pole, residue in zip(self.response.poles, self.response.residues, strict=True):
+            if pole.imag >= 0:  # its conjugate speaks for both
+                twice = 2.0 if pole.imag > 0 else 1.0
+                rung += np.where(after > 0, twice * (residue * np.exp(pole * np.maximum(after, 0.0))).real, 0.0)
+        return np.asarray(changed.T - (rung * jumps[jumped]) @ motion.later[1:][jumped])
+
     @cached_property
     def response(self) -> Response:
         """Of its mount and its discharge."""
@@ -145,9 +170,16 @@ class Stretch:
 
     def run(self, oscillator: Oscillator, start: Mapping[str, float | str], off: Array) -> Trajectory:
         """The motion from a start on, to the last instant that a sensor read, under a drive that is `off`."""
-        end = max(float(sensor.time[-1]) for sensor in self.sensors)
-        driven = replace(oscillator, drive=self.drive(self.span[0], self.span[0] + end, off))
-        return simulate(driven, duration=end, start=start, rtol=RTOL)
+        return simulate(self.driven(oscillator, off), duration=self.end, start=start, rtol=RTOL)
+
+    @cached_property
+    def end(self) -> float:
+        """Instant [s] from the start that a sensor read last."""
+        return max(float(sensor.time[-1]) for sensor in self.sensors)
+
+    def driven(self, oscillator: Oscillator, off: Array) -> Oscillator:
+        """The oscillator under the stretch's drive, which is `off`."""
+        return replace(oscillator, drive=self.drive(self.span[0], self.span[0] + self.end, off))
 
     def told(self, run: Trajectory, delays: Mapping[str, float]) -> list[tuple[Array, NDArray[np.int64] | None]]:
         """What each sensor would read of a run, as :meth:`Sensor.predicted`; `delays` [s] by channel."""
@@ -156,9 +188,14 @@ class Stretch:
 
     def motion(self, run: Trajectory) -> Motion:
         """What the sensors feel of a run."""
+        return Motion(run, self.outputs)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Of a run that the sensors ask for."""
         outputs = {SENSED[sensor.channel.name] for sensor in self.sensors}
         outputs |= {"a"} if any(sensor.channel.inertia for sensor in self.sensors) else set()
-        return Motion(run, tuple(sorted(outputs)))
+        return tuple(sorted(outputs))
 
     def face_speed(self, oscillator: Oscillator) -> float:
         """Velocity [m/s] of the counter-face at the first instant."""

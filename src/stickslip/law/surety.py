@@ -21,6 +21,7 @@ UNSURE = 0.25  # of a coordinate: a wider deviation is looked at by the likeliho
 REACH = (0.7, 1.6, 3.2, 7.0)  # steps of the coordinate that the look takes, to three decades away
 FAINT = 1e-12  # of the sharpest direction: below it a direction is not seen at all
 HALVINGS = 3
+CLOSE = 10  # passes of a descent that starts near its end, damper, spring and gains among what is turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,7 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
     faint = [k for k, knob in enumerate(problem.knobs) if sd[k] > UNSURE and knob.kind in ("log", "above")]
     if faint:
         part = thinned_out(problem)
-        near = descend(part, part.at(point.u, part.own(point.starts)), passes=2, tell=tell)
+        near = descend(part, part.at(point.u, part.own(point.starts)), passes=CLOSE, tell=tell)
         allowed = 3.84 * excess * sum(map(len, near.residuals)) / sum(map(len, point.residuals))
         for k in faint:
             low, high = (_end(part, near, k, side, allowed, tell) for side in (-1.0, 1.0))
@@ -128,7 +129,7 @@ def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, te
             return math.inf
         rest = np.delete(point.u, k)
         start = replace(held.at(rest, point.starts), u=rest)
-        return descend(replace(held, knobs=others), start, passes=3).chi2 - point.chi2 if start.raw else math.inf
+        return descend(replace(held, knobs=others), start, passes=CLOSE).chi2 - point.chi2 if start.raw else math.inf
 
     inside = float(point.u[k])
     for reach in REACH:

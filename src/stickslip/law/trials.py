@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stickslip.law.choice import Evidence, Key, independent
 from stickslip.law.drive import Sampled
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
-from stickslip.law.start import Shown, bounded, free_names, knob, thinned
+from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
 from stickslip.law.stretch import Motion, Stretch, attempted
 from stickslip.laws.guessing import STIFF, STIFFEST
 from stickslip.oscillator import Oscillator
@@ -22,15 +22,15 @@ Array = NDArray[np.float64]
 Left = dict[Key, Array]
 Tell = Callable[[], None]
 
-FINALISTS = 2  # starts that are followed
+LOOKS, FINALISTS = 4, 2  # starts that are looked at, and that are followed
+ROUGHLY = 0.1  # of the misfit, lowered by less in a step before all that is unsure is turned
 ENOUGH = 1e-3  # of the misfit: what a step lowers it less by tells no law from another
-CONTENDING = 10.0  # times the least misfit of the others: a law beyond is not followed to its end
+CONTENDING = 100.0  # times the least misfit of the others: a law beyond is not followed to its end
 PASSES, FEW = 12, 3  # of a descent: of a law, and of one that stands near its end
 TURNS = 24  # of the motion, after which a record tells laws apart no better
 DETUNED = (0.01, 0.0025)  # steps in which a mount is tried, against what is stated
 SILENT = 0.2  # of a channel's size, left by the best law: nothing is known of such a sensor
 COARSE = 0.3  # of the calibration's error, by which a base's motion may be missed where laws are compared
-STILL = 1e-12  # scale of a knob that is not turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +80,12 @@ class Trial:
         """What is left of each channel of each record [unit of the channel]."""
         return left_of(self.problem, self.point)
 
+    @property
+    def moved(self) -> float:
+        """Sum of squares of how far what was stated had to move, in units of how unsure it is."""
+        parts = zip(self.problem.stretches, self.point.residuals, strict=True)
+        return sum(float(np.sum(values[rows_of(stretch.sensors)[-1].stop :] ** 2)) for stretch, values in parts)
+
 
 def left_of(problem: Problem, point: Point) -> Left:
     """What is left of each channel of each record [unit of the channel]."""
@@ -95,17 +101,21 @@ def squares(left: Left) -> dict[Key, float]:
     return {key: float(np.mean(values**2)) for key, values in left.items()}
 
 
-def weighed(shown: Shown, number: int, calibration: float, *, whole: bool = False) -> Stretch:
-    """What a record shows from its first slide on, each channel counted by its noise and its calibration's error."""
+def weighed(
+    shown: Shown, number: int, calibration: float, evidence: Evidence | None = None, *, whole: bool = False
+) -> Stretch:
+    """What a record shows from its first slide on, each channel counted by its noise and its calibration's error; by
+    evidence, where there is some."""
     first, last = int(shown.slides()[0]), len(shown.record) - 1
     if not whole:
         last = min(last, shown.turned(first, TURNS))
     every = shown.stretch(number, (first, last))
     stretch = every if whole else thinned(every)
     sensors = tuple(
-        replace(each, noise=math.hypot(each.noise, calibration * float(np.std(each.readings))))
+        replace(each, noise=evidence.weight((each.channel.name, number), len(each.time)) if evidence
+                else math.hypot(each.noise, calibration * float(np.std(each.readings))))
         for each in stretch.sensors
-    )
+    )  # fmt: skip
     drive = stretch.drive
     if isinstance(drive, Sampled) and not whole:
         drive = drive.coarser(COARSE * calibration)
@@ -114,10 +124,10 @@ def weighed(shown: Shown, number: int, calibration: float, *, whole: bool = Fals
 
 def searched(
     name: str,
-    starts: Sequence[Any],
-    oscillator: Oscillator,
+    starts: Sequence[Oscillator],
     stretches: Sequence[Stretch],
     known: Sequence[str],
+    calibration: float,
     least: float,
     passes: int,
     tell: Tell,
@@ -127,23 +137,31 @@ def searched(
     Of many starts those are followed whose first look is best, and a law that stays far above the `least` misfit of
     the others not to its very end.
     """
+    problems = [Problem.of(system, stretches, ()) for system in starts]
+    begun = [(problem.begin(np.zeros(0)), problem) for problem in problems]
     looks = []
-    for number, law in enumerate(starts):
-        system = replace(oscillator, law=law)
-        problem = Problem.of(system, stretches, ())
-        looks.append((descend(problem, problem.begin(np.zeros(0)), passes=2, share=ENOUGH, tell=tell), number, problem))
-    looks = sorted((each for each in looks if math.isfinite(each[0].chi2)), key=lambda each: (each[0].chi2, each[1]))
+    for point, still in sorted(begun, key=lambda each: each[0].chi2)[:LOOKS]:
+        looks.append((descend(still, point, passes=2, share=ENOUGH, tell=tell), still))
     ends = []
-    for begun, _, still in looks[:FINALISTS]:
-        names = (*free_names(still.oscillator, None), *known)
-        problem = replace(still, knobs=tuple(_knob(still.oscillator, each, stretches) for each in names))
-        point = descend(problem, problem.at(np.zeros(len(names)), begun.starts), passes=FEW, share=ENOUGH, tell=tell)
-        if point.chi2 < CONTENDING * least:
-            point = descend(problem, point, passes=passes, share=ENOUGH, tell=tell)
-        if math.isfinite(point.chi2):
-            ends.append((problem, point))
-            least = min(least, point.chi2)
-    return Trial(name, *min(ends, key=lambda each: each[1].chi2)) if ends else None
+    for look, still in sorted(looks, key=lambda each: each[0].chi2)[:FINALISTS]:
+        if not math.isfinite(look.chi2):
+            continue
+        own = [_knob(still.oscillator, name, stretches) for name in free_names(still.oscillator, None)]
+        # a damper that is far off would be made up for by the gains, were they free from the first
+        few = nuisance_knobs(still.oscillator, [name for name in known if name == "damping"], stretches, calibration)
+        first = replace(still, knobs=(*own, *few))
+        begin = first.at(np.zeros(len(first.knobs)), look.starts)
+        ends.append((first, descend(first, begin, passes=FEW, share=ROUGHLY, tell=tell)))
+    if not ends:
+        return None
+    first, point = min(ends, key=lambda each: each[1].chi2)
+    others = [name for name in known if name != "damping"]
+    problem = replace(first, knobs=(*first.knobs, *nuisance_knobs(first.oscillator, others, stretches, calibration)))
+    whole = problem.at(np.append(point.u, np.zeros(len(problem.knobs) - len(point.u))), point.starts)
+    point = descend(problem, whole, passes=FEW, share=ENOUGH, tell=tell)
+    if point.chi2 < CONTENDING * least:
+        point = descend(problem, point, passes=passes, share=ENOUGH, tell=tell)
+    return Trial(name, problem, point) if math.isfinite(point.chi2) else None
 
 
 def _knob(oscillator: Oscillator, name: str, stretches: Sequence[Stretch]) -> Knob:
@@ -172,37 +190,6 @@ def with_static(trial: Trial, excess: float) -> Trial:
     return replace(trial, problem=problem, point=problem.at(np.zeros(len(knobs)), trial.point.starts))
 
 
-def predicted(trial: Trial, tell: Tell) -> Left:
-    """What is left of each record by a fit to the others; its own start alone is found anew."""
-    found: Left = {}
-    for number in range(len(trial.problem.stretches)):
-        others = [j for j in range(len(trial.problem.stretches)) if j != number]
-        fitted = descend(*_part(trial.problem, trial.point, others), passes=FEW, share=ENOUGH, tell=tell)
-        held, begun = _part(trial.problem, replace(trial.point, u=fitted.u), [number])
-        sensors = [(k, u) for k, u in zip(held.knobs, fitted.u, strict=True) if k.kind in ("gain", "delay")]
-        knobs = tuple(stopped(k, u) for k, u in sensors)
-        still = replace(held, oscillator=held.system(fitted.u), knobs=knobs)
-        point = descend(still, still.at(np.zeros(len(still.knobs)), begun.starts), passes=FEW, share=ENOUGH, tell=tell)
-        if not math.isfinite(point.chi2):
-            point = replace(begun, residuals=tuple(np.full_like(r, np.inf) for r in begun.residuals))
-        found |= left_of(still, point)
-    return found
-
-
-def stopped(turned: Knob, u: float) -> Knob:
-    """The knob where it stands, turned no more."""
-    return turned._replace(origin=turned.value(u), scale=STILL)
-
-
-def _part(problem: Problem, point: Point, rows: Sequence[int]) -> tuple[Problem, Point]:
-    """Some stretches of a problem, at the same point."""
-    part = replace(
-        problem, stretches=tuple(problem.stretches[j] for j in rows), entries=tuple(problem.entries[j] for j in rows),
-        scales=tuple(problem.scales[j] for j in rows),
-    )  # fmt: skip
-    return part, part.at(point.u, tuple(point.starts[j] for j in rows))
-
-
 def evidence_of(trial: Trial, shown: Sequence[Shown]) -> Evidence:
     """How much each channel counts: the error of a model tells at most one story from one reversal to the next."""
     left = trial.left
@@ -210,7 +197,7 @@ def evidence_of(trial: Trial, shown: Sequence[Shown]) -> Evidence:
         key: min(float(min(TURNS, max(1, len(shown[key[1]].turns)))), independent(values))
         for key, values in left.items()
     }
-    return Evidence(counts, {key: shown[key[1]].noise(key[0]) for key in left})
+    return Evidence(counts, {key: shown[key[1]].noise(key[0]) for key in left}, squares(left))
 
 
 def unexplained(trial: Trial, shown: Sequence[Shown]) -> dict[str, float]:
@@ -268,7 +255,7 @@ def _unread(trial: Trial, motions: Sequence[Motion | None], stretch: Stretch, j:
     sensors = [sensor for sensor in stretch.sensors if sensor.channel.name == name]
     if motion is None or not sensors:
         return 0.0
-    late = trial.problem.sensor_knobs(trial.point.u, "delay").get(name, 0.0)
+    late = trial.problem.sensor_knobs(trial.point.u, "delay", j).get(name, 0.0)
     told, read = (sensors[0].freed(each) for each in (sensors[0].predicted(motion, late)[0], sensors[0].readings))
     return float(
         sensors[0].noise ** 2 * np.mean((read - told * (float(told @ read) / max(float(told @ told), 1e-300))) ** 2)

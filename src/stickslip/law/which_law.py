@@ -11,20 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import NORMAL_95, Estimate, Result, Status
-from stickslip.law.choice import CALIBRATIONS, Misfit, Standing, standings, times, undescribed
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
+from stickslip.law.choice import CALIBRATIONS, Evidence, Misfit, Standing, standings, times, undescribed
 from stickslip.law.guess import Seen
 from stickslip.law.law import LawFit, answered
 from stickslip.law.search import descend
-from stickslip.law.start import Shown, require_apart, too_few
+from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
 from stickslip.law.stretch import Stretch, channels_of
 from stickslip.law.surety import surety
 from stickslip.law.trials import (
-    CONTENDING,
     PASSES,
     Trial,
     evidence_of,
-    predicted,
     resumed,
     searched,
     squares,
@@ -39,14 +37,14 @@ from stickslip.record.record import Record, Step
 
 Array = NDArray[np.float64]
 
-CALIBRATION = 0.01  # by which gains are wrong, if nothing is known
 CALLS = 40.0  # of progress that the trial of a law is taken for
 BAD = 0.3  # of a channel's own size: a law that leaves more beyond the noise describes little
 LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
 RETUNED = 8  # times that mounts and law are found in turn
+REMAINDER = "remainder"  # the kind of doubt where the best law leaves more than noise
 LEFT = 0.05  # of it: so much comes of more than the chance that an interval knows
 SCALED = ("kinetic", "static", "speed", "rate", "steepness")  # parameters in proportion to the motion, or against it
-OFF = 0.05  # of a gain, beyond which it is no calibration's error
+FAR = 6.0  # of how unsure a gain or a spring is, beyond which it is no calibration's error: 5 came of 3 % of roughness
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +144,7 @@ class LawComparison(Result):
 
 def _told(candidate: Candidate) -> dict[str, Any]:
     standing = candidate.standing
-    values = {"misfit": standing.misfit, "criterion": standing.criterion, "prediction": standing.prediction}
+    values = {"misfit": standing.misfit, "criterion": standing.criterion}
     law = candidate.oscillator.law
     return {
         "name": standing.name, "family": standing.family, "verdict": standing.verdict, "kept": standing.kept,
@@ -163,7 +161,6 @@ def compare_laws(
     laws: Sequence[Any] | None = None,
     nuisance: Sequence[str] | None = None,
     calibration: float = CALIBRATION,
-    leave_out: bool = True,
     progress: Callable[[float], object] | None = None,
 ) -> LawComparison:
     r"""Which friction law is it?
@@ -176,10 +173,10 @@ def compare_laws(
     .. math:: \sum_c n_c \log S_c + p \log \sum_c n_c
 
     S_c the mean square left of channel c, n_c the number of samples that tell a story of their own, p the number of
-    parameters. The odds between two families are exp(-C/4) where their best laws' criteria differ by C (the exponent
-    would be C/2, did what laws leave over come of chance alone); another family is rejected where they are below 1 in
-    20, unless it has no more parameters and predicts records that were left out better. Rigid laws are told apart by
-    the friction around rest, and an effect within three times the calibration's error is not told from it.
+    parameters; how far springs, gains and delays had to move is added in units of how unsure they are. The odds between
+    two families are exp(-C/4) where their best laws' criteria differ by C (the exponent would be C/2, did what laws
+    leave over come of chance alone); another family is rejected where they are below 1 in 20. Rigid laws are told apart
+    by the friction around rest, and an effect within three times the calibration's error is not told from it.
 
     Parameters
     ----------
@@ -191,11 +188,9 @@ def compare_laws(
         Names ("Coulomb", "static", "Stribeck", "compliant", "state variable", "LuGre"), classes, or laws with the
         values to start from. All six names where left out.
     nuisance : sequence of str, optional
-        What is fitted beside each law, as :func:`fit_law` takes it; all gains and the delay of x where left out.
+        What is fitted beside each law, as :func:`fit_law` takes it, and chooses it where left out.
     calibration : float
-        By what part gains and constants may be wrong.
-    leave_out : bool
-        Whether to predict each record by a fit to the others.
+        By what part gains and the spring may be wrong, one standard deviation.
     progress : callable, optional
         Called with the share of the work that is done, 0 to 1; an exception from it, as Ctrl-C, ends the comparison.
 
@@ -232,31 +227,35 @@ def compare_laws(
         each.require_sliding()
     require_apart(oscillator, (), nuisance or (), shown)
     tell = _teller(progress, len(kinds))
-    seen = Seen.of(records, oscillator)
+    known = tuple(nuisance) if nuisance is not None else usual_nuisance(oscillator, (), shown)
+    systems = [oscillator, *([seen_damping(oscillator, shown)] if "damping" in known else [])]
+    seen = _seen(records, systems)
 
     def stretch(each: Shown, number: int) -> Stretch:
-        return weighed(each, number, calibration)
+        return weighed(each, number, calibration, evidence)
 
     def tried(names: Sequence[tuple[str, list[Any]]], passes: int, before: Mapping[str, Trial]) -> dict[str, Trial]:
         stretches = [stretch(each, number) for number, each in enumerate(shown)]
-        known = tuple(nuisance) if nuisance is not None else _nuisance(shown)
         found: dict[str, Trial] = {}
         for name, given in names:
             least = min((each.point.chi2 for each in {**before, **found}.values()), default=math.inf)
             trial = resumed(before[name], stretches, least, passes, tell) if name in before else None
             if trial is None:
-                begun = _begun(name, given, seen, found)
-                trial = searched(name, begun, oscillator, stretches, known, least, passes, tell)
+                begun = [replace(system, law=law) for system, told in seen for law in _guessed(name, given, told)]
+                begun += _continued(name, found)
+                trial = searched(name, begun, stretches, known, calibration, least, passes, tell)
             if trial is not None:
                 found[name] = trial
         return found
 
+    evidence: Evidence | None = None
     rough, silent, stated = tried(kinds, LOOK, {}), dict[str, float](), shown
     if rough:
         nearest = min(rough.values(), key=lambda each: each.point.chi2)
         silent = unexplained(nearest, shown)
         shown = [replace(each, channels=tuple(n for n in each.channels if n not in silent)) for each in shown]
         stated, shown = shown, tuned(shown, nearest, stretch, tell)
+        evidence = evidence_of(nearest, shown)
     trials = tried(kinds, PASSES, {} if silent else rough)
     if not trials:
         raise EstimateError(
@@ -264,13 +263,14 @@ def compare_laws(
             "check mass= and stiffness=, or give laws with their values",
         )  # fmt: skip
     first = min(trials.values(), key=lambda each: each.point.chi2)
-    rigid, likely = seen.rests.fall, seen.rests.probabilities(calibration, CALIBRATIONS * calibration)
-    misfits = []
-    for trial in trials.values():
-        left, near = squares(trial.left), trial.point.chi2 < CONTENDING * first.point.chi2
-        ahead = squares(predicted(trial, tell)) if leave_out and len(records) > 1 and near else None
-        misfits.append(Misfit(trial.name, trial.count, left, ahead, trial.stiff))
-    told, confidence = standings(misfits, evidence_of(first, shown), likely=likely)
+    rests = seen[-1][1].rests  # of the balance with the likelier damper
+    rigid, likely = rests.fall, rests.probabilities(calibration, CALIBRATIONS * calibration)
+    misfits = [
+        Misfit(trial.name, trial.count, squares(trial.left), trial.stiff, trial.moved) for trial in trials.values()
+    ]
+    evidence = evidence_of(first, shown)
+    told, confidence = standings(misfits, evidence, likely=likely)
+    confidence = min(confidence, evidence.supported)
     best = trials[told[0].name]
     if best.name == "static" and rigid is not None:
         best = with_static(best, rigid.value)
@@ -284,7 +284,7 @@ def compare_laws(
     fit = _fit(best, shown, whole, tell)
     if best.name == "static" and rigid is not None:
         fit = _with_static(fit, rigid)
-    doubt = _doubt(fit, calibration)
+    doubt = _doubt(fit, oscillator, calibration)
     if doubt:
         told, confidence = undescribed(told), 0.0
         fit = _flagged(fit, "none of the laws tried describes these records")
@@ -297,12 +297,43 @@ def compare_laws(
         Candidate(each, fit.oscillator if each is told[0] else trials[each.name].system, _left(trials[each.name]))
         for each in told
     )
-    worries = [
+    worries: list[Doubt | str] = [
         f"{name} is left out: the best law leaves {share:.0%} of it, and no mount or delay of its sensor is stated"
         for name, share in silent.items()
     ]
-    worries += filter(None, [too_few(shown, best.count)])
-    return _answer(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
+    worries += filter(None, [too_few(shown, best.count), _remainder(fit)])
+    found = _answer(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
+    return found if doubt else replace(found, verdict=" ".join([found.verdict, *_damper(fit, oscillator.damping)]))
+
+
+def _remainder(fit: LawFit) -> Doubt | str:
+    """What even the best law leaves, where that is more than calibrations and noise are."""
+    name, share = _worst(fit, fit.noise)
+    if share <= LEFT:
+        return ""
+    return Doubt(
+        f"the best of those tried leaves {share:.0%} of {name}: the friction may follow none of them", REMAINDER
+    )
+
+
+def _damper(fit: LawFit, stated: float) -> Iterator[str]:
+    """The damper that was found, where it is not the stated one."""
+    found = fit.parameters.get("damping")
+    if found is not None and not found.includes(stated):
+        yield f"With it goes a {found}, where {stated:.4g} N s/m is stated."
+
+
+def _seen(records: Sequence[Record], systems: Sequence[Oscillator]) -> list[tuple[Oscillator, Seen]]:
+    """What the records show by each of several dampers; one that leaves no friction is none."""
+    found, refused = [], None
+    for system in systems:
+        try:
+            found.append((system, Seen.of(records, system)))
+        except EstimateError as error:
+            refused = error
+    if refused and not found:
+        raise refused
+    return found
 
 
 def _excess(fit: LawFit) -> Estimate:
@@ -387,18 +418,20 @@ def _worst(fit: LawFit, noise: Mapping[str, float]) -> tuple[str, float]:
     return max(shares.items(), key=lambda each: each[1])
 
 
-def _nuisance(shown: Sequence[Shown]) -> tuple[str, ...]:
-    """The gains of all channels, and the delay of the displacement against the others."""
-    channels = dict.fromkeys(name for each in shown for name in each.channels)
-    return (*(f"{name}.gain" for name in channels), *(["x.delay"] if "x" in channels and len(channels) > 1 else []))
-
-
-def _begun(name: str, given: Sequence[Any], seen: Seen, before: Mapping[str, Trial]) -> list[Any]:
-    """Where the search for a law begins: at the laws given, or its own guesses; and where simpler ones have ended."""
+def _guessed(name: str, given: Sequence[Any], seen: Seen) -> list[Any]:
+    """Where the search for a law begins: at the laws given, or its own guesses."""
     known = hypotheses().get(name)
-    if known is None:
-        return [*given]
-    return [*(given or known.guesses(seen)), *known.continued(before)]
+    return [*given] if given or known is None else known.guesses(seen)
+
+
+def _continued(name: str, before: Mapping[str, Trial]) -> list[Oscillator]:
+    """Where else: at the ends of simpler laws' searches, with the damper of the one that left least."""
+    known = hypotheses().get(name)
+    if known is None or not before:
+        return []
+    nearest = min(before.values(), key=lambda each: each.point.chi2)
+    stated = nearest.problem.oscillator.having(damping=nearest.system.damping)
+    return [replace(stated, law=law) for law in known.continued(before)]
 
 
 def _teller(progress: Callable[[float], object] | None, laws: int) -> Callable[[], None]:
@@ -452,17 +485,13 @@ def _answer(
     calibration: float,
     records: Sequence[Record],
     doubt: str,
-    worries: Sequence[str],
+    worries: Sequence[Doubt | str],
 ) -> LawComparison:
     told = [each.standing for each in candidates]
     kept = [each for each in told if each.kept]
     families = list(dict.fromkeys(each.family for each in kept))
     excess_ = excess_ if told[0].family == "rigid" else None
-    checks = tuple(
-        f"{each.name}: misfit {times(each.misfit)} the least"
-        + (f", of records left out {times(each.prediction)} the best one's" if math.isfinite(each.prediction) else "")
-        for each in told
-    )
+    checks = tuple(f"{each.name}: misfit {times(each.misfit)} the least" for each in told)
     step = Step(
         "compare_laws", {"laws": [each.name for each in candidates], "calibration": calibration},
         f"{', '.join(each.name for each in kept)} not rejected",
@@ -478,14 +507,17 @@ def _answer(
     )  # fmt: skip
 
 
-def _doubt(fit: LawFit, calibration: float) -> str:
+def _doubt(fit: LawFit, stated: Oscillator, calibration: float) -> str:
     """Why even the best law is none for these records; nothing where it is."""
-    gains = {name[:-5]: each.value for name, each in fit.parameters.items() if name.endswith(".gain")}
-    far = [name for name, gain in gains.items() if abs(gain - 1) > max(OFF, 5 * calibration)]
+    shares = {each: each.value for name, each in fit.parameters.items() if "gain" in name.split(".")}
+    if "stiffness" in fit.parameters and stated.stiffness > 0:
+        shares[fit.parameters["stiffness"]] = fit.parameters["stiffness"].value / stated.stiffness
+    far = [each for each, share in shares.items() if abs(math.log(share)) > FAR * calibration > 0]
     if far:
-        told = ", ".join(f"the gain of {name} comes out as {gains[name]:.3g}" for name in far)
+        told = ", ".join(f"the {each.name} comes out as {each.value:.3g}" for each in far)
         return (
-            f"{told}, where calibrations are off by {calibration:.0%}: check mass=, stiffness= and the channels' units"
+            f"{told}, where calibrations are off by {100 * calibration:.2g} %: check mass=, stiffness= and the "
+            "channels' units"
         )
     name, share = _worst(fit, fit.noise)
     if share <= BAD:
@@ -528,7 +560,7 @@ def _sentences(
         if len(kept) > 1:
             yield (
                 f"Within it {_either(kept)} can not be told apart: static friction exceeds the kinetic {exceeds}, "
-                f"where calibrations within {calibration:.0%} hide {CALIBRATIONS * calibration:.0%}."
+                f"where calibrations within {100 * calibration:.2g} % hide {100 * CALIBRATIONS * calibration:.2g} %."
             )
         elif best.name == "Coulomb" or kept == ["Coulomb"]:
             yield f"One level of friction explains it: static friction exceeds the kinetic by {high:.1%} at most."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stickslip.laws.base import Exit, Mode, Rigid, static_level
-from stickslip.laws.guessing import LITTLE, RIGID, Hypothesis
+from stickslip.laws.guessing import EXCESSES, LITTLE, RIGID, Hypothesis
 from stickslip.parameters import parameter, parametric
 
 
@@ -43,7 +43,7 @@ class Coulomb(Rigid):
             Hypothesis(
                 "static",
                 RIGID,
-                lambda seen: [_exceeding(seen.level, seen.excess)],
+                lambda seen: [_exceeding(seen.level, excess) for excess in (seen.excess, *EXCESSES)],
                 lambda simpler: [_exceeding(simpler["Coulomb"].law.kinetic, LITTLE)] if "Coulomb" in simpler else [],
                 holds=lambda law: law.static is not None,
             ),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LEAST_EXCESS = 0.03  # of the static friction over the kinetic, at a start
+EXCESSES = (0.06, 0.2, 0.4)  # the misfit has several valleys over it: where else a search starts
 SPEEDS = (0.02, 0.3)  # of the largest speed: where a Stribeck curve falls
 GRID = 16  # values that are tried of one parameter
 LITTLE = 0.01  # of the kinetic friction, by which the static one exceeds it at a start

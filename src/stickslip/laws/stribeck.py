@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from stickslip.laws.lugre import LuGre
 
 Curve = Callable[[Expression], Expression]
+LOWEST = 0.1  # of the level, that a guess has in fast sliding
 SLIDING = 0.01  # of the largest speed, above which friction tells the curve
 
 
@@ -129,6 +130,7 @@ def _guesses(seen: Observed) -> list[Stribeck]:
     for fall in seen.fastest * np.geomspace(*SPEEDS, GRID):
         columns = np.column_stack([np.ones(len(speed)), np.exp(-((speed / fall) ** 2))])
         (level, excess), left, *_ = np.linalg.lstsq(columns, friction, rcond=None)
+        level = max(float(level), LOWEST * seen.level)
         static = float(level + max(LEAST_EXCESS * level, excess))
         tried.append((float(left[0]) if len(left) else np.inf, Stribeck(float(level), static, speed=float(fall))))
     best = min(range(GRID), key=lambda i: tried[i][0])

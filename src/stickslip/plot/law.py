@@ -64,9 +64,6 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
         rows = [j for j, standing in enumerate(standings) if standing.kept == kept]
         if rows:
             ax.plot([standings[j].misfit for j in rows], places[rows], "o", color=colour, markersize=7, label=label)
-    forecast = [(law.prediction, j) for j, law in enumerate(standings) if np.isfinite(law.prediction)]
-    if forecast:
-        ax.plot(*zip(*forecast, strict=True), "D", color=ORANGE, markersize=4, label="of records left out")
     ax.set_xscale("log")
     ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter(NullFormatter())

@@ -92,7 +92,7 @@ def respond(
     Parameters
     ----------
     values : callable
-        The input at increasing instants [s], none below 0.
+        The input at increasing instants [s], none below 0; or several inputs, a row for each.
     breaks : ndarray
         Instants at which the input may jump, increasing.
     times : ndarray (n,)
@@ -103,9 +103,8 @@ def respond(
 
     Returns
     -------
-    ndarray (n,)
+    ndarray (n,), or a row for each input
     """
-
     after = np.maximum(times, 0.0)
     if not response.poles or len(times) < 2:
         return response.direct * values(after)
@@ -114,24 +113,27 @@ def respond(
     grid = times[0] + step * np.arange(-ahead, len(times))
     pieces = max(1, math.ceil(max(abs(pole) for pole in response.poles) * step / TURN))
     finer = step * np.arange(pieces) / pieces
-    rule, began = gauss(nodes), 0.0
-    states = np.zeros(len(response.poles), dtype=complex)
-    filter_ = np.array(response.poles), np.array(response.residues), states
-    factors, answer = np.empty(nodes, dtype=complex), np.zeros(len(grid))
+    rule, first_input = gauss(nodes), np.asarray(values(after[:1]))
+    lead, inputs = first_input.shape[:-1], first_input.size
+    poles, residues = np.array(response.poles), np.array(response.residues)
+    states, began = np.zeros((inputs, len(poles)), dtype=complex), np.zeros((inputs, 1))
+    factors, answer = np.empty(nodes, dtype=complex), np.zeros((inputs, len(grid)))
     for first in range(0, len(grid) - 1, BLOCK):
         part = grid[first : first + BLOCK + 1]
         inside = breaks[slice(*np.searchsorted(breaks, part[[0, -1]]))]
         parts = (part[:-1, None] + finer).ravel(), part[-1:], inside, np.zeros(int(part[0] < 0 < part[-1]))
         edges = np.sort(np.concatenate(parts))
         at = edges[:-1, None] + np.diff(edges)[:, None] * rule[0]
-        forced = values(np.maximum(at, 0.0).ravel()).reshape(at.shape)
-        began = began if first else float(forced[0, 0])  # the grid starts before 0
+        forced = np.asarray(values(np.maximum(at, 0.0).ravel())).reshape(inputs, *at.shape)
+        began = began if first else forced[:, 0, :1].copy()  # the grid starts before 0
         ends = np.searchsorted(edges, part[1:])
-        follow(filter_, edges, ends, forced - began, rule, factors, answer[first + 1 :])
-    out = answer[ahead:] + began * np.exp(-response.leak * after)
+        for k in range(inputs):
+            filter_ = poles, residues, states[k]
+            follow(filter_, edges, ends, forced[k] - began[k], rule, factors, answer[k, first + 1 :])
+    out = answer[:, ahead:] + began * np.exp(-response.leak * after)
     if response.direct:
-        out += response.direct * (values(after) - began)
-    return out
+        out += response.direct * (np.asarray(values(after)).reshape(inputs, -1) - began)
+    return out.reshape(*lead, -1)
 
 
 @cache

@@ -180,6 +180,7 @@ class _Run:
         self.state, self.big = state.copy(), np.abs(state)
         self.work = Work(taylor.room(count, self.model.order), collocation.room(count, size, table.physical))
         self.kept: list[Steps] = []
+        self.leapt = 0  # long steps among those kept
 
     @property
     def ahead(self) -> float:
@@ -204,19 +205,17 @@ class _Run:
                 self.clock, self.state, self.big, self.mode, until, steps, self.work
             )
         if written:
-            steps.leaps[:written][steps.leaps[:written] >= 0] += sum(len(part.reach) for part in self.kept)
+            steps.leaps[:written][steps.leaps[:written] >= 0] += self.leapt
+            self.leapt += leapt
             columns = (column[:written] for column in steps[:-2])
             self.kept.append(Steps._make([*columns, steps.polys[:leapt].copy(), steps.reach[:leapt].copy()]))
         laps = self.clock[LAPS] - before[LAPS]
         passed = self.clock[TIME] - before[TIME] + (laps * self.model.period if laps else 0.0)
-        self._refuse(outcome, passed)
-        require_budget(
-            int(np.sum(steps.ends[:written] >= 0)),
-            passed=passed,
-            scale=self.scale,
-            budget=self.budget,
-            state=named(self.table.names[: self.table.physical], self.state),
-        )
+        if outcome != march.DONE or not np.isfinite(self.state).all():
+            self._refuse(outcome, passed)
+        if events := int(np.sum(steps.ends[:written] >= 0)):
+            place = named(self.table.names[: self.table.physical], self.state)
+            require_budget(events, passed=passed, scale=self.scale, budget=self.budget, state=place)
         return outcome
 
     def _refuse(self, outcome: int, passed: float) -> None:

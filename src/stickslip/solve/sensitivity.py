@@ -1,0 +1,325 @@
+"""How a motion changes with its parameters: derivatives of what it is at any instant, events included.
+
+Beside the state S, S' = A S, runs its derivative D by a parameter p, D' = A D + (dA/dp) S. At an event that ends a mode
+where q S = 0, the neighbour's exit comes later by t = -(q D + (dq/dp) S) / (q A S), and with S+ = R S the derivative
+goes on as D+ = R (D + A S t) + (dR/dp) S - A+ S+ t. The tables are smooth in their parameters and cheap, so that their
+own derivatives are differences of two tables; the motion is never differenced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.compiled import OPTIONS, compiled
+from stickslip.oscillator import Oscillator
+from stickslip.solve.assembly import tables_of
+from stickslip.solve.cells import DEGREE
+from stickslip.solve.kernel import multiply
+from stickslip.solve.tables import Array, Tables, systems_of
+from stickslip.solve.trajectory import Trajectory
+
+TERMS = 40  # of a Taylor series over a cell at most
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Derivatives of a motion by K parameters.
+
+    Attributes
+    ----------
+    run : Trajectory
+        The motion.
+    flow : ndarray (K, M, N, N)
+        Derivatives of the tables' flows.
+    rows : mapping of str to ndarray (K, M, N)
+        Derivatives of the outputs as linear forms of the state, by name.
+    begun : ndarray (n, K, N)
+        Derivatives of the state at the start of each piece.
+    later : ndarray (n, K)
+        Derivatives of the instant [s] at which each piece begins.
+    """
+
+    run: Trajectory
+    flow: Array
+    rows: dict[str, Array]
+    begun: Array
+    later: Array
+
+    def sample(self, times: Array, name: str) -> Array:
+        """Derivatives of an output at increasing instants (K, T), each within the piece that it falls in."""
+        run = self.run
+        size, count = run.states.shape[1], len(self.flow)
+        out = np.empty((count, len(times)))
+        forms = np.ascontiguousarray(run.rows(name)[:, 0]), self.rows[name]
+        series = np.empty((DEGREE + 1, 1 + count))
+        sample_tangents(
+            run.table.linear, self.flow, (run.starts, run.modes, run.states, self.begun), times, forms, out, series,
+            np.empty((3, 1 + count, size)),
+        )  # fmt: skip
+        return out
+
+    def jumps(self, name: str) -> Array:
+        """By how much an output jumps where each piece but the first begins."""
+        run, forms = self.run, self.run.rows(name)[:, 0]
+        after = np.einsum("jn,jn->j", forms[run.modes[1:]], run.states[1:])
+        ends = np.empty_like(run.states[1:])
+        pieces = run.modes, run.states, run.durations
+        _ends(run.table.linear, self.flow[:0], pieces, ends, np.empty((3, 1, run.states.shape[1])))
+        return np.asarray(after - np.einsum("jn,jn->j", forms[run.modes[:-1]], ends))
+
+
+def sensitivity(
+    run: Trajectory,
+    neighbours: Sequence[Oscillator],
+    *,
+    step: float,
+    starts: Mapping[str, float],
+    scaled: Sequence[float],
+    outputs: Sequence[str],
+) -> Sensitivity:
+    """Derivatives of a run of linear modes: by parameters, by what scales its drive, and by its start.
+
+    Parameters
+    ----------
+    run : Trajectory
+        Of an oscillator, its start given entry by entry.
+    neighbours : sequence of Oscillator
+        For each parameter the same oscillator with that parameter larger by `step` in its own unit.
+    step : float
+        Of the differences of tables.
+    starts : mapping of str to float
+        Entries of the state whose values at time 0 come last, and the unit of each.
+    scaled : sequence of float
+        For each unit by which a recorded motion of the base may be larger: the share of it that one is.
+    outputs : sequence of str
+        What will be asked for, as :meth:`Trajectory.sample` names them.
+
+    Returns
+    -------
+    Sensitivity
+    """
+    table = run.table
+    size, first, last = len(table.names), len(neighbours), len(neighbours) + len(scaled)
+    count, signals = last + len(starts), slice(table.physical + 1, size)
+    changes = _Changes.none(table, count, outputs, run)
+    begun, later = np.zeros((len(run.modes), count, size)), np.zeros((len(run.modes), count))
+    if neighbours:
+        near = tables_of(systems_of(list(neighbours)))
+        changes.take(near, run, step)
+        begun[0, :first, signals] = (near.begin - run.states[0])[:, signals] / step
+    knotted = np.array([table.names.index(name) for name in table.motion.knotted], dtype=np.int64)
+    grown = np.concatenate([np.zeros(first), scaled, np.zeros(len(starts))])
+    begun[0, first:last, signals] += np.outer(scaled, run.states[0, signals])
+    for k, (name, unit) in enumerate(starts.items(), start=last):
+        begun[0, k, table.names.index(name)] = unit
+    carry_parameters(
+        table.linear, changes.of_events, table.leap, (run.modes, run.states, run.durations, run.exits),
+        (knotted, grown), begun, later, np.empty((4, 1 + count, size)),
+    )  # fmt: skip
+    return Sensitivity(run, changes.flow, changes.rows, begun, later)
+
+
+@dataclass(frozen=True, eq=False)
+class _Changes:
+    """Derivatives of tables by parameters (K, ...)."""
+
+    flow: Array
+    quantity: Array
+    reset: Array
+    leap: Array
+    rows: dict[str, Array]
+
+    @classmethod
+    def none(cls, table: Tables, count: int, outputs: Sequence[str], run: Trajectory) -> _Changes:
+        """Of tables that do not change."""
+        shapes = table.flow.shape, table.series[:, 0].shape, table.reset.shape, table.leap.shape
+        rows = {name: np.zeros((count, *run.rows(name)[:, 0].shape)) for name in outputs}
+        flow, quantity, reset, leap = (np.zeros((count, *shape)) for shape in shapes)
+        return cls(flow, quantity, reset, leap, rows)
+
+    def take(self, near: Tables, run: Trajectory, step: float) -> None:
+        """Fill in those of the first parameters from neighbouring tables."""
+        table, first = run.table, slice(len(near.flow))
+        self.flow[first] = (near.flow - table.flow) / step
+        self.quantity[first] = (near.series[:, :, 0] - table.series[:, 0]) / step
+        self.reset[first] = (near.reset - table.reset) / step
+        self.leap[first] = (near.leap - table.leap) / step
+        for name, rows in self.rows.items():
+            rows[first] = [(replace(run, table=near.of(k)).rows(name) - run.rows(name))[:, 0] / step
+                           for k in range(len(near.flow))]  # fmt: skip
+
+    @property
+    def of_events(self) -> tuple[Array, ...]:
+        """What an event's derivative is made of."""
+        return self.flow, self.quantity, self.reset, self.leap
+
+
+@compiled(**OPTIONS)
+def grow(flow, change, time, both, term):
+    """Carry a state and its derivatives through a time within one cell: `both` is (1 + K, N), the state first."""
+    count, n = both.shape
+    for p in range(count):
+        for i in range(n):
+            term[0, p, i] = both[p, i]
+    for k in range(1, TERMS):
+        scale, small = time / k, True
+        for p in range(count):
+            for i in range(n):
+                total = 0.0
+                for j in range(n):
+                    total += flow[i, j] * term[0, p, j]
+                    if p > 0:
+                        total += change[p - 1, i, j] * term[0, 0, j]
+                term[1, p, i] = total * scale
+        for p in range(count):
+            for i in range(n):
+                term[0, p, i] = term[1, p, i]
+                before = both[p, i]
+                both[p, i] += term[1, p, i]
+                small = small and both[p, i] == before
+        if small and k > 4:
+            break
+
+
+@compiled(**OPTIONS)
+def through(linear, change, mode, time, both, term):
+    """As `grow`, however long the time."""
+    cell = linear.cell[mode]
+    steps = int(time / cell) + 1 if cell < np.inf else 1
+    for _ in range(steps):
+        grow(linear.flow[mode], change[:, mode], time / steps, both, term)
+
+
+@compiled(**OPTIONS)
+def _ends(linear, none, pieces, out, work):
+    """The state at the end of each piece but the last; `none` are the derivatives by no parameter."""
+    modes, states, durations = pieces
+    for j in range(out.shape[0]):
+        for i in range(states.shape[1]):
+            work[0, 0, i] = states[j, i]
+        through(linear, none, modes[j], durations[j], work[0], work[1:])
+        for i in range(states.shape[1]):
+            out[j, i] = work[0, 0, i]
+
+
+@compiled(**OPTIONS)
+def carry_parameters(linear, changes, leap, pieces, signals, begun, later, work):
+    """Derivatives of the state at the start of each piece, and of that instant, from those at the first.
+
+    `changes` are the derivatives of flow, exits' quantities, resets and leaps; `signals` the entries that are set anew
+    where each piece begins, and by what share of themselves each parameter makes them larger.
+    """
+    knotted, scaled = signals
+    flow, quantity, reset, passage = changes
+    modes, states, durations, exits = pieces
+    count, n = begun.shape[1], states.shape[1]
+    both, spare = work[0], work[3]
+    for j in range(modes.shape[0] - 1):
+        mode, e, following = modes[j], exits[j], modes[j + 1]
+        for i in range(n):
+            both[0, i] = states[j, i]
+            for p in range(count):
+                both[1 + p, i] = begun[j, p, i]
+        through(linear, flow, mode, durations[j], both, work[1:3])
+        if e >= 0:
+            multiply(linear.flow[mode], both[0], spare[0])
+            speed = 0.0
+            for i in range(n):
+                speed += linear.series[e, 0, i] * spare[0, i]
+            held = leap[linear.target[e], following]
+            for p in range(count):
+                late = 0.0
+                for i in range(n):
+                    late -= linear.series[e, 0, i] * both[1 + p, i] + quantity[p, e, i] * both[0, i]
+                late = late / speed if speed != 0.0 else 0.0
+                later[j + 1, p] = late
+                # R (D + A S t) + dR S, then the modes passed through at once
+                multiply(linear.reset[e], both[0], work[1, 0])
+                multiply(reset[p, e], both[0], work[1, 1])
+                for i in range(n):
+                    both[1 + p, i] += spare[0, i] * late
+                multiply(linear.reset[e], both[1 + p], work[2, 0])
+                for i in range(n):
+                    work[2, 0, i] += work[1, 1, i]
+                multiply(held, work[2, 0], both[1 + p])
+                multiply(passage[p, linear.target[e], following], work[1, 0], work[2, 1])
+                multiply(linear.flow[following], states[j + 1], work[1, 1])
+                for i in range(n):
+                    both[1 + p, i] += work[2, 1, i] - work[1, 1, i] * late
+        for p in range(count):
+            for i in range(n):
+                begun[j + 1, p, i] = both[1 + p, i]
+            for i in knotted:
+                begun[j + 1, p, i] = scaled[p] * states[j + 1, i]
+
+
+@compiled(**OPTIONS)
+def sample_tangents(linear, change, pieces, times, forms, out, series, work):
+    """Derivatives of a linear form of the state at increasing `times` [s], one polynomial of time for each cell."""
+    begin, modes, states, begun = pieces
+    rows, moved = forms
+    count, n, last = begun.shape[1], states.shape[1], begin.shape[0] - 1
+    held, spare = work[0], work[1:]
+    j, known, cells = -1, 0, 0
+    for t in range(times.shape[0]):
+        if j < 0 or (j < last and begin[j + 1] <= times[t]):
+            j = max(j, 0)
+            while j < last and begin[j + 1] <= times[t]:
+                j += 1
+            known, cells = 0, 0
+            for i in range(n):
+                held[0, i] = states[j, i]
+                for p in range(count):
+                    held[1 + p, i] = begun[j, p, i]
+        mode = modes[j]
+        cell = linear.cell[mode]
+        unit = cell if cell < np.inf else 1.0
+        time = times[t] - begin[j]
+        while cell < np.inf and time - cells * cell > cell:
+            grow(linear.flow[mode], change[:, mode], cell, held, spare)
+            cells += 1
+            known = 0
+        if known == 0:
+            known = _polynomial(
+                linear.flow[mode], change[:, mode], unit, held, rows[mode], moved[:, mode], series, spare
+            )
+        at = (time - cells * cell if cells else time) / unit
+        for p in range(count):
+            total = 0.0
+            for k in range(known - 1, -1, -1):
+                total = total * at + series[k, 1 + p]
+            out[p, t] = total
+
+
+@compiled(**OPTIONS)
+def _polynomial(flow, change, cell, held, row, moved, series, term):
+    """Taylor coefficients of a form's derivatives over a cell; returns how many there are."""
+    count, n = held.shape
+    for p in range(count):
+        for i in range(n):
+            term[0, p, i] = held[p, i]
+    for k in range(series.shape[0]):
+        for p in range(1, count):
+            total = 0.0
+            for i in range(n):
+                total += row[i] * term[0, p, i] + moved[p - 1, i] * term[0, 0, i]
+            series[k, p] = total
+        small, scale = True, cell / (k + 1)
+        for p in range(count):
+            for i in range(n):
+                total = 0.0
+                for j in range(n):
+                    total += flow[i, j] * term[0, p, j]
+                    if p > 0:
+                        total += change[p - 1, i, j] * term[0, 0, j]
+                term[1, p, i] = total * scale
+                small = small and held[p, i] + term[1, p, i] == held[p, i]
+        for p in range(count):
+            for i in range(n):
+                term[0, p, i] = term[1, p, i]
+        if small and k > 4:
+            return k + 1
+    return series.shape[0]
