@@ -17,7 +17,7 @@ from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import StickslipError
 from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record
-from stickslip.twin.belief import believe
+from stickslip.twin.search import believe
 from stickslip.twin.trial import GIVES, Trial, try_on_twins
 
 Answer = TypeVar("Answer", Loops | None, Sticks | None, Breakaway | None)

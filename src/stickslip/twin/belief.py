@@ -10,66 +10,37 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.motion import is_measured
-from stickslip.drives.kinds import HarmonicBase
-from stickslip.errors import EstimateError, StickslipError
-from stickslip.law.drive import DriveFrom, measured_drive
+from stickslip.errors import StickslipError
+from stickslip.law.drive import DriveFrom
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.stribeck import Stribeck
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import declaration
-from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.rig.rig import Rig
-from stickslip.rig.sensor import Digitiser, Mount, Noise, Sensor
-from stickslip.signals.noise import noise_level, quantisation_step
+from stickslip.rig.sensor import Digitiser, Noise, Sensor
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
-from stickslip.statistics import correlation_time, least_squares
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-QUESTION = "the twin of a record"
-STARTS = (
-    3  # of a grid, the nearest, from which the search goes on: some end in a valley of their own, then thrice as many
-)
-NEAR = 1.1  # times a sensor's noise, that a search may leave to have come to its end
-SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: below, sticks and smoothing are in it
-PASSES = 8  # of the descent: the first two do nearly all of it
-SEARCHED = 4000  # samples in which it is searched where a law's valley lies
-LOOK = 2  # passes of it, after which it is seen which of several starts leads nearer
-FALL = 0.02  # of friction, over the speeds at which it slides
-HALVINGS = 6  # of a step that leads away, before the descent ends
-SETTLED = 0.999  # of what is left, from which a further pass gains nothing
-TINY = 1e-9  # of the motion: noise below is rounding
-NUDGE = 1e-3  # of a value, by which it is moved to see what the displacement does: well above rounding
-SENSED = ("x", "z", "v", "a", "load")  # channels that a virtual rig writes
-LAWS = 3  # that are tried beside the simplest
-CHANCE = 0.01  # that a part which is not there is believed in
+# Names of what is believed: parts of a law, and constants that may be off.
 KINETIC, SLOPE, EXCESS, GIVE, LOSS, SPEED, POWER = (
     "kinetic", "slope", "excess", "stiffness", "loss", "speed", "exponent"
 )  # fmt: skip
-MASS, SPRING, DAMPER, GAIN = "mass", "spring", "damper", "gain of x"  # constants that may be off
+MASS, SPRING, DAMPER, GAIN = "mass", "spring", "damper", "gain of x"
 DRIVE = ("drive 0", "drive 1", "drive 2")  # ways in which the measured drive may be off
-LOGARITHMS = (
-    GIVE,
-    SPEED,
-    POWER,
-    MASS,
-    SPRING,
-    GAIN,
-)  # of these the values are logarithms: of positive numbers, or of a ratio
+LOGARITHMS = (GIVE, SPEED, POWER, MASS, SPRING, GAIN)  # whose values are logarithms: of positive numbers, or of a ratio
 POSITIVE = (KINETIC, EXCESS, LOSS)
-# Where the search for a part begins: static over sliding friction less 1; deflection before slip over the largest
-# displacement; Stribeck speed over the largest speed. The nearest of them is taken.
-EXCESSES = (0.02, 0.1, 0.25, 0.5, 0.8)
-DEFLECTIONS = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
-LOSSES = (0.02, 0.1, 0.5)  # of a contact: its damping over the root of its stiffness times the mass
-SPEEDS = (0.03, 0.1, 0.3)
-LEVELS = (0.8, 0.9, 1.0)  # of the friction that a law without a fall in speed would have
 EXPONENT = (0.35, 0.35)  # logarithm of a Stribeck curve's, and its uncertainty: Tustin's is 1, Gauss's 2
+SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: below, sticks and smoothing are in it
+FALL = 0.02  # of friction, over the speeds at which it slides
+NEAR = 1.1  # times a sensor's noise, that a search may leave to have come to its end
+TINY = 1e-9  # of the motion: noise below is rounding
+NUDGE = 1e-3  # of a value, by which it is moved to see what the displacement does: well above rounding
+SEARCHED = 4000  # samples in which it is searched where a law's valley lies
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,275 +310,3 @@ class Fit:
     def sd(self, name: str) -> float:
         """Standard deviation of a value; infinite of one that moves nothing."""
         return float(np.linalg.norm(self.root[self.names.index(name)])) if name in self.names else math.inf
-
-
-def believe(record: Record) -> Belief:
-    r"""Which rig would have written this record?
-
-    The law is the simplest that the record leaves possible. It begins as :math:`f = f_k\,\mathrm{sgn}\,v + s\,v`, by
-    least squares where the mass slides faster than a fifth of its largest speed; its values, the state in which the
-    record begins, and the constants within their stated uncertainty are moved to where the simulated displacement is
-    nearest to the measured one, by Gauss's and Newton's method. A part that does not stand out of chance (one in a
-    hundred) is left out; a static friction above the sliding one, a contact that gives way or a friction that falls as
-    Stribeck's does is believed in where it leaves less of the displacement than chance would (by an F test, at one in a
-    hundred for all of them together).
-
-    Parameters
-    ----------
-    record : Record
-        With x, what moved it (z or force), and the friction by :func:`~stickslip.friction_force` from a stated mass and
-        spring.
-
-    Returns
-    -------
-    Belief
-
-    Raises
-    ------
-    EstimateError
-        There is no balance of forces behind the friction, or nothing in the record tells what moved the mass.
-
-    Examples
-    --------
-    >>> import stickslip as ss
-    >>> slider = ss.Oscillator(mass=2.0, stiffness=800, law=ss.laws.Coulomb(1.0),
-    ...                        drive=ss.drives.HarmonicBase(4e-3, frequency=2.0))
-    >>> record = ss.Rig.perfect("x", "z").having("x", white=1e-6).measure(ss.simulate(slider, cycles=8), fs=1000, rng=1)
-    >>> belief = believe(ss.friction_force(record, mass=2.0, stiffness=800))
-    >>> bool(abs(belief.kinetic - 1.0) < 0.01), len(belief.twin(np.random.default_rng(1))) == len(record)
-    (True, True)
-    """
-    stated = record.rig
-    if stated is None or stated.mass is None or stated.stiffness is None or is_measured(record, "friction"):
-        raise EstimateError(
-            "a friction without a balance of forces behind it",
-            f"{QUESTION} needs the mass and the spring that moved",
-            "state mass and stiffness",
-        )
-    record.require("x", "v", question=QUESTION)
-    if not any(name in record and np.ptp(record[name]) > 0 for name in ("z", "force")):
-        raise EstimateError(
-            "neither a motion z of the base nor an applied force",
-            f"{QUESTION} is moved as the record was",
-            "record what moves the mass",
-        )
-    oscillator = Oscillator(
-        mass=stated.mass,
-        stiffness=stated.stiffness,
-        damping=stated.damping,
-        damper=stated.damper,
-        law=LinearSlope(0.0, slope=0.0),
-    )
-    drive = measured_drive(record, HarmonicBase(0.0, frequency=1.0, contact=stated.contact))
-    unsure = _unsure(record, drive)
-    start = {"x": float(record["x"][0]), "v": float(record["v"][0])}
-    values = {**start, **dict.fromkeys(unsure, 0.0), **_sliding(record, stated.contact)}
-    begun = Belief(record, oscillator, values, drive, Rig(tuple(_sensors(record))), unsure)
-    return _needed(_richer(_needed(_nearest(begun), SLOPE, KINETIC)), SLOPE)
-
-
-def _needed(belief: Belief, *parts: str) -> Belief:
-    """Without those parts, asked in turn, that chance would have shown too."""
-    for part in parts:
-        if part in belief.values and not _stands_out(belief, part):
-            belief = _nearest(belief.without(part))
-    return belief
-
-
-def _stands_out(belief: Belief, part: str) -> bool:
-    """Whether a value is further from zero than chance would bring it."""
-    from scipy.special import stdtrit  # half a second, where nothing else of an analysis loads it
-
-    fit = belief.fit
-    if fit is None or part not in fit.names:
-        return False
-    return abs(belief.values[part]) > float(stdtrit(fit.freedom, 1 - CHANCE / 2)) * fit.sd(part)
-
-
-def _richer(simple: Belief) -> Belief:
-    """With the parts that leave the least of the displacement, where that is less than chance would leave."""
-    best, least = simple, CHANCE
-    for starts in _parts(simple.beginning()):
-        richer = _best(starts, simple.record)
-        chance = _by_chance(simple, richer)
-        if chance < least or (chance == least and _left(richer) < _left(best)):
-            best, least = richer, chance
-    if GIVE in best.values:  # a contact's own damping matters less than its stiffness: it is looked for last
-        damped = _best([best.beginning().at(**{LOSS: loss}) for loss in LOSSES], simple.record)
-        best = damped if _by_chance(best, damped) < CHANCE else best
-    return best
-
-
-def _best(starts: list[Belief], record: Record) -> Belief:
-    """The nearest to a record of those that the nearest starts lead to on its beginning."""
-    starts = sorted(starts, key=_left)
-    best = starts[0]
-    for number, begun in enumerate(starts[: 3 * STARTS]):
-        if number >= STARTS and best.like_noise:
-            break
-        best = min(best, _tried(begun, LOOK), key=_left)
-    return _tried(replace(best, record=record), PASSES)
-
-
-def _tried(begun: Belief, passes: int) -> Belief:
-    """The nearest from there; as it was of a law that can not be followed."""
-    try:
-        return _nearest(begun, passes)
-    except StickslipError:
-        return begun
-
-
-def _parts(simple: Belief) -> list[list[Belief]]:
-    """Beginnings of the richer laws, of each a grid."""
-    record = simple.record
-    furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
-    # a slope is what static friction, and dry friction through a spring, look like to a fit without them
-    level = float(np.mean(np.abs(record["friction"])[np.abs(record["v"]) > SLIDES * fastest]))
-    levels = [level, simple.values[KINETIC]] if KINETIC in simple.values else [level]
-    static = [{KINETIC: a * level, EXCESS: b * level, SLOPE: 0.0} for a in LEVELS for b in EXCESSES]
-    give = [
-        {KINETIC: level, GIVE: math.log(level / (share * furthest)), SLOPE: 0.0}
-        for share in DEFLECTIONS
-        for level in levels
-    ]
-    falls = [
-        {**start, SPEED: math.log(share * fastest), POWER: power}
-        for share in SPEEDS
-        for power in (0.0, 0.7)
-        for start in static
-    ]
-    return [[simple.at(**start) for start in starts] for starts in (static, give, falls)]
-
-
-def _by_chance(simple: Belief, richer: Belief) -> float:
-    """Probability that the richer law leaves so much less by chance alone, for as many laws as are tried."""
-    from scipy.special import fdtrc  # as above
-
-    less, more = simple.fit, richer.fit
-    if less is None or more is None:  # a law that could not be followed explains nothing
-        return 1.0
-    added = len(more.names) - len(less.names)
-    gained = _left(simple) / _left(richer) - 1
-    if added < 1 or gained <= 0:
-        return 1.0
-    return min(1.0, LAWS * float(fdtrc(added, more.freedom, gained * more.freedom / added)))
-
-
-def _left(belief: Belief) -> float:
-    """What the simulated displacement leaves of the measured one, and constants that are off [m^2].
-
-    Infinite where the rig can not be followed.
-    """
-    try:
-        residual = belief.residual
-    except StickslipError:
-        return math.inf
-    off = sum(((belief.values[name] - middle) / sd) ** 2 for name, (middle, sd) in belief.priors.items())
-    with np.errstate(over="ignore"):  # a step that leads far away
-        return float(residual @ residual) + belief.noise**2 * off
-
-
-def _nearest(belief: Belief, passes: int = PASSES) -> Belief:
-    """The belief whose displacement is nearest to the record's, where that is near; else as it was begun."""
-    belief = _linearised(belief)
-    for _ in range(passes):
-        fit = belief.fit
-        assert fit is not None
-        before = _left(belief)
-        step = fit.gain @ belief.residual - fit.pull
-        step /= max(1.0, *(abs(s) for n, s in zip(fit.names, step, strict=True) if n in LOGARITHMS), 1.0)
-        for halving in range(HALVINGS):
-            moved = belief.by(fit.names, step / 2**halving)
-            nearer = _left(moved)
-            if nearer < before:
-                break
-        else:
-            break
-        belief = _linearised(moved)
-        if nearer > SETTLED * before:
-            break
-    return belief
-
-
-def _linearised(belief: Belief) -> Belief:
-    """With how its values follow from x, in their neighbourhood."""
-    residual = belief.residual
-    slopes = {name: _slope_of(belief, name) for name in belief.values}
-    names = tuple(name for name, slope in slopes.items() if slope.any())  # what moves nothing can not be told
-    if not names:
-        raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")
-    jacobian = np.column_stack([slopes[name] for name in names])
-    jacobian -= jacobian.mean(axis=0)
-    independent = len(residual) / correlation_time(residual)
-    freedom = max(1.0, independent - len(names))
-    weight = float(residual @ residual) / freedom
-    # what is known beforehand counts against the sensor's noise: a misfit must not hold values to it
-    known = [belief.priors.get(name, (0.0, math.inf)) for name in names]
-    prior = np.array([belief.noise**2 / sd**2 for _, sd in known])
-    scale = np.sqrt(np.sum(jacobian**2, axis=0) + prior)
-    unit = jacobian / scale
-    seen = unit.T @ unit
-    inverse = np.linalg.pinv(seen + np.diag(prior / scale**2))
-    covariance = inverse @ (weight * seen + np.diag(belief.noise**2 * prior / scale**2)) @ inverse
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    inverse /= np.outer(scale, scale)
-    pull = inverse @ (prior * [belief.values[n] - middle for n, (middle, _) in zip(names, known, strict=True)])
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return replace(belief, fit=Fit(names, jacobian, inverse @ jacobian.T, pull, root, weight, freedom))
-
-
-def _slope_of(belief: Belief, name: str) -> Array:
-    """How the displacement changes with one value, by a difference forward: a part at zero has no other side."""
-    step = NUDGE * belief.size(name)
-    try:
-        moved = belief.at(**{name: belief.values[name] + step}).moved
-    except StickslipError:  # an exit that is a tangency just there
-        step /= 3
-        moved = belief.at(**{name: belief.values[name] + step}).moved
-    return np.asarray((moved - belief.moved) / step)
-
-
-def _unsure(record: Record, drive: DriveFrom) -> dict[str, float]:
-    """Standard deviation of each constant that may be off: as stated, and as the drive was measured."""
-    rig, gains = record.rig, {name: record.channels[name].gain_sd for name in record if name in "xz"}
-    assert rig is not None
-    stated = {MASS: ("mass", rig.mass), SPRING: ("stiffness", rig.stiffness), DAMPER: ("damping", 1.0)}
-    unsure = {part: rig.sd[name] / scale for part, (name, scale) in stated.items() if rig.sd.get(name) and scale}
-    if gains.get("x"):
-        unsure[GAIN] = gains["x"]
-    drives = dict(zip(DRIVE, drive.unsure, strict=False))
-    if gains.get("z") and drives:  # the first way in which a drive may be off is its size
-        drives[DRIVE[0]] = math.hypot(drives[DRIVE[0]], gains["z"])
-    return {**unsure, **drives}
-
-
-def _sliding(record: Record, contact: str) -> dict[str, float]:
-    """Dry friction and slope against speed while it slides."""
-    velocity = record["v"]
-    if contact == "base" and "z" in record:
-        velocity = velocity - np.gradient(record["z"]) * record.fs
-    slides = np.abs(velocity) > SLIDES * float(np.max(np.abs(velocity)))
-    columns = np.column_stack([np.sign(velocity), velocity, np.ones(len(velocity))])[slides]
-    kinetic, slope, _ = least_squares(columns, record["friction"][slides]).coefficients
-    return {KINETIC: max(0.0, float(kinetic)), SLOPE: float(slope)}
-
-
-def _sensors(record: Record) -> list[Sensor]:
-    """Sensors with the noise, counts, range, mount and delay of the record's own."""
-    sensors = []
-    for name in SENSED:
-        if name in record and is_measured(record, name):
-            channel, values = record.channels[name], record[name]
-            step = quantisation_step(values)
-            limit = float(np.max(np.abs(values))) if saturated(values).any() else np.inf
-            mount = None if channel.mount is None else Mount(*channel.mount, mass=channel.inertia)
-            level = noise_level(values, record.fs)  # counts are in what is measured, and not in what is stated
-            white = math.sqrt(max(level**2 - step**2 / 12, 0.0)) if channel.noise is None else channel.noise
-            discharge = np.inf if channel.discharge is None else channel.discharge
-            digitiser = Digitiser(step=step, limit=limit)
-            sensors.append(
-                Sensor(
-                    name, lag=channel.delay, mount=mount, discharge=discharge, noise=Noise(white), digitiser=digitiser
-                )
-            )
-    return sensors

@@ -14,7 +14,8 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
 from stickslip.statistics import student
-from stickslip.twin.belief import CHANCE, EXCESS, GIVE, KINETIC, SLOPE, Belief
+from stickslip.twin.belief import EXCESS, GIVE, KINETIC, SLOPE, Belief
+from stickslip.twin.search import CHANCE
 
 Array = NDArray[np.float64]
 Answers = Mapping[str, Estimate]
