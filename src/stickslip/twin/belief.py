@@ -199,11 +199,11 @@ class Belief:
                 return part
         return None
 
-    def told_by(self, record: Record) -> Belief:
-        """The rig that a record of a twin would have been believed to come from, by the same linear fit."""
+    def told_by(self, x: Array) -> Belief:
+        """The rig that a twin would have been believed to be by its displacement, by the same linear fit."""
         if self.fit is None:
             return self
-        left = record["x"] - self.moved
+        left = x - self.moved
         return self.by(self.fit.names, self.fit.gain @ (left - left.mean()))
 
     @cached_property
