@@ -39,6 +39,7 @@ from stickslip.twin.belief import (
     SPRING,
     Belief,
     Fit,
+    levelled,
 )
 from stickslip.workers import Map
 
@@ -128,6 +129,8 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     start = {"x": float(record["x"][0]), "v": float(record["v"][0])}
     values = {**start, **dict.fromkeys(unsure, 0.0), **_sliding(record, stated.contact)}
     begun = Belief(record, oscillator, values, drive, Rig(tuple(_sensors(record))), unsure)
+    # where the sensor has an offset, the rest position is nearer to its mean than to its zero
+    begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=_left)
     return _needed(_richer(_needed(_nearest(begun), SLOPE, KINETIC), mapped), SLOPE)
 
 
@@ -260,8 +263,7 @@ def _linearised(belief: Belief) -> Belief:
     names = tuple(name for name, slope in slopes.items() if slope.any())  # what moves nothing can not be told
     if not names:
         raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")
-    jacobian = np.column_stack([slopes[name] for name in names])
-    jacobian -= jacobian.mean(axis=0)
+    jacobian = levelled(np.column_stack([slopes[name] for name in names]))
     independent = len(residual) / correlation_time(residual)
     freedom = max(1.0, independent - len(names))
     weight = float(residual @ residual) / freedom

@@ -15,7 +15,7 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
 from stickslip.statistics import student
-from stickslip.twin.belief import EXCESS, GIVE, KINETIC, SLOPE, Belief
+from stickslip.twin.belief import EXCESS, GIVE, KINETIC, SLOPE, Belief, levelled
 from stickslip.twin.search import CHANCE
 from stickslip.workers import Map
 
@@ -323,8 +323,7 @@ def _strays(belief: Belief, twins: list[_Twin]) -> float:
     """How much more x strays from its nearest rig than a twin's does from its own, which noise alone parts."""
     if belief.fit is None:
         return math.inf
-    apart = np.array([twin.x - belief.moved for twin in twins]).T
-    apart -= apart.mean(axis=0)
+    apart = levelled(np.array([twin.x - belief.moved for twin in twins]).T)
     apart -= belief.fit.jacobian @ (belief.fit.gain @ apart)
     explained = float(np.mean(apart**2))
     return float(np.std(belief.residual)) / math.sqrt(explained) if explained > 0 else math.inf
