@@ -183,7 +183,7 @@ def record(rig: Rig, rng: np.random.Generator, *, noise: float = 1e-3, cycles: i
     }
     truth: dict[str, Any] = {
         "sliding friction": rig.kinetic, "slope of friction against speed": rig.slope,
-        "stuck share of the time": held * fs / samples, "stops per cycle": stops * cycle / samples,
+        "stuck share of the time": held * fs / samples, "stops per cycle": stops / cycles,
         "static over sliding friction": max(1.0, rig.static / rig.kinetic) if rig.kinetic else np.nan,
     }  # fmt: skip
     return ss.Record.of(written, fs=fs, truth=truth)

@@ -14,6 +14,8 @@ from stickslip.errors import StickslipError
 from stickslip.law.drive import DriveFrom
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.lugre import LuGre
+from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import Stribeck
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import declaration
@@ -27,18 +29,28 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 # Names of what is believed: parts of a law, and constants that may be off.
-KINETIC, SLOPE, EXCESS, GIVE, LOSS, SPEED, POWER = (
-    "kinetic", "slope", "excess", "stiffness", "loss", "speed", "exponent"
+KINETIC, SLOPE, EXCESS, GIVE, LOSS, SPEED, POWER, RATE, HELD = (
+    "kinetic", "slope", "excess", "stiffness", "loss", "speed", "exponent", "rate", "friction at the start"
 )  # fmt: skip
 MASS, SPRING, DAMPER, GAIN = "mass", "spring", "damper", "gain of x"
 DRIVE = ("drive 0", "drive 1", "drive 2")  # ways in which the measured drive may be off
-LOGARITHMS = (GIVE, SPEED, POWER, MASS, SPRING, GAIN)  # whose values are logarithms: of positive numbers, or of a ratio
+LOGARITHMS = (
+    GIVE,
+    SPEED,
+    POWER,
+    RATE,
+    MASS,
+    SPRING,
+    GAIN,
+)  # whose values are logarithms: of positive numbers, or of a ratio
 POSITIVE = (KINETIC, EXCESS, LOSS)
 EXPONENT = (0.35, 0.35)  # logarithm of a Stribeck curve's, and its uncertainty: Tustin's is 1, Gauss's 2
+STEEP = 1e-3  # of the largest speed, at which the backbone of a friction that lags has turned over: as good as a jump
 SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: below, sticks and smoothing are in it
 FALL = 0.02  # of friction, over the speeds at which it slides
 NEAR = 1.1  # times a sensor's noise, that a search may leave to have come to its end
 TINY = 1e-9  # of the motion: noise below is rounding
+FURTHEST = 30.0  # step of a logarithm: beyond it nothing is told
 NUDGE = 1e-3  # of a value, by which it is moved to see what the displacement does: well above rounding
 SEARCHED = 4000  # samples in which it is searched where a law's valley lies
 
@@ -55,8 +67,9 @@ class Belief:
         With the constants as stated.
     values : mapping of str to float
         What is believed: where the mass begins ("x" [m], "v" [m/s]), the law's parts ("kinetic" [N], "slope" [N s/m],
-        "excess" of static over sliding friction [N], logarithms of contact "stiffness" [N/m] or Stribeck "speed"
-        [m/s] and "exponent", the contact's "loss" c / sqrt(K m)), and by how much a constant is off.
+        "excess" of static over sliding friction [N], logarithms of contact "stiffness" [N/m], of Stribeck "speed"
+        [m/s] and "exponent", or of the "rate" [1/s] at which friction follows; the contact's "loss" c / sqrt(K m); the
+        "friction at the start" over the sliding one), and by how much a constant is off.
     drive : DriveFrom
         The motion of the base, or the force, as it was recorded.
     rig : Rig
@@ -65,6 +78,8 @@ class Belief:
         Standard deviation of each constant that may be off.
     fit : Fit or None
         How the values were found.
+    rivals : tuple of Belief
+        Laws of another kind that leave no more of the displacement than chance would.
     """
 
     record: Record
@@ -74,13 +89,20 @@ class Belief:
     rig: Rig
     unsure: Values = field(default_factory=dict)
     fit: Fit | None = None
+    rivals: tuple[Belief, ...] = ()
 
     @property
-    def law(self) -> LinearSlope | CompliantContact | Stribeck:
-        """The contact's law: rigid and linear in speed, or one that gives way, or that falls as Stribeck's does."""
+    def law(self) -> LinearSlope | CompliantContact | Stribeck | StateVariable | LuGre:
+        """The contact's law: rigid and linear in speed, giving way, falling as Stribeck's, with bristles, lagging."""
         values = self.values
         kinetic = values.get(KINETIC, 0.0)
         static = kinetic + values[EXCESS] if EXCESS in values else None
+        if RATE in values:
+            steepness = 1 / (STEEP * float(np.max(np.abs(self.record["v"]))))
+            return StateVariable(kinetic, rate=math.exp(values[RATE]) / kinetic, steepness=steepness)
+        if GIVE in values and SPEED in values:
+            fall, bristles = math.exp(values[SPEED]), math.exp(values[GIVE])
+            return LuGre(kinetic, static or kinetic, speed=fall, stiffness=bristles, damping=0.0)
         if GIVE in values:
             loss = values.get(LOSS, 0.0) * math.sqrt(math.exp(values[GIVE]) * self.stated.mass)
             return CompliantContact(kinetic, stiffness=math.exp(values[GIVE]), damping=loss, static=static)
@@ -159,9 +181,24 @@ class Belief:
 
     def by(self, names: Iterable[str], steps: Array) -> Belief:
         """The same with values moved by steps; what can not be negative stays at zero."""
-        moved = {name: self.values[name] + step for name, step in zip(names, steps, strict=True)}
+        moved = {
+            name: self.values[name] + (min(max(step, -FURTHEST), FURTHEST) if name in LOGARITHMS else step)
+            for name, step in zip(names, steps, strict=True)
+        }
+        ends = {name: self.ends(name) for name in moved}
+        return self.at(**{name: min(max(value, ends[name][0]), ends[name][1]) for name, value in moved.items()})
+
+    def ends(self, name: str) -> tuple[float, float]:
+        """Between which a value lies."""
+        if name == HELD:
+            return -1.0, 1.0
         positive = (*POSITIVE, SLOPE) if SPEED in self.values else POSITIVE  # what falls with speed is Stribeck's part
-        return self.at(**{name: max(0.0, value) if name in positive else value for name, value in moved.items()})
+        return (0.0 if name in positive else -math.inf), math.inf
+
+    def pinned(self, name: str, towards: float) -> bool:
+        """Whether a value is at its end and can not move that way."""
+        low, high = self.ends(name)
+        return self.values[name] <= low if towards < 0 else self.values[name] >= high
 
     def without(self, part: str) -> Belief:
         """The same without a part."""
@@ -179,7 +216,7 @@ class Belief:
             return float(np.std(self.record[name]))
         if name in self.unsure:
             return max(NUDGE, self.unsure[name])
-        if name in LOGARITHMS or name == LOSS:
+        if name in (*LOGARITHMS, LOSS, HELD):
             return 1.0
         friction = float(np.std(self.record["friction"]))
         return friction / float(np.std(self.record["v"])) if name == SLOPE else friction
@@ -246,12 +283,26 @@ class Belief:
         """Of the record's beginning alone, that is long enough to search in."""
         return replace(self, record=self.record.rows(0, SEARCHED))
 
+    @property
+    def start(self) -> dict[str, float]:
+        """The state in which the record begins."""
+        values = self.values
+        begun = {"x": values["x"], "v": values["v"]}
+        held = values.get(HELD, 0.0) * values.get(KINETIC, 0.0)
+        if RATE in values:
+            begun["theta"] = held
+        elif GIVE in values and SPEED in values:
+            begun["bristle"] = held / self.contact
+        elif GIVE in values:
+            begun["anchor"] = values["x"] - held / self.contact
+        return begun
+
     def _run(self) -> Trajectory:
         """The motion."""
         last = (len(self.record) - 1) / self.record.fs
         off = [self.values[name] for name in DRIVE if name in self.values]
         moved = self.oscillator.having(drive=self.drive(0.0, last, off))
-        return simulate(moved, duration=last, start={"x": self.values["x"], "v": self.values["v"]})
+        return simulate(moved, duration=last, start=self.start)
 
     def twin(self, rng: np.random.Generator) -> Record:
         """What the rig writes: as long as the record, begun from its state, with what is known of its sensors.

@@ -27,12 +27,14 @@ from stickslip.twin.belief import (
     EXCESS,
     GAIN,
     GIVE,
+    HELD,
     KINETIC,
     LOGARITHMS,
     LOSS,
     MASS,
     NUDGE,
     POWER,
+    RATE,
     SLIDES,
     SLOPE,
     SPEED,
@@ -49,19 +51,21 @@ QUESTION = "the twin of a record"
 # Of a grid, so many of the nearest are starts from which the search goes on: some end in a valley of their own. Where
 # none leads to the noise, thrice as many.
 STARTS = 3
-PASSES = 8  # of the descent: the first two do nearly all of it
+PASSES = 20  # of the descent: in a narrow valley; elsewhere the first two do nearly all of it
 LOOK = 2  # passes of it, after which it is seen which of several starts leads nearer
 HALVINGS = 6  # of a step that leads away, before the descent ends
 SETTLED = 0.999  # of what is left, from which a further pass gains nothing
 SENSED = ("x", "z", "v", "a", "load")  # channels that a virtual rig writes
 LAWS = 3  # that are tried beside the simplest
+CLOSE = 6.6  # chi-squared by which one law leads another, one in a hundred by chance
 CHANCE = 0.01  # that a part which is not there is believed in
 # Where the search for a part begins: static over sliding friction less 1; deflection before slip over the largest
 # displacement; Stribeck speed over the largest speed. The nearest of them is taken.
 EXCESSES = (0.02, 0.1, 0.25, 0.5, 0.8)
 DEFLECTIONS = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
 LOSSES = (0.02, 0.1, 0.5)  # of a contact: its damping over the root of its stiffness times the mass
-SPEEDS = (0.03, 0.1, 0.3)
+SPEEDS = (0.03, 0.1, 0.3, 1.0)
+RATES = (2.0, 5.0, 12.0, 30.0, 80.0)  # at which friction follows, over the largest speed over the largest displacement
 LEVELS = (0.8, 0.9, 1.0)  # of the friction that a law without a fall in speed would have
 
 
@@ -154,15 +158,26 @@ def _stands_out(belief: Belief, part: str) -> bool:
 
 def _richer(simple: Belief, mapped: Map) -> Belief:
     """With the parts that leave the least of the displacement, where that is less than chance would leave."""
-    best, least = simple, CHANCE
-    for richer in mapped(partial(_best, record=simple.record), _parts(simple.beginning())):
-        chance = _by_chance(simple, richer)
-        if chance < least or (chance == least and _left(richer) < _left(best)):
-            best, least = richer, chance
-    if GIVE in best.values:  # a contact's own damping matters less than its stiffness: it is looked for last
-        damped = _best([best.beginning().at(**{LOSS: loss}) for loss in LOSSES], simple.record)
-        best = damped if _by_chance(best, damped) < CHANCE else best
-    return best
+    laws: list[Belief] = list(mapped(partial(_best, record=simple.record), _parts(simple.beginning())))
+    best = min([simple, *laws], key=lambda law: (CHANCE if law is simple else _by_chance(simple, law), _left(law)))
+    if GIVE in best.values:
+        laws += mapped(partial(_best, record=simple.record), _softer(best.beginning()))
+        best = _simplest([law for law in laws if {GIVE, RATE} & law.values.keys()])
+    if best is simple and not best.falls:
+        return best  # what else might be there is bounded by what would have been felt of it
+    return replace(best, rivals=tuple(law for law in laws if law is not best and _as_near(law, best)))
+
+
+def _simplest(laws: list[Belief]) -> Belief:
+    """The law that leaves the least, where each value that it has more spares what chance would."""
+    nearest = min(laws, key=_left)
+    freedom = nearest.fit.freedom if nearest.fit is not None else 1.0
+    return min(laws, key=lambda law: freedom * math.log(_left(law)) + CLOSE * len(law.values))
+
+
+def _as_near(law: Belief, best: Belief) -> bool:
+    """Whether a law leaves no more than chance would, were it the one that wrote the record."""
+    return best.fit is not None and best.fit.freedom * math.log(_left(law) / _left(best)) < CLOSE
 
 
 def _best(starts: list[Belief], record: Record) -> Belief:
@@ -204,6 +219,21 @@ def _parts(simple: Belief) -> list[list[Belief]]:
         for start in static
     ]
     return [[simple.at(**start) for start in starts] for starts in (static, give, falls)]
+
+
+def _softer(give: Belief) -> list[list[Belief]]:
+    """Beginnings of what else may look like a contact that gives way: one with a damping, bristles, or a lag."""
+    record, values = give.record, give.values
+    furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
+    damped = [give.at(**{LOSS: loss}) for loss in LOSSES]
+    slid = give.at(**{HELD: float(np.sign(record["v"][0]))})
+    bristles = [
+        slid.at(**{EXCESS: excess * values[KINETIC], SPEED: math.log(share * fastest)})
+        for excess in EXCESSES[1:4]
+        for share in SPEEDS
+    ]
+    lags = [slid.without(GIVE).at(**{RATE: math.log(rate * fastest / furthest)}) for rate in RATES]
+    return [damped, bristles, lags]
 
 
 def _by_chance(simple: Belief, richer: Belief) -> float:
@@ -260,7 +290,10 @@ def _linearised(belief: Belief) -> Belief:
     """With how its values follow from x, in their neighbourhood."""
     residual = belief.residual
     slopes = {name: _slope_of(belief, name) for name in belief.values}
-    names = tuple(name for name, slope in slopes.items() if slope.any())  # what moves nothing can not be told
+    # what moves nothing can not be told, and what is at its end would hold the others back
+    names = tuple(
+        name for name, slope in slopes.items() if slope.any() and not belief.pinned(name, float(slope @ residual))
+    )
     if not names:
         raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")
     jacobian = levelled(np.column_stack([slopes[name] for name in names]))
@@ -285,6 +318,8 @@ def _linearised(belief: Belief) -> Belief:
 def _slope_of(belief: Belief, name: str) -> Array:
     """How the displacement changes with one value, by a difference forward: a part at zero has no other side."""
     step = NUDGE * belief.size(name)
+    if name == HELD and belief.values[name] > 0:  # the contact bears no more than all
+        step = -step
     try:
         moved = belief.at(**{name: belief.values[name] + step}).moved
     except StickslipError:  # an exit that is a tangency just there

@@ -41,8 +41,8 @@ ASKED = (*DIRECTIONS, SHARE, STOPS)
 SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the motion: parts looked for, to two fifths
 STICKS = ("stick", "microstick")  # kinds of event
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
-UNLIKE = 1.3  # times what noise explains, by which x may stray from its twin before that is said
-ASTRAY, UNFELT = "unlike its twins", "not felt"  # kinds of doubt
+UNLIKE = 1.15  # times what noise explains, by which x may stray from its twin before that is said
+ASTRAY, UNFELT, RIVALS = "unlike its twins", "not felt", "another law as likely"  # kinds of doubt
 
 
 @dataclass(frozen=True)
@@ -177,12 +177,13 @@ def try_on_twins(
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
             both = belief.falls or UNSTATED in kinds(answers[name].status)
-            tried[name] = _tried(answers[name], pairs, strays, both=both)
+            answer = _tried(answers[name], pairs, strays, both=both)
+            tried[name] = _among(answer, _counted(belief, name, frequency))
     if GIVE in belief.values:
         answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
     for name, value in FITTED.items():
         if name in answers and (name != GIVES or GIVE in belief.values):
-            tried[name] = _fitted(answers[name], value, belief, twins, strays)
+            tried[name] = _among(_fitted(answers[name], value, belief, twins, strays), _apart(belief, value))
     return Trial(count, belief, tried, *_powers(belief), strays)
 
 
@@ -283,6 +284,30 @@ def _reach(belief: Belief, part: str, value: Callable[[Belief], float]) -> float
     larger = ({part: size * belief.size(part)} for size in SIZES)
     felt = belief.first_felt(larger, student(belief.fit.freedom))
     return math.inf if felt is None else value(belief.at(**felt)) - value(belief)
+
+
+def _apart(belief: Belief, value: Callable[[Belief], float]) -> list[float]:
+    """By how much other laws that the record leaves possible would answer more."""
+    return [value(rival) - value(belief) for rival in belief.rivals]
+
+
+def _counted(belief: Belief, name: str, frequency: float) -> list[float]:
+    """The same of what is counted in a simulated motion."""
+    chance = np.random.default_rng(0)  # the noise that it draws is not looked at
+    true, *others = (_truth(rig, rig.twin(chance), frequency)[name] for rig in (belief, *belief.rivals))
+    return [other - true for other in others]
+
+
+def _among(answer: Estimate, apart: list[float]) -> Estimate:
+    """The answer with an interval that holds what other laws would answer, too."""
+    if not answer.known or not apart:
+        return answer
+    if not np.isfinite(apart).all():
+        words = Doubt("laws without it explain x as well", RIVALS)
+        return replace(answer, status=Status(*doubts_of(answer.status), words))
+    low, high = answer.interval
+    interval = (low + min(0.0, *apart), high + max(0.0, *apart))
+    return replace(answer, interval=interval, sd=(interval[1] - interval[0]) / (2 * NORMAL_95))
 
 
 def _less_bias(value: float, errors: Array, strays: float) -> tuple[float, tuple[float, float]]:
