@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.estimate import stands
 from stickslip.scenarios import forced
 
 TURN = 2 * math.pi
@@ -108,6 +109,12 @@ def test_a_start_that_can_not_be_followed_costs_no_map() -> None:
     assert np.count_nonzero(found.which[0] == -1) == len(found.lost)
     assert np.all(found.which[1] >= 0)
     assert "could not be followed" in repr(found)
+    followed = found.which.size - len(found.lost)
+    for number, share in enumerate(found.shares):
+        count = np.count_nonzero(found.which == number)
+        assert share.value == pytest.approx(count / followed)  # what failed is no start that leads elsewhere
+        assert share.interval[1] >= (count + len(found.lost)) / found.which.size
+        assert not stands(share.status)
 
 
 def test_micro_slips_go_one_by_one_as_the_contact_is_damped() -> None:
