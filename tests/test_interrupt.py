@@ -23,7 +23,7 @@ DITHER = ss.drives.MultiTone([(0.65e-3, 2.5, 0.0), (1e-5, 31.0, 0.0)])
 LONG = {
     "many events": RIGID.having(drive=DITHER),
     "one piece": ss.Oscillator(mass=1, stiffness=1e6, law=ss.laws.Coulomb(1.0), drive=ss.drives.Belt(10.0)),
-    "recorded base": RIGID.having(drive=ss.drives.RecordedBase(1e-3 * np.cos(np.arange(2_000_000) / 50), fs=1000.0)),
+    "recorded base": RIGID.having(drive=ss.drives.Recorded(1e-3 * np.cos(np.arange(2_000_000) / 50), fs=1000.0)),
     "curved law": RIGID.having(law=ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=2e5, damping=20.0)),
 }
 SCRIPT = """

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
-from stickslip.maps.attractor import Attractor, Start, as_start, numbers, require_period, same, settled
+from stickslip.maps.attractor import ENDLESS, Attractor, Start, as_start, numbers, require_period, same, settled
 from stickslip.record.exchange import labelled_arrays
 from stickslip.solve.poincare import Table, extent, lap, tables
 from stickslip.solve.simulate import opening
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 NEAR = 1e-6  # of an orbit's size: what comes this near, with the orbit's own events, and nearer still, belongs to it
-ENDLESS = ("not periodic", "unbounded")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,7 +170,7 @@ def _number(system: System, table: Table, attractors: list[Attractor], start: St
 
 def _belongs(system: System, table: Table, state: Array, mode: int, attractor: Attractor) -> bool:
     """Whether a motion is on its last way to an attractor."""
-    if attractor.status in (*ENDLESS, "not unique", "grazing"):
+    if attractor.status in (*ENDLESS, "unbounded", "not unique", "grazing"):
         return False
     if attractor.status == "rest":
         course = lap(system, table, state, mode, 1)

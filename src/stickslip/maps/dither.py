@@ -201,8 +201,7 @@ def dither(
     lost = sum(search.lost.values())
     if not reached and lost:
         raise SolveError(
-            f"at {lost} amplitudes a run could not be followed, and at no other the stick of "
-            f"{stick:.3g} s goes",
+            f"at {lost} amplitudes a run could not be followed, and at no other the stick of {stick:.3g} s goes",
             "an amplitude is found by runs that can be followed",
             "simulate() the system with this dither to see why one can not, or give another frequency=",
         )
