@@ -404,7 +404,7 @@ class Recorded:
         --------
         >>> chirp = Recorded.of(lambda t: math.cos(math.pi * t * (1 + 3 * t)), duration=2.0, error=1e-6, on="force")
         >>> len(chirp.samples), chirp.error < 1e-6
-        (1025, True)
+        (2049, True)
         """
         finite("duration", duration, unit="s")
         from scipy.interpolate import CubicSpline
