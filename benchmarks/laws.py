@@ -134,9 +134,7 @@ def _roughened(
     moving = np.abs(even.sample(inside, ("v",))[0][0]) > SLOWEST if slips.all() else slips
     added = share * wandering(len(times), 1 / KNOTS, chance) * friction[0] * moving
     base = even.sample(inside, ("z",))[0][0] - added / RIG["stiffness"]
-    rough = ss.simulate(
-        even.system.having(drive=ss.drives.RecordedBase(base, fs=KNOTS)), duration=even.duration, rtol=1e-9
-    )
+    rough = ss.simulate(even.system.having(drive=ss.drives.Recorded(base, fs=KNOTS)), duration=even.duration, rtol=1e-9)
     lag = {sensor.channel: sensor for sensor in rig.sensors}["load"]
     shaken = rig.measure(rough, fs=FS, rng=seed, start=SETTLED)
     instants = SETTLED + shaken.time - shaken.time[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import stickslip as ss
-from stickslip.laws.curved import asinh, exp, log, sqrt, symbol, tanh
+from stickslip.laws.base import Exit, Rigid
+from stickslip.laws.curved import CurvedMode, asinh, exp, log, sqrt, symbol, tanh
 from stickslip.solve import march
 from stickslip.solve.series import expansion
 from stickslip.solve.tape import tape
@@ -418,3 +420,71 @@ def test_an_expression_differentiates_itself() -> None:
     step = 1e-6
     wide = (formula.at(v=0.7 + step) - formula.at(v=0.7 - step)) / (2 * step)
     assert formula.slope("v").at(v=0.7) == pytest.approx(wide, rel=1e-9)
+
+
+FALLING = ss.laws.Stribeck(1.0, 1.5, speed=0.1)
+LEVEL = ss.laws.FrictionCurve(lambda v: 0.5 + 0.0 * v, static=0.7)  # Coulomb's law, by way of the curves
+
+
+@pytest.mark.parametrize("amplitude", [1e-4, 5e-3])
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_a_stick_is_left_under_dither_as_on_a_still_belt(amplitude: float, damping: float) -> None:
+    """Late in a run the clock has fewer digits than the tone's phase needs: a release must not hang on it."""
+    belt = ss.Oscillator(1.0, 1.0, FALLING, ss.drives.Belt(0.05), damping=damping)
+    run = ss.simulate(belt.having(drive=ss.drives.Dithered(ss.drives.Belt(0.05), amplitude, 5.0)), duration=60.0)
+    assert run.status == "complete"
+    assert np.min(run.durations) > 1e-9  # no release that holds no motion
+
+
+@pytest.mark.parametrize(
+    "tones",
+    [
+        [(0.0332, 0.41119, 1.417), (0.0011056, 3.57349, 0.51495)],
+        [(0.00895, 0.24243, 0.00552), (0.01822, 0.77475, 5.60977), (0.59024, 0.16602, 5.93317)],
+        [(0.4552, 0.18574, 2.19843), (0.01779, 0.99255, 4.71164)],
+        [(0.2950, 0.07014, 2.43059), (0.00166, 2.44166, 4.97279), (0.00263, 0.45670, 1.54885)],
+    ],
+)
+def test_a_level_curve_is_coulomb_on_a_face_of_several_tones(tones: list[tuple[float, float, float]]) -> None:
+    system = ss.Oscillator(1.0, 1.0, LEVEL, ss.drives.MultiTone(tones, on="face"))
+    run = ss.simulate(system, duration=40.0)
+    exact = ss.simulate(system.having(law=ss.laws.Coulomb(0.5, static=0.7)), duration=40.0)
+    times = np.linspace(0, 40, 201)
+    assert [event.kind for event in run.events] == [event.kind for event in exact.events]
+    np.testing.assert_allclose(run.sample(times, ("x",))[0], exact.sample(times, ("x",))[0], rtol=0, atol=1e-10)
+
+
+@dataclass(frozen=True)
+class Flicker(Rigid):
+    """Two modes that follow each other every 2e-18 s."""
+
+    memory = {"w": {}}  # noqa: RUF012
+    entry = ("up", "up", "up")
+
+    def rates(self) -> tuple[CurvedMode, ...]:
+        still = 0.0 * symbol("v")
+        return (
+            CurvedMode("up", "slip", 1, still, (Exit({"w": 1.0, "1": -1.0}, "down"),), {"w": still + 1e18}),
+            CurvedMode("down", "slip", -1, still, (Exit({"w": -1.0, "1": -1.0}, "up"),), {"w": still - 1e18}),
+        )
+
+
+def test_a_run_that_gets_nowhere_is_refused_for_its_events() -> None:
+    with pytest.raises(ss.errors.SolveError, match=r"events within .*e-1. s at .* has at most 10000 events"):
+        ss.simulate(ss.Oscillator(1.0, 1.0, Flicker()), duration=40.0, start={"x": 1.0})
+
+
+@pytest.mark.parametrize("law", [LEVEL, ss.laws.Coulomb(0.5)])
+def test_a_budget_holds_beyond_a_chunk(law: object) -> None:
+    system = ss.Oscillator(1.0, 1.0, law, ss.drives.MultiTone([(1.0, 0.5, 0.0)], on="face"))
+    assert len(ss.simulate(system, cycles=20, budget=4).events) >= 40
+    with pytest.raises(ss.errors.SolveError, match="has at most 1 events"):
+        ss.simulate(system, cycles=20, budget=1)
+
+
+def test_lines_of_a_table_spend_no_events() -> None:
+    """A table of a hundred lines passes a hundred of them where its curve has one event."""
+    table = ss.laws.Tabulated.of(FALLING.friction, np.linspace(0, 0.5, 101))
+    system = ss.Oscillator(1.0, 1.0, table, ss.drives.Belt(0.3))
+    run = ss.simulate(system, duration=60.0, budget=20)
+    assert len(run.modes) > 20 * 60.0 / (2 * math.pi)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 import stickslip as ss
 from scripts import loaded
+from stickslip.estimate import stands
 from stickslip.maps.dither import averaged_friction, longest_stick
 
 BELT = ss.Oscillator(mass=1, stiffness=1, law=ss.laws.Coulomb(1.0, static=1.5), drive=ss.drives.Belt(0.5), damping=0.02)
@@ -106,6 +108,47 @@ def test_the_longest_stick_is_put_together_across_pieces() -> None:
     events = [event for event in run.events if event.time > 20]
     lengths = [b.time - a.time for a, b in pairwise(events) if a.kind == "stick"]
     assert longest_stick(run, 20.0) == pytest.approx(max(lengths), rel=1e-9)
+
+
+def unfollowed(low: float, high: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs with a dither between two amplitudes can not be followed."""
+    module = sys.modules["stickslip.maps.dither"]
+
+    def simulate(system: ss.Oscillator, **options: object) -> ss.solve.Trajectory:
+        if low < getattr(system.drive, "amplitude", 0.0) < high:
+            raise ss.errors.SolveError("chatter", "a law leaves every state in one direction", "check the law")
+        return ss.simulate(system, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(module, "simulate", simulate)
+
+
+def test_a_run_that_failed_is_no_stick(found: ss.maps.Dither, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is not known below the answer stands in its interval and its doubt."""
+    unfollowed(0.5 * found.amplitude.value, 2 * found.amplitude.value, monkeypatch)
+    other = ss.dither(BELT, frequency=FREQUENCY)
+    assert other.amplitude.value >= 2 * found.amplitude.value
+    assert other.amplitude.interval[0] <= 0.5 * found.amplitude.value
+    assert not stands(other.amplitude.status)
+    assert stands(found.amplitude.status)
+    assert np.any(np.isnan(other.scan[:, 1]))
+    assert not np.any(np.isinf(other.scan))
+
+
+def test_no_answer_rests_on_runs_that_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    unfollowed(0.0, math.inf, monkeypatch)
+    with pytest.raises(ss.errors.SolveError, match="at 64 amplitudes a run could not be followed"):
+        ss.dither(BELT, frequency=FREQUENCY)
+
+
+def test_a_falling_curve_needs_the_dither_that_its_table_needs() -> None:
+    """A table of the curve goes through the exact engine, and passes many lines in every period of the dither."""
+    curve = ss.laws.Stribeck(1.0, 1.5, speed=0.1)
+    falling = BELT.having(law=curve, drive=ss.drives.Belt(0.3))
+    table = falling.having(law=ss.laws.Tabulated.of(curve.friction, np.linspace(0, 0.5, 101)))
+    one, other = (ss.dither(system, frequency=FREQUENCY, cycles=20) for system in (falling, table))
+    assert one.amplitude.value == pytest.approx(other.amplitude.value, rel=0.1)
+    assert one.amplitude.value == pytest.approx(0.00108, rel=0.1)
+    assert stands(one.amplitude.status)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from stickslip.solve.energies import energy
 RIGID = ss.Oscillator(
     mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
 )
-RECORDED = ss.drives.RecordedBase([0.0, 1e-3, 0.0, -1e-3], fs=10.0)  # 0.3 s
+RECORDED = ss.drives.Recorded([0.0, 1e-3, 0.0, -1e-3], fs=10.0)  # 0.3 s
 CONTACT = ss.laws.CompliantContact(1.1, 192000, 23.8635)
 COMPLIANT = RIGID.having(law=CONTACT)
 DRIVES = (
@@ -302,7 +302,7 @@ def test_a_recorded_base_follows_the_tone_it_was_taken_from() -> None:
     times = np.arange(8001) / fs
     tone = ss.simulate(RIGID, duration=4.0)
     taken = ss.simulate(
-        RIGID.having(drive=ss.drives.RecordedBase(0.65e-3 * np.cos(5 * math.pi * times), fs=fs)), duration=4.0
+        RIGID.having(drive=ss.drives.Recorded(0.65e-3 * np.cos(5 * math.pi * times), fs=fs)), duration=4.0
     )
     assert [e.mode for e in taken.events] == [e.mode for e in tone.events]
     assert np.allclose([e.time for e in taken.events], [e.time for e in tone.events], rtol=0, atol=1e-7)
@@ -342,7 +342,7 @@ def test_critical_damping_and_no_spring_are_exact() -> None:
         lambda: ss.laws.Tabulated([0, 2, 1], [1, 1, 1]),
         lambda: ss.drives.Belt(0.0),
         lambda: ss.drives.HarmonicForce(1.0, 1e12),
-        lambda: ss.drives.RecordedBase([0.0, math.nan, 1.0, 2.0], fs=10),
+        lambda: ss.drives.Recorded([0.0, math.nan, 1.0, 2.0], fs=10),
         lambda: ss.simulate(RIGID, duration=0.0),
         lambda: ss.simulate(RIGID, duration=1.0, cycles=1.0),
         lambda: ss.simulate(RIGID, duration=1.0, start={"y": 1.0}),

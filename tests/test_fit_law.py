@@ -131,7 +131,7 @@ def test_a_base_of_any_motion_drives() -> None:
     fs, seconds = 2000, 4.0
     time = np.arange(int(fs * seconds)) / fs
     base = 1e-3 * np.sin(2 * np.pi * 5.3 * time) + 0.6e-3 * np.sin(2 * np.pi * 8.1 * time + 1)
-    slider = ss.Oscillator(law=ss.laws.Coulomb(1.0), drive=ss.drives.RecordedBase(base, fs=fs), **RIG)
+    slider = ss.Oscillator(law=ss.laws.Coulomb(1.0), drive=ss.drives.Recorded(base, fs=fs), **RIG)
     record = ss.Rig.perfect("x", "z").having("x", white=1e-6).measure(ss.simulate(slider, duration=3.9), fs=fs, rng=5)
     found = ss.fit_law(record.rows(2000, 6000), ss.Oscillator(law=ss.laws.Coulomb(0.8), **RIG))
     assert found.law.kinetic == pytest.approx(1.0, rel=2e-3)

@@ -151,7 +151,7 @@ def test_a_state_may_hold_text_with_units(client: TestClient) -> None:
     [
         ({"law": {"name": "Coulomb", "kinetic": -1}}, "kinetic"), ({"system": {"mass": 0, "stiffness": 1}}, "mass"),
         ({"law": {"name": "Nobody"}}, "Nobody"), ({"run": {"cycles": 1e6}}, "5000 cycles"),
-        ({"drive": {"name": "RecordedBase", "record": "/etc/passwd", "channel": "x"}}, "hold the samples"),
+        ({"drive": {"name": "Recorded", "record": "/etc/passwd", "channel": "x"}}, "hold the samples"),
         ({"law": {"name": "FrictionCurve", "curve": "__import__('os')"}}, "curve"), ({"nonsense": 1}, "nonsense"),
     ],
 )  # fmt: skip

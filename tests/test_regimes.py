@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.estimate import stands
 from stickslip.scenarios import forced
+from stickslip.solve import poincare
 
 TURN = 2 * math.pi
 BISTABLE = forced(0.8, 1.0, static_ratio=1.5)  # over the force's amplitude P: r = 1 / P
@@ -60,7 +63,7 @@ def test_chaos_is_points_that_do_not_repeat() -> None:
     case = ss.scenarios.get("FM-1")
     found = ss.bifurcation(case.system, "drive.amplitude", values=[1.88, 1.9], transient=100)
     wild = found.up[-1]
-    assert wild.regime == "not periodic"
+    assert wild.regime == "chaotic"
     assert len(np.unique(wild.points[:, 0].round(9))) > 200
     assert found.data["points"].sizes["point"] == len(wild.points)
 
@@ -100,14 +103,26 @@ def test_a_grid_of_rest_is_known_in_closed_form() -> None:
     assert np.all(stay[np.abs(x) <= 0.4 - 1e-9])
 
 
-def test_a_start_that_can_not_be_followed_costs_no_map() -> None:
-    """A start under a negative load meets transitions that chase each other; the other starts are answered."""
+def test_a_start_that_can_not_be_followed_costs_no_map(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other starts are answered, and no share counts it as one that leads elsewhere."""
+    module, lap = sys.modules["stickslip.maps.basins"], poincare.lap
+
+    def failing(system: ss.Oscillator, table: object, state: np.ndarray, mode: int, laps: int) -> ss.solve.Trajectory:
+        if (state[0], state[1]) == (-1.0, 1.0):
+            raise ss.errors.SolveError("chatter", "a law leaves every state in one direction", "check the law")
+        return lap(system, table, state, mode, laps)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(module, "lap", failing)
     found = ss.basins(ss.scenarios.get("FM-1").system, grid={"x": [-1.0, 0.5], "v": [0.5, 1.0]}, transient=20)
-    assert found.lost, "rounding decides which of the two that are under it"
-    assert all(sentence.startswith("x = -1, v = ") for sentence in found.lost)
-    assert np.count_nonzero(found.which[0] == -1) == len(found.lost)
-    assert np.all(found.which[1] >= 0)
+    assert [sentence.partition(":")[0] for sentence in found.lost] == ["x = -1, v = 1"]
+    assert found.which.tolist() == [[0, -1], [0, 0]]
     assert "could not be followed" in repr(found)
+    followed = found.which.size - len(found.lost)
+    for number, share in enumerate(found.shares):
+        count = np.count_nonzero(found.which == number)
+        assert share.value == pytest.approx(count / followed)  # what failed is no start that leads elsewhere
+        assert share.interval[1] >= (count + len(found.lost)) / found.which.size
+        assert not stands(share.status)
 
 
 def test_micro_slips_go_one_by_one_as_the_contact_is_damped() -> None:

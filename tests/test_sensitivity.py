@@ -15,7 +15,7 @@ RIG: dict[str, Any] = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.5}
 TIME = np.arange(200) / 200
 SWEPT = 1e-3 * np.sin(10 * np.pi * TIME) + 0.5e-3 * np.sin(14 * np.pi * TIME)
 STEP = 1e-6
-DRIVES = [ss.drives.HarmonicBase(0.65e-3, frequency=2.5), ss.drives.RecordedBase(SWEPT, fs=200.0)]
+DRIVES = [ss.drives.HarmonicBase(0.65e-3, frequency=2.5), ss.drives.Recorded(SWEPT, fs=200.0)]
 LAWS = {
     "static": (ss.laws.Coulomb(0.95, static=1.2), ["kinetic", "damping", "stiffness"]),
     "compliant": (ss.laws.CompliantContact(0.95, stiffness=192000, damping=24.0), ["kinetic", "law.stiffness"]),

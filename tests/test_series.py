@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, RecordedBase
+from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, Recorded
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact
@@ -31,7 +31,7 @@ DRIVES: list[Drive] = [
     HarmonicForce(1.2, frequency=0.13),
     HarmonicBase(1.2, frequency=0.1, contact="base"),
     Belt(0.05),
-    RecordedBase(np.cumsum(np.random.default_rng(5).normal(size=60)) * 0.4, fs=1.0, contact="base"),
+    Recorded(np.cumsum(np.random.default_rng(5).normal(size=60)) * 0.4, fs=1.0, contact="base"),
 ]
 
 

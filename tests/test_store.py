@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import textwrap
@@ -22,6 +24,8 @@ from stickslip import Oscillator, simulate, sweep
 from stickslip.drives import HarmonicForce
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws import Coulomb
+from stickslip.maps.block import run_block
+from stickslip.maps.store import Store
 from stickslip.maps.sweep import planned
 from stickslip.solve import Trajectory
 
@@ -190,10 +194,52 @@ def test_two_writers_are_refused(whole: Path) -> None:
     handle = os.open(whole, os.O_RDONLY)
     fcntl.flock(handle, fcntl.LOCK_EX)
     try:
-        with pytest.raises(SolveError, match="is being written by another process"):
+        with pytest.raises(
+            SolveError, match=r"another process is writing .*map\.zarr; a map has one writer; wait for it"
+        ):
             sweep(SLIDER, GRID, store=whole, **SETTINGS)
     finally:
         os.close(handle)
+
+
+def test_a_map_that_another_laid_in_its_place_is_left_alone(whole: Path, tmp_path: Path) -> None:
+    """A store that somebody removed under its writer, and began anew, has the new writer alone."""
+    path = tmp_path / "map.zarr"
+    plan = planned(SLIDER, GRID, measures=["stops", "amplitude"], settle=20, cycles=5, start=None)
+    other = planned(SLIDER.having(mass=2.0), GRID, measures=["stops", "amplitude"], settle=20, cycles=5, start=None)
+    first = Store(path, plan)
+    path.rename(tmp_path / "removed")
+    with Store(path, other) as second:
+        second.keep(0, run_block(other, 0)[0])
+        before = files(path)
+        with pytest.raises(SolveError, match=r"map\.zarr .*; another process is writing there.*name another path"):
+            first.keep(0, run_block(plan, 0)[0])
+        assert files(path) == before
+    first.__exit__(None, None, None)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="its locks are not flock's")
+def test_a_disk_without_locks_has_one_writer_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lock is a file then, which names its process; that of a process which is gone counts for nothing."""
+    import fcntl
+
+    def refused(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", refused)
+    path = tmp_path / "map.zarr"
+    plan = planned(SLIDER, GRID, measures=["stops"], settle=2, cycles=2, start=None)
+    with Store(path, plan) as kept:
+        with pytest.raises(SolveError, match="another process is writing"):
+            Store(path, plan)
+        kept.keep(0, run_block(plan, 0)[0])
+    gone = subprocess.run(
+        [sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True
+    ).stdout
+    (tmp_path / "map.zarr.lock").write_text(f"{gone.strip()} {socket.gethostname()}")
+    with Store(path, plan) as kept:
+        assert len(kept.missing) == len(plan.blocks) - 1
+    assert not (tmp_path / "map.zarr.lock").exists()
 
 
 def test_a_full_disk_is_one_sentence_and_the_map_goes_on(whole: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, MultiTone, Ramp, RecordedBase, Release
+from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, MultiTone, Ramp, Recorded, Release
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact
@@ -43,7 +43,7 @@ DRIVES: list[Drive] = [
     MultiTone([(1.0, 0.11, 0.0), (0.3, 0.7, 1.0)]),
     Belt(0.3),
     Ramp(0.2),
-    RecordedBase(SWELL, fs=1.0, contact="base"),
+    Recorded(SWELL, fs=1.0, contact="base"),
 ]
 
 
@@ -62,7 +62,7 @@ def test_one_degree_of_freedom_is_the_oscillator(law: Law, drive: Drive) -> None
     start: dict[str, float | str] = {"x": 2.0} if isinstance(drive, Release) else {}
     run, other = (simulate(system, duration=39.0, start=start) for system in (structure, slider))
     same_events(run, other)
-    assert len(run.events) > 0 or isinstance(drive, RecordedBase)
+    assert len(run.events) > 0 or isinstance(drive, Recorded)
     times = np.linspace(0, 39.0, 500)
     far = max(1.0, float(np.max(np.abs(other.sample(times, ("x",))[0]))))
     # a force is a difference of displacements times the contact's stiffness, 50 N/m: it has their rounding

@@ -18,6 +18,7 @@ import stickslip as ss
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Exit, Mode, Rigid
 from stickslip.maps import engines
+from stickslip.maps.measures import FAILED, MOVING
 from stickslip.maps.plan import Arrays, Plan
 
 pytest.importorskip("xarray")
@@ -227,6 +228,38 @@ def test_a_border_is_refined_with_few_runs_and_none_wrong() -> None:
         ss.maps.refine(slider, coarse, measure="amplitude")
     with pytest.raises(ModelError, match=r"1099513724929 points.*memory"):
         ss.maps.refine(slider, {"frequency": [0.1, 0.2], "kinetic": [0.3, 0.5]}, halvings=20)
+
+
+def test_between_two_runs_that_failed_nothing_is_claimed() -> None:
+    found = ss.maps.refine(UNIT, {"damping": [-2e4, -1e4, 0.1]}, halvings=2, settle=2, cycles=40)
+    status, run = found.status.values, found.run.values
+    assert status[0] == status[4] == FAILED
+    assert np.all(run[[0, 4, 8]])
+    assert np.all(status[~run][:3] == -1)
+    assert np.all(np.isnan(found.normal_stops.values[~run][:3]))
+
+
+def test_an_own_measure_of_a_run_that_fails_alone_marks_its_point() -> None:
+    """What was marched with others and fails by itself has no answer, and ends no sweep."""
+
+    def refused(run: ss.solve.Trajectory) -> float:
+        if run.system.mass == 2.0:
+            raise SolveError("a state", "it is told by the engine", "ask another")
+        return 1.0
+
+    found = ss.sweep(UNIT, {"mass": [1.0, 2.0]}, measures=["amplitude", refused], settle=0, cycles=2, engine="serial")
+    assert found.status.values.tolist() == [MOVING, FAILED]
+    assert np.isnan(found.amplitude.values).tolist() == [False, True]
+    assert np.isnan(found.refused.values).tolist() == [False, True]
+
+
+def test_lines_of_a_table_fail_no_motion_of_a_map() -> None:
+    """A table of many lines passes them all in each period: thousands of changes of mode, two events."""
+    table = ss.laws.Tabulated.of(lambda v: 0.3 + 0.1 * math.exp(-v), np.linspace(0, 4, 4001))
+    found = ss.sweep(UNIT.having(law=table), {"amplitude": [2.0]}, settle=2, cycles=2)
+    run = ss.simulate(UNIT.having(law=table, amplitude=2.0), cycles=4)
+    assert len(run.modes) > 4 * 10_000
+    assert found.status.values.tolist() == [MOVING]
 
 
 @pytest.mark.parametrize("last", [12, 17])

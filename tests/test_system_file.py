@@ -89,8 +89,8 @@ def test_the_motion_is_that_of_the_same_system_in_python(tmp_path: Path) -> None
         ("frequency = 2.5", "frequency = 1e12", ["line 14", "1e+10 times a second"]),
         (DRIVE, 'name = "Belt"\nspeed = 0', ["line 13", "a belt runs"]),
         (DRIVE, 'name = "MultiTone"\ntones = [[1e-3, 2.5, "9 N"]]', ["line 13", "drive.tones", "measured in rad"]),
-        (DRIVE, 'name = "RecordedBase"\nrecord = "z.csv"', ["line 13", "channel"]),
-        (DRIVE, 'name = "RecordedBase"\nsamples = [0, 1, 0, 1]\nfs = 3', ["[run]", "ends at 1 s"]),
+        (DRIVE, 'name = "Recorded"\nrecord = "z.csv"', ["line 13", "channel"]),
+        (DRIVE, 'name = "Recorded"\nsamples = [0, 1, 0, 1]\nfs = 3', ["[run]", "ends at 1 s"]),
         ('x = "0.1 mm"', "q = 1", ["line 16", "'start.q'", "known are x, v, anchor, mode"]),
         ('x = "0.1 mm"', 'mode = "flying"', ["line 16", "'microstuck'"]),
         ("cycles = 40", "cycles = -40", ["line 18", "greater than 0"]),
@@ -137,10 +137,10 @@ def test_a_recorded_base_comes_from_a_file_beside(tmp_path: Path) -> None:
     time = np.arange(400) / 200
     z = 1e-3 * np.sin(2 * np.pi * time)
     ss.write_record(ss.Record.of({"plate": z}, fs=200, units={"plate": "m"}), tmp_path / "base.csv")
-    text = WHOLE.replace(DRIVE, 'name = "RecordedBase"\nrecord = "base.csv"\nchannel = "plate [m]"')
+    text = WHOLE.replace(DRIVE, 'name = "Recorded"\nrecord = "base.csv"\nchannel = "plate [m]"')
     case = read_system(written(tmp_path, text.replace("cycles = 40", "")))
     drive = case.system.drive
-    assert isinstance(drive, ss.drives.RecordedBase)
+    assert isinstance(drive, ss.drives.Recorded)
     assert drive.fs == 200
     assert np.array_equal(np.asarray(drive.samples), z)
     assert case.run == {"duration": 399 / 200}, "as long as the record"

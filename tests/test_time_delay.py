@@ -221,7 +221,7 @@ def test_a_long_run_keeps_its_pace_and_its_past() -> None:
 
 def test_a_recorded_base_moves_a_law_with_a_lag() -> None:
     times = np.arange(81) / 100
-    base = ss.drives.RecordedBase(0.65e-3 * np.cos(2 * math.pi * 2.5 * times), fs=100)
+    base = ss.drives.Recorded(0.65e-3 * np.cos(2 * math.pi * 2.5 * times), fs=100)
     run = ss.simulate(SHAKEN.having(drive=base), duration=0.8)
     near = ss.simulate(SHAKEN, duration=0.8)
     assert [e.mode for e in run.events] == [e.mode for e in near.events]

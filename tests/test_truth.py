@@ -100,13 +100,16 @@ def sliding(ratio: float, load: float, amplitude: float) -> dict[str, float]:
 
 
 def test_negative_damping_loses_stability() -> None:
-    """SHAW-3: det J = 1 at zeta_c = -0.0722590314..."""
-    critical = -0.072259031436387934
-    for side, status in ((-1, "unstable"), (1, "unique")):
+    """SHAW-3: det J = 1 at zeta_c = -0.0722590314...; beyond it a torus, which turns as the multiplier does there."""
+    critical, turns = -0.072259031436387934, list[float]()
+    for side, status in ((1, "unique"), (-1, "quasi-periodic")):
         near = scenarios.forced(1.3, 0.4, damping_ratio=critical * (1 - side * 1e-3))
         start = steady_state(scenarios.forced(1.3, 0.4, damping_ratio=-0.05), start={"x": 1.2}).orbit.states[0]
         orbit = steady_state(near, start={"x": float(start[0]), "v": float(start[1])}, transient=1)
         assert orbit.status == status
+        turn = orbit.rotation_numbers[0] if orbit.rotation_numbers else np.angle(orbit.multipliers[0]) / (2 * math.pi)
+        turns.append(math.cos(2 * math.pi * turn))
+    assert turns[0] == pytest.approx(turns[1], abs=0.02)
     law = [abs(steady_state(scenarios.forced(1.3, 0.4, damping_ratio=critical * f), start={"x": 1.2, "v": 0.0},
                             transient=1).multipliers[0]) for f in (0.999, 1.0)]  # fmt: skip
     assert law[0] < 1

@@ -150,7 +150,7 @@ def impact(given: Given) -> ss.Record:
 
 @functools.lru_cache(2)
 def _struck(mass: float, spring: float, law: Any, base: tuple[float, ...], fs: float) -> ss.Record:
-    drive = ss.drives.RecordedBase(base, fs=fs)
+    drive = ss.drives.Recorded(base, fs=fs)
     run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive), duration=(len(base) - 1) / fs)
     return ss.Rig().measure(run, fs=4000, rng=4)
 

@@ -10,6 +10,7 @@ import errno
 import os
 import re
 import shutil
+import socket
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
@@ -107,7 +108,46 @@ def locked(folder: Path) -> ExitStack | None:
         except OSError as error:
             if error.errno not in LOCKLESS:
                 raise
+            return _claimed(folder)
         return stack.pop_all()
+
+
+def lock_beside(folder: Path) -> Path:
+    """The file that locks a folder where folders themselves can not be."""
+    return folder.with_name(f"{folder.name}.lock")
+
+
+def _claimed(folder: Path) -> ExitStack | None:
+    """The lock of a disk that knows none: a file beside, made by one process alone, which it names."""
+    path, own = lock_beside(folder), f"{os.getpid()} {socket.gethostname()}"
+    for _ in range(2):  # once more where the process that made it is gone
+        try:
+            handle = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
+        except FileExistsError:
+            if not _is_left(path):
+                return None
+            path.unlink(missing_ok=True)
+            continue
+        with os.fdopen(handle, "w") as file:
+            file.write(own)
+        held = ExitStack()
+        held.callback(path.unlink, missing_ok=True)
+        return held
+    return None
+
+
+def _is_left(path: Path) -> bool:
+    """Whether a process of this machine made a lock's file, and has ended; of other machines nothing is known."""
+    try:
+        process, host = path.read_text().split()
+        if host != socket.gethostname():
+            return False
+        os.kill(int(process), 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, ValueError):  # it is somebody else's, or is just being written or removed
+        return False
+    return False
 
 
 def _locked_beside(folder: Path) -> ExitStack | None:
@@ -116,7 +156,7 @@ def _locked_beside(folder: Path) -> ExitStack | None:
         import msvcrt
     except ImportError:  # a system without locks
         return ExitStack()
-    path = folder.with_name(f"{folder.name}.lock")
+    path = lock_beside(folder)
     with ExitStack() as stack:
         file = stack.enter_context(path.open("ab"))
         try:

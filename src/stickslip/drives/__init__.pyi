@@ -4,7 +4,7 @@ from stickslip.drives.kinds import HarmonicBase as HarmonicBase
 from stickslip.drives.kinds import HarmonicForce as HarmonicForce
 from stickslip.drives.kinds import MultiTone as MultiTone
 from stickslip.drives.kinds import Ramp as Ramp
-from stickslip.drives.kinds import RecordedBase as RecordedBase
+from stickslip.drives.kinds import Recorded as Recorded
 from stickslip.drives.kinds import Release as Release
 from stickslip.drives.kinds import SpeedProfile as SpeedProfile
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +17,9 @@ from stickslip.parameters import finite, parameter, parametric
 
 Row = Mapping[str, float]
 LARGEST_FREQUENCY = 1e10  # Hz; more is a wrong unit
+LONGEST = 1000  # cycles of a tone in a period; by more, any two numbers nearly have one
+MOST_SAMPLES = 2**20  # of a signal that is given as a function
+SAME = 1e-9  # of a frequency: so near a ratio of whole numbers is one
 
 
 @dataclass(frozen=True)
@@ -103,8 +108,24 @@ def _tones(tones: Sequence[tuple[float, float, float]]) -> tuple[Motion, Row]:
         start |= {cosine: math.cos(phase), sine: math.sin(phase)}
         turning.append((cosine, sine, omega, phase))
         row[cosine] = amplitude
-    period = 1 / tones[0][1] if len(tones) == 1 else math.inf
-    return Motion(rates, start, tuple(turning), period), row
+    return Motion(rates, start, tuple(turning), common_period([frequency for _, frequency, _ in tones])), row
+
+
+def common_period(frequencies: Sequence[float]) -> float:
+    """Least time [s] in which each frequency [Hz] has whole cycles; infinite where there is none.
+
+    Examples
+    --------
+    >>> common_period([2.0, 3.0]), common_period([2.5, 2.5 * 2**0.5])
+    (1.0, inf)
+    """
+    ratios = [Fraction(frequency / frequencies[0]).limit_denominator(LONGEST) for frequency in frequencies]
+    exact = [abs(f - r * frequencies[0]) <= SAME * f for f, r in zip(frequencies, ratios, strict=True)]
+    if not all(exact):
+        return math.inf
+    cycles = math.lcm(*(ratio.denominator for ratio in ratios))  # of the first tone, in which each has whole ones
+    spare = math.gcd(*(int(ratio * cycles) for ratio in ratios))
+    return cycles / spare / frequencies[0] if cycles // spare <= LONGEST else math.inf
 
 
 @parametric
@@ -266,37 +287,58 @@ class Ramp:
 
 
 @parametric(eq=False)
-class RecordedBase:
-    """A recorded base motion: between samples a linear or a cubic (natural spline) piece, solved in closed form.
+class Recorded:
+    """A recorded or any other force, or motion of the spring's end or the counter-face, in pieces between its samples.
 
-    After the last sample there is no motion to follow: a longer run is refused.
+    A chirp, a step, a pulse, a ramp, a shaker's table. Each piece is a polynomial, which the solver takes in closed
+    form: cubic (spline through all samples, its third derivative continuous at the second from either end; de Boor, A
+    Practical Guide to Splines, 1978), linear, or of a force level. After the last sample nothing is known: a longer run
+    is refused.
 
     Examples
     --------
-    >>> RecordedBase([0.0, 1e-3, 0.0, -1e-3], fs=10.0).motion().knots.shape
+    >>> Recorded([0.0, 1e-3, 0.0, -1e-3], fs=10.0).motion().knots.shape
     (3, 5)
+    >>> pulse = Recorded([0.0, 5.0, 0.0, 0.0], times=[0.0, 1.0, 1.2, 3.0], on="force", order=0)
+    >>> pulse.motion().knots[:, :2].tolist()
+    [[0.0, 0.0], [1.0, 5.0], [1.2, 0.0]]
     """
 
-    label = "Recorded base motion"
+    label = "Recorded motion or force"
 
     samples: ArrayLike = parameter(
-        "m", "displacement of the spring's end", size="array", note="two values at least, four for cubic pieces"
+        "m", "displacement", size="array", note="in N of a force; two values at least, four for cubic pieces"
     )
-    fs: float = parameter("Hz", "sampling rate", positive=True, note="the first sample is at time 0")
+    fs: float | None = parameter(
+        "Hz", "sampling rate", default=None, positive=True, note="the first sample is at time 0"
+    )
+    times: Sequence[float] | None = parameter(
+        "s", "instants of the samples", default=None, size="array", note="in place of fs, increasing from 0"
+    )
+    on: str = parameter(
+        "",
+        "what it moves",
+        default="base",
+        choices=("base", "force", "face"),
+        note="the spring's end, the mass (a force), or the counter-face",
+    )
     order: int = parameter(
         "",
         "degree of the pieces",
         default=3,
-        note="3 or 1; linear pieces kick the base's velocity at every sample: use them with the contact and the damper "
-        "on the ground only",
+        note="3, 1 or, of a force, 0: each sample holds until the next; linear pieces kick the base's velocity at "
+        "every sample: use them with the contact and the damper on the ground only",
     )
-    contact: str = parameter("", "what the mass rubs on", default="ground", choices=("ground", "base"))
+    contact: str = parameter(
+        "", "what the mass rubs on", default="ground", choices=("ground", "base"), note='for ``on="base"``'
+    )
 
     def __post_init__(self) -> None:
+        degrees = {"force": (0, 1, 3), "base": (1, 3), "face": (3,)}[self.on]
         _require(
-            self.order in (1, 3),
-            f"order = {self.order}",
-            "pieces are linear (1) or cubic (3)",
+            self.order in degrees,
+            f"order = {self.order} on the {self.on}",
+            f"pieces of a {self.on} are of degree {' or '.join(map(str, degrees))}",
             "choose one",
             of="order",
         )
@@ -306,41 +348,144 @@ class RecordedBase:
             "the base's acceleration must be finite there",
             "use order=3",
         )
-        values = np.array(self.samples, dtype=np.float64)
+        values, least = np.array(self.samples, dtype=np.float64), max(self.order, 1) + 1
         _require(
-            values.ndim == 1 and len(values) >= self.order + 1 and bool(np.all(np.isfinite(values))),
+            values.ndim == 1 and len(values) >= least and bool(np.all(np.isfinite(values))),
             f"samples of shape {values.shape}",
-            f"at least {self.order + 1} finite numbers in one row are needed",
+            f"at least {least} finite numbers in one row are needed",
             "cut or mend the record",
         )
+        _require(
+            (self.fs is None) != (self.times is None),
+            f"fs = {self.fs}, times = {'None' if self.times is None else 'given'}",
+            "samples have one rate or their instants",
+            "give one of the two",
+            of="fs",
+        )
+        if self.times is not None:
+            _require_increasing(self.times, len(values))
+            object.__setattr__(self, "times", tuple(map(float, self.times)))
         values.flags.writeable = False
         object.__setattr__(self, "samples", values)
 
-    def motion(self) -> Motion:
-        """Displacement and its derivatives, set anew at every sample."""
-        values = np.asarray(self.samples)
-        names = ("z0", "z1", "z2", "z3")
-        knots = np.zeros((len(values) - 1, 5))
-        knots[:, 0] = np.arange(len(values) - 1) / self.fs
-        knots[:, 1] = values[:-1]
-        if self.order == 1:
-            knots[:, 2] = np.diff(values) * self.fs
-        else:
-            from scipy.interpolate import CubicSpline
+    @classmethod
+    def of(
+        cls,
+        signal: Callable[[float], float],
+        *,
+        duration: float,
+        error: float,
+        on: str = "base",
+        contact: str = "ground",
+    ) -> Recorded:
+        """A smooth function of time, sampled so densely that its cubic pieces are as near as asked for.
 
-            spline = CubicSpline(np.arange(len(values)) / self.fs, values, bc_type="natural")
-            knots[:, 2:] = np.column_stack([spline.c[2], 2 * spline.c[1], 6 * spline.c[0]])
-        rates = {"z0": {"z1": 1.0}, "z1": {"z2": 1.0}, "z2": {"z3": 1.0}, "z3": {}}
-        row = {"z0": 1.0}
-        return Motion(
-            rates,
-            dict(zip(names, knots[0, 1:], strict=True)),
-            base=row,
-            face=row if self.contact == "base" else {},
-            knots=knots,
-            knotted=names,
-            end=(len(values) - 1) / self.fs,
+        Parameters
+        ----------
+        signal : callable
+            Displacement [m], or force [N], at a time [s].
+        duration : float
+            How long it lasts [s].
+        error : float
+            Largest distance of the pieces from it, at seven instants in each piece [m or N].
+        on, contact : str
+            As of the class.
+
+        Returns
+        -------
+        Recorded
+
+        Raises
+        ------
+        ModelError
+            No million of samples comes as near.
+
+        Examples
+        --------
+        >>> chirp = Recorded.of(lambda t: math.cos(math.pi * t * (1 + 3 * t)), duration=2.0, error=1e-6, on="force")
+        >>> len(chirp.samples), chirp.error < 1e-6
+        (2049, True)
+        """
+        finite("duration", duration, unit="s")
+        from scipy.interpolate import CubicSpline
+
+        count = 8
+        while count < MOST_SAMPLES:
+            count *= 2
+            fine = np.arange(8 * count + 1) * (duration / (8 * count))
+            values = np.array([float(signal(time)) for time in fine])
+            if not np.max(np.abs(CubicSpline(fine[::8], values[::8])(fine) - values)) > error:
+                return cls(values[::8], count / duration, on=on, contact=contact)
+        raise ModelError(
+            f"error = {error} of a signal of {duration:g} s",
+            f"{MOST_SAMPLES} samples come as near to a smooth signal",
+            "allow more, or give samples= at the times= where it jumps, with order=0 or 1",
         )
+
+    @property
+    def error(self) -> float:
+        """How far between samples the pieces may be from what was sampled [m or N]; NaN of few samples.
+
+        What every second sample misses of the others, over what half the distance gains: 15 for cubic pieces, 3 for
+        linear ones (Richardson). Level pieces, and instants that are stated, are the signal itself: 0.
+        """
+        values, degree = np.asarray(self.samples), self.order
+        if degree == 0 or self.times is not None:
+            return 0.0
+        known = np.arange(0, len(values), 2)
+        if len(known) <= degree:
+            return math.nan
+        coarse = self._curve(known.astype(np.float64), values[known])(np.arange(known[-1] + 1))
+        return float(np.max(np.abs(coarse - values[: known[-1] + 1])) / (2.0 ** (degree + 1) - 1))
+
+    def _curve(self, times: NDArray[np.float64], values: NDArray[np.float64]) -> Any:
+        """The pieces as a function of time, and what its derivatives are."""
+        from scipy.interpolate import CubicSpline, make_interp_spline
+
+        return CubicSpline(times, values) if self.order == 3 else make_interp_spline(times, values, k=self.order)
+
+    def motion(self) -> Motion:
+        """The signal and its derivatives, set anew at every sample."""
+        values = np.asarray(self.samples)
+        times = np.arange(len(values)) / self.fs if self.fs is not None else np.array(self.times)
+        if self.order == 3:
+            slopes = self._curve(times, values).c
+            columns = [values[:-1], slopes[2], 2 * slopes[1], 6 * slopes[0]]
+        else:
+            columns = [values[:-1], *([np.diff(values) / np.diff(times)] if self.order else [])]
+        motion = _pieces(times[:-1], columns, self.on, end=float(times[-1]))
+        return replace(motion, face=motion.base) if self.contact == "base" and self.on == "base" else motion
+
+
+def _require_increasing(times: Sequence[float], count: int) -> None:
+    """Refuse instants that are not those of so many values, increasing from 0."""
+    values = np.asarray(times, dtype=np.float64)
+    _require(
+        values.shape == (count,) and bool(np.all(np.isfinite(values))),
+        f"{values.size} times of {count} values",
+        "each value has its instant, a finite number",
+        "give as many of one as of the other",
+        of="times",
+    )
+    _require(
+        values[0] == 0 and bool(np.all(np.diff(values) > 0)),
+        f"times from {values[0]:g} to {values[-1]:g} s",
+        "instants increase from 0",
+        "sort them, and leave out the same instant twice",
+        of="times",
+    )
+
+
+def _pieces(times: NDArray[np.float64], columns: Sequence[ArrayLike], on: str, *, end: float = math.inf) -> Motion:
+    """A drive of polynomials, whose value and derivatives are set anew at each instant."""
+    names = tuple(f"z{j}" for j in range(len(columns)))
+    knots = np.column_stack([times, *columns])
+    rates: dict[str, Row] = {name: {after: 1.0} for name, after in pairwise(names)}
+    rates[names[-1]] = {}
+    start = dict(zip(names, map(float, knots[0, 1:]), strict=True))
+    row = {names[0]: 1.0}
+    force, base, face = (row if on == part else {} for part in ("force", "base", "face"))
+    return Motion(rates, start, force=force, base=base, face=face, knots=knots, knotted=names, end=end)
 
 
 @parametric
@@ -374,28 +519,14 @@ class SpeedProfile:
             "both are finite numbers, as many of one as of the other, at least two",
             "give a speed for each instant",
         )
-        _require(
-            self.times[0] == 0 and bool(np.all(np.diff(self.times) > 0)),
-            f"times from {self.times[0]:g} to {self.times[-1]:g} s",
-            "instants increase from 0",
-            "sort them, and leave out the same instant twice",
-        )
+        _require_increasing(self.times, len(self.speeds))
 
     def motion(self) -> Motion:
         """Displacement, speed and acceleration, set anew at every instant."""
         times, speeds = np.array(self.times), np.array(self.speeds)
         steps = np.diff(times)
         ways = np.cumsum([0.0, *(steps * (speeds[1:] + speeds[:-1]) / 2)])
-        knots = np.column_stack([times, ways, speeds, [*(np.diff(speeds) / steps), 0.0]])
-        names, row = ("z0", "z1", "z2"), {"z0": 1.0}
-        return Motion(
-            {"z0": {"z1": 1.0}, "z1": {"z2": 1.0}, "z2": {}},
-            dict(zip(names, knots[0, 1:], strict=True)),
-            base=row if self.on == "base" else {},
-            face=row if self.on == "face" else {},
-            knots=knots,
-            knotted=names,
-        )
+        return _pieces(times, [ways, speeds, [*(np.diff(speeds) / steps), 0.0]], self.on)
 
 
 @parametric

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.drives.kinds import Belt, Drive, HarmonicBase, MultiTone, RecordedBase
+from stickslip.drives.kinds import Belt, Drive, HarmonicBase, MultiTone, Recorded
 from stickslip.errors import EstimateError
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
@@ -88,7 +88,7 @@ class Sampled:
         count = max(4, int(np.ceil((end - begin) * self.fs)) + 1)
         step = max((end - begin) / (count - 1), 1e-12)
         samples = (1 + share) * CubicSpline(own, self.values)(begin + step * np.arange(count + 1))
-        return RecordedBase(samples, fs=1 / step, contact=self.contact)
+        return Recorded(samples, fs=1 / step, contact=self.contact)
 
 
 def measured_drive(record: Record, given: Drive) -> DriveFrom:

@@ -14,7 +14,6 @@ from stickslip.parameters import PARTS
 from stickslip.solve.orbit import SteadyState, alike
 from stickslip.solve.periodic import steady_state
 from stickslip.solve.poincare import Table, lap, tables
-from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Structure
@@ -23,7 +22,7 @@ Start = Mapping[str, float | str]
 
 LOOKS = 256  # periods at which a motion that never repeats is looked at
 PATIENCE = 60  # times 256 periods that a motion is given which still comes nearer to an orbit
-ROUNDS = 3  # times that an unstable orbit beside the motion is left again
+ENDLESS = ("quasi-periodic", "chaotic", "not periodic")  # statuses of what does not repeat
 STILL = 1e-5  # of its displacement: what moves by no more is held at its very limit
 PUSH = 1e-6  # of its size: what keeps a carried motion from staying on an orbit that has become unstable
 
@@ -51,7 +50,7 @@ class Attractor:
 
     @property
     def regime(self) -> str:
-        """What it does, in words: "held", "no stops", "2 + 4 stops", "2 + 0 stops, period 3", "not periodic"."""
+        """What it does, in words: "held", "no stops", "2 + 4 stops", "2 + 0 stops, period 3", "chaotic"."""
         return regime(self.orbit)
 
 
@@ -76,22 +75,18 @@ def regime(orbit: SteadyState) -> str:
 
 
 def settled(system: System, start: Start, *, transient: int, orders: int) -> Attractor:
-    """What a start leads to. Newton's method may close an unstable orbit that the motion only passes: it goes on."""
-    for _ in range(ROUNDS):
-        orbit = steady_state(system, start=start, transient=transient, orders=orders)
-        if orbit.status != "unstable":
-            break
-        table = tables(system)
-        start = as_start(table, *lap(system, table, *opening(table, start), transient).end())
-        transient *= 4
-    else:
+    """What a start leads to."""
+    orbit = steady_state(system, start=start, transient=transient, orders=orders)
+    if orbit.status == "unstable":
         orbit = replace(orbit, status="not periodic", order=0, period=math.nan)
     for turn in range(PATIENCE + 1):
-        if orbit.status != "not periodic":
+        if orbit.status not in ENDLESS:
             break
         table = orbit.orbit.table
         course = lap(system, table, *orbit.orbit.end(), LOOKS)
         points = course.section()
+        if orbit.status != "not periodic":
+            return Attractor(orbit, points[:-1])
         if _is_still(course):
             orbit = replace(orbit, status="rest", order=1, period=table.motion.period)
         elif turn == PATIENCE or not _approaches(points):
@@ -141,7 +136,7 @@ def onward(attractor: Attractor) -> Start:
 
 def same(one: Attractor, other: Attractor) -> bool:
     """Whether two are one: by their events and their orbit; those that never repeat can not be told apart."""
-    if one.status in ("not periodic", "unbounded", "not unique"):
+    if one.status in (*ENDLESS, "unbounded", "not unique"):
         return one.regime == other.regime
     return alike(one.orbit, other.orbit)
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.estimate import NORMAL_95, Estimate
-from stickslip.maps.attractor import Attractor, Start, as_start, numbers, require_period, same, settled
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
+from stickslip.maps.attractor import ENDLESS, Attractor, Start, as_start, numbers, require_period, same, settled
 from stickslip.record.exchange import labelled_arrays
 from stickslip.solve.poincare import Table, extent, lap, tables
 from stickslip.solve.simulate import opening
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 NEAR = 1e-6  # of an orbit's size: what comes this near, with the orbit's own events, and nearer still, belongs to it
-ENDLESS = ("not periodic", "unbounded")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,7 +39,7 @@ class Basins:
     which : ndarray (n, m)
         Number of the attractor to which each start leads; the first coordinate runs down the rows. -1: not followed.
     shares : tuple of Estimate
-        Share of the starts that lead to each.
+        Share of the starts that lead to each, of those that could be followed.
     lost : tuple of str
         Why starts could not be followed, a sentence for each.
     """
@@ -137,7 +136,7 @@ def basins(
         raise SolveError("no start of the grid could be followed", lost[0], "see which motion is meant")
     counts = np.bincount(which[which >= 0], minlength=len(attractors))
     order = np.argsort(-counts, kind="stable")
-    shares = tuple(_share(attractors[k].regime, int(counts[k]), which.size) for k in order)
+    shares = tuple(_share(attractors[k].regime, int(counts[k]), which.size, len(lost)) for k in order)
     ranks = np.append(np.argsort(order), -1)  # the last for those that were not followed
     return Basins(names, axes, tuple(attractors[k] for k in order), ranks[which], shares, tuple(lost))
 
@@ -171,7 +170,7 @@ def _number(system: System, table: Table, attractors: list[Attractor], start: St
 
 def _belongs(system: System, table: Table, state: Array, mode: int, attractor: Attractor) -> bool:
     """Whether a motion is on its last way to an attractor."""
-    if attractor.status in (*ENDLESS, "not unique", "grazing"):
+    if attractor.status in (*ENDLESS, "unbounded", "not unique", "grazing"):
         return False
     if attractor.status == "rest":
         course = lap(system, table, state, mode, 1)
@@ -187,11 +186,20 @@ def _belongs(system: System, table: Table, state: Array, mode: int, attractor: A
     return attractor.orbit.order > 1 or list(course.modes) == list(attractor.orbit.orbit.modes)
 
 
-def _share(name: str, count: int, total: int) -> Estimate:
-    """A share with Wilson's interval: as of starts drawn at random, which scatter more than a grid."""
-    share, square = count / total, NORMAL_95**2 / total
+def _share(name: str, count: int, total: int, lost: int) -> Estimate:
+    """A share of what was followed, with Wilson's interval: as of starts drawn at random, which scatter more than a
+    grid. Starts that were not followed may belong to it or not: the interval holds both."""
+    share = count / (total - lost)
+    interval = (_wilson(count / total, total)[0], _wilson((count + lost) / total, total)[1])
+    doubts = [Doubt(f"{lost} of {total} starts could not be followed")] if lost else []
+    method = f"count of {total - lost} starts, Wilson's interval"
+    sd = math.sqrt(share * (1 - share) / total)
+    return Estimate(f"share of '{name}'", share, interval, sd, "1", method, Status(*doubts))
+
+
+def _wilson(share: float, total: int) -> tuple[float, float]:
+    """The 95 % interval of a share."""
+    square = NORMAL_95**2 / total
     middle = (share + square / 2) / (1 + square)
     half = math.sqrt(square * (share * (1 - share) + square / 4)) / (1 + square)
-    interval = (max(0.0, middle - half), min(1.0, middle + half))
-    sd = math.sqrt(share * (1 - share) / total)
-    return Estimate(f"share of '{name}'", share, interval, sd, "1", f"count of {total} starts, Wilson's interval")
+    return max(0.0, middle - half), min(1.0, middle + half)

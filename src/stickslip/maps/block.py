@@ -6,7 +6,7 @@ The measures of a Trajectory are the slow way, for any law, and the truth of the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -52,10 +52,7 @@ def run_block(
     for row in range(len(points)) if own else sorted(left):
         steps = points[row]
         if row in left or columns["status"][row] not in (NO_SYSTEM, FAILED):
-            answers: Mapping[str, Any]
-            answers = (
-                (alone or _alone)(plan, steps) if row in left else {own_name(m): m(_run(plan, steps)) for m in own}
-            )
+            answers = (alone or _alone)(plan, steps) if row in left else _owns(plan, steps, own)
             for name in columns.keys() & answers.keys():
                 columns[name][row] = answers[name]
             logs += [[*steps, *event] for event in answers.get("log", ())]
@@ -72,6 +69,14 @@ def _columns(plan: Plan, logs: list[list[Any]]) -> Arrays:
 def _run(plan: Plan, steps: tuple[int, ...]) -> Any:
     system, start = plan.at(steps)
     return simulate(system, cycles=plan.settle + plan.cycles, start=start)
+
+
+def _owns(plan: Plan, steps: tuple[int, ...], own: Sequence[Callable[..., float]]) -> Mapping[str, Any]:
+    """A user's measures of a motion that was marched with others; where it fails by itself nothing of it is known."""
+    try:
+        return {own_name(measure): measure(_run(plan, steps)) for measure in own}
+    except SolveError:
+        return {name: variable.fill for name, variable in plan.variables.items()} | {"status": FAILED}
 
 
 def _alone(plan: Plan, steps: tuple[int, ...]) -> Mapping[str, Any]:

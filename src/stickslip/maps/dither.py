@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from stickslip.contact.frequency_transition import Transition
 from stickslip.drives.kinds import Belt, Dithered
 from stickslip.errors import ModelError, SolveError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.maps.attractor import Start
 from stickslip.oscillator import Oscillator
 from stickslip.solve.poincare import tables
@@ -56,7 +56,8 @@ class Dither(Result):
     tried : tuple of (float, float)
         Every frequency tried, with its smallest amplitude; NaN where none was found.
     scan : ndarray (n, 2)
-        Amplitudes tried at the frequency, and the longest stick with each [s]; infinite where the run did not end.
+        Amplitudes tried at the frequency, and the longest stick with each [s]; NaN where it is not known, because runs
+        could not be followed.
     averaged : ndarray (n, 4)
         Sliding speed over the dither's; mean friction over sliding friction by the averaged law, by simulation with
         this dither, and with one ten times as large; NaN where a run did not end.
@@ -197,6 +198,13 @@ def dither(
     candidates = _frequencies(frequency, transition, period, stick)
     amplitudes = [search.smallest(f, friction, stick, precision) for f in candidates]
     reached = [amplitude for amplitude in amplitudes if amplitude is not None]
+    lost = sum(search.lost.values())
+    if not reached and lost:
+        raise SolveError(
+            f"at {lost} amplitudes a run could not be followed, and at no other the stick of {stick:.3g} s goes",
+            "an amplitude is found by runs that can be followed",
+            "simulate() the system with this dither to see why one can not, or give another frequency=",
+        )
     if not reached:
         raise SolveError(
             f"no dither of {', '.join(f'{f:g}' for f in candidates)} Hz removes the stick of {stick:.3g} s",
@@ -229,7 +237,7 @@ def longest_stick(run: Trajectory, after: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """The smallest amplitude at a frequency, the largest that is too small, and all that were tried."""
+    """The smallest amplitude at a frequency, the largest below it that leaves a stick, and all that were tried."""
 
     frequency: float
     amplitude: float
@@ -245,22 +253,28 @@ class _Search:
     on: str
     starts: tuple[Start, ...]
     duration: float
+    lost: dict[float, int] = field(default_factory=dict)  # amplitudes of which nothing is known, by frequency
 
     def having(self, amplitude: float, frequency: float) -> Oscillator:
         return self.system.having(drive=Dithered(self.system.drive, amplitude, frequency, on=self.on))
 
     def stick(self, amplitude: float, frequency: float, *, longer: float = 1.0) -> float:
-        """Longest stick with a dither [s], of the first start where it is macroscopic, or of all."""
+        """Longest stick with a dither [s], of the first start where it is macroscopic, or of all.
+
+        NaN where none is macroscopic, but a run could not be followed: it may have stuck, or not.
+        """
         longest, duration, dithered = 0.0, longer * self.duration, self.having(amplitude, frequency)
+        lost = False
         for start in self.starts:
             try:
                 run = simulate(dithered, duration=duration, start=start)
             except SolveError:
-                return math.inf  # what can not be followed removes nothing for sure; the scan shows it
+                lost = True
+                continue
             longest = max(longest, longest_stick(run, FORGET * duration))
             if longest * frequency >= 1.0:
-                break
-        return longest
+                return longest
+        return math.nan if lost else longest
 
     def smallest(self, frequency: float, friction: float, stick: float, precision: float) -> _Found | None:
         """The smallest amplitude that removes sticks, and its margin; None where there is none."""
@@ -283,9 +297,12 @@ class _Search:
                 low, top = (low, middle) if removes(middle) else (middle, top)
             while top <= high:
                 if removes(MARGIN * top, PATIENT) and removes(BEYOND * top):
-                    return _Found(frequency, MARGIN * top, low, np.array(sorted(tried)))
+                    scan = np.array(sorted(tried))
+                    below = scan[(scan[:, 1] * frequency >= 1.0) & (scan[:, 0] < MARGIN * top), 0]
+                    return _Found(frequency, MARGIN * top, float(np.max(below, initial=0.0)), scan)
                 low, top = top, (1 + precision) * top
             low = high
+        self.lost[frequency] = int(np.count_nonzero(np.isnan([stick for _, stick in tried])))
         return None
 
     def _unit(self, frequency: float, friction: float) -> float:
@@ -381,11 +398,21 @@ def _designed(
         (high - low) / math.sqrt(12),
         unit,
         f"bisection of exact runs of {search.duration:.4g} s, and 5 %",
+        Status(*_lost(best)),
     )
     rows = tuple((f, math.nan if amplitude is None else amplitude.amplitude) for f, amplitude in tried)
     return Dither(
         best.frequency, amplitude, search.on, speed, system, (stick, with_it), rows, best.scan, averaged, tuple(checks)
     )
+
+
+def _lost(best: _Found) -> list[Doubt]:
+    """The doubt that runs leave which could not be followed: each amplitude between may be enough."""
+    between = best.scan[(best.scan[:, 0] > best.too_small) & (best.scan[:, 0] < best.amplitude)]
+    count = int(np.count_nonzero(np.isnan(between[:, 1])))
+    if not count:
+        return []
+    return [Doubt(f"at {count} smaller amplitudes runs could not be followed: one of them may be enough")]
 
 
 def averaged_friction(system: Oscillator, *, frequency: float, speed: float) -> Array:

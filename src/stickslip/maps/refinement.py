@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.maps.grid import START, read_grid, unit
-from stickslip.maps.measures import COUNTS, NO_SYSTEM, STATUS, variables
+from stickslip.maps.measures import COUNTS, FAILED, NO_SYSTEM, STATUS, variables
 from stickslip.maps.plan import required
 from stickslip.maps.sweep import NoSystem, require_memory, sweep
 from stickslip.solve.tables import System
@@ -52,8 +52,9 @@ def refine(
     -------
     xarray.Dataset
         The variables of the measure on the finest grid, what lies between equal neighbours filled in from them, with
-        ``run``: whether a point was run. Where the user interrupts (Ctrl-C), what is known until then, with the status
-        "interrupted" and the points that are not known marked as not run.
+        ``run``: whether a point was run; between two runs that failed nothing is filled in. Where the user interrupts
+        (Ctrl-C), what is known until then, with the status "interrupted" and the points that are not known marked as
+        not run.
 
     Raises
     ------
@@ -107,6 +108,9 @@ def refine(
             break
         step //= 2
         wanted = _halved(arrays, step)
+    unknown = (arrays["status"] == FAILED) & ~run  # between two runs that failed: that tells of no third
+    for name, variable in kept.items():
+        arrays[name][unknown] = variable.fill
     known = {name: (name, column, {"units": unit(system, name)}) for name, column in zip(grid, values, strict=True)}
     data = {name: (tuple(grid), array, last[name].attrs) for name, array in arrays.items()}
     attributes = {**last.attrs, "status": "complete" if whole else f"interrupted: {run.sum()} points were run"}

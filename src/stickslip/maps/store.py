@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError, SolveError
 from stickslip.maps.measures import LOG
 from stickslip.maps.plan import Plan, assemble, required
-from stickslip.whole import NEW, locked, sync_all, workshop
+from stickslip.whole import NEW, lock_beside, locked, sync_all, workshop
 
 DONE = "done"
 """Name of the array of the seals: of each block the checksum of its files, 0 where it is not finished."""
@@ -52,16 +52,9 @@ class Store(AbstractContextManager["Store"]):
             self._new = not self.path.exists() and self._lay_out(layout)
             lock = locked(self.path) if self.path.is_dir() else None
         if lock is None:
-            raise (
-                self._not_ours()
-                if not self.path.is_dir()
-                else SolveError(
-                    f"{self.path} is being written by another process",
-                    "a map has one writer",
-                    "wait for it, or name another path",
-                )
-            )
+            raise self._written_by_another() if self.path.is_dir() else self._not_ours()
         with lock as held:
+            self._place = self.path.stat()
             if not self._new:
                 self._require_own()
                 with self._on_disk():
@@ -74,12 +67,19 @@ class Store(AbstractContextManager["Store"]):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         with self._lock, self._on_disk():
-            if error is not None and self._new and not self._tried:
+            if error is not None and self._new and not self._tried and self._in_place():
                 self._take_back()
             elif error is None:
                 for folder in (self.path, self.events):
                     if folder.exists():
                         sync_all(folder)
+
+    def _in_place(self) -> bool:
+        """Whether the folder at the path is the one that is locked: it may have been removed, and begun anew."""
+        try:
+            return os.path.samestat(self.path.stat(), self._place)
+        except OSError:
+            return False
 
     @property
     def missing(self) -> list[int]:
@@ -91,6 +91,12 @@ class Store(AbstractContextManager["Store"]):
     ) -> None:
         """Write a block, and then its seal."""
         place, self._tried = self.plan.slices(number), True
+        if not self._in_place():
+            raise SolveError(
+                f"{self.path} was removed or replaced while it was written",
+                "another process is writing there, or has moved it; its map is left alone",
+                "wait for it, or name another path",
+            )
         with self._on_disk():
             for path in (*self._files(number), self._seal_of(number)):
                 _free(path)
@@ -181,6 +187,14 @@ class Store(AbstractContextManager["Store"]):
             f"{self.path} holds the map of {_difference(there, self.plan.attributes)}",
             "a store holds the map of one set of settings",
             "name another path, or ask with the settings of that map",
+        )
+
+    def _written_by_another(self) -> SolveError:
+        left = lock_beside(self.path)
+        return SolveError(
+            f"another process is writing {self.path}",
+            "a map has one writer",
+            "wait for it, or name another path" + (f"; where it is gone, remove {left}" if left.exists() else ""),
         )
 
     def _not_ours(self) -> ModelError:

@@ -20,6 +20,7 @@ from stickslip.solve.cells import Linear
 from stickslip.solve.glide import Clock, Model, Past, Pieces
 from stickslip.solve.kernel import DONE, FULL, advance, begin, follow, march, set_tones
 from stickslip.solve.phasors import Phasors
+from stickslip.solve.refusal import Budget
 from stickslip.solve.tables import Array
 from stickslip.solve.tangent import carry_tangents
 
@@ -27,6 +28,7 @@ TIRELESS = np.int64(2**62)  # cells: a march of many motions is not interrupted 
 LAP = 64  # pieces remembered of a motion, a power of two; a lap of the drive with more has no fast path
 ROOM = 16  # pieces written before they are counted
 BUDGET = 10_000  # events in a period; more is taken for chatter
+SILENT = Budget.SILENT
 PARTS = 256  # steps of a run, a lap each where it is short: what moves less than STILL in a step or more is steady,
 STILL = 4e-15  # and would not move by more than PARTS times as much, some 1e-12, in the rest
 STEPS = 4  # after which a mark is made anew
@@ -196,12 +198,12 @@ def _to(i, lap, until, motion, mode, clock, given, tangent, sums):
     where nothing ended it, and the clock."""
     model, pieces, marks, settled = motion.model, motion.pieces, motion.marks, given.wants[SETTLE]
     limit = Clock(float(until), 0.0, 0.0) if math.isfinite(model.period) else Clock(0.0, until * motion.unit, 0.0)
-    outcome, events, last, lasted = FULL, 0, mode, 0.0
+    outcome, events, last, lasted = FULL, 0.0, mode, 0.0
     while outcome == FULL:
         outcome, count, mode, clock = march(
             model, clock, motion.state, mode, limit, motion.past, pieces, motion.work, TIRELESS
         )
-        events += count
+        events += _events(pieces.modes, count, given.look)
         if outcome != FULL and outcome != DONE:
             return -1, last, 0.0, clock
         if not math.isfinite(motion.state[0]) or events > BUDGET * (until - lap):
@@ -217,11 +219,22 @@ def _to(i, lap, until, motion, mode, clock, given, tangent, sums):
 
 
 @compiled(**OPTIONS)
+def _events(modes, count, look):
+    """How many of the changes of mode among pieces are events to the contact; others take a small part of one."""
+    events = 0.0
+    for p in range(count):
+        m, before = modes[p], modes[p - 1] if p > 0 else -1
+        silent = p > 0 and look.kinds[m] == look.kinds[before] and look.sides[m] == look.sides[before]
+        events += SILENT if silent else 1.0
+    return events
+
+
+@compiled(**OPTIONS)
 def _carry(i, count, motion, mode, leaps, tangents):
     """Carry small differences through the pieces just written."""
     linear, pieces = motion.model.linear, motion.pieces
     for p in range(count):
-        set_tones(linear.tones, pieces.states[p], pieces.offsets[p])
+        set_tones(linear.tones, pieces.states[p], pieces.offsets[p], motion.model.period)
     written = Pieces(
         pieces.laps[:count],
         pieces.offsets[:count],
@@ -346,7 +359,7 @@ def _count(i, count, motion, clock, settled, given, sums):
             if look.inner[m] or varies or not first:
                 for k in range(n):
                     held[k] = pieces.states[p, k]
-                set_tones(tones, held, offset)
+                set_tones(tones, held, offset, period)
                 if not first:
                     follow(linear, m, held, -begun, motion.work[7:10, :n])
                     place = _read(look.gap[i], held, tones, offset - begun)

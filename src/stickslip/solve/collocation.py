@@ -16,7 +16,7 @@ from numpy.polynomial import Legendre
 
 from stickslip.compiled import compiled
 from stickslip.solve.roots import NOISE, NONE, first_rise
-from stickslip.solve.taylor import EXACT, Array, Exits, Guards, Sums, advance, awake, coded, set_tones, waking
+from stickslip.solve.taylor import EXACT, Array, Exits, Guards, Sums, advance, awake, coded, turn, waking
 
 STAGES = 9
 WIDTH = STAGES + 1
@@ -228,15 +228,15 @@ def at(c, w):
 
 
 @compiled(**EXACT)
-def leap(model, mode, clock, state, big, h, poly, work):
+def leap(model, mode, unit, state, big, h, poly, work):
     """A step of length h [s] as polynomials of w, and the length of the next in units of h; 0 where it failed.
 
-    `clock` is the time [s] and the unit of the Taylor series there: the drive's signals are polynomials, or tones.
+    `unit` is that of the Taylor series [s]: the drive's signals are polynomials, or tones.
     """
-    (time, unit), (step, stages), scheme = clock, work, model.scheme
+    (step, stages), scheme = work, model.scheme
     for i in range(STAGES):
         advance(step.s, step.order, scheme.points[i] * h / unit, stages.values[i])
-        set_tones(model.tones, time + scheme.points[i] * h, stages.values[i])
+        turn(model.tones, state, scheme.points[i] * h, stages.values[i])
         for j in range(model.physical):
             stages.values[i, j] = state[j]
     change = settle(model, mode, state, h, big, stages)

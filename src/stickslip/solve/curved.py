@@ -25,7 +25,7 @@ from stickslip.errors import ModelError, SolveError
 from stickslip.solve import collocation, march, taylor
 from stickslip.solve.collocation import Model
 from stickslip.solve.march import LAPS, TIME, TRY, Dense, Shown, Steps, Work
-from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
+from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.series import expansion
 from stickslip.solve.tape import Tape
 from stickslip.solve.taylor import Array
@@ -172,10 +172,11 @@ class _Run:
 
     def __init__(self, table: Tape, state: Array, mode: int, *, total: float, budget: int, rtol: float) -> None:
         system, size, period, count = table.system, len(table.names), table.motion.period, table.nodes.most
-        self.table, self.mode, self.total, self.budget = table, mode, total, budget
+        self.table, self.mode, self.total = table, mode, total
         self.model = model_of(table, rtol)
         longest = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total
         self.scale = min(longest, total)
+        self.events = Budget(table, scale=self.scale, most=budget)
         self.clock = np.array([0.0, 0.0, 1e-6 * self.scale, 0.0, 0.0, march.PATIENCE])
         self.state, self.big = state.copy(), np.abs(state)
         self.work = Work(taylor.room(count, self.model.order), collocation.room(count, size, table.physical))
@@ -213,9 +214,7 @@ class _Run:
         passed = self.clock[TIME] - before[TIME] + (laps * self.model.period if laps else 0.0)
         if outcome != march.DONE or not np.isfinite(self.state).all():
             self._refuse(outcome, passed)
-        if events := int(np.sum(steps.ends[:written] >= 0)):
-            place = named(self.table.names[: self.table.physical], self.state)
-            require_budget(events, passed=passed, scale=self.scale, budget=self.budget, state=place)
+        self.events.spend(steps.ends[:written], passed=passed, state=self.state)
         return outcome
 
     def _refuse(self, outcome: int, passed: float) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Estimate
 from stickslip.solve.curved import CurvedTrajectory
-from stickslip.solve.poincare import carried, extent, lap, tables
+from stickslip.solve.poincare import Table, beat, beats, carried, carried_on, extent, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 from stickslip.solve.tape import Tape
@@ -39,9 +39,9 @@ def lyapunov(
     Parameters
     ----------
     system : Oscillator or Structure
-        What moves, with a periodic drive.
+        What moves, with a periodic drive or one of several tones.
     cycles : int
-        Periods over which the growth is averaged.
+        Periods over which the growth is averaged; of tones without a common one, those of the slowest.
     transient : int
         Periods before that.
     start : mapping, optional
@@ -55,7 +55,7 @@ def lyapunov(
     Raises
     ------
     SolveError
-        The drive has no period.
+        The drive has neither period nor tones.
 
     Examples
     --------
@@ -70,17 +70,21 @@ def lyapunov(
     if cycles < BATCHES or transient < 0:
         raise ModelError(f"cycles = {cycles}", f"the interval needs {BATCHES} cycles at least", "raise cycles=")
     table = tables(system)
-    period = table.motion.period
-    if not math.isfinite(period):
+    if not math.isfinite(beat(table)):
         raise SolveError("the drive has no period", "growth is counted from period to period", "use a periodic drive")
-    state, mode = opening(table, start or {})
+    return growth(system, table, *opening(table, start or {}), cycles=cycles, transient=transient)
+
+
+def growth(system: System, table: Table, state: Array, mode: int, *, cycles: int, transient: int = 0) -> Estimate:
+    """The largest Lyapunov exponent [1/s] of the motion from a state on."""
+    period = beat(table)
     difference = np.linspace(1.0, 0.5, table.physical)
     weights = np.ones(table.physical)
-    growth: list[float] = []
+    grown: list[float] = []
     how = "differences of the map" if isinstance(table, Tape) else "exact tangent"
     for number in range(transient + cycles):
-        orbit = lap(system, table, state, mode, 1)
-        state, mode = orbit.end()
+        orbit = beats(system, table, state, mode, 1)
+        state, mode = carried_on(orbit)
         if number == 0:
             weights = _weights(system, orbit)
             difference /= weights
@@ -98,12 +102,12 @@ def lyapunov(
             )
         difference /= length
         if number >= transient:
-            growth.append(math.log(length) / period)
-    batches = np.array([np.mean(part) for part in np.array_split(growth, BATCHES)])
+            grown.append(math.log(length) / period)
+    batches = np.array([np.mean(part) for part in np.array_split(grown, BATCHES)])
     spread = float(np.std(batches, ddof=1) / math.sqrt(BATCHES))
     method = f"{how} over {cycles} periods, scatter of {BATCHES} batches"
     return Estimate.normal(
-        "Lyapunov exponent", float(np.mean(growth)), sd=spread, unit="1/s", method=method, quantile=STUDENT
+        "Lyapunov exponent", float(np.mean(grown)), sd=spread, unit="1/s", method=method, quantile=STUDENT
     )
 
 
@@ -115,6 +119,6 @@ def _weights(system: System, orbit: Trajectory) -> Array:
     table = orbit.table
     weights = np.ones(table.physical)
     weights[table.degrees : 2 * table.degrees] = (
-        1 / system.frequency / (2 * math.pi) if system.frequency else table.motion.period
+        1 / system.frequency / (2 * math.pi) if system.frequency else beat(table)
     )
     return weights

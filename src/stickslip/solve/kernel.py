@@ -47,15 +47,16 @@ def parts_of(work, size):
 
 
 @compiled(**OPTIONS)
-def set_tones(tones, state, time):
+def set_tones(tones, state, time, period):
     """Keep the turning signals of the drive true.
 
-    One tone is put where it is at `time`, which stays within its period. Several have no period in common: each is
-    only brought back to unit length, because far from zero a time no longer tells its phase to the last digit.
+    One tone whose period is the drive's is put where it is at `time`, which stays within it. Several have no period in
+    common, and beside a belt time goes on and on: each is only brought back to unit length, because far from zero a
+    time no longer tells its phase to the last digit.
     """
     for j in range(tones.shape[0]):
         c, s = int(tones[j, 0]), int(tones[j, 1])
-        if tones.shape[0] == 1:
+        if tones.shape[0] == 1 and period < math.inf:
             angle = tones[j, 2] * time + tones[j, 3]
             state[c], state[s] = math.cos(angle), math.sin(angle)
         else:
@@ -165,7 +166,7 @@ def expand(series, state, scale, cell, c, noise):
 @compiled(**OPTIONS)
 def settle(linear, mode, state, cell, work):
     """Take every exit that is due at once; returns the mode in which time passes, or -1 if the chain does not end."""
-    for _ in range(CHAIN):
+    for _ in range(CHAIN + linear.first.shape[0]):  # a table of speeds may have to be gone through line by line
         fired = -1
         for e in range(linear.first[mode], linear.first[mode + 1]):
             if linear.crossing[e]:
@@ -272,8 +273,8 @@ def _crossed(model, mode, clock, left, patience, work):
             work.scale[i] = max(work.scale[i], abs(held[i]))
         cells += 1
         gone = cells * cell
-        if linear.tones.shape[0] == 1:
-            set_tones(linear.tones, held, clock.time + gone)
+        if linear.tones.shape[0] == 1 and model.period < math.inf:
+            set_tones(linear.tones, held, clock.time + gone, model.period)
             tail[int(linear.tones[0, 0])], tail[int(linear.tones[0, 1])] = 0.0, 0.0
         if gone > 2.0 * model.period and _rests(linear.flow[mode], linear.tones):
             return left, leaving, cells  # held through two periods of the drive: held for good
@@ -328,7 +329,7 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
         left = until(clock, limit, model.period)
         if left <= 4e-16 * limit.time:
             return DONE, count, mode, clock
-        set_tones(linear.tones, state, clock.time)
+        set_tones(linear.tones, state, clock.time, model.period)
         out.laps[count], out.offsets[count], out.modes[count] = clock.laps, clock.time, mode
         for i in range(out.states.shape[1]):
             out.states[count, i] = state[i]
@@ -349,12 +350,12 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
         for i in range(n):
             state[i] = held[i]
         if over:
-            set_tones(linear.tones, state, clock.time)
+            set_tones(linear.tones, state, clock.time, model.period)
             return DONE, count, mode, clock
         if leaving < 0:
             return FULL, count, mode, clock
         # the event: carry the state over, and take what is due at once
-        set_tones(linear.tones, state, clock.time)
+        set_tones(linear.tones, state, clock.time, model.period)
         multiply(linear.reset[leaving], state, held)
         for i in range(n):
             state[i] = held[i]

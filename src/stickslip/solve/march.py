@@ -24,6 +24,7 @@ from stickslip.solve.taylor import (
     rise,
     set_tones,
     surely_below,
+    turn,
     woken,
 )
 
@@ -82,7 +83,7 @@ class Shown(NamedTuple):
 
 
 @compiled(**EXACT)
-def _polish(model, node, mode, h, time, state, step):
+def _polish(model, node, mode, h, state, step):
     """Newton's step onto the zero of an exit that holds the drive: the delay [s], and the state at it.
 
     The step's series has the drive to the tolerance only; what follows a release must not hang on that.
@@ -90,7 +91,6 @@ def _polish(model, node, mode, h, time, state, step):
     series = coded(model.series)  # by itself: numba makes a type of functions of a tuple that holds one
     s, total, width = step.s, 0.0, step.order + 1
     for _ in range(2):
-        set_tones(model.tones, time + total, state)
         series(model.numbers, mode, state, h, s)
         at, slope = s[width * node], s[width * node + 1]
         if not abs(at) <= 1e-2 * abs(slope):
@@ -141,7 +141,7 @@ def _attempt(model, clock, state, big, mode, full, remaining, poly, work):
     h = clock[TRY]
     clock[REACH] = LEAP * full * h if clock[REACH] == 0.0 else clock[REACH]
     reach, ahead, leaving = min(clock[REACH], remaining), 0.0, -1
-    grow = leap(model, mode, (clock[TIME], h), state, big, reach, poly, work)
+    grow = leap(model, mode, h, state, big, reach, poly, work)
     if grow >= 0.9:
         w, leaving = landing(model, mode, big, work)
         ahead = 0.5 * (w + 1.0) * reach
@@ -164,8 +164,13 @@ def _remaining(clock, until, period):
 
 
 @compiled(**EXACT)
-def _arrived(clock, until, period, remaining, ahead, leaving):
-    """The clock after a step; whole periods count as laps."""
+def _arrived(clock, until, model, remaining, ahead, leaving, state):
+    """The clock after a step; whole periods count as laps.
+
+    The tones are turned from step to step: a release must find them as they were a moment before, to rounding. Each
+    lap sets them anew, so that they gather no error of the steps.
+    """
+    laps, period = clock[LAPS], model.period
     if leaving < 0 and ahead >= remaining:
         clock[LAPS], clock[TIME] = until[0], until[1]
     else:
@@ -173,6 +178,8 @@ def _arrived(clock, until, period, remaining, ahead, leaving):
     while clock[TIME] >= period:
         clock[LAPS] += 1.0
         clock[TIME] -= period
+    if clock[LAPS] != laps:
+        set_tones(model.tones, clock[TIME], state)
 
 
 @compiled(**EXACT)
@@ -185,9 +192,8 @@ def _write(steps, row, clock, state, mode, ahead, leaving, which):
 
 
 @compiled(**EXACT)
-def _hold(model, clock, state):
+def _hold(model, state):
     """The state on the counter-face, which it does not leave until the contact gives way."""
-    set_tones(model.tones, clock[TIME], state)
     speed = 0.0
     for i in range(len(state)):
         speed += model.face[i] * state[i]
@@ -205,7 +211,6 @@ def march(model, clock, state, big, mode, until, steps, work):
         remaining = _remaining(clock, until, model.period)
         if remaining <= 4e-16 * (clock[TIME] + clock[TRY]):
             return DONE, written, leapt, mode
-        set_tones(model.tones, clock[TIME], state)
         h = clock[TRY]
         series(model.numbers, mode, state, h, step.s)
         full = length(step.s, step.order, big, model.tolerance)
@@ -237,10 +242,11 @@ def march(model, clock, state, big, mode, until, steps, work):
                 for i in range(size):
                     state[i] = at(steps.polys[which, i], 2.0 * ahead / reach - 1.0)
                 steps.reach[which] = reach
+            turn(model.tones, steps.states[written - 1], ahead, state)
             for i in range(size):
                 big[i] = max(big[i], abs(state[i]))
             clock[TRY] = full * h
-            _arrived(clock, until, model.period, remaining, ahead, leaving)
+            _arrived(clock, until, model, remaining, ahead, leaving, state)
         else:
             if written > 0 and steps.ends[written - 1] < 0:
                 steps.ends[written - 1] = leaving
@@ -250,9 +256,9 @@ def march(model, clock, state, big, mode, until, steps, work):
         # Leave the mode.
         if leaving >= 0:
             if exits.held[leaving]:
-                _hold(model, clock, state)
+                _hold(model, state)
             elif ahead > 0.0:
-                delay = _polish(model, exits.node[leaving], mode, h, clock[TIME], state, step)
+                delay = _polish(model, exits.node[leaving], mode, h, state, step)
                 steps.lengths[written - 1] += delay
                 clock[TIME] += delay
             mode = exits.target[leaving]

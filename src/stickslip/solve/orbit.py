@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
+from stickslip.estimate import Estimate
 from stickslip.solve.poincare import extent
 from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.structure import Structure
@@ -24,16 +25,23 @@ class SteadyState:
     status : str
         "unique" (isolated and stable; from other starts there may be others), "unstable", "grazing" (an
         exit is met at a tangent: no derivative, no multipliers), "not unique" (a family of orbits: a
-        multiplier is 1), "rest" (held all the time), "unbounded" (the amplitude grows without end), "not
-        periodic" (no orbit found).
+        multiplier is 1), "rest" (held all the time), "unbounded" (the amplitude grows without end),
+        "quasi-periodic" (several frequencies without a common period), "chaotic" (neighbours part for good), "not
+        periodic" (no orbit found, and neither of these).
     period : float
         Period [s]; of several periods of the drive where `order` is above 1.
     order : int
         Period over the drive's; 1 for a self-excited orbit.
     orbit : Trajectory
-        One period, from phase zero of the drive.
+        One period, from phase zero of the drive; of a motion that does not repeat, as much of it.
     multipliers : ndarray of complex
         Eigenvalues of the map over one period, largest first; saltation at events included.
+    exponent : Estimate or None
+        Largest Lyapunov exponent [1/s] of a motion that does not repeat.
+    frequencies : tuple of float
+        Basic frequencies [Hz] of a quasi-periodic motion, the drive's first.
+    lines : ndarray (n, 2) or None
+        Strongest lines of its displacement: frequency [Hz] and amplitude [m].
     """
 
     status: str
@@ -41,6 +49,14 @@ class SteadyState:
     order: int
     orbit: Trajectory
     multipliers: NDArray[np.complex128]
+    exponent: Estimate | None = None
+    frequencies: tuple[float, ...] = ()
+    lines: NDArray[np.float64] | None = None
+
+    @property
+    def rotation_numbers(self) -> tuple[float, ...]:
+        """The other basic frequencies over the first: irrational where the motion is quasi-periodic."""
+        return tuple(frequency / self.frequencies[0] for frequency in self.frequencies[1:])
 
     @property
     def amplitude(self) -> float:

@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from stickslip.errors import ModelError
+from stickslip.errors import ModelError, SolveError
+from stickslip.solve.aperiodic import aperiodic, tonal
 from stickslip.solve.orbit import SteadyState, alike
 from stickslip.solve.poincare import CLOSED, Table, closes, derivative, extent, lap, tables
 from stickslip.solve.self_excited import self_excited
@@ -19,6 +20,8 @@ from stickslip.solve.trajectory import Trajectory
 
 UNIT = 1e-7  # a multiplier this close to 1 is 1: its rounding grows with the square root of a double eigenvalue
 GRAZING = 1e-9  # an exit crossed this slowly, relative to the terms of its rate, is a tangency
+RESONANT = 2**17  # periods of a system without damping in resonance, before its growth is told from its beginning
+EVEN = 0.02  # by which growth may differ from twice as much in twice the time
 RUNAWAY = 1e30  # of the first period's size: what grows so far has no bound
 
 
@@ -36,7 +39,9 @@ def steady_state(
     exact derivative; that of a curved law is differenced, and its multipliers are known to some 1e-9. A system without
     a periodic drive (a belt, a ramp) is followed until a stick ends as the one before did; where contacts lift off and
     none sticks, until Newton's method closes the cycle; where the law never holds the mass, until two turns of the mass
-    on a belt are alike.
+    on a belt are alike. Tones have the least common multiple of their periods for one; where there is none, and where
+    no orbit closes, neighbours of the motion and its spectrum tell what it is: quasi-periodic, with its basic
+    frequencies, or chaotic, with its largest Lyapunov exponent.
 
     Parameters
     ----------
@@ -82,28 +87,36 @@ def steady_state(
         )
     table = tables(system)
     if not math.isfinite(table.motion.period):
+        if table.motion.tones and table.motion.knots is None and not table.motion.base.get("way"):
+            return tonal(system, table, start or {}, (transient, patience))
         return self_excited(system, table, start or {}, transient)
     state, mode = opening(table, start or {})
     laps, sizes, first = 0, [], _iterate(system, table, state, mode, 1)[2]
-    count = transient
-    while laps < patience:
+    count, passed = transient, None
+    resonant = _repeats_freely(table)
+    while laps < (max(patience, RESONANT) if resonant else patience):
         state, mode, size = _iterate(system, table, state, mode, count)
         laps += count
         sizes.append(size)
-        if size > RUNAWAY * first:
+        if size > RUNAWAY * first or (resonant and _grows_evenly(sizes)):
             break
-        orbits = _closed(system, table, state, mode, orders)
-        if orbits is None and _repeats_freely(table):
-            orbits = _family(system, table, state, mode, size, orders)
-        if orbits is not None:
-            return orbits
+        orbit = _closed(system, table, state, mode, orders) if laps <= 2 * patience else None
+        if orbit is None and resonant:
+            orbit = _family(system, table, state, mode, size, orders)
+        if orbit is not None and orbit.status != "unstable":
+            return orbit
+        passed = passed or orbit  # an unstable orbit, which Newton's method closes where a motion only passes
         count = laps
-    orbit = lap(system, table, state, mode, 1)
-    growing = sizes[-1] > RUNAWAY * first or (
-        len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:]))
+    growing = (
+        sizes[-1] > RUNAWAY * first
+        or (resonant and _grows_evenly(sizes))
+        or (len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:])))
     )
-    none = np.full(table.physical, np.nan, dtype=np.complex128)
-    return SteadyState("unbounded" if growing else "not periodic", math.nan, 0, orbit, none)
+    if growing:
+        none = np.full(table.physical, np.nan, dtype=np.complex128)
+        return passed or SteadyState("unbounded", math.nan, 0, lap(system, table, state, mode, 1), none)
+    found = aperiodic(system, table, state, mode)
+    return passed if passed is not None and found.status == "not periodic" else found
 
 
 def attractors(
@@ -148,6 +161,12 @@ def _iterate(system: System, table: Table, state: Array, mode: int, laps: int) -
     return *orbit.end(), _size(orbit)
 
 
+def _grows_evenly(sizes: list[float]) -> bool:
+    """Whether each of the last doublings of the time has added twice what the one before did."""
+    added = np.diff(sizes[-4:])
+    return len(added) == 3 and bool(np.all(added > 0) and np.all(np.abs(added[1:] / added[:-1] - 2) < EVEN))
+
+
 def _size(orbit: Trajectory) -> float:
     """Largest displacement of late."""
     return float(np.max(np.abs(orbit.corners[-64:, 0])))
@@ -159,7 +178,10 @@ def _closed(system: System, table: Table, state: Array, mode: int, orders: int) 
         best: tuple[float, Trajectory | None, int] = (math.inf, None, 0)
         point, where = state, mode
         for _ in range(12):
-            orbit = lap(system, table, point, where, order)
+            try:
+                orbit = lap(system, table, point, where, order)
+            except SolveError:
+                break  # Newton's method left what moves; the motion itself goes on
             end, after = orbit.end()
             size = extent(orbit)
             gap = (end - point)[: table.physical]

@@ -59,6 +59,38 @@ def lap(system: System, table: Table, state: Array, mode: int, laps: int) -> Tra
     return stretch(system, table, state, mode, span=(float(laps), 0.0))
 
 
+def beat(table: Table) -> float:
+    """Time from look to look [s]: the drive's period; of tones without one, that of the slowest; else infinite."""
+    if np.isfinite(table.motion.period) or not table.motion.tones:
+        return table.motion.period
+    return max(2 * np.pi / omega for _, _, omega, _ in table.motion.tones)
+
+
+def beats(system: System, table: Table, state: Array, mode: int, count: int) -> Trajectory:
+    """The motion over so many beats, from a state that holds where the drive's signals are."""
+    whole = np.isfinite(table.motion.period)
+    return stretch(system, table, state, mode, span=(float(count), 0.0) if whole else (0.0, count * beat(table)))
+
+
+def carried_on(orbit: Trajectory) -> tuple[Array, int]:
+    """State and mode at the end of a motion, with the drive's signals as they are there."""
+    table, (state, mode) = orbit.table, orbit.end()
+    if np.isfinite(table.motion.period):
+        return state, mode
+    from scipy.linalg import expm
+
+    place, motion, turned = table.names.index, table.motion, set[str]()
+    for cosine, sine, omega, _ in motion.tones:
+        turn = complex(state[place(cosine)], state[place(sine)]) * np.exp(1j * (omega * orbit.duration))
+        state[place(cosine)], state[place(sine)] = turn.real, turn.imag
+        turned |= {cosine, sine}
+    others = ["1", *(name for name in motion.rates if name not in turned)]
+    flow = np.array([[motion.rates.get(name, {}).get(other, 0.0) for other in others] for name in others])
+    places = [place(name) for name in others]
+    state[places] = expm(flow * orbit.duration) @ state[places]
+    return state, mode
+
+
 def closes(orbit: Trajectory, gap: float) -> bool:
     """Whether a return this close, relative to the orbit's size, is one to rounding."""
     return gap <= (10 * CLOSED if isinstance(orbit, CurvedTrajectory) else CLOSED)

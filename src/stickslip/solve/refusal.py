@@ -9,11 +9,17 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stickslip.errors import SolveError
 from stickslip.solve.tables import Array
+
+if TYPE_CHECKING:
+    from stickslip.solve.tables import Tables
+    from stickslip.solve.tape import Tape
 
 
 def named(names: Sequence[str], state: Array) -> str:
@@ -53,14 +59,44 @@ def require_numbers(state: Array, place: str) -> None:
         )
 
 
-def require_budget(events: int, *, passed: float, scale: float, budget: int, state: str) -> None:
-    """Refuse more than `budget` events in a period of `scale` [s], counted over the time `passed` [s]."""
-    if events > budget * max(1.0, passed / scale):
-        raise SolveError(
-            f"{events} events within {passed:g} s at {state}",
-            f"a period of {scale:g} s has at most {budget} events",
-            "check the law there (chatter), or raise budget=",
-        )
+class Budget:
+    """Events that a run may still have: `most` in each period of `scale` [s], and as many ahead of the time.
+
+    Lives for one run. A change of mode that is no event to the contact, as from one line of a table of speeds to the
+    next, takes a small part of one, so that a run that does nothing else ends as well.
+    """
+
+    SILENT = 1e-3
+
+    def __init__(self, table: Tables | Tape, *, scale: float, most: int) -> None:
+        self.table, self.scale, self.most = table, scale, most
+        self.owed = self.since = 0.0
+
+    def spend(self, exits: NDArray[np.int16], *, passed: float, state: Array) -> None:
+        """Take the events by which a stretch of `passed` [s] went on; refuse the run where they are too many."""
+        income = self.most * passed / self.scale
+        if not self.owed and np.count_nonzero(exits >= 0) <= income:
+            return
+        numbers, counts = np.unique(exits[exits >= 0], return_counts=True)
+        weights = [self.SILENT if self._silent(int(leaving)) else 1.0 for leaving in numbers]
+        self.owed, self.since = max(0.0, self.owed + float(counts @ weights) - income), self.since + passed
+        if self.owed > self.most:
+            raise SolveError(
+                f"{self.owed + self.most * self.since / self.scale:.0f} events within {self.since:g} s at "
+                f"{named(self.table.names[: self.table.physical], state)}",
+                f"a period of {self.scale:g} s has at most {self.most} events",
+                "check the law there (chatter), or raise budget=",
+            )
+        self.since = self.since if self.owed else 0.0
+
+    def _silent(self, leaving: int) -> bool:
+        """Whether an exit changes neither the kind nor the side of any contact."""
+        table = self.table
+        left = int(np.searchsorted(table.first, leaving, side="right")) - 1
+        before: Any = table.modes[left]
+        after: Any = table.modes[int(table.target[leaving])]
+        changes = after.changes(before, leaving - int(table.first[left]))
+        return all((old.kind, old.side) == (new.kind, new.side) for _, old, new in changes)
 
 
 @contextmanager

@@ -28,6 +28,8 @@ ROUNDS = 16
 RANK = 1e-9  # of the largest singular value: below it a direction is free
 LOOKED = 96  # samples of a lag, of the shortest period looked for
 MOST, ALIKE = 64, 1e-4  # turns of an orbit that may be alike, and how alike, relative to its spread
+SHORTEST = 0.2  # of the natural period: the shortest cycle looked for under a curved law
+STEADY = 1e-6  # of the sliding speed: what moves by no more slides steadily
 NEAR = 0.3  # of the spread: a state this close to an earlier one may repeat it
 
 
@@ -54,7 +56,7 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
             gap = np.abs(motion.states[last, own] - motion.states[first, own])
             if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, own]), axis=0)):
                 return _between(motion, first, last)
-        if not isinstance(table, Tape) and (not ends or motion.starts[ends[-1]] < duration / 2):
+        if not ends or motion.starts[ends[-1]] < duration / 2:
             orbit = _without_sticks(motion)
             if orbit is not None:
                 return orbit
@@ -67,11 +69,20 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
 
 
 def _without_sticks(motion: Trajectory) -> SteadyState | None:
-    """The orbit that a motion of linear modes ends in; between events nothing bounds it, so it has some."""
-    cycle = settled_cycle(motion, 2 * math.pi * float(np.min(motion.table.cell)))
-    if cycle is None or len(cycle[0].modes) == 1:
+    """The orbit that a motion ends in which does not stick; one of linear modes has events, since nothing else bounds
+    it, and one of a curved law moves by more than what steady sliding leaves of it."""
+    curved, system = isinstance(motion, CurvedTrajectory), motion.system
+    if curved and not system.frequency:
+        return None
+    shortest = SHORTEST / system.frequency if curved else 2 * math.pi * float(np.min(motion.table.cell))
+    cycle = settled_cycle(motion, shortest)
+    if cycle is None or (len(cycle[0].modes) == 1 and not curved):
         return None
     orbit, across = cycle
+    if curved:
+        v, slip = orbit.sample(np.linspace(0.0, orbit.duration, LOOKED) * (1 - 1e-12), ("v", "slip"))[0]
+        if np.ptp(v) <= STEADY * np.max(np.abs(slip)):
+            return None
     multipliers = np.append(across, 0.0)  # along the orbit nothing grows: its phase is free
     return SteadyState("unique" if abs(across[0]) < 1 else "unstable", orbit.duration, 1, orbit, multipliers)
 

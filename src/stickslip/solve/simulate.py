@@ -21,7 +21,7 @@ from stickslip.solve.curved import degree, run_curved
 from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
 from stickslip.solve.phasors import fast_tables
-from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
+from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
@@ -214,6 +214,7 @@ def run(
     clock, state = Clock(0.0, 0.0, 0.0), state.copy()
     total = offset + (laps * period if math.isfinite(period) else 0.0)
     scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
+    events = Budget(table, scale=scale, most=budget)
     pieces = _Log(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
     heed: Callable[[], None] | None = None
@@ -238,14 +239,7 @@ def run(
                     passed = until(before, clock, period)
                     pieces.keep(count, passed, total)
                     _refuse(outcome, table, state, clock)
-                    if count > budget:
-                        require_budget(
-                            count - (outcome == kernel.DONE),
-                            passed=passed,
-                            scale=scale,
-                            budget=budget,
-                            state=named(table.names[: table.physical], state),
-                        )
+                    events.spend(pieces.columns.exits[pieces.count - count : pieces.count], passed=passed, state=state)
                     if tell:
                         tell(pieces.passed / total)
     except KeyboardInterrupt:

@@ -96,6 +96,11 @@ class Tape:
         """Exits of mode j are ``first[j]`` to ``first[j + 1]``."""
         return self.exits.first
 
+    @property
+    def target(self) -> NDArray[np.int64]:
+        """The mode behind each exit."""
+        return self.exits.target
+
     def index(self, mode: str) -> int:
         """Number of the mode of that name."""
         return mode_number(self.modes, mode)

@@ -265,7 +265,17 @@ def rise(sums, exits, e, mode, h, u, big, step):
 
 @compiled(**EXACT)
 def set_tones(tones, time, state):
-    """The drive's tones by the clock: they gather no error of the steps."""
+    """The drive's tones by the clock."""
     for j in range(len(tones)):
         angle = tones[j, 2] * time + tones[j, 3]
         state[int(tones[j, 0])], state[int(tones[j, 1])] = math.cos(angle), math.sin(angle)
+
+
+@compiled(**EXACT)
+def turn(tones, before, ahead, state):
+    """The drive's tones a time `ahead` [s] after a state: turned, because far from zero a clock tells no phase."""
+    for j in range(len(tones)):
+        c, s = int(tones[j, 0]), int(tones[j, 1])
+        angle, length = tones[j, 2] * ahead, 1.5 - 0.5 * (before[c] * before[c] + before[s] * before[s])
+        cosine, sine = length * math.cos(angle), length * math.sin(angle)
+        state[c], state[s] = cosine * before[c] - sine * before[s], sine * before[c] + cosine * before[s]

@@ -255,7 +255,7 @@ def read_system(path: str | Path | Mapping[str, Any]) -> Case:
             cycles = 40                   # or duration, in seconds
             fs = 4000                     # of the record; chosen where left out
 
-        A drive ``RecordedBase`` takes its samples from ``record = "file.csv"`` and ``channel = "column [mm]"``; in
+        A drive ``Recorded`` takes its samples from ``record = "file.csv"`` and ``channel = "column [mm]"``; in
         plain data they stand themselves.
 
     Returns
@@ -348,7 +348,7 @@ def _check_run(case: Case) -> None:
     end = case.system.drive.motion().end
     if case.duration > end * (1 + 1e-9):
         raise ModelError(
-            f"duration = {case.duration:g} s", f"the recorded base motion ends at {end:g} s", "run it no longer"
+            f"duration = {case.duration:g} s", f"the recorded drive ends at {end:g} s", "run it no longer"
         ).of("duration")
 
 
@@ -382,7 +382,7 @@ def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mappi
     for part, known in (("law", LAWS), ("drive", DRIVES)):  # a law on a law, a tone on a drive
         if isinstance(parameters.get(part), Mapping):
             parameters[part] = _built(f"{table}.{part}", known, parameters[part], source)
-    if name == "RecordedBase" and "record" in parameters:
+    if name == "Recorded" and "record" in parameters:
         parameters |= _recorded(parameters, source)
         parameters = {key: value for key, value in parameters.items() if key not in ("record", "channel")}
     given = _part(_model_of(factory, str(values.get("on", ""))), table, parameters, source)
@@ -391,21 +391,22 @@ def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mappi
 
 
 def _recorded(parameters: Mapping[str, Any], source: _Source) -> dict[str, Any]:
-    """Samples and rate of the base motion that stands in a file of its own."""
+    """Samples and rate of the motion or force that stands in a file of its own."""
     from stickslip.files.read import read_record
 
     path, channel = parameters["record"], parameters.get("channel")
+    of = "force" if parameters.get("on") == "force" else "z"
     if source.folder is None:
         raise ModelError(f"record = {path!r}", "plain data hold the samples themselves", "give samples = and fs =")
     if not isinstance(path, str) or not isinstance(channel, str):
         where = f"{source.name}{line_of(['drive', 'record'], source.lines)}"
         raise ModelError(
             f"{where} names a record = {path!r}, channel = {channel!r}",
-            "a recorded base motion is a file and the column that moves",
+            "a recorded motion or force is a file and its column",
             'write record = "base.csv" and channel = "column [mm]"',
         )
-    record = read_record(source.folder / path, channels={"z": channel})
-    return {"samples": record["z"].tolist(), "fs": parameters.get("fs", record.fs)}
+    record = read_record(source.folder / path, channels={of: channel})
+    return {"samples": record[of].tolist(), "fs": parameters.get("fs", record.fs)}
 
 
 @contextmanager
@@ -440,9 +441,10 @@ def _kind(factory: type, name: str, on: str = "") -> Any:
         return Annotated[Any, BeforeValidator(functools.partial(_table_of, "law", "{name = 'Coulomb', kinetic = 1}"))]
     if hint is Drive:
         return Annotated[Any, BeforeValidator(functools.partial(_table_of, "drive", "{name = 'Belt', speed = 0.1}"))]
-    number = Annotated[float, quantity(declared(factory, name).unit or "1")]
-    if name == "samples" or hint == Sequence[float]:
-        return list[number]
+    unit = declared(factory, name).unit or "1"
+    number = Annotated[float, quantity("N" if on == "force" and unit == "m" else unit)]
+    if name == "samples" or hint in (Sequence[float], Sequence[float] | None):
+        return list[number] if hint != Sequence[float] | None else list[number] | None
     return {float: number, float | None: number | None}.get(hint, hint)
 
 

@@ -6,7 +6,7 @@ const WORDS = {
   run: { cycles: "cycles", duration: "time" },
 };
 const UNITS = { s: "s", x: "m", v: "m/s", duration: "s", cycles: "1" };
-const NOT_DRAWN = new Set(["RecordedBase"]); // needs a file: kept where a state has it
+const NOT_DRAWN = new Set(["Recorded"]); // needs a file: kept where a state has it
 
 export const at = (state, path) => path.reduce((held, key) => held?.[key], state);
 export function put(state, path, value) {
