@@ -13,8 +13,6 @@ from stickslip.cli.words import spoken
 if TYPE_CHECKING:
     from stickslip.story import Story
 
-LONG = 30  # letters of a status that is not said twice
-
 
 def print_json(told: Mapping[str, Any]) -> None:
     """Results for a machine, which begin as results.json does: with what made them."""
@@ -56,12 +54,12 @@ def _print_story(story: Story) -> None:
 
 
 def _print_lines(story: Story) -> None:
-    """The numbers. A long status that stands above the table is not said once more in each row."""
-    truth, said = story.has_truth, " ".join((*story.headline, *story.cautions))
+    """The numbers."""
+    truth = story.has_truth
     headings = ("quantity", "value", "95 % interval", *(["true value"] if truth else []), "how sure")
     rows = []
     for line in story.lines:
-        status = "as said above" if len(line.status) > LONG and line.status in said else line.status
-        rows.append([line.name, line.value, line.interval, *([line.true or "-"] if truth else []), status])
+        true = [line.true or "-"] if truth else []
+        rows.append([line.name, line.value, line.interval, *true, story.how_sure(line)])
     if rows:
         print_table(headings, rows)

@@ -99,6 +99,9 @@ def _nothing_more(folder: Path) -> None:
     """Of most results page, numbers and figures are all."""
 
 
+SHORT = 30  # letters of a status that may be said twice
+
+
 @dataclass(frozen=True)
 class Story:
     """A result as it is told.
@@ -156,6 +159,11 @@ class Story:
     def has_truth(self) -> bool:
         """Whether a true value is known for any row."""
         return any(line.true is not None for line in self.lines)
+
+    def how_sure(self, line: Line) -> str:
+        """A row's status; where it stands above already, that it does."""
+        said = " ".join((*self.headline, *self.cautions))
+        return "as said above" if len(line.status) > SHORT and line.status in said else line.status
 
     @property
     def has_checks(self) -> bool:

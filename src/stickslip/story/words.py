@@ -70,8 +70,8 @@ def interval_of(estimate: Estimate) -> str:
 def cautions(findings: Findings, said: Iterable[Estimate] = ()) -> list[str]:
     """What should keep the reader from trusting a number, but what the headline has `said` of those without a value."""
     untold = {estimate.name for estimate in said if not estimate.known}
-    flagged = _flags([estimate for estimate in findings.estimates if estimate.name not in untold])
-    flagged += [sentence(f"{name}: {status}.") for name, status in findings.doubts if not _only_few(status)]
+    told = [(estimate.name, estimate.status) for estimate in findings.estimates if estimate.name not in untold]
+    flagged = _flags([*told, *findings.doubts])
     flagged += _of_few([estimate.status for estimate in findings.estimates])
     if findings.faults:
         many = len(findings.faults)
@@ -81,14 +81,18 @@ def cautions(findings: Findings, said: Iterable[Estimate] = ()) -> list[str]:
 
 def doubts(estimates: Sequence[Estimate]) -> list[str]:
     """The estimates that are flagged, with the reason, each reason once."""
-    return [*_flags(estimates), *_of_few([estimate.status for estimate in estimates])]
+    return [
+        *_flags([(each.name, each.status) for each in estimates]),
+        *_of_few([estimate.status for estimate in estimates]),
+    ]
 
 
-def _flags(estimates: Sequence[Estimate]) -> list[str]:
+def _flags(told: Sequence[tuple[str, str]]) -> list[str]:
+    """What speaks against answers, each reason once, with the names of those that it speaks against."""
     flagged: dict[str, list[str]] = {}
-    for estimate in estimates:
-        if estimate.status != "ok" and not _only_few(estimate.status):
-            flagged.setdefault(estimate.status, []).append(estimate.name)
+    for name, status in told:
+        if status != "ok" and not _only_few(status):
+            flagged.setdefault(status, []).append(name)
     return [sentence(f"{_few(names)}: {status}.") for status, names in flagged.items()]
 
 
