@@ -1,5 +1,7 @@
 from stickslip.solve.continuation import Branch as Branch
 from stickslip.solve.continuation import continue_orbit as continue_orbit
+from stickslip.solve.derivatives import Sensitivities as Sensitivities
+from stickslip.solve.derivatives import sensitivities as sensitivities
 from stickslip.solve.energies import EnergyFlow as EnergyFlow
 from stickslip.solve.energies import energy as energy
 from stickslip.solve.energies import energy_flow as energy_flow
