@@ -177,8 +177,11 @@ def settle(model, mode, state, h, big, stages):
         change = 0.0
         for i in range(STAGES):
             for j in range(physical):
+                moved = abs(b[i * physical + j]) / max(big[j], 1e-300)
+                if not moved < math.inf:  # no number: a larger one would hide it
+                    return math.inf
                 stages.values[i, j] -= b[i * physical + j]
-                change = max(change, abs(b[i * physical + j]) / max(big[j], 1e-300))
+                change = max(change, moved)
         if change <= max(1e-2 * tolerance, 1e-15):
             return change
         if not change < math.inf or (iteration > 3 and change > 0.5 * before):
