@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.laws.base import Law
+from stickslip.laws.base import Exit, Law, Mode, Rigid
+from stickslip.solve import assembly
 
 HEAVY = 1e15  # kg: a mass that the contact can not move, so that the counter-face imposes the motion
 
@@ -101,3 +102,65 @@ def test_a_lifted_contact_rubs_no_more() -> None:
     assert lifted.any()
     assert np.all(values[1][lifted] == 0)
     assert len(piece) == 601
+
+
+def _state_variable(seed: int) -> tuple[ss.Oscillator, dict[str, float], float]:
+    """A system under the law as it is constructed by default, its start and its natural period [s]."""
+    draw = np.random.default_rng(seed)
+    stiffness, mass, level = 10.0 ** draw.uniform(1, 5), 10.0 ** draw.uniform(-1, 1), 10.0 ** draw.uniform(-1, 2)
+    natural = math.sqrt(stiffness / mass) / (2 * math.pi)
+    speed, far, fast = level / math.sqrt(stiffness * mass), 10.0 ** draw.uniform(-0.2, 1), 10.0 ** draw.uniform(-1, 0.5)
+    drive = [
+        ss.drives.HarmonicForce(level * far, natural * fast),
+        ss.drives.HarmonicBase(level / stiffness * far, natural * fast),
+        ss.drives.Belt(speed * 10.0 ** draw.uniform(-2, 0.5)),
+        ss.drives.Release(),
+    ][seed % 4]
+    system = ss.Oscillator(
+        mass, stiffness, ss.laws.StateVariable(level, 10.0 ** draw.uniform(0, 3) * natural / level), drive,
+        damping=2 * math.sqrt(stiffness * mass) * float(draw.choice([0.0, 0.01, 0.1])),
+    )  # fmt: skip
+    return system, {"x": level / stiffness * 10.0 ** draw.uniform(0, 1.5)} if seed % 4 == 3 else {}, 1 / natural
+
+
+@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 1000), marks=pytest.mark.soak)])
+def test_a_tremble_ends_in_the_rest_that_the_law_has(seeds: range) -> None:
+    """Half of them were refused: the swings before a rest have no end."""
+    for seed in seeds:
+        system, start, period = _state_variable(seed)
+        run = ss.simulate(system, duration=20 * period, start=start)
+        assert ss.solve.energy(run).residual < 1e-9
+        if seed % 4 == 3 and run.status == "at rest":
+            last = run.state(run.duration)
+            assert last["friction"] == pytest.approx(-system.stiffness * last["x"], rel=1e-9)
+
+
+def test_what_is_left_of_a_tremble_is_nothing_to_the_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    for seed in (3, 4, 5, 7, 11):
+        system, start, period = _state_variable(seed)
+        ways = []
+        for share in (5e-4, 5e-5):
+            monkeypatch.setattr("stickslip.laws.state_variable.TREMBLE", share)
+            assembly._known.cache_clear()  # tables are kept by the law's values
+            run = ss.simulate(system, duration=8 * period, start=start, budget=10**6)
+            ways.append(run.sample(np.linspace(0, run.duration, 200), ("x",))[0][0])
+        assert ways[0] == pytest.approx(ways[1], abs=1e-6 * np.max(np.abs(ways[1])))
+
+
+def test_modes_that_chase_each_other_are_named() -> None:
+    with pytest.raises(ss.errors.SolveError, match=r"'back' and 'forward'|'forward' and 'back'"):
+        ss.simulate(ss.Oscillator(1.0, 1.0, _Unheld()), duration=10.0, start={"x": 3.5})
+
+
+class _Unheld(Rigid):
+    """Coulomb's law without a mode that holds the mass."""
+
+    @property
+    def entry(self) -> tuple[str, str, str]:
+        return "back", "forward", "forward"
+
+    def modes(self) -> tuple[Mode, ...]:
+        return (
+            Mode("back", "slip", -1, {"1": -1.0}, (Exit({"v": 1.0}, "forward"),)),
+            Mode("forward", "slip", 1, {"1": 1.0}, (Exit({"v": -1.0}, "back"),)),
+        )

@@ -215,14 +215,17 @@ class _Run:
             self._refuse(outcome, passed)
         if events := int(np.sum(steps.ends[:written] >= 0)):
             place = named(self.table.names[: self.table.physical], self.state)
-            require_budget(events, passed=passed, scale=self.scale, budget=self.budget, state=place)
+            modes = [self.table.modes[mode].name for mode in steps.modes[:written][steps.ends[:written] >= 0][-4:]]
+            require_budget(events, passed=passed, scale=self.scale, budget=self.budget, state=place, modes=modes)
         return outcome
 
     def _refuse(self, outcome: int, passed: float) -> None:
         laps, time = self.clock[LAPS], self.clock[TIME]
         place = f"lap {laps:g}, {time:g} s, at {named(self.table.names[: self.table.physical], self.state)}"
         if outcome == march.CHATTER:
-            raise chatter(place)
+            first, exits = self.table.exits.first, self.table.exits
+            targets = exits.target[first[self.mode] : first[self.mode + 1]]
+            raise chatter([self.table.modes[j].name for j in (self.mode, *targets)], place)
         if outcome == march.UNPROVED:
             raise unproved(place)
         if outcome == march.STALL:

@@ -25,13 +25,17 @@ class Endless(SolveError):
     """A law's modes follow one another without end while no time passes: what fails is the law, not a motion."""
 
 
-def chatter(place: str) -> Endless:
+def chatter(modes: Sequence[str], place: str) -> Endless:
     """Modes that follow one another without end while no time passes."""
     return Endless(
-        f"transitions without time between them, {place}",
-        "a law leaves every state in one direction",
-        "check the law's exits there",
+        f"transitions without time between the modes {_listed(modes)}, {place}",
+        "a law leaves every state in one direction, or has a mode that holds the mass there",
+        "check the law's exits there; a mode with friction=None holds the mass",
     )
+
+
+def _listed(modes: Sequence[str]) -> str:
+    return " and ".join(f"'{mode}'" for mode in dict.fromkeys(modes))
 
 
 def unproved(place: str) -> SolveError:
@@ -53,11 +57,12 @@ def require_numbers(state: Array, place: str) -> None:
         )
 
 
-def require_budget(events: int, *, passed: float, scale: float, budget: int, state: str) -> None:
-    """Refuse more than `budget` events in a period of `scale` [s], counted over the time `passed` [s]."""
+def require_budget(events: int, *, passed: float, scale: float, budget: int, state: str, modes: Sequence[str]) -> None:
+    """Refuse more than `budget` events in a period of `scale` [s], counted over the time `passed` [s]; the `modes` of
+    the last pieces are named."""
     if events > budget * max(1.0, passed / scale):
         raise SolveError(
-            f"{events} events within {passed:g} s at {state}",
+            f"{events} events within {passed:g} s, the last between {_listed(modes)}, at {state}",
             f"a period of {scale:g} s has at most {budget} events",
             "check the law there (chatter), or raise budget=",
         )

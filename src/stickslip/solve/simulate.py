@@ -22,6 +22,7 @@ from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import chatter, held_back, named, require_budget, require_numbers, unproved
+from stickslip.solve.roots import NOISE
 from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 CHUNK = 16384  # pieces between two looks at the clock and the keyboard
 CELLS = 65536  # Taylor cells between two looks
+LISTED = 4  # pieces whose modes an error names
 PACE = 0.1  # s between two calls of progress
 
 
@@ -40,7 +42,7 @@ def simulate(
     duration: float | None = None,
     cycles: float | None = None,
     start: Mapping[str, float | str] | None = None,
-    budget: int = 10_000,
+    budget: int = 100_000,
     rtol: float = 1e-12,
     progress: Callable[[float], object] | None = None,
 ) -> Trajectory:
@@ -221,8 +223,8 @@ def run(
         with ExitStack() as holding:
             for at, (signals, values) in stops_of(table, laps, offset):
                 state[signals] = values
-                mode = kernel.begin(model.linear, mode, state, total, 1.0, work)
-                _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
+                came, mode = mode, kernel.begin(model.linear, mode, state, total, 1.0, work)
+                _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, came, clock)
                 outcome = kernel.FULL
                 while outcome == kernel.FULL:
                     before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
@@ -237,7 +239,7 @@ def run(
                         heed()
                     passed = until(before, clock, period)
                     pieces.keep(count, passed, total)
-                    _refuse(outcome, table, state, clock)
+                    _refuse(outcome, table, state, mode, clock)
                     if count > budget:
                         require_budget(
                             count - (outcome == kernel.DONE),
@@ -245,6 +247,7 @@ def run(
                             scale=scale,
                             budget=budget,
                             state=named(table.names[: table.physical], state),
+                            modes=[table.modes[j].name for j in pieces.last(LISTED)],
                         )
                     if tell:
                         tell(pieces.passed / total)
@@ -287,6 +290,10 @@ class _Log:
             getattr(grown, name)[: self.count] = getattr(self.columns, name)[: self.count]
         self.columns = grown
 
+    def last(self, count: int) -> list[int]:
+        """Modes of the last pieces."""
+        return [int(mode) for mode in self.columns.modes[max(0, self.count - count) : self.count]]
+
     def done(self) -> Pieces:
         """The pieces alone."""
         return self.columns.part(0, self.count)
@@ -315,12 +322,26 @@ def _at_rest(table: Tables, state: Array, mode: int) -> bool:
     return bool(np.all(table.flow[mode] @ state == 0.0))
 
 
-def _refuse(outcome: int, table: Tables, state: Array, clock: Clock) -> None:
+def _chasing(table: Tables, mode: int, state: Array) -> list[str]:
+    """The modes that follow one another at a state, by the exits that are due at once."""
+    names = []
+    for _ in range(2 * LISTED):
+        names.append(table.modes[mode].name)
+        for e in range(table.first[mode], table.first[mode + 1]):
+            ahead, noise = table.series[e] @ state, NOISE * (np.abs(table.series[e]) @ np.abs(state))
+            told = ahead[np.abs(ahead) > noise]
+            if not table.crossing[e] and len(told) and told[0] > 0:
+                mode, state = int(table.target[e]), table.reset[e] @ state
+                break
+    return names[-LISTED:]
+
+
+def _refuse(outcome: int, table: Tables, state: Array, mode: int, clock: Clock) -> None:
     if outcome in (kernel.DONE, kernel.FULL) and math.isfinite(state.sum()):
         return
     place = f"lap {clock.laps:g}, {clock.time:g} s, at {named(table.names[: table.physical], state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
-        raise chatter(place)
+        raise chatter(_chasing(table, mode, state), place)
     if outcome == kernel.UNPROVED:
         raise unproved(place)
     require_numbers(state, place)
