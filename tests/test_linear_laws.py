@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import stickslip as ss
 from stickslip.laws.base import Exit, Law, Mode, Rigid
@@ -164,3 +165,34 @@ class _Unheld(Rigid):
             Mode("back", "slip", -1, {"1": -1.0}, (Exit({"v": 1.0}, "forward"),)),
             Mode("forward", "slip", 1, {"1": 1.0}, (Exit({"v": -1.0}, "back"),)),
         )
+
+
+def test_a_contact_with_a_mass_slips_on_a_face_that_outruns_its_friction() -> None:
+    """1 N carries 1 kg along at 1 m/s^2 at the most; a relaxed contact slips where the face accelerates by more."""
+    law = ss.laws.InertialContact(1.0, stiffness=1e4, mass=1.0)
+    for acceleration, mode in ((0.99, "stuck"), (1.01, "back"), (5.0, "back")):
+        face = ss.drives.MultiTone([(acceleration / (2 * math.pi) ** 2, 1.0, math.pi)], on="face")
+        run = ss.simulate(ss.Oscillator(HEAVY, 0.0, law, face), duration=0.01)
+        assert run.pieces[0].mode == mode
+
+
+def test_a_contact_with_a_mass_moves_as_an_implicit_solver_says() -> None:
+    stiffness, damping, kinetic, light = 400.0, 3.0, 1.0, 1.0
+    law = ss.laws.InertialContact(kinetic, stiffness, light, damping)
+    size, turn = 5.0 / (2 * math.pi) ** 2, 2 * math.pi
+    system = ss.Oscillator(2.0, 100.0, law, ss.drives.MultiTone([(size, 1.0, 0.0)], on="face"), damping=1.0)
+    run = ss.simulate(system, duration=1.5)
+    assert run.pieces[0].mode == "forward"  # 5 m/s^2 are more than 1 N carries
+
+    def rates(t: float, s: np.ndarray) -> list[float]:
+        x, v, y, w = s
+        force = stiffness * (x - y) + damping * (v - w)
+        rubs = kinetic * math.tanh((w + size * turn * math.sin(turn * t)) / 1e-7)
+        return [v, (-100 * x - v - force) / 2.0, w, (force - rubs) / light]
+
+    opening = run.state(0.0)
+    begin = [0.0, opening["v"], 0.0 - opening["stretch"], opening["u"]]
+    known = solve_ivp(rates, (0, 1.5), begin, "Radau", rtol=1e-9, atol=1e-12, t_eval=np.linspace(0, 1.5, 31))
+    own = run.sample(known.t, ("x", "v"))[0]
+    assert own[0] == pytest.approx(known.y[0], abs=1e-6 * np.max(np.abs(known.y[0])))
+    assert own[1] == pytest.approx(known.y[1], abs=1e-6 * np.max(np.abs(known.y[1])))

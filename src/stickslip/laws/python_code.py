@@ -12,13 +12,14 @@ from stickslip.laws.curved import FUNCTIONS, CurvedLaw, Expression
 from stickslip.laws.written import remark, written
 
 OVER_SPEED = ["back", "stuck", "forward"]  # modes of a law that the speed alone tells
-OTHERS = ("hold", "hold_rate", "delayed_speed")  # that a law may ask for beside x and v
+OTHERS = ("hold", "hold_rate", "delayed_speed", "face_acceleration")  # that a law may ask for beside x and v
 
 NOTES = {
     "hold": "hold [N]: the force that would keep the mass at rest against the counter-face, as the rest of the model "
     "has it",
     "hold_rate": "hold_rate [N/s]: how fast that changes",
     "delayed_speed": "delayed_speed [m/s]: the speed a lag ago",
+    "face_acceleration": "face_acceleration [m/s^2]: of the counter-face",
 }
 CLASS = """\
 class Friction:
