@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 import stickslip as ss
 from stickslip.laws.base import Exit, Law, Mode, Rigid
-from stickslip.solve import assembly
+from stickslip.solve import assembly, cells
 
 HEAVY = 1e15  # kg: a mass that the contact can not move, so that the counter-face imposes the motion
 
@@ -196,3 +197,30 @@ def test_a_contact_with_a_mass_moves_as_an_implicit_solver_says() -> None:
     own = run.sample(known.t, ("x", "v"))[0]
     assert own[0] == pytest.approx(known.y[0], abs=1e-6 * np.max(np.abs(known.y[0])))
     assert own[1] == pytest.approx(known.y[1], abs=1e-6 * np.max(np.abs(known.y[1])))
+
+
+@pytest.mark.parametrize("drive", [ss.drives.Release(), ss.drives.Belt(0.1), ss.drives.HarmonicForce(1.5, 0.11)])
+def test_a_load_that_is_nothing_rubs_nowhere(drive: ss.drives.Drive) -> None:
+    free = ss.Oscillator(1.0, 1.0, ss.laws.PositionLoad(0.0, gradient=0.0), drive)
+    other = free.having(law=ss.laws.Coulomb(0.0))
+    start = {"x": 0.5, "v": -0.3}
+    ends = [ss.simulate(system, duration=20, start=start).state(20) for system in (free, other)]
+    assert ends[0]["friction"] == 0.0
+    assert ends[0]["x"] == pytest.approx(ends[1]["x"], abs=1e-12)
+
+
+def test_the_exponentials_of_many_elements_are_those_of_what_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hundred elements took half a minute: each place where one holds was turned with the mass."""
+    sizes = []
+    turned = cells._exponentials
+    monkeypatch.setattr(cells, "_exponentials", lambda flow, time: sizes.append(flow.shape[1]) or turned(flow, time))
+    monkeypatch.setattr(cells, "_known_turns", {})
+    law = ss.laws.ElastoSlip.iwan(1.3e5, width=1e-3, elements=30)
+    for drive, moving in ((ss.drives.HarmonicForce(300.0, 5.1), 4), (ss.drives.Belt(0.1), 33)):
+        sizes.clear()
+        table = assembly.table_of(ss.Oscillator(1.1, 1e3, law, drive))
+        assert max(sizes) == moving
+        for mode in (0, 7, 31, 60):
+            known = expm(table.flow[mode] * table.cell[mode])
+            size = np.maximum(np.abs(known), 1e-3 * np.max(np.abs(known), axis=1, keepdims=True))
+            assert np.max(np.abs(table.hop[mode].sum(axis=0) - known) / size) < 1e-11

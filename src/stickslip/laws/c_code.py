@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
@@ -57,6 +57,12 @@ def c_code(law: Law | CurvedLaw, formula: str) -> str:
 def modes_of(law: Law | CurvedLaw) -> Modes:
     """Its modes, linear or curved."""
     return law.rates() if isinstance(law, CurvedLaw) else law.modes()
+
+
+def levels_of(mode: Mode | CurvedMode, text: Callable[[Expression], str]) -> dict[str, str]:
+    """What else a mode's exits speak of, as text."""
+    levels: Mapping[str, Expression] = getattr(mode, "levels", {})
+    return {name: f"({text(form)})" for name, form in levels.items()}
 
 
 def _require_writable(law: Law | CurvedLaw, modes: Modes) -> None:
@@ -124,7 +130,8 @@ def _leave(modes: Modes, names: Mapping[str, str]) -> str:
     for mode in modes:
         if mode.exits:
             lines.append(f"    case {_token(mode.name)}:")
-            lines += [_exit(number, exit_, named) for number, exit_ in enumerate(mode.exits)]
+            own = {**named, **levels_of(mode, lambda form: _text(form, named))}
+            lines += [_exit(number, exit_, own) for number, exit_ in enumerate(mode.exits)]
             lines.append("        break;")
     return "\n".join([
         "/* Whether the mode ends here; then the next one is set, with what it remembers. */",

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Row
-from stickslip.laws.c_code import Modes, modes_of
+from stickslip.laws.c_code import Modes, levels_of, modes_of
 from stickslip.laws.curved import FUNCTIONS, CurvedLaw, Expression
 from stickslip.laws.written import remark, written
 
@@ -111,8 +111,9 @@ def _leave(modes: Modes, names: Mapping[str, str]) -> list[str]:
     for mode in modes:
         if mode.exits:
             body.append(f"        if self.mode == {mode.name!r}:")
+            own = {**named, **levels_of(mode, lambda form: written(form, names=named))}
             for number, exit_ in enumerate(mode.exits):
-                body += _exit(number, exit_, named)
+                body += _exit(number, exit_, own)
     if any(re.search(r"\bforce\b", line) for line in body):
         lines.append("        force = self.force(x, v, OTHERS)")
     return [*lines, *body, "        return False", ""]
