@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.errors import ModelError
+from stickslip.errors import ModelError, SolveError
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from stickslip.solve.tape import Tape
 
 CHUNK = 16384  # pieces between two looks at the clock and the keyboard
-CELLS = 65536  # Taylor cells between two looks
+CELLS = 65536  # Taylor cells between two looks, of a state of up to `SMALL` entries; of larger ones less by the square
+SMALL = 8
+MOST_CELLS = 1e10  # of a run: some hours
 LISTED = 4  # pieces whose modes an error names
 PACE = 0.1  # s between two calls of progress
 
@@ -219,6 +221,7 @@ def run(
     pieces = _Log(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
     heed: Callable[[], None] | None = None
+    patience = max(1, CELLS // max(1, size // SMALL) ** 2)
     try:
         with ExitStack() as holding:
             for at, (signals, values) in stops_of(table, laps, offset):
@@ -233,13 +236,15 @@ def run(
                     if heed is None and getattr(kernel.march, "overloads", True):
                         heed = holding.enter_context(held_back())
                     outcome, count, mode, clock = kernel.march(
-                        model, before, state, mode, goal, past, pieces.room(), work, CELLS
+                        model, before, state, mode, goal, past, pieces.room(), work, patience
                     )
                     if heed is not None:
                         heed()
                     passed = until(before, clock, period)
                     pieces.keep(count, passed, total)
                     _refuse(outcome, table, state, mode, clock)
+                    if outcome == kernel.FULL and count < CHUNK:  # by its patience: it goes cell by cell
+                        _require_cells(passed / patience, total - pieces.passed, table.modes[mode].name)
                     if count > budget:
                         require_budget(
                             count - (outcome == kernel.DONE),
@@ -334,6 +339,16 @@ def _chasing(table: Tables, mode: int, state: Array) -> list[str]:
                 mode, state = int(table.target[e]), table.reset[e] @ state
                 break
     return names[-LISTED:]
+
+
+def _require_cells(cell: float, ahead: float, mode: str) -> None:
+    """Refuse a run that has more than `MOST_CELLS` ahead, by the time of one and the time that is left [s]."""
+    if ahead > MOST_CELLS * cell:
+        raise SolveError(
+            f"{ahead / cell:.2g} cells of {cell:.1e} s ahead, the last in the mode '{mode}'",
+            f"a run takes at most {MOST_CELLS:g}, some hours; a rate of the contact is far above the motion's own",
+            "simulate a shorter time, or leave out the damping or the mass that makes the contact so fast",
+        )
 
 
 def _refuse(outcome: int, table: Tables, state: Array, mode: int, clock: Clock) -> None:
