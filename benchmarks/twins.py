@@ -26,6 +26,12 @@ from stickslip.estimate import stands
 NAMES = ("sliding friction", "slope of friction against speed", "stuck share of the time", "stops per cycle")
 CLAIMS = ("dry friction", "static", "sticks", "gives way")
 RATIO, GIVES = "static over sliding friction", "presliding stiffness"
+COMPARED = {  # what has a true value of its own
+    "Stribeck": (NAMES[0], *NAMES[2:], RATIO),
+    "compliant": (NAMES[0], NAMES[1], RATIO),
+    "LuGre": (NAMES[0], RATIO),
+    "state variable": (NAMES[0],),
+}
 
 
 def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, list[bool]]) -> None:
@@ -34,16 +40,21 @@ def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, li
     for estimate in findings.estimates:
         if not estimate.known or not stands(estimate.status):
             continue
-        compared = {"compliant": (NAMES[0], NAMES[1], RATIO), "Stribeck": (NAMES[0], *NAMES[2:], RATIO)}
+        compared = {
+            "Stribeck": (NAMES[0], *NAMES[2:], RATIO),
+            "LuGre": (NAMES[0], RATIO),
+            "state variable": (NAMES[0],),
+        }
+        compared["compliant"] = (NAMES[0], NAMES[1], RATIO)
         if estimate.name in compared.get(rig.kind, (*NAMES, RATIO)) and np.isfinite(truth[estimate.name]):
             tally[estimate.name].append(estimate.includes(truth[estimate.name]))
         if estimate.name == GIVES:
-            tally["claim: gives way"].append(rig.kind == "compliant")
-            if rig.kind == "compliant":
+            tally["claim: gives way"].append(rig.kind in stepped.SOFT)
+            if rig.contact:
                 tally[GIVES].append(estimate.includes(rig.contact))
         if estimate.name == RATIO and estimate.interval[0] > 1:
             tally["claim: static"].append(truth[RATIO] > 1)
-        if estimate.name == NAMES[2] and estimate.interval[0] > 0 and rig.kind != "compliant":
+        if estimate.name == NAMES[2] and estimate.interval[0] > 0 and rig.kind not in stepped.SOFT:
             tally["claim: sticks"].append(truth[NAMES[2]] > 0)
         if estimate.name == NAMES[0] and estimate.interval[0] > 0:
             tally["claim: dry friction"].append(rig.kinetic > 0)

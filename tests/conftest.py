@@ -15,6 +15,9 @@ from stickslip.errors import StickslipError
 # Tests read local copies alone: with the variable set, the room never touches the network.
 os.environ.setdefault("STICKSLIP_DATA", str(Path(__file__).resolve().parents[2] / "shared" / "data"))
 
+# The program tries its answers on 40 twins unless told otherwise, which takes seconds: test_twin.py asks for them.
+os.environ.setdefault("STICKSLIP_TWINS", "0")
+
 # The same examples in every run: a change is what makes a test fail, not chance.
 # pytest --hypothesis-profile=default looks further.
 settings.register_profile("same", derandomize=True, deadline=None)

@@ -14,12 +14,18 @@ import numpy as np
 import stickslip as ss
 
 STEPS = 16  # in a sample: the displacement is then right to 1e-9 of its amplitude
-KINDS = ("Coulomb", "static", "Stribeck", "compliant", "viscous", "none")
+KINDS = ("Coulomb", "static", "Stribeck", "compliant", "LuGre", "state variable", "viscous", "none")
+SOFT = ("compliant", "LuGre", "state variable")  # contacts that do not stick: no stops are counted of them
+STILL = 1e-4  # of the base's velocity: where the state variable's backbone turns over
 
 
 @dataclass(frozen=True)
 class Rig:
-    """A mass on a spring, shaken at its base: (kinetic + drop exp(-|v|/speed)) sgn v + slope v, or a spring."""
+    """A mass on a spring, shaken at its base: (kinetic + drop exp(-|v|/speed)) sgn v + slope v, a spring, or a memory.
+
+    LuGre's bristles have the stiffness `contact` and fall as Stribeck's curve of exponent 2; the state variable's force
+    follows Coulomb's at the `rate` [1/s].
+    """
 
     kind: str
     mass: float
@@ -32,6 +38,7 @@ class Rig:
     slope: float = 0.0
     speed: float = 0.0
     contact: float = 0.0
+    rate: float = 0.0
 
     @property
     def stated(self) -> dict[str, float]:
@@ -119,23 +126,61 @@ def _compliant(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     return out, 0.0, 0
 
 
+@numba.njit
+def _remembering(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
+    """The same of a friction that remembers: its own equation solved exactly in each step, at the step's velocity."""
+    m, k, c, amplitude, w, kinetic, static, _, speed, stiffness, rate = p
+    out = np.zeros((3, samples))
+    x, v, t, f = 0.0, 0.0, 0.0, 0.0
+    for number in range((settle + samples - 1) * steps + 1):
+        a = (k * (amplitude * np.sin(w * t) - x) - c * v - f) / m
+        row = number // steps - settle
+        if number % steps == 0 and row >= 0:
+            out[0, row], out[1, row], out[2, row] = x, v, a
+        half_v = v + h / 2 * a
+        x += h * half_v
+        t += h
+        if stiffness > 0:  # f' = stiffness (v - |v| f / level)
+            level = kinetic + (static - kinetic) * np.exp(-((half_v / speed) ** 2))
+            towards, quick = level * np.sign(half_v), stiffness * abs(half_v) / level
+        else:
+            towards, quick = kinetic * np.tanh(half_v / (STILL * amplitude * w)), rate
+        f = towards + (f - towards) * np.exp(-quick * h)
+        v = (half_v + h / 2 * (k * (amplitude * np.sin(w * t) - x) - f) / m) / (1 + h / 2 * c / m)
+    return out, 0.0, 0
+
+
+def _written(values: np.ndarray, gain: float, level: float, rng: np.random.Generator, *, dirty: bool) -> np.ndarray:
+    """A sensor's: with noise and a gain; a dirty one with an offset, a drift, and counts of 12 bits, too."""
+    own = gain * values + level * rng.standard_normal(len(values))
+    if not dirty:
+        return own
+    size = float(np.ptp(values))
+    own += size * (rng.uniform(-0.2, 0.2) + rng.uniform(-0.02, 0.02) * np.linspace(0, 1, len(values)))
+    count = 1.5 * size / 4096
+    return count * np.round(own / count)
+
+
 def record(rig: Rig, rng: np.random.Generator, *, noise: float = 1e-3, cycles: int = 10, off: float = 0.0) -> ss.Record:
-    """What its sensors write of it: x and z with noise (a share of the base's amplitude) and gains off by chance."""
+    """What its sensors write of it: x and z with noise (a share of the base's amplitude), dirty where gains are off."""
     fs = float(np.clip(400 * rig.frequency, 200, 5000))
     cycle = fs / rig.frequency
     samples, settle = round(cycles * cycle), round(30 * cycle)
     p = np.array([
         rig.mass, rig.stiffness, rig.damping, rig.amplitude, 2 * np.pi * rig.frequency, rig.kinetic,
-        max(rig.static, rig.kinetic), rig.slope, rig.speed, rig.contact,
+        max(rig.static, rig.kinetic), rig.slope, rig.speed, rig.contact, rig.rate,
     ])  # fmt: skip
-    march, steps = (_compliant, 20 * STEPS) if rig.kind == "compliant" else (_rigid, STEPS)
+    march = {"compliant": _compliant, "LuGre": _remembering, "state variable": _remembering}.get(rig.kind, _rigid)
+    steps = 20 * STEPS if rig.kind in SOFT else STEPS
     (x, _, _), held, stops = march(p, samples, settle, 1 / (fs * steps), steps)
     time = (settle + np.arange(samples)) / fs
     z = rig.amplitude * np.sin(2 * np.pi * rig.frequency * time)
     gains = 1 + off * rng.standard_normal(2)
     level = noise * rig.amplitude
-    written = {name: gain * values + level * rng.standard_normal(samples)
-               for name, gain, values in zip("xz", gains, (x, z), strict=True)}  # fmt: skip
+    written = {
+        name: _written(values, gain, level, rng, dirty=off > 0)
+        for name, gain, values in zip("xz", gains, (x, z), strict=True)
+    }
     truth: dict[str, Any] = {
         "sliding friction": rig.kinetic, "slope of friction against speed": rig.slope,
         "stuck share of the time": held * fs / samples, "stops per cycle": stops * cycle / samples,
@@ -155,12 +200,14 @@ def drawn(kind: str, rng: np.random.Generator) -> Rig:
     kinetic, more = {}, {}
     if kind not in ("viscous", "none"):
         kinetic = {"kinetic": pull * rng.uniform(0.1, 0.6)}
-    if kind in ("static", "Stribeck"):
+    if kind in ("static", "Stribeck", "LuGre"):
         more["static"] = kinetic["kinetic"] * rng.uniform(1.1, 1.6)
-    if kind == "Stribeck":
+    if kind in ("Stribeck", "LuGre"):
         more["speed"] = rng.uniform(0.05, 0.3) * amplitude * 2 * np.pi * frequency
     if kind == "viscous":
         more["slope"] = rng.uniform(0.1, 0.5) * np.sqrt(stiffness * mass)
-    if kind == "compliant":
+    if kind in ("compliant", "LuGre"):
         more["contact"] = stiffness * rng.uniform(5, 50)
+    if kind == "state variable":
+        more["rate"] = 2 * np.pi * frequency * rng.uniform(3, 30)
     return Rig(**{**vars(begun), **kinetic, **more})

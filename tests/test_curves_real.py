@@ -23,7 +23,7 @@ def emps(dataset: Sets) -> ss.Record:
 
 @pytest.mark.parametrize(("symmetric", "published", "most"), [(True, SYMMETRIC, 0.0412), (False, UNEVEN, 0.0312)])
 def test_emps_as_published(dataset: Sets, symmetric: bool, published: dict[str, float], most: float) -> None:
-    found = ss.regress_friction(emps(dataset), symmetric=symmetric)
+    found = ss.cycle.regress_friction(emps(dataset), symmetric=symmetric)
     assert found.residual <= most
     for name, value in published.items():
         assert getattr(found, name).value == pytest.approx(value, rel=0.01)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import json
 import math
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -118,3 +120,14 @@ def test_a_poisoned_description_is_one_sentence(
     path = ss.write_record(record, tmp_path / f"kept{suffix}")
     with contextlib.suppress(ss.StickslipError):  # what does not fit is refused, or not believed and read anew
         assert ss.read_record(path).history[-1].action == "read_record"
+
+
+def test_a_record_is_pickled_and_copied_read_only() -> None:
+    record = Record.of({"x": [0.0, 1.0, 0.0, -1.0]}, fs=4.0, truth={"mass": 1.0})
+    for again in (pickle.loads(pickle.dumps(record)), copy.deepcopy(record)):
+        assert (again["x"] == record["x"]).all()
+        assert (dict(again.channels), again.history, again.truth) == (
+            dict(record.channels), record.history, record.truth,
+        )  # fmt: skip
+        with pytest.raises(ValueError, match="read-only"):
+            again["x"][0] = 1.0

@@ -124,6 +124,12 @@ def test_the_same_seed_gives_the_same_answers() -> None:
     assert first.loops.level.interval != other.loops.level.interval
 
 
+def test_two_processes_give_what_one_gives() -> None:
+    quick, _ = asked(SLIDES)
+    alone, together = (ss.tried(quick, twins=8, processes=count) for count in (1, 2))
+    assert [str(e) for e in alone.estimates] == [str(e) for e in together.estimates]
+
+
 def test_a_record_without_a_twin_is_refused_in_a_sentence() -> None:
     time = np.arange(4000) / 500
     v = np.cos(2 * np.pi * time)
@@ -136,15 +142,37 @@ def test_a_record_without_a_twin_is_refused_in_a_sentence() -> None:
         ss.tried(quick, twins=3)
 
 
-def test_the_command_tries_and_tells(tmp_path: Path) -> None:
-    path = tmp_path / "slides.csv"
+def command(folder: Path, *options: str) -> list[str]:
+    """Analyse a record of the rig that slides."""
+    path = folder / "slides.csv"
     ss.write_record(stepped.record(SLIDES, np.random.default_rng(11)), path)
-    words = ["analyze", str(path), "--twins", "8", "--output", str(tmp_path / "out"), "--json"]
-    for name, value in SLIDES.stated.items():
-        words += [f"--{name}", str(value)]
-    result = CliRunner().invoke(main, words)
+    constants = [f"--{name}={value}" for name, value in SLIDES.stated.items()]
+    return ["analyze", str(path), "--twins", "8", "--output", str(folder / "out"), *constants, *options]
+
+
+def test_the_command_tries_and_tells(tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, command(tmp_path, "--json"))
     assert result.exit_code == 0, result.output
     told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
     assert told["twins"]["count"] == 8
     assert (tmp_path / "out" / "figures" / "twin.png").exists()
     assert any(note.startswith("Tried on 8 twins") for note in told["notes"])
+
+
+@pytest.mark.parametrize("output", [True, False])
+def test_an_interrupt_leaves_the_quick_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, output: bool) -> None:
+    def interrupted(*arguments: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("stickslip.tried", interrupted, raising=False)
+    words = command(tmp_path, "--json")
+    if not output:
+        words = [word for word in words if word not in ("--output", str(tmp_path / "out"))]
+    result = CliRunner().invoke(main, words)
+    assert (tmp_path / "out" / "report.html").exists() is output
+    if output:
+        assert result.exit_code == 130
+        assert "quick answers, not tried on twins" in result.stderr
+        assert "twins" not in json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
+    else:
+        assert result.exit_code != 0

@@ -21,6 +21,7 @@ from stickslip import solve as solve
 from stickslip import squeak as squeak
 from stickslip import story as story
 from stickslip import systems as systems
+from stickslip import twin as twin
 from stickslip.answers.comparison import compare as compare
 from stickslip.answers.decays import analyze_decay as analyze_decay
 
@@ -31,7 +32,6 @@ from stickslip.answers.squeaks import analyze_squeaks as analyze_squeaks
 from stickslip.balance.force import friction_force as friction_force
 from stickslip.contact.contact import contact_stiffness as contact_stiffness
 from stickslip.cycle.loops import friction_loops as friction_loops
-from stickslip.cycle.regression import regress_friction as regress_friction
 from stickslip.cycle.sticks import find_sticks as find_sticks
 from stickslip.decay.decrement import decrement as decrement
 from stickslip.decay.fit_decay import fit_decay as fit_decay

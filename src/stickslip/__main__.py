@@ -1,5 +1,6 @@
 """The program's door: ``stickslip`` and ``python -m stickslip``."""
 
+import os
 import sys
 
 from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
@@ -7,6 +8,8 @@ from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
 
 def main() -> None:
     """Run the command line; Ctrl-C ends it in one sentence, while it is still being loaded too."""
+    # read as numpy is imported: the matrices here are small, and threads that wait for each other take thrice as long
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from stickslip.cli.program import main as program
 

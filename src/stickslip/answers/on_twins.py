@@ -16,22 +16,28 @@ from stickslip.cycle.onset import Breakaway, breakaway
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import StickslipError
 from stickslip.estimate import Estimate, Result
-from stickslip.record.record import Record
+from stickslip.record.record import Record, StatedRig
 from stickslip.twin.search import believe
 from stickslip.twin.trial import GIVES, Trial, try_on_twins
+from stickslip.workers import workers
 
 Answer = TypeVar("Answer", Loops | None, Sticks | None, Breakaway | None)
 ASKED = (friction_loops, find_sticks, breakaway, presliding)
 
 
 def tried(
-    findings: Findings, *, twins: int = 40, rng: int = 0, progress: Callable[[float], None] = lambda share: None
+    findings: Findings,
+    *,
+    twins: int = 40,
+    rng: int = 0,
+    processes: int = 1,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> Findings:
     r"""What of an analysis holds on rigs that the record may come from, whose truth is known?
 
     The rig that the record is believed to come from (:func:`~stickslip.twin.believe`) writes so many records of its
-    own, and is asked the same questions (:func:`~stickslip.twin.try_on_twins`): the bias of each answer is taken off,
-    its interval is what the twins' errors leave, and a static friction above the sliding one is claimed only where
+    own, and is asked the same questions (:class:`~stickslip.twin.Trial`): the bias of each answer is taken off, its
+    interval is what the twins' errors leave, and a static friction above the sliding one is claimed only where
     twins without it would not have shown it.
 
     Parameters
@@ -41,7 +47,10 @@ def tried(
     twins : int
         How many are asked, eight at least.
     rng : int
-        Seed: the same one gives the same answers.
+        Seed: the same one gives the same answers, by any number of processes.
+    processes : int
+        Processes that ask the twins. With more than one a script must begin under ``if __name__ == "__main__":``, as
+        Python's `multiprocessing` says.
     progress : callable, optional
         Called with the share done.
 
@@ -67,9 +76,11 @@ def tried(
     >>> sure.breakaway.ratio.known  # what such a record says of static friction its twins without any say too
     False
     """
-    belief = believe(findings.record)
     answers = {estimate.name: estimate for estimate in findings.estimates}
-    trial = try_on_twins(belief, answers, partial(_ask, like=findings.record), count=twins, rng=rng, progress=progress)
+    with workers(processes, __name__) as mapped:  # they are ready when the rig is found
+        belief = believe(findings.record, mapped=mapped)
+        ask = partial(_ask, stated=belief.record.rig)
+        trial = try_on_twins(belief, answers, ask, count=twins, rng=rng, progress=progress, mapped=mapped)
     answered = findings.having(
         loops=_with(findings.loops, trial.estimates),
         sticks=_with(findings.sticks, trial.estimates),
@@ -128,9 +139,8 @@ def _telling(quick: Presliding, verdict: str, why: str, stiffness: Estimate | No
     )  # fmt: skip
 
 
-def _ask(record: Record, *, like: Record) -> dict[str, Estimate]:
+def _ask(record: Record, *, stated: StatedRig | None) -> dict[str, Estimate]:
     """The answers of a twin, found as those of its record were."""
-    stated = like.rig
     assert stated is not None  # it was believed in
     record = friction_force(record, method=stated.method, **stated.constants)
     answers: dict[str, Estimate] = {}

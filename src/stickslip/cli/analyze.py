@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import stickslip as ss
+from stickslip.cli.interrupted import INTERRUPTED
 from stickslip.cli.options import reading_options, result_options, usable
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
@@ -22,6 +24,24 @@ from stickslip.cli.records import (
     with_left_out,
 )
 from stickslip.cli.show import show
+from stickslip.cli.terminal import complain
+from stickslip.workers import processors
+
+if TYPE_CHECKING:
+    from stickslip.answers import Comparison, Findings
+
+
+twins_option = click.option(
+    "--twins",
+    type=click.IntRange(min=0),
+    default=40,
+    show_default=True,
+    envvar="STICKSLIP_TWINS",
+    show_envvar=True,
+    metavar="N",
+    help="Try the answers on N simulated rigs that may have written the record: their bias is taken off, and nothing "
+    "is claimed that rigs without it show too. 0 for the quick answers, which are written first.",
+)
 
 
 @click.command()
@@ -44,14 +64,7 @@ from stickslip.cli.show import show
     show_default=True,
     help="How the friction is found: by all sensors together (fusion), by some, or by derivatives; auto says why.",
 )
-@click.option(
-    "--twins",
-    type=click.IntRange(min=0),
-    default=0,
-    metavar="N",
-    help="Try the answers on N simulated rigs that may have written the record (40 is good): their bias is taken off, "
-    "and nothing is claimed that rigs without it show too. 0 for the quick answers.",
-)
+@twins_option
 @result_options("FILE-stickslip")
 @reading_options
 def analyze(
@@ -76,23 +89,51 @@ def analyze(
         found, refused = answers(
             groups,
             rig,
-            lambda record: _tried(ss.analyze(record, rig=rig, method=method), twins, tell),
+            lambda record: ss.analyze(record, rig=rig, method=method),
             tell,
             of_parts=lambda parts, say: ss.answers.analyze_blocks(parts, rig=rig, method=method, progress=say),
         )
-        results = with_left_out(ss.compare(found) if len(found) > 1 else found[0], refused)
+
+        def told(findings: list[Findings]) -> Findings | Comparison:
+            return with_left_out(ss.compare(findings) if len(findings) > 1 else findings[0], refused)
+
         tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if output or not as_json else None
+        results, written = _sure(found, twins, told, folder if output or not as_json else None, tell)
     name_left_out(refused)
     show(results, written, as_json=as_json)
 
 
-def _tried(findings: ss.answers.Findings, twins: int, tell: Callable[..., None]) -> ss.answers.Findings:
-    """The answers as their twins leave them; with a note of why, where the record has no twin."""
+def _sure(
+    found: list[Findings],
+    twins: int,
+    told: Callable[[list[Findings]], Findings | Comparison],
+    folder: Path | None,
+    tell: Callable[..., None],
+) -> tuple[Findings | Comparison, Path | None]:
+    """The results, tried on twins and written; the quick ones are written first, and stay where that is interrupted."""
+    written = folder and ss.publish(told(found), folder=folder)
     if not twins:
-        return findings
+        return told(found), written
     try:
-        return ss.tried(findings, twins=twins, progress=lambda share: tell(f"asking twins, {100 * share:.0f} %"))
+        results = told([_tried(findings, twins, tell) for findings in found])
+        tell("drawing and writing")
+        return results, folder and ss.publish(results, folder=folder)
+    except KeyboardInterrupt:
+        if written is None:
+            raise
+        complain(f"interrupted: {written} has the quick answers, not tried on twins.")
+        sys.exit(INTERRUPTED)
+
+
+def _tried(findings: Findings, twins: int, tell: Callable[..., None]) -> Findings:
+    """The answers as their twins leave them; with a note of why, where the record has no twin."""
+
+    def asked(share: float) -> None:
+        tell(f"trying the answers of {findings.name} on twins, {100 * share:.0f} %")
+
+    asked(0.0)
+    try:
+        return ss.tried(findings, twins=twins, processes=processors(), progress=asked)
     except ss.errors.EstimateError as error:
         return replace(findings, notes=(*findings.notes, f"Twins: {error}"))
 
@@ -108,7 +149,8 @@ def _tried(findings: ss.answers.Findings, twins: int, tell: Callable[..., None])
     help="Folder for the results.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
-def demo(output: Path, as_json: bool) -> None:
+@twins_option
+def demo(output: Path, as_json: bool, twins: int) -> None:
     """Analyse the bundled record of a simulated rig, with the true answers beside the estimates."""
     with progress(3) as tell:
         tell("reading the bundled record", 0)
@@ -117,5 +159,5 @@ def demo(output: Path, as_json: bool) -> None:
         constants = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
         findings = ss.analyze(record, **constants)
         tell("drawing and writing", 2)
-        written = ss.publish(findings, folder=output)
-    show(findings, written, as_json=as_json)
+        results, written = _sure([findings], twins, lambda found: found[0], output, tell)
+    show(results, written, as_json=as_json)

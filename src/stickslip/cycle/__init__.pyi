@@ -5,6 +5,7 @@ from stickslip.cycle.onset import breakaway as breakaway
 from stickslip.cycle.parts import Stretch as Stretch
 from stickslip.cycle.parts import join_sticks as join_sticks
 from stickslip.cycle.parts import overlapping as overlapping
+from stickslip.cycle.regression import regress_friction as regress_friction
 from stickslip.cycle.slips import SlipRinging as SlipRinging
 from stickslip.cycle.slips import slip_ringing as slip_ringing
 from stickslip.cycle.sticks import StickEvent as StickEvent

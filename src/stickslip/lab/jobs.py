@@ -19,6 +19,7 @@ from typing import Any
 from starlette.exceptions import HTTPException
 
 from stickslip.lab.task import ANSWER, ASK
+from stickslip.workers import processors
 
 LONGEST_ANSWER = 64 << 20  # bytes
 LONGEST_LINE = 1 << 16
@@ -49,7 +50,7 @@ class Limits:
     processor: float = 1800.0
     wall: float = 3600.0
     written: int = 1 << 30
-    at_once: int = os.cpu_count() or 2
+    at_once: int = processors()
     waiting: int = 64
     kept: int = 64
 

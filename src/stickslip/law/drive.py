@@ -24,6 +24,7 @@ HARMONICS = 5
 AS_GOOD = 1.15  # times its noise that a sum of tones may stray from what was measured
 COARSE = (128, 64, 32, 16, 8, 4, 2)  # samples from knot to knot of a motion without tones, tried in turn
 NEAR = 0.3  # of its noise by which the knots may miss it
+DRIFT = 0.1  # of a tone: what a sensor may drift in a record; more of it is a motion
 SURE = 1e-9  # of a drive, that is never surer
 
 
@@ -175,8 +176,9 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
         best = minimize_scalar(left, bounds=(coarse - 0.5 / span, coarse + 0.5 / span), method="bounded",
                                options={"xatol": 1e-9 * coarse})  # fmt: skip
         found, rest = _fitted(values, time, float(best.x), count)
-        if rest <= allowed:
-            sizes, angles = np.hypot(found[1::2], found[2::2]), np.arctan2(-found[2::2], found[1::2])
+        cosines, sines = found[1:-1:2], found[2:-1:2]
+        sizes, angles = np.hypot(cosines, sines), np.arctan2(-sines, cosines)
+        if rest <= allowed and abs(found[-1]) <= DRIFT * sizes[0]:
             return tuple(
                 (float(a), (j + 1) * float(best.x), float(p))
                 for j, (a, p) in enumerate(zip(sizes, angles, strict=True))
@@ -186,8 +188,9 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
 
 def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, float]:
     waves = np.cumprod(np.tile(np.exp(2j * np.pi * frequency * time)[:, None], count), axis=1)
-    columns = np.ones((len(time), 2 * count + 1))
-    columns[:, 1::2], columns[:, 2::2] = waves.real, waves.imag
+    columns = np.ones((len(time), 2 * count + 2))
+    columns[:, 1:-1:2], columns[:, 2:-1:2] = waves.real, waves.imag
+    columns[:, -1] = np.linspace(-0.5, 0.5, len(time))
     found = np.linalg.solve(columns.T @ columns, columns.T @ values)
     return np.asarray(found), float(np.sqrt(np.mean((values - columns @ found) ** 2)))
 

@@ -6,8 +6,6 @@ run again.
 
 from __future__ import annotations
 
-import os
-import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
@@ -19,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from stickslip.errors import ModelError, SolveError
 from stickslip.maps.block import run_block
 from stickslip.maps.plan import Keep, Plan, required
+from stickslip.workers import processors, unheard
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -42,7 +41,7 @@ def threads(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None 
     The kernels let go of Python's lock while they march. No more blocks are under way than twice the threads, so that
     memory stays flat; on an interrupt those not begun are dropped and those under way are kept.
     """
-    count = int(address) if address else _processors()
+    count = int(address) if address else processors()
     left = iter(numbers)
     with ThreadPoolExecutor(count, "sweep") as pool:
         running = {pool.submit(run_block, plan, number): number for number in islice(left, 2 * count)}
@@ -56,11 +55,6 @@ def threads(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None 
                 if not task.cancel():
                     keep(number, *task.result())
             raise
-
-
-def _processors() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def on_gpu(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None = None) -> None:
@@ -105,11 +99,6 @@ def _run(plan: Plan, number: int) -> tuple[int, Any, Any]:
     return (number, *run_block(plan, number))
 
 
-def _unheard() -> None:
-    """Leave Ctrl-C, which a terminal sends to every process, to the one that asks: it ends its workers."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 @contextmanager
 def _client(address: str | None) -> Iterator[Client]:
     """A cluster of one's own, or the one that stands at an address."""
@@ -122,7 +111,7 @@ def _client(address: str | None) -> Iterator[Client]:
             ) as cluster,
             distributed.Client(cluster) as client,
         ):
-            client.run(_unheard)
+            client.run(unheard)
             yield client
         return
     _require_port(address)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -195,6 +195,12 @@ class Record:
         object.__setattr__(self, "truth", MappingProxyType(dict(self.truth)))
         if self.stamps is not None:
             object.__setattr__(self, "stamps", _frozen(self.stamps))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle and copy, which can not follow a mapping that is read-only: made again from its fields."""
+        own = {field.name: getattr(self, field.name) for field in fields(self)}
+        plain = [dict(value) if isinstance(value, MappingProxyType) else value for value in own.values()]
+        return type(self), tuple(plain)
 
     @classmethod
     def of(

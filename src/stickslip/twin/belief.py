@@ -193,18 +193,17 @@ class Belief:
                 apart = self.at(**part).moved - still
             except StickslipError:
                 return None
-            apart -= apart.mean()
+            apart = levelled(apart)
             apart -= fit.jacobian @ (fit.gain @ apart)
             if float(apart @ apart) > deviations**2 * fit.weight:
                 return part
         return None
 
-    def told_by(self, record: Record) -> Belief:
-        """The rig that a record of a twin would have been believed to come from, by the same linear fit."""
+    def told_by(self, x: Array) -> Belief:
+        """The rig that a twin would have been believed to be by its displacement, by the same linear fit."""
         if self.fit is None:
             return self
-        left = record["x"] - self.moved
-        return self.by(self.fit.names, self.fit.gain @ (left - left.mean()))
+        return self.by(self.fit.names, self.fit.gain @ levelled(x - self.moved))
 
     @cached_property
     def moved(self) -> Array:
@@ -219,9 +218,8 @@ class Belief:
 
     @cached_property
     def residual(self) -> Array:
-        """What it leaves of the measured displacement, but for its mean [m]."""
-        left = self.record["x"] - self.moved
-        return np.asarray(left - left.mean())
+        """What it leaves of the measured displacement, levelled [m]."""
+        return levelled(self.record["x"] - self.moved)
 
     @property
     def sensor(self) -> Sensor:
@@ -277,6 +275,12 @@ class Belief:
         return written
 
 
+def levelled(values: Array) -> Array:
+    """Columns less their means and straight lines: the offset and the drift of a sensor are no motion."""
+    line = np.linspace(-1.0, 1.0, len(values))
+    return np.asarray(values - values.mean(axis=0) - np.multiply.outer(line, line @ values / (line @ line)))
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """How the values of a belief were found: linear in their neighbourhood.
@@ -286,7 +290,7 @@ class Fit:
     names : tuple of str
         What was moved.
     jacobian : ndarray, shape (samples, values)
-        How x, less its mean, changes with each value.
+        How x, levelled, changes with each value.
     gain : ndarray, shape (values, samples)
         By how much each value changes with each sample of x.
     pull : ndarray, shape (values,)

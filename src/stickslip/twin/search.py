@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,9 @@ from stickslip.twin.belief import (
     SPRING,
     Belief,
     Fit,
+    levelled,
 )
+from stickslip.workers import Map
 
 Array = NDArray[np.float64]
 
@@ -62,7 +65,7 @@ SPEEDS = (0.03, 0.1, 0.3)
 LEVELS = (0.8, 0.9, 1.0)  # of the friction that a law without a fall in speed would have
 
 
-def believe(record: Record) -> Belief:
+def believe(record: Record, *, mapped: Map = map) -> Belief:
     r"""Which rig would have written this record?
 
     The law is the simplest that the record leaves possible. It begins as :math:`f = f_k\,\mathrm{sgn}\,v + s\,v`, by
@@ -78,6 +81,8 @@ def believe(record: Record) -> Belief:
     record : Record
         With x, what moved it (z or force), and the friction by :func:`~stickslip.friction_force` from a stated mass and
         spring.
+    mapped : callable, optional
+        As `map`, where several processes try the laws.
 
     Returns
     -------
@@ -124,7 +129,9 @@ def believe(record: Record) -> Belief:
     start = {"x": float(record["x"][0]), "v": float(record["v"][0])}
     values = {**start, **dict.fromkeys(unsure, 0.0), **_sliding(record, stated.contact)}
     begun = Belief(record, oscillator, values, drive, Rig(tuple(_sensors(record))), unsure)
-    return _needed(_richer(_needed(_nearest(begun), SLOPE, KINETIC)), SLOPE)
+    # where the sensor has an offset, the rest position is nearer to its mean than to its zero
+    begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=_left)
+    return _needed(_richer(_needed(_nearest(begun), SLOPE, KINETIC), mapped), SLOPE)
 
 
 def _needed(belief: Belief, *parts: str) -> Belief:
@@ -145,11 +152,10 @@ def _stands_out(belief: Belief, part: str) -> bool:
     return abs(belief.values[part]) > float(stdtrit(fit.freedom, 1 - CHANCE / 2)) * fit.sd(part)
 
 
-def _richer(simple: Belief) -> Belief:
+def _richer(simple: Belief, mapped: Map) -> Belief:
     """With the parts that leave the least of the displacement, where that is less than chance would leave."""
     best, least = simple, CHANCE
-    for starts in _parts(simple.beginning()):
-        richer = _best(starts, simple.record)
+    for richer in mapped(partial(_best, record=simple.record), _parts(simple.beginning())):
         chance = _by_chance(simple, richer)
         if chance < least or (chance == least and _left(richer) < _left(best)):
             best, least = richer, chance
@@ -257,8 +263,7 @@ def _linearised(belief: Belief) -> Belief:
     names = tuple(name for name, slope in slopes.items() if slope.any())  # what moves nothing can not be told
     if not names:
         raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")
-    jacobian = np.column_stack([slopes[name] for name in names])
-    jacobian -= jacobian.mean(axis=0)
+    jacobian = levelled(np.column_stack([slopes[name] for name in names]))
     independent = len(residual) / correlation_time(residual)
     freedom = max(1.0, independent - len(names))
     weight = float(residual @ residual) / freedom

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,9 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
 from stickslip.statistics import student
-from stickslip.twin.belief import EXCESS, GIVE, KINETIC, SLOPE, Belief
+from stickslip.twin.belief import EXCESS, GIVE, KINETIC, SLOPE, Belief, levelled
 from stickslip.twin.search import CHANCE
+from stickslip.workers import Map
 
 Array = NDArray[np.float64]
 Answers = Mapping[str, Estimate]
@@ -118,6 +120,7 @@ def try_on_twins(
     count: int = 40,
     rng: int = 0,
     progress: Callable[[float], None] = lambda share: None,
+    mapped: Map = map,
 ) -> Trial:
     r"""What of these answers would rigs whose truth is known have given too?
 
@@ -143,6 +146,8 @@ def try_on_twins(
         Seed: the same one gives the same answers.
     progress : callable, optional
         Called with the share done.
+    mapped : callable, optional
+        As `map`, where the twins are asked by several processes; `ask` must be picklable then.
 
     Returns
     -------
@@ -156,8 +161,17 @@ def try_on_twins(
     if count < 8:
         raise EstimateError(f"{count} twins", "an interval needs eight at least", "ask for 40")
     frequency = answers[FREQUENCY].value if FREQUENCY in answers else math.nan
-    twins = _asked(belief, ask, count, rng, frequency, progress)
-    strays = _strays(belief, [twin.record for twin in twins])
+    twins, seeds = [], np.random.SeedSequence(rng).spawn(count)
+    for number, twin in enumerate(mapped(partial(_asked, belief, ask, frequency), seeds), start=1):
+        twins += [twin] if twin is not None else []
+        progress(number / count)
+    if len(twins) < max(8, ANSWERED * count):
+        raise EstimateError(
+            f"{len(twins)} of {count} twins could be asked",
+            "an answer is tried on most of its twins",
+            "take the quick answers",
+        )
+    strays = _strays(belief, twins)
     tried = {}
     for name in ASKED:
         if name in answers and answers[name].known:
@@ -174,39 +188,23 @@ def try_on_twins(
 
 @dataclass(frozen=True, eq=False)
 class _Twin:
-    rig: Belief
-    record: Record
+    values: Mapping[str, float]  # of its rig
+    x: Array
     answers: Answers
     truth: Mapping[str, float]
 
 
 def _asked(
-    belief: Belief,
-    ask: Callable[[Record], Answers],
-    count: int,
-    rng: int,
-    frequency: float,
-    progress: Callable[[float], None],
-) -> list[_Twin]:
-    """The twins' records, answers and truths."""
-    twins: list[_Twin] = []
-    refusal: StickslipError | None = None
-    for number, seed in enumerate(np.random.SeedSequence(rng).spawn(count)):
-        chance = np.random.default_rng(seed)
-        drawn = belief.drawn(chance)
-        try:
-            record = drawn.twin(chance)
-            twins.append(_Twin(drawn, record, ask(record), _truth(drawn, record, frequency)))
-        except StickslipError as error:  # a twin that can not be followed tells nothing; most of them must be
-            refusal = error
-        progress((number + 1) / count)
-    if len(twins) < max(8, ANSWERED * count):
-        raise EstimateError(
-            f"{len(twins)} of {count} twins could be asked" + (f" ({refusal.value})" if refusal else ""),
-            "an answer is tried on most of its twins",
-            "take the quick answers",
-        )
-    return twins
+    belief: Belief, ask: Callable[[Record], Answers], frequency: float, seed: np.random.SeedSequence
+) -> _Twin | None:
+    """A twin, with its answers and its truth; None of one that can not be followed: it tells nothing."""
+    chance = np.random.default_rng(seed)
+    drawn = belief.drawn(chance)
+    try:
+        record = drawn.twin(chance)
+        return _Twin(drawn.values, record["x"], ask(record), _truth(drawn, record, frequency))
+    except StickslipError:
+        return None
 
 
 def _truth(rig: Belief, record: Record, frequency: float) -> dict[str, float]:
@@ -269,7 +267,7 @@ def _fitted(
     if not math.isfinite(value(belief) + reach):
         words = Doubt("the motion does not depend on it, so that the record tells nothing of it", UNFELT)
         return replace(quick.unknown(Status(words)), method=f"fit to x, {len(twins)} twins")
-    errors = np.array([value(belief.told_by(twin.record)) - value(twin.rig) for twin in twins])
+    errors = np.array([value(belief.told_by(twin.x)) - value(belief.at(**twin.values)) for twin in twins])
     least, (low, high) = _less_bias(value(belief), errors, strays)
     interval = (low - reach if part == SLOPE else low, high + reach)
     if quick.known and (strays > UNLIKE or belief.falls):  # a line, where a real one is a curve
@@ -321,12 +319,11 @@ def _estimate(
     return tried if quick.name == FALL else tried.within(0.0, 1.0 if quick.name == SHARE else math.inf)
 
 
-def _strays(belief: Belief, twins: list[Record]) -> float:
+def _strays(belief: Belief, twins: list[_Twin]) -> float:
     """How much more x strays from its nearest rig than a twin's does from its own, which noise alone parts."""
     if belief.fit is None:
         return math.inf
-    apart = np.array([twin["x"] - belief.moved for twin in twins]).T
-    apart -= apart.mean(axis=0)
+    apart = levelled(np.array([twin.x - belief.moved for twin in twins]).T)
     apart -= belief.fit.jacobian @ (belief.fit.gain @ apart)
     explained = float(np.mean(apart**2))
     return float(np.std(belief.residual)) / math.sqrt(explained) if explained > 0 else math.inf
