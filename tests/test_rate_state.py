@@ -118,3 +118,12 @@ def test_a_leap_that_comes_to_no_number_has_failed() -> None:
     stages = collocation.room(table.nodes.most, size, table.physical)
     stages.values[:] = math.nan
     assert collocation.settle(model, 0, np.zeros(size), 1.0, np.ones(size), stages) == math.inf
+
+
+def test_a_mass_carried_along_by_a_face_that_shakes_takes_long_steps() -> None:
+    """Implicit steps began with a velocity, not with a slip, and failed on such a face: 19 million small ones."""
+    law = ss.laws.RateState(20.0, 0.6, 0.063, 0.089, distance=2.4e-5, reference=0.025)
+    face = ss.drives.MultiTone([(1.7, 0.0824, 0.0)], on="face")
+    run = ss.simulate(ss.Oscillator(4.12, 57.6, law, face, damping=0.308), duration=20.0)
+    assert len(run.steps.starts) < 20_000
+    assert ss.solve.energy(run).residual < 1e-9

@@ -135,10 +135,9 @@ def _slopes(model, mode, i, big, stages):
         value[j] = work[2 * j + 1]
     for j in range(len(every)):
         every[j] = work[2 * j]
-    speed = 0.0
+    speed = _faced(model.face, stage)
     for j in range(len(stage)):
         moved[j] = stage[j]
-        speed += model.face[j] * stage[j]
     for d in range(physical):
         # friction may follow the logarithm of the velocity against the counter-face
         step = 1e-7 * abs(stage[1] - speed) + 1e-13 * big[1] if d == 1 else 1e-7 * abs(stage[d]) + 1e-10 * big[d]
@@ -231,6 +230,15 @@ def at(c, w):
 
 
 @compiled(**EXACT)
+def _faced(face, state):
+    """The counter-face's velocity."""
+    total = 0.0
+    for i in range(len(state)):
+        total += face[i] * state[i]
+    return total
+
+
+@compiled(**EXACT)
 def leap(model, mode, clock, state, big, h, poly, work):
     """A step of length h [s] as polynomials of w, and the length of the next in units of h; 0 where it failed.
 
@@ -242,6 +250,8 @@ def leap(model, mode, clock, state, big, h, poly, work):
         set_tones(model.tones, time + scheme.points[i] * h, stages.values[i])
         for j in range(model.physical):
             stages.values[i, j] = state[j]
+        # the slip of now, however fast the counter-face: friction may follow the logarithm of it
+        stages.values[i, 1] += _faced(model.face, stages.values[i]) - _faced(model.face, state)
     change = settle(model, mode, state, h, big, stages)
     if change == math.inf:
         return 0.0
