@@ -44,7 +44,8 @@ class Replay:
         return drive - SPRING * y[order] - LOSS * y[1] * (order == 0)
 
     def value(self, form: Mapping[str, float], t: float, y: np.ndarray, mode: Mode) -> float:
-        own = {"x": y[0], "v": y[1], "1": 1.0, **dict(zip(self.memory, y[2:], strict=True))}
+        still = {"1": 1.0, "face_acceleration": 0.0}
+        own = {"x": y[0], "v": y[1], **still, **dict(zip(self.memory, y[2:], strict=True))}
         total = sum(factor * own[name] for name, factor in form.items() if name not in ("f", "df"))
         total += form["f"] * self.friction(t, y, mode) if "f" in form else 0.0
         return total + (form["df"] * self.pull(t, y, 1) if "df" in form else 0.0)

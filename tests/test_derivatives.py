@@ -30,7 +30,7 @@ def test_a_free_slide_and_its_turn_have_the_closed_form() -> None:
         return (turned + f / k) * mpmath.cos(w * t - mpmath.pi) - f / k
 
     run = ss.simulate(ss.Oscillator(mass=1.3, stiffness=4.0, law=ss.laws.Coulomb(1.0)), duration=3.0, start={"x": 2.0})
-    by = ss.solve.sensitivities(run, ["mass", "stiffness", "kinetic"])
+    by = ss.solve.sensitivities(run, "mass", "stiffness", "kinetic")
     times = [0.4, 1.1, 2.3, 2.9]
     order = {0: (1, 0, 0), 1: (0, 1, 0), 2: (0, 0, 1)}
     with mpmath.workdps(50):
@@ -53,7 +53,7 @@ def test_it_is_the_limit_of_differences(name: str, parameter: str) -> None:
         parameter, path = "law.damping", ("law", "damping")
     value = float(getattr(places(system)[path], path[-1]))
     run, step = ss.simulate(system, duration=2.3), 1e-5 * (value or 1.0)
-    by, times = ss.solve.sensitivities(run, [parameter]), np.linspace(0.013, 2.283, 40)
+    by, times = ss.solve.sensitivities(run, parameter), np.linspace(0.013, 2.283, 40)
     low, high = (ss.simulate(system.having(**{parameter: value + side}), duration=2.3) for side in (-step, step))
     for output in ("x", "v"):
         near = [other.sample(times, (output,))[0][0] for other in (low, high)]
@@ -65,11 +65,11 @@ def test_it_is_the_limit_of_differences(name: str, parameter: str) -> None:
 
 def test_what_has_no_derivative_is_refused() -> None:
     run = ss.simulate(ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.laws.Coulomb(1.0)), duration=3.0, start={"x": 2.0})
-    assert ss.solve.sensitivities(run, ["damping"]).sample([1.0])[0, 0] > 0
+    assert ss.solve.sensitivities(run, "damping").sample([1.0])[0, 0] > 0
     with pytest.raises(ss.errors.ModelError, match="static = None; a derivative is by a number"):
-        ss.solve.sensitivities(run, ["static"])
+        ss.solve.sensitivities(run, "static")
     with pytest.raises(ss.errors.ModelError, match="no parameter is called 'sliding'"):
-        ss.solve.sensitivities(run, ["sliding"])
+        ss.solve.sensitivities(run, "sliding")
     curved = ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.laws.Stribeck(1.0, 1.2, speed=0.1))
     with pytest.raises(ss.errors.ModelError, match="linear between its events"):
-        ss.solve.sensitivities(ss.simulate(curved, duration=3.0, start={"x": 2.0}), ["kinetic"])
+        ss.solve.sensitivities(ss.simulate(curved, duration=3.0, start={"x": 2.0}), "kinetic")

@@ -117,6 +117,7 @@ def test_python_of_a_contact_has_the_friction_of_each_mode(name: str) -> None:
             "hold": 0.3,
             "hold_rate": 2.0,
             "delayed_speed": 0.03,
+            "face_acceleration": 0.7,
             "1": 1.0,
         }
         contact = kind(values["x"], values["v"])
@@ -178,7 +179,7 @@ MARCH = """
 int main(void)
 {
     double t, x, v, rate[8];
-    friction_motion in = { 0.0, 0.0, 0.0, 0.0, 0.0 };
+    friction_motion in = { 0.0, 0.0, 0.0, 0.0, 0.0, 0.0 };
     friction_state s = friction_start(&in);
     int row, fine, i;
     scanf("%*s");

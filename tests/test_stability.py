@@ -21,6 +21,9 @@ def inclined(friction: float = 0.3, preload: float = 10.0, **law: float) -> ss.S
     return ss.Structure(np.eye(2), np.zeros((2, 2)), stiffness, contacts=[pad], drive=ss.drives.Belt(1.0))
 
 
+ROCK = ss.laws.RateState(1.0, 0.6, 0.01, 0.015, distance=1e-3, reference=1e-3)
+
+
 def block(law: Any, speed: float = 1.0) -> ss.Oscillator:
     return ss.Oscillator(1.0, 1.0, law, ss.drives.Belt(speed), damping=0.3)
 
@@ -191,6 +194,7 @@ def test_a_contact_that_would_lift_off_is_named() -> None:
         (lambda: ss.stability(ss.Structure([[1.0]], [[0.0]], [[1.0]], drive=ss.drives.Belt(1.0))), "without contacts"),
         (lambda: ss.stability(block(ss.laws.LuGre(1.0, 1.5, speed=0.1, stiffness=1e4))), "LuGre"),
         (lambda: ss.stability(block(ss.laws.StateVariable(1.0, rate=10.0))), "remembers"),
+        (lambda: ss.squeak.critical_value(block(ROCK), "evolution", between=(0.001, 0.1)), "RateState, which"),
         (lambda: ss.squeak.critical_value(inclined(), "kinetic", between=(0.1, 0.2)), "stable at 257 values"),
         (lambda: ss.squeak.critical_value(inclined(), "kinetic", between=(0.2, 0.1)), "the lower one first"),
         (lambda: ss.squeak.critical_value(inclined(), "kinetic", between=(0.2,)), "two values"),  # type: ignore[arg-type]

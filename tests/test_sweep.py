@@ -184,7 +184,9 @@ class Undecided(Rigid):
 @pytest.mark.parametrize("measure", ["stops", "events"])
 def test_a_law_that_changes_for_ever_is_refused(measure: str, tmp_path: Path) -> None:
     """Motions marched together and alone; what grows without bound is no mistake and has its place on the map."""
-    with pytest.raises(SolveError, match=r"transitions without time between them.*with level = 0\.5.*the law's exits"):
+    with pytest.raises(
+        SolveError, match=r"without time between the modes 'stuck' and 'forward'.*with level = 0\.5.*the law's exits"
+    ):
         ss.sweep(UNIT.having(law=Undecided(1.0)), {"level": [0.5]}, measures=[measure], store=tmp_path / "map.zarr")
     assert not list(tmp_path.iterdir())
     growing = ss.sweep(UNIT, {"damping": [-1e4, 0.1]}, measures=[measure], settle=2, cycles=40)

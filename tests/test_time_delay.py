@@ -280,3 +280,31 @@ def test_bad_input_is_named(build: object, word: str) -> None:
 def test_a_lag_too_short_for_the_run_is_refused() -> None:
     with pytest.raises(ss.errors.SolveError, match="lag"):
         ss.simulate(SHAKEN.having(lag=1e-12), cycles=100)
+
+
+@pytest.mark.parametrize("seeds", [range(12), pytest.param(range(12, 200), marks=pytest.mark.soak)])
+def test_friction_that_rises_with_the_speed_holds_what_it_stopped(seeds: range) -> None:
+    """A mass that stops is pulled by more than f_s, and by less than the friction of the speed a while ago."""
+    for seed in seeds:
+        draw = np.random.default_rng(seed)
+        level, stiffness, mass = 10.0 ** draw.uniform(-1, 2), 10.0 ** draw.uniform(1, 4), 10.0 ** draw.uniform(-1, 1)
+        speed, natural = level / math.sqrt(stiffness * mass), math.sqrt(stiffness / mass) / (2 * math.pi)
+        curve = ss.laws.LinearSlope(level, slope=level / speed * draw.uniform(0.05, 1))
+        law = ss.laws.TimeDelay(curve, lag=10.0 ** draw.uniform(-3, -0.5) / natural)
+        system = ss.Oscillator(mass, stiffness, law)
+        run = ss.simulate(system, duration=6 / natural, start={"x": level / stiffness * 10.0 ** draw.uniform(0, 1.5)})
+        assert run.status in ("at rest", "complete")
+        assert ss.solve.energy(run).residual < 1e-9
+
+
+def test_a_hold_lasts_until_the_larger_of_break_away_and_friction() -> None:
+    """Stopped from 1 m/s by a wall's pull: held while what the speed a lag ago had is more than the pull."""
+    curve, lag = ss.laws.LinearSlope(1.0, slope=2.0), 0.5
+    system = ss.Oscillator(1.0, 4.0, ss.laws.TimeDelay(curve, lag))
+    run = ss.simulate(system, duration=4.0, start={"x": 1.25, "v": 0.0})
+    stops = [event for event in run.events if event.kind == "stick"]
+    assert stops
+    for event in stops:
+        pull = abs(4.0 * run.state(event.time)["x"])
+        ago = abs(run.state(event.time - lag)["v"])
+        assert pull <= max(1.0, 1.0 + 2.0 * ago) * (1 + 1e-9)

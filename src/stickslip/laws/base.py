@@ -10,7 +10,8 @@ from stickslip.errors import ModelError
 
 Row = Mapping[str, float]
 """A linear form: coefficients over "x", "v" (displacement and velocity of the mass relative to the counter-face),
-"f" and "df" (the friction force of the mode and its rate), "1" (the constant) and the names of the law's memory."""
+"f" and "df" (the friction force of the mode and its rate), "face_acceleration" (of the counter-face), "1" (the
+constant) and the names of the law's memory."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
@@ -11,10 +11,10 @@ from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
 from stickslip.laws.written import remark, written
 
 Modes = Sequence[Mode | CurvedMode]
-INPUTS = ("x", "v", "hold", "hold_rate", "delayed_speed")
+INPUTS = ("x", "v", "hold", "hold_rate", "delayed_speed", "face_acceleration")
 SPEEDS = (1e-3, 1e-2, 0.1)  # of the test vector [m/s]
 SOON = 1e-6  # s, in which memory leaves its start for the test vector
-PLACE, HOLD, HOLD_RATE = 1e-5, 0.3, 2.0  # of the test vector [m, N, N/s]
+PLACE, HOLD, HOLD_RATE, CARRIED = 1e-5, 0.3, 2.0, 0.7  # of the test vector [m, N, N/s, m/s^2]
 
 HEAD = """\
 /* {formula}
@@ -22,6 +22,7 @@ HEAD = """\
    Friction [N], positive against positive velocity. Motion: x [m] and v [m/s] of the mass against the counter-face;
    hold [N] and hold_rate [N/s]: the force that keeps the mass at rest, as the rest of the model has it, and its rate;
    a mode whose friction is hold has v = 0. delayed_speed [m/s]: the speed a lag ago, of a law with a lag.
+   face_acceleration [m/s^2]: of the counter-face, of a contact with a mass.
 
    friction_state s = friction_start(&motion);
    each step: while (friction_leave(&s, &motion)) {{}}     (at most as often as there are modes)
@@ -34,7 +35,7 @@ HEAD = """\
 
 #define FRICTION_MEMORY {memory}
 enum {{ {modes} }};
-typedef struct {{ double x, v, hold, hold_rate, delayed_speed; }} friction_motion;
+typedef struct {{ double x, v, hold, hold_rate, delayed_speed, face_acceleration; }} friction_motion;
 typedef struct {{ int mode; unsigned armed; double memory[{size}]; }} friction_state;
 """
 
@@ -56,6 +57,12 @@ def c_code(law: Law | CurvedLaw, formula: str) -> str:
 def modes_of(law: Law | CurvedLaw) -> Modes:
     """Its modes, linear or curved."""
     return law.rates() if isinstance(law, CurvedLaw) else law.modes()
+
+
+def levels_of(mode: Mode | CurvedMode, text: Callable[[Expression], str]) -> dict[str, str]:
+    """What else a mode's exits speak of, as text."""
+    levels: Mapping[str, Expression] = getattr(mode, "levels", {})
+    return {name: f"({text(form)})" for name, form in levels.items()}
 
 
 def _require_writable(law: Law | CurvedLaw, modes: Modes) -> None:
@@ -123,7 +130,8 @@ def _leave(modes: Modes, names: Mapping[str, str]) -> str:
     for mode in modes:
         if mode.exits:
             lines.append(f"    case {_token(mode.name)}:")
-            lines += [_exit(number, exit_, named) for number, exit_ in enumerate(mode.exits)]
+            own = {**named, **levels_of(mode, lambda form: _text(form, named))}
+            lines += [_exit(number, exit_, own) for number, exit_ in enumerate(mode.exits)]
             lines.append("        break;")
     return "\n".join([
         "/* Whether the mode ends here; then the next one is set, with what it remembers. */",
@@ -153,7 +161,7 @@ def _test(law: Law | CurvedLaw, modes: Modes, memory: list[str]) -> str:
     for mode in modes:
         for speed in SPEEDS:
             values = {"x": PLACE, "v": (mode.side or 1) * speed, "hold": HOLD, "hold_rate": HOLD_RATE}
-            values |= {"delayed_speed": 1.5 * speed, "1": 1.0, "f": HOLD, "df": HOLD_RATE}
+            values |= {"delayed_speed": 1.5 * speed, "face_acceleration": CARRIED, "1": 1.0, "f": HOLD, "df": HOLD_RATE}
             values |= {name: at(form, values) for name, form in law.memory.items()}
             moved = {name: values[name] + SOON * at(form, values) for name, form in mode.rates.items()}
             values |= moved
@@ -163,12 +171,12 @@ def _test(law: Law | CurvedLaw, modes: Modes, memory: list[str]) -> str:
     inputs = len(INPUTS)
     return "\n".join([
         "#ifdef FRICTION_TEST", "#include <stdio.h>",
-        "/* mode, x, v, hold, hold_rate, delayed_speed, memory, friction */",
+        f"/* mode, {', '.join(INPUTS)}, memory, friction */",
         f"static const double vector[{len(rows)}][{inputs + len(memory) + 2}] = {{", ",\n".join(rows), "};",
         "int main(void)", "{", "    int i, j, wrong = 0;",
         f"    for (i = 0; i < {len(rows)}; i++) {{",
         "        const double *r = vector[i];",
-        "        friction_motion in = { r[1], r[2], r[3], r[4], r[5] };",
+        f"        friction_motion in = {{ {', '.join(f'r[{1 + j}]' for j in range(inputs))} }};",
         "        friction_state s = { (int)r[0], 0u, {0} };",
         f"        const double wanted = r[{inputs + len(memory) + 1}];",
         f"        for (j = 0; j < FRICTION_MEMORY; j++) s.memory[j] = r[{inputs + 1} + j];",

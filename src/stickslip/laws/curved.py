@@ -199,6 +199,11 @@ class CurvedMode:
         As of a linear mode.
     rates : mapping of str to Expression
         Time derivative of the memory.
+    creep : Expression or None
+        Of a mode that holds the mass: how fast it creeps on the counter-face [m/s], by "f" and the memory. It is so
+        slow that the mass's inertia is nothing beside friction; None: not at all.
+    levels : mapping of str to Expression
+        What exits may speak of beside the state.
     """
 
     name: str
@@ -207,6 +212,8 @@ class CurvedMode:
     friction: Expression | None
     exits: tuple[Exit, ...] = ()
     rates: Mapping[str, Expression] = field(default_factory=dict)
+    creep: Expression | None = None
+    levels: Mapping[str, Expression] = field(default_factory=dict)
 
     def changes(self, before: CurvedMode, leaving: int) -> Iterator[tuple[int, CurvedMode, CurvedMode]]:
         """Contact, its mode before and its mode now, as of a linear mode."""
@@ -231,6 +238,21 @@ class CurvedLaw(Protocol):
 
     def rates(self) -> tuple[CurvedMode, ...]:
         """The modes."""
+
+
+@runtime_checkable
+class Creeping(Protocol):
+    """A curved law whose friction takes the whole of its range within a speed too small to be told from none.
+
+    At such speeds the force balance tells the friction, and friction the speed: the solver goes through a mode that
+    holds the mass, and leaves it where the mass creeps as fast as it told the law.
+    """
+
+    def rates(self) -> tuple[CurvedMode, ...]:
+        """The modes of sliding."""
+
+    def holding(self, speed: float) -> CurvedMode:
+        """The mode "held" of a contact that creeps, up to a speed [m/s]."""
 
 
 @dataclass(frozen=True)

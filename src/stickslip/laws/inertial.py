@@ -13,8 +13,10 @@ from stickslip.parameters import parameter, parametric
 class InertialContact:
     r"""A contact with a mass of its own: spring and damper to the slider, Coulomb friction to the counter-face.
 
-    :math:`m_c\ddot y = K_y(x-y) + c(\dot x-\dot y) - f_k\,\mathrm{sgn}\,\dot y`; the slider feels
-    :math:`f = K_y(x-y) + c(\dot x-\dot y)` (thesis, equation 4.3, with the imposed motion replaced by the slider's).
+    :math:`m_c\ddot y = K_y(x-y) + c(\dot x-\dot y) - f_k\,\mathrm{sgn}(\dot y-\dot b)`, b the counter-face's
+    displacement; the slider feels :math:`f = K_y(x-y) + c(\dot x-\dot y)` (thesis, equation 4.3, with the imposed
+    motion replaced by the slider's). The contact holds while :math:`|f - m_c\ddot b| \le f_s`: on a counter-face that
+    accelerates, friction has its mass to carry along as well.
 
     Examples
     --------
@@ -23,7 +25,10 @@ class InertialContact:
     """
 
     label = "Contact with inertia"
-    formula = "f = stiffness (x - y) + damping (x' - y'), mass y'' = f - kinetic sign(y')"
+    formula = (
+        "f = stiffness (x - y) + damping (x' - y'), mass (y'' + face_acceleration) = f - kinetic sign(y'), x and y on "
+        "the counter-face"
+    )
     memory_units: ClassVar[Mapping[str, str]] = {"stretch": "m", "u": "m/s"}
     loads = ("preload",)  # of a contact: its levels are proportional to a steady load
 
@@ -40,7 +45,7 @@ class InertialContact:
 
     @property
     def memory(self) -> Mapping[str, Row]:
-        """Stretch x - y [m] and velocity u [m/s] of the contact, at the start relaxed and at rest.
+        """Stretch x - y [m] and velocity u [m/s] of the contact on its face, at the start relaxed and at rest.
 
         Not y itself: far along the way a stiff contact's force would lose its digits in x - y.
         """
@@ -60,9 +65,10 @@ class InertialContact:
         """The contact slides to either side, or holds."""
         force = {"stretch": self.stiffness, "v": self.damping, "u": -self.damping}
         level = static_level(self.static, self.kinetic)
+        borne = {"stretch": self.stiffness, "v": self.damping, "face_acceleration": -self.mass}
         held = (
-            Exit({"stretch": self.stiffness, "v": self.damping, "1": -level}, "forward"),
-            Exit({"stretch": -self.stiffness, "v": -self.damping, "1": -level}, "back"),
+            Exit({**borne, "1": -level}, "forward"),
+            Exit({**{name: -value for name, value in borne.items()}, "1": -level}, "back"),
         )
         return (
             self._slip("back", -1, force),
@@ -71,6 +77,7 @@ class InertialContact:
         )
 
     def _slip(self, name: str, side: int, force: Row) -> Mode:
-        push = {key: value / self.mass for key, value in force.items()} | {"1": -side * self.kinetic / self.mass}
+        push = {key: value / self.mass for key, value in force.items()}
+        push |= {"face_acceleration": -1.0, "1": -side * self.kinetic / self.mass}
         stop = Exit({"u": float(-side)}, "stuck", {"u": {}})
         return Mode(name, "slip", side, force, (stop,), {"stretch": {"v": 1.0, "u": -1.0}, "u": push})

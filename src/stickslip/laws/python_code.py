@@ -7,18 +7,19 @@ from collections.abc import Mapping, Sequence
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Row
-from stickslip.laws.c_code import Modes, modes_of
+from stickslip.laws.c_code import Modes, levels_of, modes_of
 from stickslip.laws.curved import FUNCTIONS, CurvedLaw, Expression
 from stickslip.laws.written import remark, written
 
 OVER_SPEED = ["back", "stuck", "forward"]  # modes of a law that the speed alone tells
-OTHERS = ("hold", "hold_rate", "delayed_speed")  # that a law may ask for beside x and v
+OTHERS = ("hold", "hold_rate", "delayed_speed", "face_acceleration")  # that a law may ask for beside x and v
 
 NOTES = {
     "hold": "hold [N]: the force that would keep the mass at rest against the counter-face, as the rest of the model "
     "has it",
     "hold_rate": "hold_rate [N/s]: how fast that changes",
     "delayed_speed": "delayed_speed [m/s]: the speed a lag ago",
+    "face_acceleration": "face_acceleration [m/s^2]: of the counter-face",
 }
 CLASS = """\
 class Friction:
@@ -110,8 +111,9 @@ def _leave(modes: Modes, names: Mapping[str, str]) -> list[str]:
     for mode in modes:
         if mode.exits:
             body.append(f"        if self.mode == {mode.name!r}:")
+            own = {**named, **levels_of(mode, lambda form: written(form, names=named))}
             for number, exit_ in enumerate(mode.exits):
-                body += _exit(number, exit_, named)
+                body += _exit(number, exit_, own)
     if any(re.search(r"\bforce\b", line) for line in body):
         lines.append("        force = self.force(x, v, OTHERS)")
     return [*lines, *body, "        return False", ""]

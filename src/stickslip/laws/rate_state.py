@@ -7,9 +7,11 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Row
-from stickslip.laws.curved import CurvedMode, Sliding, asinh, either_side, exp, log, symbol
+from stickslip.laws.base import Exit, Row
+from stickslip.laws.curved import CurvedMode, Expression, Sliding, asinh, either_side, exp, log, symbol
 from stickslip.parameters import finite, parameter, parametric
+
+STILLEST = 1e-12  # of the speed at which friction turns: a logarithm of the speed wants one that is not zero
 
 
 @parametric
@@ -83,13 +85,42 @@ class RateState(Sliding):
 
     def rates(self) -> tuple[CurvedMode, ...]:
         """Slip on either side; they meet where the velocity turns."""
-        v, age = symbol("v"), symbol("age")
-        renewed = log(age * (self.reference / self.distance))
-        grip = exp((self.friction + self.evolution * renewed) / self.direct)
-        force = self.direct * self.normal * asinh(v * grip / (2 * self.reference))
-        modes = []
-        for name, side, turn in either_side():
-            way = v * age * (side / self.distance)
-            rate = 1 - way if self.law == "aging" else -(way * log(way))
-            modes.append(CurvedMode(name, "slip", side, force, (turn,), {"age": rate}))
-        return tuple(modes)
+        v = symbol("v")
+        return tuple(
+            CurvedMode(name, "slip", side, self._force(v), (turn,), {"age": self._ageing(v * float(side))})
+            for name, side, turn in either_side()
+        )
+
+    def holding(self, speed: float) -> CurvedMode:
+        r"""Creep slower than a speed [m/s]: the mass goes as fast as its friction, which is the push, makes it go.
+
+        With :math:`q = f/(a N)` and :math:`G = \exp[(\mu_0 + b\ln(V_0\theta/D_c))/a]` the law says
+        :math:`v = (2 V_0/G) \sinh q`. For the age's sake :math:`|v|` is :math:`(2 V_0/G)(\cosh q - 1)`: both are
+        nothing where they differ, this one is smooth.
+        """
+        stress, grip = symbol("f") / (self.direct * self.normal), self._grip()
+        onward, backward, still = exp(stress - grip), exp(-stress - grip), exp(-grip)
+        pace = onward + backward - 2 * (1 - STILLEST) * still
+        return CurvedMode(
+            "held",
+            "stick",
+            0,
+            None,
+            (Exit({"f": 1.0, "level": -1.0}, "forward"), Exit({"f": -1.0, "level": -1.0}, "back")),
+            {"age": self._ageing(self.reference * pace)},
+            creep=self.reference * (onward - backward),
+            levels={"level": self._force(speed)},
+        )
+
+    def _grip(self) -> Expression:
+        """Logarithm of how many times the reference speed is above the speed at which friction turns."""
+        renewed = log(symbol("age") * (self.reference / self.distance))
+        return (self.friction + self.evolution * renewed) / self.direct
+
+    def _force(self, speed: Expression | float) -> Expression:
+        return self.direct * self.normal * asinh(exp(self._grip()) * speed / (2 * self.reference))
+
+    def _ageing(self, speed: Expression) -> Expression:
+        """Rate of the age at a speed without sign."""
+        way = speed * symbol("age") * (1 / self.distance)
+        return 1 - way if self.law == "aging" else -(way * log(way))

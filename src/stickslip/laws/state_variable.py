@@ -9,6 +9,9 @@ from stickslip.laws.base import Exit, Mode, Rigid, Row
 from stickslip.laws.smooth_state import SmoothStateVariable
 from stickslip.parameters import parameter, parametric
 
+# Of the friction's level: the n-th swing of a tremble has 1.5/n of it, and the way that is left to go is the square.
+TREMBLE = 5e-4
+
 
 @parametric
 class StateVariable(Rigid):
@@ -16,12 +19,14 @@ class StateVariable(Rigid):
 
     Thesis, equations 4.1 and 4.2, where the backbone lacks its factor :math:`f_k`; `printed` keeps it out, which
     limits friction to 1 N. The product :math:`f_k\gamma` is the rate. Where velocity and acceleration vanish together
-    the mass may be held: :math:`\mathrm{sgn}\,0` takes whatever value between -1 and 1 keeps it at rest.
+    the mass may be held: :math:`\mathrm{sgn}\,0` takes whatever value between -1 and 1 keeps it at rest. It comes to
+    such a rest by trembling ever faster, without end; the mass is held from where the trembling friction is within
+    5e-4 of its level; what is left of the trembling would move it by 1e-6 of the motion or less.
 
     Examples
     --------
     >>> [mode.name for mode in StateVariable(1.1, rate=100.0).modes()]
-    ['back', 'held', 'forward']
+    ['back', 'turning', 'held', 'forward']
     """
 
     label = "State variable"
@@ -37,8 +42,7 @@ class StateVariable(Rigid):
         default=None,
         positive=True,
         note=r"alpha: the backbone rises as :math:`\alpha v` to its full level instead of jumping, a polygon for the "
-        r"thesis's :math:`\tanh\alpha v`. None: it jumps. The jump makes a strongly damped rest tremble ever faster, "
-        "without end; a steepness ends that",
+        r"thesis's :math:`\tanh\alpha v`. None: it jumps",
     )
 
     hypotheses = SmoothStateVariable.hypotheses  # records are asked for its smooth form
@@ -56,7 +60,7 @@ class StateVariable(Rigid):
     @property
     def entry(self) -> tuple[str, str, str]:
         """Modes in which motion starts, by the sign of the velocity."""
-        return ("back", "held", "forward") if self.steepness is None else ("slow", "slow", "slow")
+        return ("back", "turning", "forward") if self.steepness is None else ("slow", "slow", "slow")
 
     def modes(self) -> tuple[Mode, ...]:
         """Slip on either side, and the rest in which friction follows the load."""
@@ -71,19 +75,22 @@ class StateVariable(Rigid):
                 Mode("slow", "microstick", 0, {"theta": 1.0}, slow, rates),
                 self._slip("forward", 1, decay, pull, edge),
             )
-        held = (
-            Exit({"f": 1.0, "theta": -1.0}, "forward"),
-            Exit({"f": -1.0, "theta": 1.0}, "back"),
-            Exit({"df": 1.0, "theta": decay, "1": -pull}, "forward"),
-            Exit({"df": -1.0, "theta": -decay, "1": -pull}, "back"),
-        )
+        band = TREMBLE * pull / decay
+        onward = (Exit({"f": 1.0, "theta": -1.0, "1": -band}, "forward"),
+                  Exit({"f": -1.0, "theta": 1.0, "1": -band}, "back"))  # fmt: skip
+        released = (Exit({"df": 1.0, "theta": decay, "1": -pull}, "forward"),
+                    Exit({"df": -1.0, "theta": -decay, "1": -pull}, "back"))  # fmt: skip
+        follows = {"theta": {"df": 1.0}}
+        # no time passes while it turns: it goes on, or is held with a friction that is the push from then on
+        turning = (*onward, *released, Exit({"1": 1.0}, "held", {"theta": {"f": 1.0}}))
         return (
             self._slip("back", -1, decay, pull),
-            Mode("held", "stick", 0, None, held, {"theta": {"df": 1.0}}),
+            Mode("turning", "stick", 0, None, turning, follows),
+            Mode("held", "stick", 0, None, released, follows),
             self._slip("forward", 1, decay, pull),
         )
 
     def _slip(self, name: str, side: int, decay: float, pull: float, edge: float = 0.0) -> Mode:
         rates = {"theta": {"theta": -decay, "1": side * pull}}
-        stop = Exit({"v": float(-side), "1": edge}, "slow") if edge else Exit({"v": float(-side)}, "held")
+        stop = Exit({"v": float(-side), "1": edge}, "slow") if edge else Exit({"v": float(-side)}, "turning")
         return Mode(name, "slip", side, {"theta": 1.0}, (stop,), rates)

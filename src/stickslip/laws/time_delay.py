@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Rigid
-from stickslip.laws.coulomb import held_until
-from stickslip.laws.curved import CurvedMode, symbol
+from stickslip.laws.curved import CurvedMode, Expression, lifted, sqrt, symbol
 from stickslip.laws.stribeck import Curve
 from stickslip.parameters import parameter, parametric
 
 DELAYED = "delayed_speed"
+SPEEDS = [10.0**decade for decade in range(-6, 4)]  # m/s above the beginning of a branch, at which its level is asked
+CORNER = 1e-12  # of the level: how far from its corner the larger of two is rounded; far above the rounding of a force
 
 
 @runtime_checkable
@@ -45,7 +47,8 @@ class TimeDelay(Rigid):
 
     The time-lag model of Hess and Soom (Journal of Tribology 112, 1990), one of the two frictional memories of the
     thesis (1.4). The friction-velocity curve F gives the level by the delayed speed; direction and sticking are those
-    of the present: a mass that has stopped is held while :math:`|f| \le f_s`, and friction always opposes the slip.
+    of the present: a mass that has stopped is held while :math:`|f| \le \max(f_s, F)`, by F too where the speed a
+    while ago has more friction than rest: no less could start it. Friction always opposes the slip.
     All velocities are those relative to the counter-face. Before time 0 the mass is taken to have slid as at time 0.
 
     Raises
@@ -101,8 +104,9 @@ class TimeDelay(Rigid):
         def named(name: str, j: int = number) -> str:
             return name if single else f"{name} {j}"
 
-        friction = curve(symbol(DELAYED))
-        held = held_until(self.law.breakaway, back=named("back"), forward=named("forward"))
+        friction = lifted(curve(symbol(DELAYED)))
+        level = self._held(friction, low, high)
+        held = (Exit({"f": 1.0, "level": -1.0}, named("forward")), Exit({"f": -1.0, "level": -1.0}, named("back")))
         stopped = {side: (Exit({"v": -float(side)}, named("stuck")),) for side in (-1, 1)}
         for name, kind, side, force, exits in (
             ("back", "slip", -1, -friction, stopped[-1]),
@@ -111,4 +115,19 @@ class TimeDelay(Rigid):
         ):
             slower = (Exit({DELAYED: -1.0, "1": low}, named(name, number - 1)),) * (number > 0)
             faster = (Exit({DELAYED: 1.0, "1": -high}, named(name, number + 1)),) * (high < math.inf)
-            yield DelayedMode(named(name), kind, side, force, (*exits, *slower, *faster))
+            levels = {"level": level} if side == 0 else {}
+            yield DelayedMode(named(name), kind, side, force, (*exits, *slower, *faster), levels=levels)
+
+    def _held(self, friction: Expression, low: float, high: float) -> Expression:
+        """The force that a mass at rest is held by on a branch: the larger one of break-away and friction."""
+        breakaway = self.law.breakaway
+        levels = []
+        for speed in (low, *(min(low + far, high) for far in SPEEDS)):
+            with suppress(ModelError):  # a formula may have no value where no motion leads
+                levels.append(friction.at(**{DELAYED: speed}))
+        if max(levels, default=0.0) <= breakaway:
+            return lifted(breakaway)
+        if min(levels) >= breakaway:
+            return friction
+        small = CORNER * (breakaway or 1.0)
+        return 0.5 * (friction + breakaway + small * sqrt(((friction - breakaway) / small) ** 2 + 1))

@@ -65,8 +65,8 @@ def tables_of(systems: Systems) -> Tables:
 
 # what a contact knows of, in the order in which terms are added; memory stands between, and the last ones by the mode
 KNOWN = ("x", "v", "1", "always")
-FACE, FACE_RATE, FRICTION, FRICTION_RATE, LOAD_RATE = range(-5, 0)
-LATER = {"f": FRICTION, "df": FRICTION_RATE, "d1": LOAD_RATE}
+FACE, FACE_RATE, FACE_ACCELERATION, FRICTION, FRICTION_RATE, LOAD_RATE = range(-6, 0)
+LATER = {"face_acceleration": FACE_ACCELERATION, "f": FRICTION, "df": FRICTION_RATE, "d1": LOAD_RATE}
 
 
 class _Forms:
@@ -79,7 +79,7 @@ class _Forms:
         law, self.carried = contact.laws[0], contact.carried
         self.memory, self.places = tuple(law.memory), law.places
         self.columns = {name: j for j, name in enumerate((*KNOWN, *self.memory))} | LATER
-        self.width = len(KNOWN) + len(self.memory) + 5
+        self.width = len(KNOWN) + len(self.memory) + len(range(FACE, 0))
         own = [[self._row(one.memory[name], name, FACE) for name in self.memory] for one in contact.laws]
         self.opening = np.array(own).reshape(len(own), len(self.memory), self.width)[contact.which]
         self.modes = [
@@ -103,7 +103,7 @@ class _Forms:
         """
         row = [0.0] * self.width
         for name, value in form.items():
-            row[self.columns[name]] += value
+            row[self.columns[name]] += value * (self.carried if name == "face_acceleration" else 1.0)
             if name == "x" or name in self.places:
                 row[FACE] -= self.carried * value
             elif name == "v":
@@ -189,7 +189,7 @@ class _Builder:
         if contact.normal is not None:
             known[:, 2] += contact.stiffness * (contact.normal @ self.place)
         known[:, len(KNOWN) : FACE] = self.unit[list(self.memory[c])]
-        known[:, FACE], known[:, FACE_RATE] = self.face[:2]
+        known[:, FACE], known[:, FACE_RATE], known[:, FACE_ACCELERATION] = self.face
         return known
 
     def _faces(self, held: Sequence[int], order: int) -> Rows:

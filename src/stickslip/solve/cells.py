@@ -103,18 +103,23 @@ def cells_of(flow: Array, constant: int) -> tuple[Array, Array]:
     """Length of a Taylor cell [s] of each flow (B, M, N, N), and exp(A cell) as `hop` has it.
 
     The column of the constant stands for a force that does not change: the exponential is linear in it, and that of
-    the rest is the same for all flows that differ in that force alone.
+    the rest is the same for all flows that differ in that force alone. So do the columns of other entries that no flow
+    moves, as the places where elements hold: the exponential is that of the entries that move.
     """
     count, modes, size, _ = flow.shape
     whole = flow.reshape(-1, size, size)
-    core = whole.copy()
-    core[:, :, constant] = 0.0
+    still = ~np.any(whole, axis=(0, 2))
+    still[constant] = True
+    moving, resting = np.flatnonzero(~still), np.flatnonzero(still)
+    core = np.ascontiguousarray(whole[:, moving[:, None], moving])
     where, which = np.empty((2, len(core)), np.int64)
     where = where[: distinct(core.reshape(len(core), -1), where, which)]
     cell, turned, integral = _one_by_one(core[where]) if count == 1 else _turned(core[where], where % modes)
-    hop = np.ascontiguousarray(np.moveaxis(halved(turned), 0, 1))[which]
-    pushed = np.einsum("bij,bj->bi", integral[which], whole[:, :, constant].astype(np.longdouble))
-    hop[:, :, :, constant] = np.moveaxis(halved(turned[:, :, constant][which] + pushed), 0, 1)
+    hop = np.zeros((len(whole), 3, size, size))
+    hop[:, 0, resting, resting] = 1.0
+    hop[:, :, moving[:, None], moving] = np.moveaxis(halved(turned), 0, 1)[which]
+    pushed = integral[which] @ whole[:, moving[:, None], resting].astype(np.longdouble)
+    hop[:, :, moving[:, None], resting] = np.moveaxis(halved(pushed), 0, 1)
     return cell[which].reshape(count, modes), hop.reshape(count, modes, 3, size, size)
 
 
@@ -184,21 +189,26 @@ def _exponentials(flow: Array, time: Array) -> tuple[Any, Any]:
     Each entry is summed on its own, so entries of very different units keep their digits.
     """
     part = time.astype(np.longdouble)[:, None, None] / PART
-    step = flow.astype(np.longdouble) * part
+    rows = np.flatnonzero(np.any(flow, axis=(0, 2)))  # of the flow and of what it turns; all others are zero
+    step = flow[:, rows].astype(np.longdouble) * part
     unit = np.broadcast_to(np.eye(flow.shape[1], dtype=np.longdouble), flow.shape)
-    term, turned, integral = unit, unit.copy(), unit.copy()
+    term, turned, integral = unit[:, rows], np.zeros_like(step), unit.copy()
     for k in range(1, TERMS):
-        term = term @ step / k
+        term = term[:, :, rows] @ step / k
         before = turned
         turned = turned + term
-        integral += term / (k + 1)
+        integral[:, rows] += term / (k + 1)
         if k >= SETTLED and np.array_equal(turned, before):
             break
     integral *= part
     for _ in range(int(math.log2(PART))):
-        integral = integral + turned @ integral
-        turned = turned @ turned
-    return turned, integral
+        pushed = turned @ integral
+        integral = 2 * integral
+        integral[:, rows] += pushed
+        turned = 2 * turned + turned[:, :, rows] @ turned
+    whole = unit.copy()
+    whole[:, rows] += turned
+    return whole, integral
 
 
 @compiled(**OPTIONS)

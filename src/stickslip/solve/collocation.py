@@ -135,10 +135,9 @@ def _slopes(model, mode, i, big, stages):
         value[j] = work[2 * j + 1]
     for j in range(len(every)):
         every[j] = work[2 * j]
-    speed = 0.0
+    speed = _faced(model.face, stage)
     for j in range(len(stage)):
         moved[j] = stage[j]
-        speed += model.face[j] * stage[j]
     for d in range(physical):
         # friction may follow the logarithm of the velocity against the counter-face
         step = 1e-7 * abs(stage[1] - speed) + 1e-13 * big[1] if d == 1 else 1e-7 * abs(stage[d]) + 1e-10 * big[d]
@@ -177,8 +176,11 @@ def settle(model, mode, state, h, big, stages):
         change = 0.0
         for i in range(STAGES):
             for j in range(physical):
+                moved = abs(b[i * physical + j]) / max(big[j], 1e-300)
+                if not moved < math.inf:  # no number: a larger one would hide it
+                    return math.inf
                 stages.values[i, j] -= b[i * physical + j]
-                change = max(change, abs(b[i * physical + j]) / max(big[j], 1e-300))
+                change = max(change, moved)
         if change <= max(1e-2 * tolerance, 1e-15):
             return change
         if not change < math.inf or (iteration > 3 and change > 0.5 * before):
@@ -228,6 +230,15 @@ def at(c, w):
 
 
 @compiled(**EXACT)
+def _faced(face, state):
+    """The counter-face's velocity."""
+    total = 0.0
+    for i in range(len(state)):
+        total += face[i] * state[i]
+    return total
+
+
+@compiled(**EXACT)
 def leap(model, mode, unit, state, big, h, poly, work):
     """A step of length h [s] as polynomials of w, and the length of the next in units of h; 0 where it failed.
 
@@ -239,6 +250,8 @@ def leap(model, mode, unit, state, big, h, poly, work):
         turn(model.tones, state, scheme.points[i] * h, stages.values[i])
         for j in range(model.physical):
             stages.values[i, j] = state[j]
+        # the slip of now, however fast the counter-face: friction may follow the logarithm of it
+        stages.values[i, 1] += _faced(model.face, stages.values[i]) - _faced(model.face, state)
     change = settle(model, mode, state, h, big, stages)
     if change == math.inf:
         return 0.0

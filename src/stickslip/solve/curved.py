@@ -221,7 +221,9 @@ class _Run:
         laps, time = self.clock[LAPS], self.clock[TIME]
         place = f"lap {laps:g}, {time:g} s, at {named(self.table.names[: self.table.physical], self.state)}"
         if outcome == march.CHATTER:
-            raise chatter(place)
+            first, exits = self.table.exits.first, self.table.exits
+            targets = exits.target[first[self.mode] : first[self.mode + 1]]
+            raise chatter([self.table.modes[j].name for j in (self.mode, *targets)], place)
         if outcome == march.UNPROVED:
             raise unproved(place)
         if outcome == march.STALL:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -64,7 +63,7 @@ class Sensitivities:
         return _joined(self.motion.sample(self.motion.run.instants(times), output), self.shares)
 
 
-def sensitivities(run: Trajectory, names: Sequence[str]) -> Sensitivities:
+def sensitivities(run: Trajectory, *names: str) -> Sensitivities:
     r"""How does a motion change with the parameters of its system, its events included?
 
     Between events the derivative :math:`s = \partial y / \partial p` follows
@@ -77,7 +76,7 @@ def sensitivities(run: Trajectory, names: Sequence[str]) -> Sensitivities:
     ----------
     run : Trajectory
         Of an oscillator whose law has linear modes, from :func:`~stickslip.simulate`.
-    names : sequence of str
+    *names : str
         Parameters of the system by name ("stiffness", "kinetic", "drive.amplitude").
 
     Returns
@@ -94,7 +93,7 @@ def sensitivities(run: Trajectory, names: Sequence[str]) -> Sensitivities:
     >>> import stickslip as ss
     >>> slider = ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.laws.Coulomb(1.0))
     >>> run = ss.simulate(slider, duration=4.0, start={"x": 2.0})
-    >>> by = sensitivities(run, ["kinetic"])
+    >>> by = sensitivities(run, "kinetic")
     >>> by.sample([1.5]).round(6).tolist()  # x = (x0 - f/k) cos(2 t) + f/k
     [[0.497498]]
     """
@@ -105,7 +104,6 @@ def sensitivities(run: Trajectory, names: Sequence[str]) -> Sensitivities:
             "they are carried through the modes of one mass whose law is linear between its events",
             "take differences of two runs",
         )
-    names = tuple(names)
     values = np.array([_value(system, name) for name in names])
     scales = np.where(values == 0, FROM_ZERO, np.abs(values))
     sides = np.array([np.ones(len(names)), np.where(values == 0, 1.0, -1.0)])

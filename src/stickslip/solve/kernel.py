@@ -208,9 +208,10 @@ def next_exit(linear, mode, opened, armed, span, work):
     count = c.shape[0]
     for e in range(linear.first[mode], linear.first[mode + 1]):
         expand(linear.series[e], work.held, work.scale, cell, c, noise)
-        low = opening_order(c, noise, count) if opened else 0
+        low = opening_order(c, noise, count)
         if low == count:
-            continue
+            continue  # on the tie, and staying there
+        low = low if opened else 0
         limit = min(1.0, best)
         start = 0.0
         bit = 1 << (e - linear.first[mode])

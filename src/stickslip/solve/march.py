@@ -19,6 +19,7 @@ from stickslip.solve.taylor import (
     advance,
     awake,
     coded,
+    due,
     length,
     resolved,
     rise,
@@ -30,6 +31,7 @@ from stickslip.solve.taylor import (
 
 DONE, FULL, CHATTER, STALL, UNPROVED = range(5)
 CHAIN = 16  # most transitions without time between them
+BRIEFEST = 1e-19  # of the time: a step below its rounding is one of many while a velocity falls to nothing
 LEAP = 40.0  # Taylor steps that a leap replaces, at least half of them: it costs as much as about 40
 PATIENCE = 256.0  # Taylor steps without event after which a leap is tried
 
@@ -113,6 +115,7 @@ def _explicit(model, mode, h, u, big, step):
     for g in range(guards.first[mode], guards.first[mode + 1]):
         a = guards.argument[g] * width
         if not awake(guards.kind[g], s[a], asleep):
+            u = resolved(s, a, order - 1, NOISE * abs(s[a]), u)  # its argument may be a function that ends sooner
             u = woken(guards.kind[g], a, u, asleep, step)
             if u < 0.0:
                 return u, leaving
@@ -147,7 +150,7 @@ def _attempt(model, clock, state, big, mode, full, remaining, poly, work):
         ahead = 0.5 * (w + 1.0) * reach
         if ahead > 0.0:
             clock[DUE] = PATIENCE
-    if grow < 0.9 or reach == clock[REACH]:
+    if not grow >= 0.9 or reach == clock[REACH]:
         clock[REACH] = reach * max(grow, 0.2)
     if ahead == 0.0 and (grow >= 0.9 or clock[REACH] < 0.5 * LEAP * full * h):
         clock[REACH], clock[STEADY], clock[DUE] = 0.0, 0.0, min(2.0 * clock[DUE], 64.0 * PATIENCE)
@@ -192,9 +195,8 @@ def _write(steps, row, clock, state, mode, ahead, leaving, which):
 
 
 @compiled(**EXACT)
-def _hold(model, state):
-    """The state on the counter-face, which it does not leave until the contact gives way."""
-    speed = 0.0
+def _at_speed(model, state, speed):
+    """The state with a speed against the counter-face: with none it stays on it until the contact gives way."""
     for i in range(len(state)):
         speed += model.face[i] * state[i]
     state[1] = speed
@@ -205,7 +207,7 @@ def march(model, clock, state, big, mode, until, steps, work):
     """Steps from `clock` to `until` (laps, time): the outcome, the steps written, the leaps among them, the mode."""
     series = coded(model.series)
     exits, step = model.exits, work.step
-    size, written, leapt, chain = len(state), 0, 0, 0
+    size, written, leapt, chain, tried = len(state), 0, 0, 0, 0
     while True:
         # Due: what is left, the series of a step, and how far it holds.
         remaining = _remaining(clock, until, model.period)
@@ -214,18 +216,26 @@ def march(model, clock, state, big, mode, until, steps, work):
         h = clock[TRY]
         series(model.numbers, mode, state, h, step.s)
         full = length(step.s, step.order, big, model.tolerance)
-        if not (full * h > 1e-15 * (clock[TIME] + 1e-300)) or full <= 0.0:
+        while math.isnan(full) and h > BRIEFEST * (clock[TIME] + 1e-300):
+            h *= 1e-3  # the coefficients outgrow the numbers where the step before was far longer than this one can be
+            series(model.numbers, mode, state, h, step.s)
+            full = length(step.s, step.order, big, model.tolerance)
+        clock[TRY] = h
+        stalled = not (full * h > BRIEFEST * (clock[TIME] + 1e-300)) or full <= 0.0
+        over = due(model.sums, exits, mode, h, big, step) if stalled else -1
+        if stalled and over < 0:
             return STALL, written, leapt, mode
-        if written == len(steps.laps) or leapt == len(steps.polys):
+        if written == len(steps.laps) or tried == len(steps.polys):
             return FULL, written, leapt, mode
         # Certify: a leap after many steps without event, else the Taylor step, to the first exit at the most.
-        which, reach = -1, 0.0
-        if clock[STEADY] >= clock[DUE]:
+        which, reach, ahead, leaving = -1, 0.0, 0.0, over
+        if over < 0 and clock[STEADY] >= clock[DUE]:
             reach, ahead, leaving = _attempt(model, clock, state, big, mode, full, remaining, steps.polys[leapt], work)
-            if ahead == 0.0:
-                continue
-            which, leapt = leapt, leapt + 1
-        else:
+            tried += 1
+            which, leapt = (leapt, leapt + 1) if ahead > 0.0 else (-1, leapt)
+        if (
+            which < 0 and over < 0
+        ):  # also after a leap that failed: whatever made it fail, every round brings the march on
             u, leaving = _explicit(model, mode, h, min(full, remaining / h), big, step)
             if u < 0.0:
                 return UNPROVED, written, leapt, mode
@@ -255,8 +265,8 @@ def march(model, clock, state, big, mode, until, steps, work):
                 return CHATTER, written, leapt, mode
         # Leave the mode.
         if leaving >= 0:
-            if exits.held[leaving]:
-                _hold(model, state)
+            if not math.isnan(exits.speed[leaving]):
+                _at_speed(model, state, exits.speed[leaving])
             elif ahead > 0.0:
                 delay = _polish(model, exits.node[leaving], mode, h, state, step)
                 steps.lengths[written - 1] += delay

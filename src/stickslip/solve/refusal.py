@@ -27,17 +27,24 @@ def named(names: Sequence[str], state: Array) -> str:
     return ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, state, strict=False))
 
 
+LISTED = 4  # modes that an error names
+
+
 class Endless(SolveError):
     """A law's modes follow one another without end while no time passes: what fails is the law, not a motion."""
 
 
-def chatter(place: str) -> Endless:
+def chatter(modes: Sequence[str], place: str) -> Endless:
     """Modes that follow one another without end while no time passes."""
     return Endless(
-        f"transitions without time between them, {place}",
-        "a law leaves every state in one direction",
-        "check the law's exits there",
+        f"transitions without time between the modes {_listed(modes)}, {place}",
+        "a law leaves every state in one direction, or has a mode that holds the mass there",
+        "check the law's exits there; a mode with friction=None holds the mass",
     )
+
+
+def _listed(modes: Sequence[str]) -> str:
+    return " and ".join(f"'{mode}'" for mode in dict.fromkeys(modes))
 
 
 def unproved(place: str) -> SolveError:
@@ -81,8 +88,10 @@ class Budget:
         weights = [self.SILENT if self._silent(int(leaving)) else 1.0 for leaving in numbers]
         self.owed, self.since = max(0.0, self.owed + float(counts @ weights) - income), self.since + passed
         if self.owed > self.most:
+            entered = self.table.target[exits[exits >= 0][-LISTED:]]
             raise SolveError(
-                f"{self.owed + self.most * self.since / self.scale:.0f} events within {self.since:g} s at "
+                f"{self.owed + self.most * self.since / self.scale:.0f} events within {self.since:g} s, the last into "
+                f"{_listed([self.table.modes[int(mode)].name for mode in entered])}, at "
                 f"{named(self.table.names[: self.table.physical], state)}",
                 f"a period of {self.scale:g} s has at most {self.most} events",
                 "check the law there (chatter), or raise budget=",

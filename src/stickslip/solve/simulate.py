@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.errors import ModelError
+from stickslip.errors import ModelError, SolveError
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
@@ -21,7 +21,8 @@ from stickslip.solve.curved import degree, run_curved
 from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
 from stickslip.solve.phasors import fast_tables
-from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
+from stickslip.solve.refusal import LISTED, Budget, chatter, held_back, named, require_numbers, unproved
+from stickslip.solve.roots import NOISE
 from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
@@ -30,7 +31,9 @@ if TYPE_CHECKING:
     from stickslip.solve.tape import Tape
 
 CHUNK = 16384  # pieces between two looks at the clock and the keyboard
-CELLS = 65536  # Taylor cells between two looks
+CELLS = 65536  # Taylor cells between two looks, of a state of up to `SMALL` entries; of larger ones less by the square
+SMALL = 8
+MOST_CELLS = 1e10  # of a run: some hours
 PACE = 0.1  # s between two calls of progress
 
 
@@ -40,7 +43,7 @@ def simulate(
     duration: float | None = None,
     cycles: float | None = None,
     start: Mapping[str, float | str] | None = None,
-    budget: int = 10_000,
+    budget: int = 100_000,
     rtol: float = 1e-12,
     progress: Callable[[float], object] | None = None,
 ) -> Trajectory:
@@ -218,12 +221,13 @@ def run(
     pieces = _Log(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
     heed: Callable[[], None] | None = None
+    patience = max(1, CELLS // max(1, size // SMALL) ** 2)
     try:
         with ExitStack() as holding:
             for at, (signals, values) in stops_of(table, laps, offset):
                 state[signals] = values
-                mode = kernel.begin(model.linear, mode, state, total, 1.0, work)
-                _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, clock)
+                came, mode = mode, kernel.begin(model.linear, mode, state, total, 1.0, work)
+                _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, came, clock)
                 outcome = kernel.FULL
                 while outcome == kernel.FULL:
                     before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
@@ -232,13 +236,15 @@ def run(
                     if heed is None and getattr(kernel.march, "overloads", True):
                         heed = holding.enter_context(held_back())
                     outcome, count, mode, clock = kernel.march(
-                        model, before, state, mode, goal, past, pieces.room(), work, CELLS
+                        model, before, state, mode, goal, past, pieces.room(), work, patience
                     )
                     if heed is not None:
                         heed()
                     passed = until(before, clock, period)
                     pieces.keep(count, passed, total)
-                    _refuse(outcome, table, state, clock)
+                    _refuse(outcome, table, state, mode, clock)
+                    if outcome == kernel.FULL and count < CHUNK:  # by its patience: it goes cell by cell
+                        _require_cells(passed / patience, total - pieces.passed, table.modes[mode].name)
                     events.spend(pieces.columns.exits[pieces.count - count : pieces.count], passed=passed, state=state)
                     if tell:
                         tell(pieces.passed / total)
@@ -309,12 +315,36 @@ def _at_rest(table: Tables, state: Array, mode: int) -> bool:
     return bool(np.all(table.flow[mode] @ state == 0.0))
 
 
-def _refuse(outcome: int, table: Tables, state: Array, clock: Clock) -> None:
+def _chasing(table: Tables, mode: int, state: Array) -> list[str]:
+    """The modes that follow one another at a state, by the exits that are due at once."""
+    names = []
+    for _ in range(2 * LISTED):
+        names.append(table.modes[mode].name)
+        for e in range(table.first[mode], table.first[mode + 1]):
+            ahead, noise = table.series[e] @ state, NOISE * (np.abs(table.series[e]) @ np.abs(state))
+            told = ahead[np.abs(ahead) > noise]
+            if not table.crossing[e] and len(told) and told[0] > 0:
+                mode, state = int(table.target[e]), table.reset[e] @ state
+                break
+    return names[-LISTED:]
+
+
+def _require_cells(cell: float, ahead: float, mode: str) -> None:
+    """Refuse a run that has more than `MOST_CELLS` ahead, by the time of one and the time that is left [s]."""
+    if ahead > MOST_CELLS * cell:
+        raise SolveError(
+            f"{ahead / cell:.2g} cells of {cell:.1e} s ahead, the last in the mode '{mode}'",
+            f"a run takes at most {MOST_CELLS:g}, some hours; a rate of the contact is far above the motion's own",
+            "simulate a shorter time, or leave out the damping or the mass that makes the contact so fast",
+        )
+
+
+def _refuse(outcome: int, table: Tables, state: Array, mode: int, clock: Clock) -> None:
     if outcome in (kernel.DONE, kernel.FULL) and math.isfinite(state.sum()):
         return
     place = f"lap {clock.laps:g}, {clock.time:g} s, at {named(table.names[: table.physical], state)}"
     if outcome in (kernel.CHATTER, kernel.LOST):
-        raise chatter(place)
+        raise chatter(_chasing(table, mode, state), place)
     if outcome == kernel.UNPROVED:
         raise unproved(place)
     require_numbers(state, place)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from stickslip.drives.kinds import Motion
 from stickslip.errors import ModelError
-from stickslip.laws.curved import CurvedLaw, CurvedMode, Expression
+from stickslip.laws.base import Exit
+from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, Expression
 from stickslip.oscillator import Oscillator
 from stickslip.solve import taylor
 from stickslip.solve.series import Nodes
@@ -25,6 +26,7 @@ Form = tuple[dict[int, float], float]  # weights of nodes, and a constant
 Scaled = tuple[int, float]  # a node and a factor
 
 DTYPES = (np.int64, np.float64)
+LEAST = 1e-13  # some hundred roundings of the motion's own speed: below it a velocity that falls can not be followed
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +240,7 @@ class _Builder:
     def __init__(self, system: Oscillator) -> None:
         law = system.law
         assert isinstance(law, CurvedLaw)
-        self.system, self.law, self.motion, self.modes = system, law, system.drive.motion(), law.rates()
+        self.system, self.law, self.motion, self.entry = system, law, system.drive.motion(), law.entry
         self.memory = tuple(law.memory)
         self.names = ("x", "v", *self.memory, "1", *self.motion.rates)
         self.size, self.one = len(self.names), 2 + len(self.memory)
@@ -252,6 +254,31 @@ class _Builder:
             (1.0, self.force), (system.stiffness, self.base), (-system.stiffness, ({0: 1.0}, 0.0)),
             (-system.damping, ({1: 1.0}, 0.0)), (system.damping, damper),
         ])  # fmt: skip
+        self.modes, self.least = law.rates(), 0.0
+        if isinstance(law, Creeping):
+            self.least = self.standstill(law)
+            stop = {side: (Exit({"v": -float(side), "1": 0.5 * self.least}, "held"),) for side in (-1, 1)}
+            sliding = (replace(mode, exits=stop[mode.side]) for mode in self.modes)
+            self.modes, self.entry = (*sliding, law.holding(self.least)), (self.entry[0], "held", self.entry[2])
+
+    def standstill(self, law: Creeping) -> float:
+        """The speed [m/s] that is as good as none: what friction takes from the mass in a part `LEAST` of a period."""
+        system, forward = self.system, law.rates()[-1]
+        assert forward.friction is not None
+        memory = {name: row.get("1", 0.0) for name, row in self.law.memory.items()}
+        period = self.motion.period
+        time = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else 1.0
+        face = sum(abs(weight) for weight in self.face[1][0].values()) + abs(self.face[1][1])
+        return LEAST * (forward.friction.at(x=0.0, v=1.0, **memory) / system.mass * time + face)
+
+    def left(self, mode: CurvedMode, exit_: Exit, to: CurvedMode) -> float:
+        """The speed [m/s] that an exit leaves against the counter-face; nan where it leaves what there is.
+
+        Exactly none where the contact holds, or stops: rounding must not decide what follows.
+        """
+        if to.friction is None or set(exit_.quantity) == {"v"}:
+            return 0.0
+        return to.side * self.least if mode.creep is not None else math.nan
 
     def form(self, row: Mapping[str, float]) -> Form:
         """A drive's linear form over the state."""
@@ -282,7 +309,10 @@ class _Builder:
         moving = _Operations(self.size, symbols)
         if mode.friction is None:
             friction = combined([(1.0, self.push), (-self.system.mass, self.face[2])])
-            rates = {0: self.face[1], 1: self.face[2]}
+            symbols["f"] = friction
+            symbols["v"] = moving.form(mode.creep) if mode.creep is not None else symbols["v"]
+            creep: Form = symbols["v"] if mode.creep is not None else ({}, 0.0)
+            rates = {0: combined([(1.0, self.face[1]), (1.0, creep)]), 1: self.face[2]}
         else:
             friction = moving.form(mode.friction)
             rates = {0: ({1: 1.0}, 0.0), 1: combined([(1.0, self.push), (-1.0, friction)])}
@@ -292,7 +322,7 @@ class _Builder:
         rates |= self.signal
         still: Form = ({}, 0.0)
         entries = [moving.scaled(rates[j]) if rates.get(j, still) != still else (-1, 0.0) for j in range(self.size)]
-        known = {**symbols, "f": friction}
+        known = {**symbols, "f": friction} | {name: moving.form(level) for name, level in mode.levels.items()}
         exits = [
             moving.scaled(combined((value, known[name]) for name, value in exit_.quantity.items()))
             for exit_ in mode.exits
@@ -302,6 +332,7 @@ class _Builder:
         outputs = {
             "a": rates[1], "friction": friction, "z": self.base, "slip": symbols["v"], "force": self.force,
             **{name: ({j: 1.0}, 0.0) for j, name in enumerate(self.names)},
+            **({"v": rates[0]} if mode.creep is not None else {}),
         }  # fmt: skip
         return moving, watched, entries, exits, {name: watched.node(form) for name, form in outputs.items()}
 
@@ -309,29 +340,26 @@ class _Builder:
         order = {mode.name: j for j, mode in enumerate(self.modes)}
         parts = [self.mode(mode) for mode in self.modes]
         rate = tuple(np.array([[r[c] for r in part[2]] for part in parts], dtype=d) for c, d in enumerate(DTYPES))
-        leaving = [exit_ for mode in self.modes for exit_ in mode.exits]
-        # an exit at zero velocity leaves exactly none: rounding must not decide what follows
-        held = [set(e.quantity) == {"v"} or self.modes[order[e.to]].friction is None for e in leaving]
+        leaving = [(mode, exit_) for mode in self.modes for exit_ in mode.exits]
         exits = Exits(
             node=np.array([node for part in parts for node, _ in part[3]], dtype=np.int64),
             factor=np.array([factor for part in parts for _, factor in part[3]], dtype=np.float64),
-            target=np.array([order[e.to] for e in leaving], dtype=np.int64),
-            crossing=np.array([e.crossing for e in leaving], dtype=np.bool_),
-            held=np.array(held, dtype=np.bool_),
+            target=np.array([order[e.to] for _, e in leaving], dtype=np.int64),
+            crossing=np.array([e.crossing for _, e in leaving], dtype=np.bool_),
+            speed=np.array([self.left(mode, exit_, self.modes[order[exit_.to]]) for mode, exit_ in leaving]),
             first=np.cumsum([0, *(len(mode.exits) for mode in self.modes)]),
         )
         nodes = Nodes(*_flat([part[0] for part in parts]), *rate)
         guards = _guards([part[0] for part in parts])
         sums = _sums([part[0] for part in parts], [part[2] for part in parts], [part[3] for part in parts])
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
-        entry = self.law.entry
         return Tape(
             system=self.system,
             names=self.names,
             modes=self.modes,
             motion=self.motion,
             physical=self.one,
-            entry=(order[entry[0]], order[entry[1]], order[entry[2]]),
+            entry=(order[self.entry[0]], order[self.entry[1]], order[self.entry[2]]),
             opening=np.array(
                 [
                     np.zeros(self.size),

@@ -61,14 +61,14 @@ class Sums(NamedTuple):
 
 
 class Exits(NamedTuple):
-    """Node of each exit and its factor, the mode behind it, whether it is crossed, whether the contact holds then; the
-    first exit of each mode."""
+    """Node of each exit and its factor, the mode behind it, whether it is crossed, the speed against the counter-face
+    that it leaves to the last digit [m/s] (nan: whatever there is); the first exit of each mode."""
 
     node: Index
     factor: Array
     target: Index
     crossing: NDArray[np.bool_]
-    held: NDArray[np.bool_]
+    speed: Array
     first: Index
 
 
@@ -229,9 +229,20 @@ def resolved(s, start, top, floor, u):
         for k in range(1, top - 1):
             power *= u
             largest = max(largest, abs(s[start + k]) * power)
-        if (abs(s[start + top - 1]) + abs(s[start + top]) * u) * power * u <= max(1e-3 * largest, floor):
+        if not (abs(s[start + top - 1]) + abs(s[start + top]) * u) * power * u > max(1e-3 * largest, floor):
             return u
         u *= 0.8
+
+
+@compiled(**EXACT)
+def due(sums, exits, mode, h, big, step):
+    """An exit that ends a mode at once, by its value alone; -1 where there is none."""
+    for e in range(exits.first[mode], exits.first[mode + 1]):
+        row = len(sums.constant) - len(exits.node) + e
+        floor = _exit_noise(sums, row, mode * len(big), 0, h, big, step)
+        if not exits.crossing[e] and exits.factor[e] * step.s[exits.node[e] * (step.order + 1)] > floor:
+            return e
+    return -1
 
 
 @compiled(**EXACT)

@@ -103,7 +103,7 @@ def _row(part: Any, velocity: float) -> tuple[float, float]:
             if mode.rates or mode.friction is None or set(mode.friction) - {"1", "v"}:
                 break
             return mode.friction.get("1", 0.0), mode.friction.get("v", 0.0)
-    law = getattr(part, "law", part)
+    law = part.law if isinstance(part, Contact) else part
     raise ModelError(
         f"{type(law).__name__}, which remembers",
         "steady sliding is told of friction that follows speed and load alone",
