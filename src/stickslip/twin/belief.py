@@ -97,7 +97,7 @@ class Belief:
         values = self.values
         kinetic = values.get(KINETIC, 0.0)
         static = kinetic + values[EXCESS] if EXCESS in values else None
-        if RATE in values:
+        if RATE in values and kinetic > 0:
             steepness = 1 / (STEEP * float(np.max(np.abs(self.record["v"]))))
             return StateVariable(kinetic, rate=math.exp(values[RATE]) / kinetic, steepness=steepness)
         if GIVE in values and SPEED in values:
@@ -286,14 +286,14 @@ class Belief:
     @property
     def start(self) -> dict[str, float]:
         """The state in which the record begins."""
-        values = self.values
+        values, law = self.values, self.law
         begun = {"x": values["x"], "v": values["v"]}
         held = values.get(HELD, 0.0) * values.get(KINETIC, 0.0)
-        if RATE in values:
+        if isinstance(law, StateVariable):
             begun["theta"] = held
-        elif GIVE in values and SPEED in values:
+        elif isinstance(law, LuGre):
             begun["bristle"] = held / self.contact
-        elif GIVE in values:
+        elif isinstance(law, CompliantContact):
             begun["anchor"] = values["x"] - held / self.contact
         return begun
 
