@@ -106,8 +106,8 @@ def _yields(quick: Presliding | None, trial: Trial) -> Presliding | None:
     stiffness, power = trial.estimates.get(GIVES), trial.yields
     if stiffness is not None and stiffness.value > 0:
         return _telling(quick, "gives way", f"a contact of {stiffness} leaves less of x than a rigid one", stiffness)
-    if trial.unlike:
-        why = f"x strays {trial.strays:.2g} times as far from its twins as noise explains"
+    if trial.doubt is not None:
+        why = trial.doubt.words
     elif power is None:
         why = "a contact that gives way would not have moved x enough to be seen"
     else:

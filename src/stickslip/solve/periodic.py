@@ -184,6 +184,8 @@ def _closed(system: System, table: Table, state: Array, mode: int, orders: int) 
                 break  # Newton's method left what moves; the motion itself goes on
             end, after = orbit.end()
             size = extent(orbit)
+            if point is not state and all(table.modes[held].friction is None for held in orbit.modes):
+                break  # Newton's method stepped to where the contact would rest; the motion itself does not
             gap = (end - point)[: table.physical]
             relative = float(np.max(np.abs(gap) / np.maximum(size, 1e-300), initial=0.0, where=size > 0))
             if relative >= best[0]:

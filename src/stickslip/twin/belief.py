@@ -46,6 +46,7 @@ LOGARITHMS = (
 POSITIVE = (KINETIC, EXCESS, LOSS)
 EXPONENT = (0.35, 0.35)  # logarithm of a Stribeck curve's, and its uncertainty: Tustin's is 1, Gauss's 2
 STEEP = 1e-3  # of the largest speed, at which the backbone of a friction that lags has turned over: as good as a jump
+GAUSS = 2.0  # exponent of the bristles' curve
 SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: below, sticks and smoothing are in it
 FALL = 0.02  # of friction, over the speeds at which it slides
 NEAR = 1.1  # times a sensor's noise, that a search may leave to have come to its end
@@ -129,7 +130,12 @@ class Belief:
     @property
     def kinetic(self) -> float:
         """Friction at the mean speed at which it slides [N]; a slope that rises is a damper's and no dry friction."""
-        return self.values.get(KINETIC, 0.0) + min(0.0, self.slope) * self.sliding_speed
+        values, speed = self.values, self.sliding_speed
+        curve = 0.0
+        if SPEED in values:
+            exponent = math.exp(values[POWER]) if POWER in values else GAUSS
+            curve = values.get(EXCESS, 0.0) * math.exp(-((speed / math.exp(values[SPEED])) ** exponent))
+        return values.get(KINETIC, 0.0) + curve + min(0.0, self.slope) * speed
 
     @property
     def falls(self) -> bool:
@@ -143,8 +149,8 @@ class Belief:
 
     @property
     def ratio(self) -> float:
-        """Static over sliding friction; NaN without friction."""
-        kinetic = self.values.get(KINETIC, 0.0)
+        """Static over sliding friction, that of a line at no speed; NaN without friction."""
+        kinetic = self.kinetic if SPEED in self.values else self.values.get(KINETIC, 0.0)
         return self.static / kinetic if kinetic else math.nan
 
     @property
@@ -199,6 +205,15 @@ class Belief:
         """Whether a value is at its end and can not move that way."""
         low, high = self.ends(name)
         return self.values[name] <= low if towards < 0 else self.values[name] >= high
+
+    def as_stated(self) -> Belief:
+        """The same with every constant as it was stated, and the drive as it was measured."""
+        return self.at(**dict.fromkeys(self.unsure, 0.0))
+
+    @property
+    def strain(self) -> float:
+        """The largest number of standard deviations by which it takes a constant to be off."""
+        return max((abs(self.values[name]) / sd for name, sd in self.unsure.items()), default=0.0)
 
     def without(self, part: str) -> Belief:
         """The same without a part."""

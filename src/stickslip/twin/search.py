@@ -163,8 +163,6 @@ def _richer(simple: Belief, mapped: Map) -> Belief:
     if GIVE in best.values:
         laws += mapped(partial(_best, record=simple.record), _softer(best.beginning()))
         best = _simplest([law for law in laws if {GIVE, RATE} & law.values.keys()])
-    if best is simple and not best.falls:
-        return best  # what else might be there is bounded by what would have been felt of it
     return replace(best, rivals=tuple(law for law in laws if law is not best and _as_near(law, best)))
 
 
@@ -200,8 +198,8 @@ def _tried(begun: Belief, passes: int) -> Belief:
 
 
 def _parts(simple: Belief) -> list[list[Belief]]:
-    """Beginnings of the richer laws, of each a grid."""
-    record = simple.record
+    """Beginnings of the richer laws, of each a grid, with the constants as stated: a wrong law strains them."""
+    record, simple = simple.record, simple.as_stated()
     furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
     # a slope is what static friction, and dry friction through a spring, look like to a fit without them
     level = float(np.mean(np.abs(record["friction"])[np.abs(record["v"]) > SLIDES * fastest]))
@@ -223,7 +221,7 @@ def _parts(simple: Belief) -> list[list[Belief]]:
 
 def _softer(give: Belief) -> list[list[Belief]]:
     """Beginnings of what else may look like a contact that gives way: one with a damping, bristles, or a lag."""
-    record, values = give.record, give.values
+    record, values, give = give.record, give.values, give.as_stated()
     furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
     damped = [give.at(**{LOSS: loss}) for loss in LOSSES]
     slid = give.at(**{HELD: float(np.sign(record["v"][0]))})

@@ -41,6 +41,7 @@ ASKED = (*DIRECTIONS, SHARE, STOPS)
 SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the motion: parts looked for, to two fifths
 STICKS = ("stick", "microstick")  # kinds of event
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
+STRAINED = 4.0  # standard deviations by which a constant may be off before that is said
 UNLIKE = 1.15  # times what noise explains, by which x may stray from its twin before that is said
 ASTRAY, UNFELT, RIVALS = "unlike its twins", "not felt", "another law as likely"  # kinds of doubt
 
@@ -97,9 +98,14 @@ class Trial:
     strays: float
 
     @property
+    def doubt(self) -> Doubt | None:
+        """Why the record is not of the kind of its twins; None where it is."""
+        return _Misfit(self.strays, self.belief.strain).doubt
+
+    @property
     def unlike(self) -> bool:
         """Whether the record is not of the kind of its twins."""
-        return self.strays > UNLIKE
+        return self.doubt is not None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: how many, the law believed in, what would be felt, and how far x strays."""
@@ -171,20 +177,45 @@ def try_on_twins(
             "an answer is tried on most of its twins",
             "take the quick answers",
         )
-    strays = _strays(belief, twins)
+    misfit = _Misfit(_strays(belief, twins), belief.strain)
     tried = {}
     for name in ASKED:
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
             both = belief.falls or UNSTATED in kinds(answers[name].status)
-            answer = _tried(answers[name], pairs, strays, both=both)
+            answer = _tried(answers[name], pairs, misfit, both=both)
             tried[name] = _among(answer, _counted(belief, name, frequency))
     if GIVE in belief.values:
         answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
     for name, value in FITTED.items():
         if name in answers and (name != GIVES or GIVE in belief.values):
-            tried[name] = _among(_fitted(answers[name], value, belief, twins, strays), _apart(belief, value))
-    return Trial(count, belief, tried, *_powers(belief), strays)
+            tried[name] = _among(_fitted(answers[name], value, belief, twins, misfit), _apart(belief, value))
+    return Trial(count, belief, tried, *_powers(belief), misfit.strays)
+
+
+@dataclass(frozen=True)
+class _Misfit:
+    """How far a record is from its twins' kind: by its displacement, and by constants that would have to be off."""
+
+    strays: float
+    strain: float
+
+    @property
+    def doubt(self) -> Doubt | None:
+        """What is said of it, where it is too far."""
+        if self.strays > UNLIKE:
+            return Doubt(
+                f"x strays {self.strays:.2g} times as far from its twins as noise explains: the contact is of no kind "
+                "that was tried, or a constant is not as stated",
+                ASTRAY,
+            )
+        if self.strain > STRAINED:
+            return Doubt(
+                f"its nearest twin has a constant {self.strain:.0f} standard deviations off: the contact is of no kind "
+                "that was tried, or that constant is less sure than stated",
+                ASTRAY,
+            )
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,39 +272,39 @@ def _powers(belief: Belief) -> tuple[Power | None, Power | None]:
     return static if static and math.isfinite(static.felt) else None, yields
 
 
-def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], strays: float, *, both: bool) -> Estimate:
+def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], misfit: _Misfit, *, both: bool) -> Estimate:
     """The answer less its bias, with the interval that held on the twins; with `both` that of the quick one in it."""
     errors = np.array([e.value - true for e, true in pairs if e is not None and e.known and math.isfinite(true)])
     if len(errors) < max(8, ANSWERED * len(pairs)):
         words = f"{len(errors)} of {len(pairs)} twins could answer it, so that it is not tried on them"
         return replace(quick, status=Status(words, quick.status))
-    value, interval = _less_bias(quick.value, errors, strays)
+    value, interval = _less_bias(quick.value, errors, misfit.strays)
     doubts = [doubt for doubt in doubts_of(quick.status) if doubt.kind != FEW]
-    if strays > UNLIKE or both:  # the twins share what is not so, or was not stated
+    if misfit.doubt or both:  # the twins share what is not so, or was not stated
         interval = _hull(value, interval, quick)
     checks = (*quick.checks, f"a bias of {errors.mean():.3g} {quick.unit} is taken off")
-    return _estimate(quick, value, interval, f"{quick.method}; tried on {len(errors)} twins", doubts, strays, checks)
+    return _estimate(quick, value, interval, f"{quick.method}; tried on {len(errors)} twins", doubts, misfit, checks)
 
 
 def _fitted(
-    quick: Estimate, value: Callable[[Belief], float], belief: Belief, twins: list[_Twin], strays: float
+    quick: Estimate, value: Callable[[Belief], float], belief: Belief, twins: list[_Twin], misfit: _Misfit
 ) -> Estimate:
     """What the displacement tells through the equation of motion; a bound where the part is not believed in."""
     part = {LEVEL: KINETIC, FALL: SLOPE, GIVES: GIVE}.get(quick.name, EXCESS)
     reach = 0.0
     if part not in belief.values:
-        if strays > UNLIKE:  # of a contact of another kind nothing is bounded
-            return _estimate(quick, quick.value, quick.interval, quick.method, [quick.status], strays)
+        if misfit.doubt:  # of a contact of another kind nothing is bounded
+            return _estimate(quick, quick.value, quick.interval, quick.method, [quick.status], misfit)
         reach = _reach(belief, part, value)
     if not math.isfinite(value(belief) + reach):
         words = Doubt("the motion does not depend on it, so that the record tells nothing of it", UNFELT)
         return replace(quick.unknown(Status(words)), method=f"fit to x, {len(twins)} twins")
     errors = np.array([value(belief.told_by(twin.x)) - value(belief.at(**twin.values)) for twin in twins])
-    least, (low, high) = _less_bias(value(belief), errors, strays)
+    least, (low, high) = _less_bias(value(belief), errors, misfit.strays)
     interval = (low - reach if part == SLOPE else low, high + reach)
-    if quick.known and (strays > UNLIKE or belief.falls):  # a line, where a real one is a curve
+    if quick.known and (misfit.doubt or belief.falls):  # a line, where a real one is a curve
         interval = _hull(least, interval, quick)
-    tried = _estimate(quick, least, interval, f"fit to x, {len(twins)} twins", [], strays)
+    tried = _estimate(quick, least, interval, f"fit to x, {len(twins)} twins", [], misfit)
     return tried if quick.name != RATIO else tried.within(1.0, math.inf)
 
 
@@ -329,16 +360,11 @@ def _estimate(
     interval: tuple[float, float],
     method: str,
     doubts: Sequence[Doubt | str],
-    strays: float,
+    misfit: _Misfit,
     checks: tuple[str, ...] = (),
 ) -> Estimate:
     """The answer as tried, with a doubt where the record is not of its twins' kind."""
-    if strays > UNLIKE:
-        words = (
-            f"x strays {strays:.2g} times as far from its twins as noise explains: the contact is of no kind that was "
-            "tried, or a constant is not as stated"
-        )
-        doubts = [*doubts, Doubt(words, ASTRAY)]
+    doubts = [*doubts, misfit.doubt] if misfit.doubt else doubts
     sd = (interval[1] - interval[0]) / (2 * NORMAL_95)
     tried = Estimate(quick.name, value, interval, sd, quick.unit, method, Status(*doubts), checks or quick.checks)
     return tried if quick.name == FALL else tried.within(0.0, 1.0 if quick.name == SHARE else math.inf)
