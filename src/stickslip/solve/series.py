@@ -33,9 +33,9 @@ def series(q, mode, y, h, s):
 '''
 
 
-# Curved nodes of all modes, each some 0.7 s of compiling at the highest order; the package's own laws
-# have up to 20.
-MOST = 32
+# Curved nodes of all modes, each some 0.7 s of compiling at the highest order; of the package's own laws rate and state
+# with a slip law, which has a mode that creeps, has the most, 29.
+MOST = 44
 
 
 class Nodes(NamedTuple):
