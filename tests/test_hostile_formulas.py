@@ -239,7 +239,7 @@ def ran(text: str) -> None:
 
 
 COSTLY = [
-    "1+" + "*".join(["exp(v/(1+v))"] * 28),
+    "1+" + "*".join(["exp(v/(1+v))"] * 22),
     "1+" + "*".join(f"exp(v/({k}+v))" for k in range(1, 20)),
     "1+" + "".join(f"tanh({k}+" for k in range(1, 24)) + "v" + ")" * 23,
     "1+" + "+".join(f"asinh(v/{k})" for k in range(1, 22)),
