@@ -14,6 +14,7 @@ import stepped
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.estimate import kinds
+from stickslip.twin.search import believe
 from stickslip.twin.trial import ASTRAY
 
 RATIO = "static over sliding friction"
@@ -124,6 +125,36 @@ def test_friction_that_falls_with_speed_is_found_with_its_static_level() -> None
     truth = tried.record.truth
     assert tried.breakaway.ratio.value == pytest.approx(truth[RATIO], rel=0.01)
     assert tried.loops.level.value == pytest.approx(truth["sliding friction"], rel=0.01)
+
+
+def off_as_stated(rig: stepped.Rig, seed: int, *, off: float) -> ss.Record:
+    """The friction of a rig whose gains and constants are off by as much as is stated."""
+    rng = np.random.default_rng(seed)
+    record = stepped.record(rig, rng, noise=3e-4, off=off)
+    for name in "xz":
+        record = record.with_details(name, gain_sd=off)
+    written = {name: value * (1 + off * rng.standard_normal()) for name, value in rig.stated.items()}
+    return ss.analyze(record, **{name: (value, off * value) for name, value in written.items()}).record
+
+
+def test_a_rig_near_its_resonance_is_found_from_constants_that_are_off() -> None:
+    # half a per cent of mass or spring moves x by a tenth there: the search led the constants 70 deviations away
+    rig = stepped.Rig(
+        "Stribeck", 0.19, 482.5, 0.0857, 5.99e-4, 10.88, kinetic=0.1289, static=0.196, speed=0.0104
+    )  # fmt: skip
+    belief = believe(off_as_stated(rig, 5, off=0.005))
+    assert belief.like_noise
+    assert belief.strain < 3.0
+    assert belief.kinetic == pytest.approx(rig.friction(belief.sliding_speed), rel=0.02)
+
+
+def test_bristles_whose_static_friction_x_does_not_show_leave_it_open() -> None:
+    rig = stepped.Rig(
+        "LuGre", 2.0, 800.0, 1.0, 4e-3, 3.9, kinetic=0.2 * PULL, static=0.3 * PULL, speed=2e-3, contact=2e4
+    )
+    tried = asked(rig)[1]
+    answer = estimate(tried, RATIO)
+    assert not answer.known or answer.includes(tried.record.truth[RATIO])
 
 
 def test_a_rigid_contact_is_rigid_up_to_what_would_have_been_seen() -> None:

@@ -45,15 +45,19 @@ LOGARITHMS = (
 )  # whose values are logarithms: of positive numbers, or of a ratio
 POSITIVE = (KINETIC, EXCESS, LOSS)
 EXPONENT = (0.35, 0.35)  # logarithm of a Stribeck curve's, and its uncertainty: Tustin's is 1, Gauss's 2
+POWERS = (math.log(0.5), math.log(4.0))  # between which the logarithm of the exponent is looked for
+FALLS = (3e-3, 10.0)  # Stribeck speed over the largest speed: below it is static friction, above a line
 STEEP = 1e-3  # of the largest speed, at which the backbone of a friction that lags has turned over: as good as a jump
 GAUSS = 2.0  # exponent of the bristles' curve
 SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: below, sticks and smoothing are in it
 FALL = 0.02  # of friction, over the speeds at which it slides
+EVENTS = 1000  # in a cycle, beyond which a rig that is tried is given up
+FOLLOWED = 1e-9  # tolerance to which curved laws are followed: well below any sensor's noise
 NEAR = 1.1  # times a sensor's noise, that a search may leave to have come to its end
 TINY = 1e-9  # of the motion: noise below is rounding
 FURTHEST = 30.0  # step of a logarithm: beyond it nothing is told
+REACH = 3.0  # standard deviations by which a search may move a constant at once
 NUDGE = 1e-3  # of a value, by which it is moved to see what the displacement does: well above rounding
-SEARCHED = 4000  # samples in which it is searched where a law's valley lies
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +84,9 @@ class Belief:
     fit : Fit or None
         How the values were found.
     rivals : tuple of Belief
-        Laws of another kind that leave no more of the displacement than chance would.
+        Other laws, or the same with other values, that leave no more of the displacement than chance would.
+    held : str
+        A value that is not moved, where it is asked what the others make of it.
     """
 
     record: Record
@@ -91,6 +97,7 @@ class Belief:
     unsure: Values = field(default_factory=dict)
     fit: Fit | None = None
     rivals: tuple[Belief, ...] = ()
+    held: str = ""
 
     @property
     def law(self) -> LinearSlope | CompliantContact | Stribeck | StateVariable | LuGre:
@@ -198,6 +205,11 @@ class Belief:
         """Between which a value lies."""
         if name == HELD:
             return -1.0, 1.0
+        if name == SPEED:
+            fastest = float(np.max(np.abs(self.record["v"])))
+            return math.log(FALLS[0] * fastest), math.log(FALLS[1] * fastest)
+        if name == POWER:
+            return POWERS
         positive = (*POSITIVE, SLOPE) if SPEED in self.values else POSITIVE  # what falls with speed is Stribeck's part
         return (0.0 if name in positive else -math.inf), math.inf
 
@@ -235,6 +247,10 @@ class Belief:
             return 1.0
         friction = float(np.std(self.record["friction"]))
         return friction / float(np.std(self.record["v"])) if name == SLOPE else friction
+
+    def reach(self, name: str) -> float:
+        """As far as a value may be moved at once: further away its slope tells nothing."""
+        return REACH * self.unsure[name] if name in self.unsure else self.size(name)
 
     def first_felt(self, parts: Iterable[Values], deviations: float) -> Values | None:
         """The first of ever larger parts that moves x by more deviations than the other values could take up."""
@@ -291,12 +307,8 @@ class Belief:
 
     @property
     def like_noise(self) -> bool:
-        """Whether it leaves no more of the displacement than its noise."""
-        return float(np.std(self.residual)) < NEAR * self.noise
-
-    def beginning(self) -> Belief:
-        """Of the record's beginning alone, that is long enough to search in."""
-        return replace(self, record=self.record.rows(0, SEARCHED))
+        """Whether it leaves no more of the displacement than its noise, and the constants within their uncertainty."""
+        return float(np.std(self.residual)) < NEAR * self.noise and self.strain < REACH
 
     @property
     def start(self) -> dict[str, float]:
@@ -317,7 +329,7 @@ class Belief:
         last = (len(self.record) - 1) / self.record.fs
         off = [self.values[name] for name in DRIVE if name in self.values]
         moved = self.oscillator.having(drive=self.drive(0.0, last, off))
-        return simulate(moved, duration=last, start=self.start)
+        return simulate(moved, duration=last, start=self.start, budget=EVENTS, rtol=FOLLOWED)
 
     def twin(self, rng: np.random.Generator) -> Record:
         """What the rig writes: as long as the record, begun from its state, with what is known of its sensors.

@@ -29,7 +29,6 @@ from stickslip.twin.belief import (
     GIVE,
     HELD,
     KINETIC,
-    LOGARITHMS,
     LOSS,
     MASS,
     NUDGE,
@@ -48,11 +47,15 @@ from stickslip.workers import Map
 Array = NDArray[np.float64]
 
 QUESTION = "the twin of a record"
-# Of a grid, so many of the nearest are starts from which the search goes on: some end in a valley of their own. Where
-# none leads to the noise, thrice as many.
-STARTS = 3
+STARTS = 9  # of a grid, that are led over a first cycle: some end in a valley of their own
+KEPT = 4  # of them, the nearest, that are led further
+SAME = 0.01  # of its size, by which a part may differ between two searches that came to the same end
+FAR = 2.0  # times what the best law leaves of the beginning, beyond which a law is not led over the whole record
 PASSES = 20  # of the descent: in a narrow valley; elsewhere the first two do nearly all of it
-LOOK = 2  # passes of it, after which it is seen which of several starts leads nearer
+HORIZONS = (1.0, 3.0)  # cycles over which a start is led to the record before it is over more
+STEPS = 4  # passes of it over each
+LEAST = 50  # samples
+SEARCHED = 4000  # samples in which it is searched where a law's valley lies
 HALVINGS = 6  # of a step that leads away, before the descent ends
 SETTLED = 0.999  # of what is left, from which a further pass gains nothing
 SENSED = ("x", "z", "v", "a", "load")  # channels that a virtual rig writes
@@ -65,6 +68,7 @@ EXCESSES = (0.02, 0.1, 0.25, 0.5, 0.8)
 DEFLECTIONS = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
 LOSSES = (0.02, 0.1, 0.5)  # of a contact: its damping over the root of its stiffness times the mass
 SPEEDS = (0.03, 0.1, 0.3, 1.0)
+STRETCHES = (0.5, 2.0, 4.0, 8.0)  # times the static friction above the sliding one, at which it is seen what else moves
 RATES = (2.0, 5.0, 12.0, 30.0, 80.0)  # at which friction follows, over the largest speed over the largest displacement
 LEVELS = (0.8, 0.9, 1.0)  # of the friction that a law without a fall in speed would have
 
@@ -135,7 +139,9 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     begun = Belief(record, oscillator, values, drive, Rig(tuple(_sensors(record))), unsure)
     # where the sensor has an offset, the rest position is nearer to its mean than to its zero
     begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=_left)
-    return _needed(_richer(_needed(_nearest(begun), SLOPE, KINETIC), mapped), SLOPE)
+    led = _led(begun, [record.rows(0, samples) for samples in _horizons(record)])
+    simple = _nearest(replace(led, record=record))
+    return _needed(_richer(_needed(simple, SLOPE, KINETIC), mapped), SLOPE)
 
 
 def _needed(belief: Belief, *parts: str) -> Belief:
@@ -158,12 +164,21 @@ def _stands_out(belief: Belief, part: str) -> bool:
 
 def _richer(simple: Belief, mapped: Map) -> Belief:
     """With the parts that leave the least of the displacement, where that is less than chance would leave."""
-    laws: list[Belief] = list(mapped(partial(_best, record=simple.record), _parts(simple.beginning())))
+    laws = _led_by(_parts(simple), simple.record, mapped)
     best = min([simple, *laws], key=lambda law: (CHANCE if law is simple else _by_chance(simple, law), _left(law)))
     if GIVE in best.values:
-        laws += mapped(partial(_best, record=simple.record), _softer(best.beginning()))
+        laws += _led_by(_softer(best), simple.record, mapped)
         best = _simplest([law for law in laws if {GIVE, RATE} & law.values.keys()])
+    if SPEED in best.values:
+        laws += _led_by(_stretched(best), simple.record, mapped)
     return replace(best, rivals=tuple(law for law in laws if law is not best and _as_near(law, best)))
+
+
+def _led_by(families: list[list[Belief]], record: Record, mapped: Map) -> list[Belief]:
+    """The nearest of each family and others as near, over the whole record where its beginning allows them."""
+    nearest = [law for laws in mapped(partial(_nearest_of, record=record), families) for law in laws]
+    least: float = min(_left(law) for law in nearest)
+    return list(mapped(partial(_over, record=record), [law for law in nearest if _left(law) <= FAR * least]))
 
 
 def _simplest(laws: list[Belief]) -> Belief:
@@ -178,15 +193,44 @@ def _as_near(law: Belief, best: Belief) -> bool:
     return best.fit is not None and best.fit.freedom * math.log(_left(law) / _left(best)) < CLOSE
 
 
-def _best(starts: list[Belief], record: Record) -> Belief:
-    """The nearest to a record of those that the nearest starts lead to on its beginning."""
-    starts = sorted(starts, key=_left)
-    best = starts[0]
-    for number, begun in enumerate(starts[: 3 * STARTS]):
-        if number >= STARTS and best.like_noise:
-            break
-        best = min(best, _tried(begun, LOOK), key=_left)
-    return _tried(replace(best, record=record), PASSES)
+def _nearest_of(starts: list[Belief], record: Record) -> list[Belief]:
+    """The nearest to a record's beginning of those that a family's starts lead to, and others as near."""
+    first, *longer = (record.rows(0, samples) for samples in _horizons(record))
+    starts = sorted((replace(begun, record=first) for begun in starts), key=_left)
+    nearest = sorted((_tried(begun, STEPS) for begun in starts[:STARTS]), key=_left)[:KEPT]
+    best, *others = sorted((_with_slope(_led(begun, longer)) for begun in nearest), key=_left)
+    return [best, *(other for other in others if _as_near(other, best) and not _same(other, best))]
+
+
+def _with_slope(led: Belief) -> Belief:
+    """The nearest with a slope against speed, of a law that was led without."""
+    return led if SLOPE in led.values else _tried(led.at(**{SLOPE: 0.0}), STEPS)
+
+
+def _same(one: Belief, other: Belief) -> bool:
+    """Whether two searches have come to the same end."""
+    names = (KINETIC, EXCESS, SLOPE)
+    return all(abs(one.values.get(n, 0.0) - other.values.get(n, 0.0)) < SAME * one.size(n) for n in names)
+
+
+def _over(begun: Belief, record: Record) -> Belief:
+    """The nearest over a whole record."""
+    return _tried(replace(begun, record=record), PASSES)
+
+
+def _horizons(record: Record) -> list[int]:
+    """Samples over which a belief is led to a record: ever more cycles, up to its whole beginning."""
+    signs = np.sign(record["v"][np.abs(record["v"]) > SLIDES * float(np.max(np.abs(record["v"])))])
+    cycle = 2 * len(record) / max(1, int(np.count_nonzero(np.diff(signs))))
+    end = min(len(record), SEARCHED)
+    return [*(round(cycles * cycle) for cycles in HORIZONS if LEAST <= cycles * cycle < end), end]
+
+
+def _led(begun: Belief, horizons: list[Record]) -> Belief:
+    """The nearest over a few samples, then over more: far ahead, a belief that is not near yet loses its way."""
+    for record in horizons:
+        begun = _tried(replace(begun, record=record), STEPS)
+    return begun
 
 
 def _tried(begun: Belief, passes: int) -> Belief:
@@ -203,8 +247,9 @@ def _parts(simple: Belief) -> list[list[Belief]]:
     furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
     # a slope is what static friction, and dry friction through a spring, look like to a fit without them
     level = float(np.mean(np.abs(record["friction"])[np.abs(record["v"]) > SLIDES * fastest]))
-    levels = [level, simple.values[KINETIC]] if KINETIC in simple.values else [level]
-    static = [{KINETIC: a * level, EXCESS: b * level, SLOPE: 0.0} for a in LEVELS for b in EXCESSES]
+    levels = [share * level for share in LEVELS]
+    levels += [simple.values[KINETIC]] if KINETIC in simple.values else []
+    static = [{KINETIC: level, EXCESS: excess * level, SLOPE: 0.0} for level in levels for excess in EXCESSES]
     give = [
         {KINETIC: level, GIVE: math.log(level / (share * furthest)), SLOPE: 0.0}
         for share in DEFLECTIONS
@@ -216,7 +261,8 @@ def _parts(simple: Belief) -> list[list[Belief]]:
         for power in (0.0, 0.7)
         for start in static
     ]
-    return [[simple.at(**start) for start in starts] for starts in (static, give, falls)]
+    rigid, compliant, falling = ([simple.at(**start) for start in starts] for starts in (static, give, falls))
+    return [rigid, compliant, [begun.without(SLOPE) for begun in falling]]  # beside it a slope would lead astray
 
 
 def _softer(give: Belief) -> list[list[Belief]]:
@@ -224,14 +270,21 @@ def _softer(give: Belief) -> list[list[Belief]]:
     record, values, give = give.record, give.values, give.as_stated()
     furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
     damped = [give.at(**{LOSS: loss}) for loss in LOSSES]
-    slid = give.at(**{HELD: float(np.sign(record["v"][0]))})
+    slid = give.without(SLOPE).at(**{HELD: float(np.sign(record["v"][0]))})
     bristles = [
-        slid.at(**{EXCESS: excess * values[KINETIC], SPEED: math.log(share * fastest)})
+        slid.at(**{KINETIC: level, EXCESS: excess * level, SPEED: math.log(share * fastest)})
+        for level in (part * values[KINETIC] for part in LEVELS)
         for excess in EXCESSES[1:4]
         for share in SPEEDS
     ]
     lags = [slid.without(GIVE).at(**{RATE: math.log(rate * fastest / furthest)}) for rate in RATES]
     return [damped, bristles, lags]
+
+
+def _stretched(best: Belief) -> list[list[Belief]]:
+    """The same with more and with less static friction: where it falls at small speeds, x may not tell how far."""
+    excess = max(best.values[EXCESS], EXCESSES[1] * best.values[KINETIC])
+    return [[replace(best.at(**{EXCESS: part * excess}), held=EXCESS)] for part in STRETCHES]
 
 
 def _by_chance(simple: Belief, richer: Belief) -> float:
@@ -270,7 +323,7 @@ def _nearest(belief: Belief, passes: int = PASSES) -> Belief:
         assert fit is not None
         before = _left(belief)
         step = fit.gain @ belief.residual - fit.pull
-        step /= max(1.0, *(abs(s) for n, s in zip(fit.names, step, strict=True) if n in LOGARITHMS), 1.0)
+        step /= max(1.0, *(abs(s) / belief.reach(n) for n, s in zip(fit.names, step, strict=True)))
         for halving in range(HALVINGS):
             moved = belief.by(fit.names, step / 2**halving)
             nearer = _left(moved)
@@ -290,7 +343,9 @@ def _linearised(belief: Belief) -> Belief:
     slopes = {name: _slope_of(belief, name) for name in belief.values}
     # what moves nothing can not be told, and what is at its end would hold the others back
     names = tuple(
-        name for name, slope in slopes.items() if slope.any() and not belief.pinned(name, float(slope @ residual))
+        name
+        for name, slope in slopes.items()
+        if slope.any() and name != belief.held and not belief.pinned(name, float(slope @ residual))
     )
     if not names:
         raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")

@@ -190,6 +190,8 @@ def try_on_twins(
     for name, value in FITTED.items():
         if name in answers and (name != GIVES or GIVE in belief.values):
             tried[name] = _among(_fitted(answers[name], value, belief, twins, misfit), _apart(belief, value))
+    if RATIO in tried:
+        tried[RATIO] = tried[RATIO].within(1.0, math.inf)
     return Trial(count, belief, tried, *_powers(belief), misfit.strays)
 
 
@@ -304,8 +306,7 @@ def _fitted(
     interval = (low - reach if part == SLOPE else low, high + reach)
     if quick.known and (misfit.doubt or belief.falls):  # a line, where a real one is a curve
         interval = _hull(least, interval, quick)
-    tried = _estimate(quick, least, interval, f"fit to x, {len(twins)} twins", [], misfit)
-    return tried if quick.name != RATIO else tried.within(1.0, math.inf)
+    return _estimate(quick, least, interval, f"fit to x, {len(twins)} twins", [], misfit)
 
 
 def _reach(belief: Belief, part: str, value: Callable[[Belief], float]) -> float:
