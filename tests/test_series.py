@@ -17,8 +17,7 @@ from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.dahl import Dahl
 from stickslip.laws.elastoslip import ElastoSlip
 from stickslip.laws.inertial import InertialContact
-from stickslip.laws.linear_slope import LinearSlope
-from stickslip.laws.position_load import PositionLoad
+from stickslip.laws.linear_slope import LinearSlope, PositionLoad
 from stickslip.laws.series import InSeries
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.tabulated import Tabulated

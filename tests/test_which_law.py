@@ -19,7 +19,7 @@ from stickslip.law.search import Knob, Problem
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
 from stickslip.law.surety import _end
-from stickslip.laws.register import hypotheses
+from stickslip.laws.guessing import hypotheses
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Step
 

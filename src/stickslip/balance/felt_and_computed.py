@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from stickslip.balance.balance import Balance, known_constants
 from stickslip.balance.force import friction_force
-from stickslip.balance.lines import Complex, Lines, find_lines
+from stickslip.balance.mass import Complex, Lines, find_lines
 from stickslip.balance.mounts import Resonance, find_mounts
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Constant, Estimate, Result, Status
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 
 Array = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from stickslip.balance.balance import Balance, known_constants
 from stickslip.balance.fusion import fuse
 from stickslip.balance.lag import SensorDelay, sensor_delay
-from stickslip.balance.lines import Complex, Lines
+from stickslip.balance.mass import Complex, Lines
 from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate
 from stickslip.record.record import Record, Step
-from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import LEAST, noise_along
+from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.signals.response import resonance
 

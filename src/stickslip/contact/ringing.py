@@ -15,9 +15,8 @@ from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Status
 from stickslip.record.record import Record
-from stickslip.signals.cutting import GLIDE, RING
 from stickslip.signals.noise import noise_level
-from stickslip.signals.pieces import Piece, Splitter
+from stickslip.signals.pieces import GLIDE, RING, Piece, Splitter
 
 Array = NDArray[np.float64]
 

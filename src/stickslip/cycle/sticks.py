@@ -26,7 +26,7 @@ from stickslip.cycle.holds import Hold, Trace, find_holds
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import mean_of_cycles
 from stickslip.units import parse_value
 

@@ -20,7 +20,7 @@ from stickslip.balance.motion import (
 )
 from stickslip.errors import EstimateError
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 
 Array = NDArray[np.float64]
 

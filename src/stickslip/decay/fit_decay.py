@@ -9,22 +9,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.decay import joint
-from stickslip.decay.answer import DecayFit, beginning, constants, spring_of
+from stickslip.decay.answer import DecayFit, beginning, constants, fit_pendulum, spring_of
 from stickslip.decay.choice import Choice
 from stickslip.decay.joint import Release
 from stickslip.decay.motions import Restoring
 from stickslip.decay.noise import KINDS, find_noise
-from stickslip.decay.pendulum import fit_pendulum
 from stickslip.decay.profile import last_swing
 from stickslip.decay.release import CLIPPED, LOST, Releases, RingDown, find_releases
-from stickslip.decay.search import Search, variance, weights
-from stickslip.decay.start import roughness
+from stickslip.decay.start import Search, roughness, variance, weights
 from stickslip.decay.waveform import Array
 from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Doubt, Estimate, Status
 from stickslip.record.record import Record, Step
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import student
 
 LEFT_OVER = "residual"  # the kind of doubt where the model leaves more than noise

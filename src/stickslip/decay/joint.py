@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.decay.likelihood import Objective, extreme, minimise, solve
-from stickslip.decay.noise import Noise
+from stickslip.decay.noise import Noise, Objective, extreme, minimise, solve
 from stickslip.decay.profile import last_swing
 from stickslip.decay.waveform import Array, Blocks
 

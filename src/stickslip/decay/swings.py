@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.signals.turns import crossings, turning_points
+from stickslip.signals.pieces import crossings, turning_points
 
 Array = NDArray[np.float64]
 

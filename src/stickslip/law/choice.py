@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.laws.register import family_of
+from stickslip.laws.guessing import family_of
 from stickslip.statistics import correlation_time
 
 Array = NDArray[np.float64]

@@ -20,8 +20,8 @@ from stickslip.balance.motion import (
 from stickslip.cycle.loops import LEAST_SPREAD, Loops
 from stickslip.errors import EstimateError
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import smooth
+from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.units import prefixed
 

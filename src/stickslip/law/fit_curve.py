@@ -18,7 +18,7 @@ from stickslip.law import presliding as presliding_curves
 from stickslip.law import speed as speed_curves
 from stickslip.law.data import Samples, require_resisting, require_reversals, require_speeds, samples_of
 from stickslip.law.family import Family, Member, best_member, model_error
-from stickslip.law.velocity_step import velocity_step
+from stickslip.law.speed import velocity_step
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.parameters import finite

@@ -31,7 +31,7 @@ from stickslip.law.trials import (
     weighed,
     with_static,
 )
-from stickslip.laws.register import family_of, hypotheses
+from stickslip.laws.guessing import family_of, hypotheses
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, Step
 

@@ -5,12 +5,12 @@ from stickslip.laws.elastoslip import ElastoSlip as ElastoSlip
 from stickslip.laws.export import export_law as export_law
 from stickslip.laws.inertial import InertialContact as InertialContact
 from stickslip.laws.linear_slope import LinearSlope as LinearSlope
+from stickslip.laws.linear_slope import PositionLoad as PositionLoad
 from stickslip.laws.lugre import LuGre as LuGre
-from stickslip.laws.position_load import PositionLoad as PositionLoad
 from stickslip.laws.rate_state import RateState as RateState
 from stickslip.laws.rough import RoughSurface as RoughSurface
 from stickslip.laws.series import InSeries as InSeries
-from stickslip.laws.smooth_state import SmoothStateVariable as SmoothStateVariable
+from stickslip.laws.state_variable import SmoothStateVariable as SmoothStateVariable
 from stickslip.laws.state_variable import StateVariable as StateVariable
 from stickslip.laws.stribeck import FrictionCurve as FrictionCurve
 from stickslip.laws.stribeck import Stribeck as Stribeck

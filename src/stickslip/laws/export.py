@@ -13,10 +13,10 @@ from stickslip.laws.base import Law
 from stickslip.laws.c_code import c_code, modes_of
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.curved import CurvedLaw, lifted
+from stickslip.laws.guessing import registered
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.lugre import LuGre
 from stickslip.laws.python_code import python_code
-from stickslip.laws.register import registered
 from stickslip.laws.rough import RoughSurface
 from stickslip.laws.stribeck import FrictionCurve
 from stickslip.laws.tabulated import Tabulated

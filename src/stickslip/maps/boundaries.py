@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.maps.attractor import Attractor, Start, numbers, require_number, require_period, settled
+from stickslip.maps.basins import Attractor, Start, numbers, require_number, require_period, settled
 from stickslip.parameters import find
 from stickslip.record.exchange import labelled_arrays
 from stickslip.solve.tables import Array, System
