@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.motion import FORCES, is_measured
-from stickslip.cycle.strokes import Stroke, Strokes, find_strokes
+from stickslip.cycle.slips import Stroke, Strokes, find_strokes
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.motion import is_measured
-from stickslip.cycle.slips import ringing_of
-from stickslip.cycle.strokes import FAST, Stroke, Strokes, find_strokes
+from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, UNSTATED, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record

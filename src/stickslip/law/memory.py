@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from stickslip.balance.motion import CREEP
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result, Status
+from stickslip.law.curves import deflections
 from stickslip.law.data import Samples, samples_of
-from stickslip.law.nonlinear import minimise
-from stickslip.law.presliding import deflections
+from stickslip.law.family import minimise
 from stickslip.record.record import Record
 from stickslip.statistics import mean_of_cycles
 

@@ -10,18 +10,16 @@ from xml.sax.saxutils import quoteattr
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
-from stickslip.laws.c_code import c_code, modes_of
+from stickslip.laws.c_code import c_code, modes_of, python_code
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.curved import CurvedLaw, lifted
+from stickslip.laws.formula import one_line, quoted, remark, written
 from stickslip.laws.guessing import registered
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.lugre import LuGre
-from stickslip.laws.python_code import python_code
 from stickslip.laws.rough import RoughSurface
-from stickslip.laws.stribeck import FrictionCurve
-from stickslip.laws.tabulated import Tabulated
+from stickslip.laws.stribeck import FrictionCurve, Tabulated
 from stickslip.laws.time_delay import SpeedCurve
-from stickslip.laws.written import one_line, quoted, remark, written
 from stickslip.settings import nearest
 
 TABLE = 33  # points of a curve over the speed, where a program takes a table

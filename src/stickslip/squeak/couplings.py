@@ -214,7 +214,7 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None, lever: float | s
     --------
     >>> from stickslip.solve.simulate import simulate
     >>> from stickslip.squeak.sound import squeak_record
-    >>> from stickslip.squeak.virtual_rig import squeak_rig
+    >>> from stickslip.squeak.sound import squeak_rig
     >>> record = squeak_record(simulate(squeak_rig(), duration=1.2), snr=30, rng=1)
     >>> found = coupling(record)
     >>> found.of("normal_acceleration", "torsion_velocity").coupled

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.laws.formula import Formula
-from stickslip.laws.written import quoted
+from stickslip.laws.formula import Formula, quoted
 from stickslip.parameters import PARTS
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import nearest
