@@ -14,7 +14,7 @@ from stickslip.balance.force import friction_force
 from stickslip.balance.mass import Complex, Lines, find_lines
 from stickslip.balance.mounts import Resonance, find_mounts
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Constant, Estimate, Result, Status
+from stickslip.estimate import NORMAL_95, Constant, Estimate, Result, Status, plain
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.signals.interpolate import without_delays
@@ -115,12 +115,7 @@ class ForceComparison(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "estimates": [estimate.to_dict() for estimate in self.estimates],
-            "bands": [vars(band) for band in self.bands],
-            "resonances": [resonance.to_dict() for resonance in self.resonances],
-            "status": self.status,
-        }
+        return dict(plain({name: getattr(self, name) for name in ("estimates", "bands", "resonances", "status")}))
 
 
 def compare_force(

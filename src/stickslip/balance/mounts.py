@@ -15,7 +15,7 @@ from stickslip.balance.lag import SensorDelay, sensor_delay
 from stickslip.balance.mass import Complex, Lines
 from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError
-from stickslip.estimate import Constant, Estimate
+from stickslip.estimate import Constant, Estimate, plain
 from stickslip.record.record import Record, Step
 from stickslip.signals.derivatives import LEAST, noise_along
 from stickslip.signals.interpolate import without_delays
@@ -58,10 +58,7 @@ class Resonance:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "name": self.name, "frequency": self.frequency.to_dict(), "damping": self.damping.to_dict(),
-            "channels": list(self.channels), "evidence": self.evidence,
-        }  # fmt: skip
+        return dict(plain(vars(self)))
 
     def __str__(self) -> str:
         frequency, damping = (

@@ -28,7 +28,7 @@ from stickslip.consistent.forced_checks import (
 )
 from stickslip.consistent.sliding_balance import Stated, stated_checks, what_fails
 from stickslip.errors import EstimateError
-from stickslip.estimate import Constant, Result
+from stickslip.estimate import Constant, Result, plain
 from stickslip.record.check import find_clipping
 from stickslip.record.flaws import constant, saturated
 from stickslip.record.record import Record
@@ -89,7 +89,7 @@ class Consistency(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {"checks": [check.to_dict() for check in self.checks], "status": self.status}
+        return dict(plain(vars(self)))
 
     def __repr__(self) -> str:
         return "\n  ".join([f"Consistency [{'ok' if self.status == 'ok' else 'not ok'}]:", *map(str, self.checks)])
