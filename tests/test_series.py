@@ -14,10 +14,9 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact, InertialContact
 from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.elastoslip import ElastoSlip
 from stickslip.laws.linear_slope import LinearSlope, PositionLoad
 from stickslip.laws.lugre import Dahl
-from stickslip.laws.series import InSeries
+from stickslip.laws.series import ElastoSlip, InSeries
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import Tabulated
 from stickslip.oscillator import Oscillator

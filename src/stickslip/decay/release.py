@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.decay.swings import SEEN, Run, Swings, bounds_of, free_decays
+from stickslip.decay.start import SEEN, Run, Swings, bounds_of, free_decays
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Status
 from stickslip.record.check import in_words

@@ -18,10 +18,10 @@ from stickslip.estimate import Estimate
 from stickslip.law.data import Samples, told
 from stickslip.law.family import Family
 from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.elastoslip import ElastoSlip
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.lugre import Dahl
-from stickslip.laws.rate_state import RateState
+from stickslip.laws.series import ElastoSlip
+from stickslip.laws.state_variable import RateState
 from stickslip.laws.stribeck import Stribeck, Tabulated
 
 Array = NDArray[np.float64]

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
-from stickslip.law.choice import CALIBRATIONS, Evidence, Misfit, Standing, standings, times, undescribed
 from stickslip.law.guess import Seen
 from stickslip.law.law import LawFit, answered
 from stickslip.law.search import descend
 from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
 from stickslip.law.stretch import Stretch, channels_of
-from stickslip.law.surety import surety
+from stickslip.law.surety import CALIBRATIONS, Evidence, Misfit, Standing, standings, surety, times, undescribed
 from stickslip.law.trials import (
     PASSES,
     Trial,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.maps import tally as log
+from stickslip.maps import measures as log
 from stickslip.maps.grid import START
 from stickslip.maps.measures import FAILED, LOG, NO_SYSTEM, ORDERS
 from stickslip.maps.plan import BLOCK, Arrays, Plan
