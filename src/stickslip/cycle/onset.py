@@ -138,11 +138,6 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     )  # fmt: skip
     ratio = _widened(ratio, borne.below / sliding, borne.above / sliding)
     status = borne.status
-    if status == "ok" and borne.method == PULL and ratio.interval[1] < 1:
-        status = (
-            "below the sliding friction: either that grows with speed, or the mass still rings on its contact when it "
-            'slips, and the pull is not what it bears: take friction_force(record, ..., method="fusion")'
-        )
     rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
     heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
     swings = [_swing(record, [stroke for stroke in borne.strokes if stroke.way == way], side) for way, side in SIDES]

@@ -20,7 +20,6 @@ from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]
 
-MEMORIES = ("none", "time delay", "state variable", "way", "undecided")
 LEAST_PHASE = 0.005  # rad: what smoothing leaves of a phase
 POINTS = 2000  # of a mean cycle, at most
 BLURRED = 0.25  # of the phase over which smoothing spreads the velocity's kinks: what it may shift the loop's

@@ -419,11 +419,6 @@ def without_starts(slopes: Sequence[Slopes]) -> list[Array]:
     return left
 
 
-def with_knobs(problem: Problem, knobs: Sequence[Knob]) -> Problem:
-    """The same stretches, with other knobs."""
-    return replace(problem, knobs=tuple(knobs))
-
-
 def rows_of(sensors: Sequence[Sensor]) -> list[slice]:
     """Where each sensor's residuals stand among those of its stretch."""
     edges = np.cumsum([0, *(len(sensor.time) for sensor in sensors)])
