@@ -251,9 +251,7 @@ def _difference(lines: Lines, difference: Array) -> Estimate:
     powers = np.sum(np.abs(apart) ** 2, axis=1) / 2
     rms = float(np.std(difference))
     sd = float(np.std(powers, ddof=1)) / math.sqrt(len(powers) * lines.worth) / (2 * rms) if rms > 0 else 0.0
-    return Estimate.normal(
-        "difference of the forces", rms, sd=sd, unit="N", method="root mean square, means taken off"
-    )  # fmt: skip
+    return Estimate.normal("difference of the forces", rms, sd=sd, unit="N", method="root mean square, means taken off")
 
 
 def _agree_up_to(bands: tuple[ForceBand, ...], tolerance: float, lines: Lines, nyquist: float) -> Estimate:

@@ -216,9 +216,10 @@ def _of_windows(record: Record, channels: Sequence[str], question: str) -> Lines
     size = 2 * len(record) // (WINDOWS + 1) // 2 * 2
     if size < SHORTEST:
         raise EstimateError(
-            f"{len(record)} samples", f"{question} needs {SHORTEST * (WINDOWS + 1) // 2} without cycles",
+            f"{len(record)} samples",
+            f"{question} needs {SHORTEST * (WINDOWS + 1) // 2} without cycles",
             "give a longer record",
-        )  # fmt: skip
+        )
     window = np.hanning(size + 1)[:-1]
     starts = np.arange(WINDOWS) * (size // 2)
     amplitudes, means = {}, {}

@@ -134,8 +134,9 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     ratio = mean_of_cycles(
         "static over sliding friction",
         [friction / pair.level for pair, friction in zip(borne.strokes, borne.friction, strict=True)],
-        unit="1", method=f"{borne.method} over the median of the stroke, mean of strokes",
-    )  # fmt: skip
+        unit="1",
+        method=f"{borne.method} over the median of the stroke, mean of strokes",
+    )
     ratio = _widened(ratio, borne.below / sliding, borne.above / sliding)
     status = borne.status
     rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too

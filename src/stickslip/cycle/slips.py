@@ -134,9 +134,10 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
     record.require("friction", question=QUESTION)
     if not is_measured(record, "friction"):
         raise RecordError(
-            "friction came from a balance of forces", f"{QUESTION} needs one that was measured: smoothing rings itself",
+            "friction came from a balance of forces",
+            f"{QUESTION} needs one that was measured: smoothing rings itself",
             "give the load cell's channel as friction",
-        )  # fmt: skip
+        )
     strokes = find_strokes(record, contact=contact, question=QUESTION)
     ringing = ringing_of(strokes.strokes, record.fs)
     if ringing is None:
@@ -204,11 +205,12 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
     parts = np.array_split(np.arange(len(swings)), min(len(swings), PARTS))
     without = [
         _ring_of(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
-        for part in parts if len(parts) > 1
-    ]  # fmt: skip
-    degrees = np.array([
-        _ring_of(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES
-    ])  # fmt: skip
+        for part in parts
+        if len(parts) > 1
+    ]
+    degrees = np.array(
+        [_ring_of(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES]
+    )
     frequency, damping = _averaged(degrees, np.reshape(without, (-1, 2)), len(cuts), side)
     amplitude = mean_of_cycles(
         f"amplitude of that ringing over the friction, {side}",

@@ -151,9 +151,7 @@ def _releases_of(records: list[Record], channel: str | None) -> list[Releases]:
     names = {ring_down.channel for each in found for ring_down in each.ring_downs}
     if len(names) > 1:
         raise EstimateError(
-            f"channels {', '.join(sorted(names))}",
-            "releases are fitted together by one channel",
-            "choose channel=",
+            f"channels {', '.join(sorted(names))}", "releases are fitted together by one channel", "choose channel="
         )
     return found
 

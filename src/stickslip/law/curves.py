@@ -275,9 +275,10 @@ def step_of(samples: Samples) -> tuple[float, float, float]:
     corner, before, after = best
     if np.ptp(x) > LEAST_WAY * abs(x[-1] - x[0]):
         raise EstimateError(
-            "the displacement goes to and fro", "a velocity step goes forward: steady sliding one way, then faster or "
-            "slower the same way", "give such a record, or fit a curve over the speed, as stribeck",
-        )  # fmt: skip
+            "the displacement goes to and fro",
+            "a velocity step goes forward: steady sliding one way, then faster or slower the same way",
+            "give such a record, or fit a curve over the speed, as stribeck",
+        )
     if min(before, after) <= 0 or max(before, after) < LEAST_STEP * min(before, after):
         raise EstimateError(
             f"the driving speed goes from {before:.3g} to {after:.3g} m/s",
@@ -403,7 +404,7 @@ def maxwell_slip(samples: Samples, elements: int) -> Family:
     if not kept.any():
         raise EstimateError(
             "no element bears friction with the motion", "some friction follows the way", "fit 'coulomb' or 'viscous'"
-        )  # fmt: skip
+        )
     yields = yields[kept]
 
     def columns(some: Samples, logs: Array) -> Array:

@@ -169,9 +169,10 @@ def _start(family: Family, samples: Samples) -> Array:
             best, least = np.array(logs), float(left @ left)
     if not len(best):
         raise EstimateError(
-            f"no start of {family.formula.partition(',')[0]} gives finite friction", "a fit begins at one",
+            f"no start of {family.formula.partition(',')[0]} gives finite friction",
+            "a fit begins at one",
             "give a record that slides more steadily",
-        )  # fmt: skip
+        )
     return best
 
 
@@ -315,12 +316,7 @@ def inverse_normal(jacobian: Array) -> Array:
 
 
 def minimise(
-    model: Callable[[Array], Array],
-    data: ArrayLike,
-    start: ArrayLike,
-    *,
-    settled_at: float = SHARP,
-    most: int = STEPS,
+    model: Callable[[Array], Array], data: ArrayLike, start: ArrayLike, *, settled_at: float = SHARP, most: int = STEPS
 ) -> Minimum:
     r"""The parameters of a model that leave the least sum of squares, from a start.
 

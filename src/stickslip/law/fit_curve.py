@@ -201,9 +201,7 @@ def fit_curve(
     if not isinstance(elements, (int, np.integer)) or not 2 <= elements <= 50:
         raise EstimateError(f"elements = {elements}", "points of a table, or elements, are 2 to 50", "leave it at 8")
     load = None if normal is None else finite("normal", parse_value(normal, "N"), unit="N", positive=True)
-    whole, sliding = samples_of(
-        data, contact=contact, frequency=frequency, smoothed=curve in OVER_WAY, normal=load
-    )  # fmt: skip
+    whole, sliding = samples_of(data, contact=contact, frequency=frequency, smoothed=curve in OVER_WAY, normal=load)
     family, member = best_member(*CURVES[curve](Request(curve, whole, sliding, int(elements), load or 1.0)))
     return _answer(curve, family, member, filled=_filled(data))
 

@@ -77,9 +77,10 @@ class Seen(Observed):
                 f"friction of {level:.3g} N while it slides" + (", the base taken to be at rest" if still else ""),
                 "friction opposes the velocity",
                 "give the base's motion as channel z, or the drive; where the motion is imposed, fit a curve of "
-                "friction (fit_curve, --curve)" if still
+                "friction (fit_curve, --curve)"
+                if still
                 else "correct the signs of the channels, or mass= and stiffness=",
-            )  # fmt: skip
+            )
         way, around = float(np.std(np.concatenate(ways))), Rests.together(rests)
         return cls(
             np.concatenate(slips), speed, friction, np.concatenate(steps), level,

@@ -165,8 +165,9 @@ def _loop(samples: Samples) -> _Loop:
     if not samples.reverses:
         raise EstimateError(
             f"the velocity runs from {samples.velocity.min():.3g} to {samples.velocity.max():.3g} {samples.unit}/s",
-            "the sense of rotation is told of motion both ways", "give a record that reverses",
-        )  # fmt: skip
+            "the sense of rotation is told of motion both ways",
+            "give a record that reverses",
+        )
     count = samples.cycles
     starts = np.searchsorted(samples.cycle, np.arange(count))
     ends = np.append(starts[1:], len(samples.cycle))

@@ -130,11 +130,7 @@ class Problem:
 
     @classmethod
     def of(
-        cls,
-        oscillator: Oscillator,
-        stretches: Sequence[Stretch],
-        knobs: Sequence[Knob],
-        profile: Profile | None = None,
+        cls, oscillator: Oscillator, stretches: Sequence[Stretch], knobs: Sequence[Knob], profile: Profile | None = None
     ) -> Problem:
         """The start's memory is that of steady sliding."""
         entries, scales = [], []
@@ -165,9 +161,10 @@ class Problem:
     def sensor_knobs(self, u: Array, kind: str, j: int) -> dict[str, float]:
         """Gains or delays by channel, in stretch j."""
         return {
-            knob.channel: knob.value(c) for knob, c in zip(self.knobs, u, strict=True)
+            knob.channel: knob.value(c)
+            for knob, c in zip(self.knobs, u, strict=True)
             if knob.kind == kind and knob.stretch in (None, j)
-        }  # fmt: skip
+        }
 
     def begin(self, u: Array) -> Point:
         """The point with the starts as estimated."""

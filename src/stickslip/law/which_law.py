@@ -525,9 +525,10 @@ def _answer(
     excess_ = excess_ if told[0].family == "rigid" else None
     checks = tuple(f"{each.name}: misfit {times(each.misfit)} the least" for each in told)
     step = Step(
-        "compare_laws", {"laws": [each.name for each in candidates], "calibration": calibration},
+        "compare_laws",
+        {"laws": [each.name for each in candidates], "calibration": calibration},
         f"{', '.join(each.name for each in kept)} not rejected",
-    )  # fmt: skip
+    )
     return LawComparison(
         candidates, kept[0].name if len(kept) == 1 and not doubt else None,
         families[0] if len(families) == 1 and not doubt else None,

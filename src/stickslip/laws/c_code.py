@@ -106,8 +106,9 @@ def _require_writable(law: Law | CurvedLaw, modes: Modes) -> None:
     if len({_token(mode.name) for mode in modes}) < len(modes):
         raise ModelError(
             f"modes called {', '.join(mode.name for mode in modes)}",
-            "each has a name of its own in letters and digits", "name them so",
-        )  # fmt: skip
+            "each has a name of its own in letters and digits",
+            "name them so",
+        )
     for mode in modes:
         forms = [*(exit_.quantity for exit_ in mode.exits), *mode.rates.values()]
         if mode.friction is not None and any("df" in form for form in forms if not isinstance(form, Expression)):
@@ -241,7 +242,7 @@ def python_code(law: Law | CurvedLaw, formula: str, breakaway: float | None) -> 
         f"# {remark(formula)}",
         "# friction [N], positive against positive velocity; x [m], v [m/s] of the mass against the counter-face",
         *(f"# {NOTES[name]}" for name in used),
-    ]  # fmt: skip
+    ]
     imports = [f"from math import {', '.join(functions)}", "", ""] if functions else ["", ""]
     body = body.replace(", OTHERS", "".join(f", {name}" for name in used))
     return "\n".join([*head, *imports, body])

@@ -72,9 +72,10 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
         raise ModelError(f"law = {law!r}", "a law is exported with its values", "give one, as in Coulomb(1.1)")
     if any(isinstance(part, RoughSurface) for part in _nested(law)):
         raise ModelError(
-            "a rough surface", "its friction follows a place by chance, and has no formula",
+            "a rough surface",
+            "its friction follows a place by chance, and has no formula",
             "export the contact on it, law.contact",
-        )  # fmt: skip
+        )
     return FORMATS[format](law).rstrip("\n") + "\n" * (format == "c")
 
 
@@ -166,8 +167,9 @@ def _parameter(name: str, value: Any) -> Any:
     if not all(isinstance(part, int | float) and isfinite(part) for part in (value if _listed(value) else [value])):
         raise ModelError(
             f"{name} of type {type(value).__name__}",
-            "a block of parameters holds finite numbers, lists of them, and text", "export Python or C",
-        )  # fmt: skip
+            "a block of parameters holds finite numbers, lists of them, and text",
+            "export Python or C",
+        )
     return value
 
 

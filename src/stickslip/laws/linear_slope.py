@@ -92,8 +92,5 @@ class PositionLoad(Rigid):
         return Mode(name, "slip", side, friction, (Exit({"v": float(-side)}, "stuck"), lift))
 
     def _lifted(self, name: str, other: str, side: int) -> Mode:
-        exits = (
-            Exit({"v": float(-side)}, f"{other} lifted"),
-            Exit({"1": self.kinetic, "x": self.gradient}, name),
-        )
+        exits = (Exit({"v": float(-side)}, f"{other} lifted"), Exit({"1": self.kinetic, "x": self.gradient}, name))
         return Mode(f"{name} lifted", "flight", side, {}, exits)

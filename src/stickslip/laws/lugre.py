@@ -109,9 +109,10 @@ def _guesses(seen: Observed) -> list[LuGre]:
     """The bristles whose bending under the measured sliding follows the friction best."""
     contact = compliant.guesses(seen)[0]
     mesh = np.meshgrid(
-        contact.stiffness * np.array([1.0, 1.5, 2.5]), seen.fastest * np.geomspace(*SPEEDS, 6),
-        np.array([LEAST_EXCESS, 0.1, 0.2, 0.35, 0.6])
-    )  # fmt: skip
+        contact.stiffness * np.array([1.0, 1.5, 2.5]),
+        seen.fastest * np.geomspace(*SPEEDS, 6),
+        np.array([LEAST_EXCESS, 0.1, 0.2, 0.35, 0.6]),
+    )
     stiffness, speed, excess = (values.ravel() for values in mesh)
     force = _bristles(seen, stiffness, speed, excess)
     best = int(np.argmin(np.mean((force - seen.friction[:, None]) ** 2, axis=0)))

@@ -328,8 +328,7 @@ class Tabulated(Rigid):
 
     def modes(self) -> tuple[Mode, ...]:
         """A mode for each straight piece on either side, and stick."""
-        stuck = Mode("stuck", "stick", 0, None, held_until(self.breakaway, back="back 0",
-                                                           forward="forward 0"))  # fmt: skip
+        stuck = Mode("stuck", "stick", 0, None, held_until(self.breakaway, back="back 0", forward="forward 0"))
         return (*self._side(-1, "back"), stuck, *self._side(1, "forward"))
 
     def _side(self, side: int, name: str) -> list[Mode]:

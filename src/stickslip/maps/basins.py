@@ -90,12 +90,7 @@ class Basins:
 
 
 def basins(
-    system: System,
-    *,
-    grid: Mapping[str, ArrayLike],
-    start: Start | None = None,
-    transient: int = 64,
-    orders: int = 4,
+    system: System, *, grid: Mapping[str, ArrayLike], start: Start | None = None, transient: int = 64, orders: int = 4
 ) -> Basins:
     """To which motion does each start lead?
 

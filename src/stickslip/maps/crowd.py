@@ -14,19 +14,7 @@ from stickslip.maps import measures as log
 from stickslip.maps.grid import START
 from stickslip.maps.measures import FAILED, LOG, NO_SYSTEM, ORDERS
 from stickslip.maps.plan import BLOCK, Arrays, Plan
-from stickslip.maps.watch import (
-    CONSTANT,
-    LAP,
-    MARK,
-    ROOM,
-    VARIES,
-    Counted,
-    Given,
-    Look,
-    Rooms,
-    repeats,
-    watch_all,
-)
+from stickslip.maps.watch import CONSTANT, LAP, MARK, ROOM, VARIES, Counted, Given, Look, Rooms, repeats, watch_all
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
 from stickslip.solve.assembly import tables_of

@@ -102,11 +102,7 @@ class CycleBranches:
 
 
 def limit_cycles(
-    system: System,
-    parameter: str | Callable[[float], System],
-    *,
-    values: ArrayLike,
-    speed: float | None = None,
+    system: System, parameter: str | Callable[[float], System], *, values: ArrayLike, speed: float | None = None
 ) -> CycleBranches:
     """How does the vibration begin as a parameter changes, and does it end where it began?
 

@@ -163,5 +163,6 @@ def _call(part: Mapping[str, Any]) -> str:
 def _arguments(values: Mapping[str, Any], without: tuple[str, ...] = ()) -> str:
     return ", ".join(
         f"{name}={_call(value) if isinstance(value, Mapping) else repr(value)}"
-        for name, value in values.items() if name not in without
-    )  # fmt: skip
+        for name, value in values.items()
+        if name not in without
+    )
