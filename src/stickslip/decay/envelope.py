@@ -252,6 +252,8 @@ def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDeca
     >>> round(found.damping_ratio.value * 2 * np.pi, 2)
     0.1
     """
+    from scipy.signal import hilbert
+
     ring_down = _displacement(record, channel)
     size = max(3, round(ring_down.fs / ring_down.frequency))
     moved = ring_down.samples[ring_down.motion] - ring_down.rest
@@ -260,7 +262,7 @@ def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDeca
         raise EstimateError(
             f"{len(moved) // size} periods", f"an envelope needs {PERIODS}", "use log_decrement or fit_decay instead"
         )
-    envelope = np.convolve(np.abs(_analytic(moved)), np.full(size, 1 / size), mode="valid")[
+    envelope = np.convolve(np.abs(hilbert(moved)), np.full(size, 1 / size), mode="valid")[
         size // 2 : -(size // 2) or None
     ]
     fall = (envelope[size:] - envelope[:-size]) * ring_down.fs / size
@@ -279,17 +281,6 @@ def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDeca
         "the transform's ends and the averaging bend the envelope: its interval does not hold that",
         "ok",
     )
-
-
-def _analytic(values: Array) -> NDArray[np.complex128]:
-    """The analytic signal: twice the positive frequencies, none of the negative."""
-    count = len(values)
-    weights = np.zeros(count)
-    weights[0] = 1.0
-    weights[1 : (count + 1) // 2] = 2.0
-    if count % 2 == 0:
-        weights[count // 2] = 1.0
-    return np.fft.ifft(np.fft.fft(values) * weights)
 
 
 def _fitted_swings(sizes: Array, numbers: Array, signs: Array, restoring: str) -> tuple[Array, Array]:

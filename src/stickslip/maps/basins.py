@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
+from stickslip.estimate import Doubt, Estimate, Status
 from stickslip.parameters import PARTS
 from stickslip.record.exchange import labelled_arrays
 from stickslip.solve.orbit import SteadyState, alike
@@ -199,20 +199,15 @@ def _belongs(system: System, table: Table, state: Array, mode: int, attractor: A
 def _share(name: str, count: int, total: int, lost: int) -> Estimate:
     """A share of what was followed, with Wilson's interval: as of starts drawn at random, which scatter more than a
     grid. Starts that were not followed may belong to it or not: the interval holds both."""
+    from scipy.stats import binomtest
+
     share = count / (total - lost)
-    interval = (_wilson(count / total, total)[0], _wilson((count + lost) / total, total)[1])
+    ends = [binomtest(most, total).proportion_ci(method="wilson") for most in (count, count + lost)]
+    interval = (float(ends[0].low), float(ends[1].high))
     doubts = [Doubt(f"{lost} of {total} starts could not be followed")] if lost else []
     method = f"count of {total - lost} starts, Wilson's interval"
     sd = math.sqrt(share * (1 - share) / total)
     return Estimate(f"share of '{name}'", share, interval, sd, "1", method, Status(*doubts))
-
-
-def _wilson(share: float, total: int) -> tuple[float, float]:
-    """The 95 % interval of a share."""
-    square = NORMAL_95**2 / total
-    middle = (share + square / 2) / (1 + square)
-    half = math.sqrt(square * (share * (1 - share) + square / 4)) / (1 + square)
-    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 @dataclass(frozen=True, eq=False)
