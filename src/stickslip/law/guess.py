@@ -30,7 +30,7 @@ FAST = 0.3  # of the largest speed, above which friction is that of sliding
 SLOW = 0.05  # of it, below which the contact may hold
 EDGE = 24  # samples at either end that a smoother knows less of
 
-QUICK, CREEPING, AT_REST = 0.3, 0.08, 0.02  # of the largest speed: for good, hardly, and not at all
+CREEPING, AT_REST = 0.08, 0.02  # of the largest speed: hardly sliding, and not at all
 NOISY = 4.0  # deviations of the velocity, below which it may be at rest
 HELD = 0.4  # of a radian of the motion that a contact holds at least, for a release to be told
 LEAST, FEW = 24, 8  # samples of a hold, and of slow sliding
@@ -139,9 +139,9 @@ class Rests:
         still = max(AT_REST * top, NOISY * unsure)
         falls, rises, shapes, strays = [], [], [], []
         ended = None
-        for first, last in _strokes(speed, still, QUICK * top):
+        for first, last in _strokes(speed, still, FAST * top):
             side = np.sign(speed[(first + last) // 2])
-            fast = side * speed[first:last] > QUICK * top
+            fast = side * speed[first:last] > FAST * top
             sliding = side * friction[first:last]
             level = float(np.median(sliding[fast]))
             if not level > 0:
