@@ -20,7 +20,7 @@ import numpy as np
 
 import stickslip as ss
 from stickslip.decay.fit_decay import fit_decay
-from stickslip.decay.search import Search, weights
+from stickslip.decay.start import Search, weights
 from stickslip.decay.waveform import Blocks
 from stickslip.statistics import student
 

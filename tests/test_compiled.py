@@ -55,7 +55,7 @@ def test_a_change_in_one_file_is_seen_by_its_callers_in_others(copy: Path) -> No
 
 def test_a_change_in_one_file_leaves_the_kernels_of_others(copy: Path) -> None:
     first = ask(copy)[2]
-    other = copy / "stickslip" / "signals" / "turns.py"
+    other = copy / "stickslip" / "signals" / "pieces.py"
     other.write_text(other.read_text("utf-8") + "\n# another word\n", "utf-8")
     order, hits, folder = ask(copy)
     assert (order, hits, folder) == (3, 1, first)

@@ -5,7 +5,7 @@ import pytest
 
 from stickslip.errors import RecordError
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 
 FS = 1000.0
 T = np.arange(4000) / FS

@@ -18,7 +18,7 @@ from stickslip.signals.derivatives import (
     five_point_response,
     smooth,
 )
-from stickslip.signals.smoother import penalised
+from stickslip.signals.noise import penalised
 
 METHODS = ("smoother", "five-point")
 

@@ -83,13 +83,3 @@ def test_too_few_extremes_and_speeds_are_refused() -> None:
     speed = np.gradient(released(0.02, 0.0)["x"], 0.005)
     with pytest.raises(ss.errors.EstimateError, match="displacements are read"):
         ss.decay.hilbert_decay(ss.Record.of({"v": speed}, fs=200))
-
-
-@pytest.mark.parametrize("count", [100, 101])
-def test_the_analytic_signal_is_scipys(count):
-    from scipy.signal import hilbert
-
-    from stickslip.decay.envelope import _analytic
-
-    values = np.random.default_rng(1).standard_normal(count)
-    assert np.abs(_analytic(values) - hilbert(values)).max() < 1e-12

@@ -11,7 +11,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.decay.motions import free_decay
-from stickslip.decay.search import Search
+from stickslip.decay.start import Search
 from stickslip.decay.waveform import Blocks, normal_equations
 
 OMEGA, DAMPING, DRY, REST, AMPLITUDE, RELEASE = 2 * math.pi, 0.0316, 0.02, 0.1, 1.0, 0.26

@@ -14,8 +14,7 @@ import stickslip as ss
 from stickslip.lab.forms import catalog
 from stickslip.laws.base import Exit, Mode, Rigid
 from stickslip.laws.export import FORMATS
-from stickslip.laws.guessing import RIGID, Hypothesis, Observed
-from stickslip.laws.register import registered
+from stickslip.laws.guessing import RIGID, Hypothesis, Observed, registered
 from stickslip.parameters import parameter, parametric, unit
 
 RIG: dict[str, Any] = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12}

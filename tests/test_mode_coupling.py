@@ -14,7 +14,7 @@ from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.linear_slope import LinearSlope
-from stickslip.laws.tabulated import Tabulated
+from stickslip.laws.stribeck import Tabulated
 from stickslip.solve.assembly import table_of
 from stickslip.solve.simulate import simulate
 from stickslip.structure import Contact, Structure

@@ -14,7 +14,7 @@ from numpy import arctan, cos, exp, log, pi, sin
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.law.nonlinear import minimise
+from stickslip.law.family import minimise
 
 Array = NDArray[np.float64]
 FOLDER = Path(__file__).parent / "data" / "nist_strd"

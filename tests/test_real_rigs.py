@@ -10,7 +10,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cycle.before_slip import HIGH, LOW, _branch
-from stickslip.cycle.strokes import find_strokes
+from stickslip.cycle.slips import find_strokes
 
 Sets = Callable[[str], Path]
 WEIGHT = 0.0307 * 9.81  # of the paper slider [N]

@@ -8,7 +8,7 @@ import pytest
 import stickslip as ss
 from motions import free_decay
 from stickslip.decay.release import find_releases
-from stickslip.signals.turns import turning_points
+from stickslip.signals.pieces import turning_points
 
 
 def of(values, fs, name="x", **more):

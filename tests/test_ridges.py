@@ -10,8 +10,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import RecordError
-from stickslip.signals.cutting import GLIDE, RING
-from stickslip.signals.pieces import Splitter
+from stickslip.signals.pieces import GLIDE, RING, Splitter
 
 RNG = np.random.default_rng(11)
 FS = 1000.0

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import stickslip as ss
 from stickslip.errors import EstimateError, RecordError
 from stickslip.signals.alignment import Lines
-from stickslip.signals.derivative_spectra import derivative_spectra, window
+from stickslip.signals.response import derivative_spectra, window
 
 Array = NDArray[np.float64]
 FS = 1000.0

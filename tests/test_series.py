@@ -12,16 +12,13 @@ from scipy.integrate import solve_ivp
 from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, Recorded
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
-from stickslip.laws.compliant import CompliantContact
+from stickslip.laws.compliant import CompliantContact, InertialContact
 from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.dahl import Dahl
-from stickslip.laws.elastoslip import ElastoSlip
-from stickslip.laws.inertial import InertialContact
-from stickslip.laws.linear_slope import LinearSlope
-from stickslip.laws.position_load import PositionLoad
-from stickslip.laws.series import InSeries
+from stickslip.laws.linear_slope import LinearSlope, PositionLoad
+from stickslip.laws.lugre import Dahl
+from stickslip.laws.series import ElastoSlip, InSeries
 from stickslip.laws.state_variable import StateVariable
-from stickslip.laws.tabulated import Tabulated
+from stickslip.laws.stribeck import Tabulated
 from stickslip.oscillator import Oscillator
 from stickslip.solve.energies import energy
 from stickslip.solve.simulate import simulate

@@ -14,11 +14,10 @@ from scipy.linalg import expm
 from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, MultiTone, Ramp, Recorded, Release
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
-from stickslip.laws.compliant import CompliantContact
+from stickslip.laws.compliant import CompliantContact, InertialContact
 from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.dahl import Dahl
-from stickslip.laws.elastoslip import ElastoSlip
-from stickslip.laws.inertial import InertialContact
+from stickslip.laws.lugre import Dahl
+from stickslip.laws.series import ElastoSlip
 from stickslip.laws.state_variable import StateVariable
 from stickslip.oscillator import Oscillator
 from stickslip.solve.energies import energy

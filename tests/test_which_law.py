@@ -13,13 +13,12 @@ from click.testing import CliRunner
 
 import stickslip as ss
 from stickslip.cli.program import main
-from stickslip.law.choice import CERTAIN, Evidence, Misfit, standings
 from stickslip.law.guess import Seen
 from stickslip.law.search import Knob, Problem
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
-from stickslip.law.surety import _end
-from stickslip.laws.register import hypotheses
+from stickslip.law.surety import CERTAIN, Evidence, Misfit, _end, standings
+from stickslip.laws.guessing import hypotheses
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Step
 

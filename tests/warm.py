@@ -8,7 +8,7 @@ import pkgutil
 import numpy as np
 
 import stickslip
-from stickslip.signals.turns import turning_points
+from stickslip.signals.pieces import turning_points
 
 LATE = (
     "h5py",

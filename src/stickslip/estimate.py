@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -195,16 +195,8 @@ class Estimate:
     def scaled(self, factor: float, unit: str, name: str | None = None) -> Estimate:
         """The same estimate in another unit, or of a quantity proportional to it."""
         ends = sorted(factor * end for end in self.interval)
-        return Estimate(
-            name or self.name,
-            factor * self.value,
-            (ends[0], ends[1]),
-            abs(factor) * self.sd,
-            unit,
-            self.method,
-            self.status,
-            self.checks,
-        )
+        interval, sd = (ends[0], ends[1]), abs(factor) * self.sd
+        return replace(self, name=name or self.name, value=factor * self.value, interval=interval, sd=sd, unit=unit)
 
     @property
     def known(self) -> bool:
@@ -246,11 +238,7 @@ class Estimate:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not finite becomes ``None``."""
-        numbers = [x if math.isfinite(x) else None for x in (self.value, *self.interval, self.sd)]
-        return {
-            "name": self.name, "value": numbers[0], "interval": numbers[1:3], "sd": numbers[3], "unit": self.unit,
-            "method": self.method, "status": self.status, "checks": list(self.checks),
-        }  # fmt: skip
+        return dict(plain(vars(self)))
 
     @property
     def spread(self) -> float:
@@ -322,6 +310,21 @@ class Result:
         status = getattr(self, "status", "ok")
         flag = "" if status == "ok" else f" [{status}]"
         return "\n  ".join([f"{getattr(self, 'name', type(self).__name__)}{flag}:", *map(str, self.estimates)])
+
+
+def plain(value: Any) -> Any:
+    """What an answer holds as plain data for JSON; a number that is not finite becomes ``None``."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, tuple | list | np.ndarray):
+        return [plain(entry) for entry in value]
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    if is_dataclass(value):
+        return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
+    return value
 
 
 def decimals(sd: float, value: float) -> int:

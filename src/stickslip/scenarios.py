@@ -18,7 +18,7 @@ from stickslip.drives.kinds import HarmonicForce, Ramp
 from stickslip.errors import ModelError
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.formula import Formula
-from stickslip.laws.register import registered
+from stickslip.laws.guessing import registered
 from stickslip.oscillator import Oscillator
 from stickslip.solve.assembly import table_of
 from stickslip.solve.orbit import SteadyState

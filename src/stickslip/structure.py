@@ -14,9 +14,9 @@ from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
 from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.guessing import registered
 from stickslip.laws.linear_slope import LinearSlope
-from stickslip.laws.register import registered
-from stickslip.laws.tabulated import Tabulated
+from stickslip.laws.stribeck import Tabulated
 from stickslip.parameters import changed, finite, parameter, parametric
 
 Array = NDArray[np.float64]

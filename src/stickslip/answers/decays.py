@@ -18,7 +18,7 @@ from stickslip.decay.envelope import EnvelopeDecay, extreme_decay, hilbert_decay
 from stickslip.decay.fit_decay import fit_decay
 from stickslip.decay.motions import Restoring
 from stickslip.decay.release import Releases, find_releases
-from stickslip.decay.swings import SEEN
+from stickslip.decay.start import SEEN
 from stickslip.decay.which_motion import DecayMotion, choose_motion
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Constant, Estimate, Result

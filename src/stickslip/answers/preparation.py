@@ -18,7 +18,7 @@ from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
 from stickslip.rig.settings import RigSettings
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 
 MOTION = ("x", "v", "theta")
 USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take

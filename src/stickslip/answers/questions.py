@@ -20,10 +20,9 @@ from stickslip.answers.preparation import (
     ready,
     unmoved,
 )
-from stickslip.balance.balance import Balance
+from stickslip.balance.balance import Balance, pulled_slider
 from stickslip.balance.force import FUSIONS, friction_force
 from stickslip.balance.motion import is_measured, slid_on
-from stickslip.balance.pull import pulled_slider
 from stickslip.consistent.contradictions import consistency
 from stickslip.contact.cause import lag_or_compliance
 from stickslip.contact.contact import contact_damping, contact_stiffness

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from stickslip.balance.balance import Balance, known_constants
 from stickslip.balance.force import friction_force
-from stickslip.balance.lines import Complex, Lines, find_lines
+from stickslip.balance.mass import Complex, Lines, find_lines
 from stickslip.balance.mounts import Resonance, find_mounts
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Constant, Estimate, Result, Status
+from stickslip.estimate import NORMAL_95, Constant, Estimate, Result, Status, plain
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 
 Array = NDArray[np.float64]
 
@@ -115,12 +115,7 @@ class ForceComparison(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "estimates": [estimate.to_dict() for estimate in self.estimates],
-            "bands": [vars(band) for band in self.bands],
-            "resonances": [resonance.to_dict() for resonance in self.resonances],
-            "status": self.status,
-        }
+        return dict(plain({name: getattr(self, name) for name in ("estimates", "bands", "resonances", "status")}))
 
 
 def compare_force(
@@ -256,9 +251,7 @@ def _difference(lines: Lines, difference: Array) -> Estimate:
     powers = np.sum(np.abs(apart) ** 2, axis=1) / 2
     rms = float(np.std(difference))
     sd = float(np.std(powers, ddof=1)) / math.sqrt(len(powers) * lines.worth) / (2 * rms) if rms > 0 else 0.0
-    return Estimate.normal(
-        "difference of the forces", rms, sd=sd, unit="N", method="root mean square, means taken off"
-    )  # fmt: skip
+    return Estimate.normal("difference of the forces", rms, sd=sd, unit="N", method="root mean square, means taken off")
 
 
 def _agree_up_to(bands: tuple[ForceBand, ...], tolerance: float, lines: Lines, nyquist: float) -> Estimate:

@@ -26,7 +26,6 @@ from stickslip.balance.motion import require_change, require_fit
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Constant, Estimate
 from stickslip.record.record import Record, StatedRig, Step
-from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import (
     LEAST,
     METHODS,
@@ -38,6 +37,7 @@ from stickslip.signals.derivatives import (
     noise_along,
     total_sd,
 )
+from stickslip.signals.interpolate import without_delays
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def friction_force(
     ----------
     record : Record
         With ``x`` [m], and z, v, a, force [N] where measured. What an earlier call derived is derived afresh. Delays
-        stated for these channels are taken out first, see :func:`~stickslip.signals.delay.without_delays`.
+        stated for these channels are taken out first, see :func:`~stickslip.signals.interpolate.without_delays`.
     mass : float, str, tuple or Estimate
         Moving mass m [kg]; or with its unit, ``"250 g"``, and with its standard uncertainty, ``"2.42 ± 0.02 kg"`` or
         ``(2.42, 0.02)``, which the friction does not feel: ``record.rig`` keeps it for the twins of a record. So may

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from stickslip.balance.balance import known_constants
 from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.errors import EstimateError
-from stickslip.estimate import Constant, Estimate, Result
+from stickslip.estimate import Constant, Estimate, Result, plain
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import noise_along
+from stickslip.signals.interpolate import without_delays
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -65,8 +65,7 @@ class ImpactTest(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        table = {"time": self.time, "duration": self.duration, "residual": self.residual, "status": self.status}
-        return {"resonances": [resonance.to_dict() for resonance in self.resonances], **table}
+        return dict(plain(vars(self)))
 
 
 def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:

@@ -78,7 +78,7 @@ def sensor_delay(
 
     (thesis, section 2.3, where d is read from one phase, d = phi / w). The relation holds line by line in spectra
     whose windows, not samples, are differentiated and shifted
-    (:func:`~stickslip.signals.derivative_spectra.derivative_spectra`), for ring-downs, forced runs and friction runs
+    (:func:`~stickslip.signals.response.derivative_spectra`), for ring-downs, forced runs and friction runs
     alike; g, d, w_m and zeta are those under which both channels are most likely with the motion unknown:
 
     .. math:: \sum_k |r_k|^2 / (\sigma_y^2 |Q_k|^2 + g^2 \omega_k^{2n} \sigma_x^2) \to \min

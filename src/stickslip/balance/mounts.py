@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from stickslip.balance.balance import Balance, known_constants
 from stickslip.balance.fusion import fuse
 from stickslip.balance.lag import SensorDelay, sensor_delay
-from stickslip.balance.lines import Complex, Lines
+from stickslip.balance.mass import Complex, Lines
 from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError
-from stickslip.estimate import Constant, Estimate
+from stickslip.estimate import Constant, Estimate, plain
 from stickslip.record.record import Record, Step
-from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import LEAST, noise_along
+from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.signals.response import resonance
 
@@ -58,10 +58,7 @@ class Resonance:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "name": self.name, "frequency": self.frequency.to_dict(), "damping": self.damping.to_dict(),
-            "channels": list(self.channels), "evidence": self.evidence,
-        }  # fmt: skip
+        return dict(plain(vars(self)))
 
     def __str__(self) -> str:
         frequency, damping = (
@@ -252,9 +249,10 @@ def _fused(record: Record, rig: dict[str, Any], question: str) -> Acceleration:
     noise = max(SWINGS * sd, ROUNDED * float(values.std()))
     step = Step("acceleration_of_mass", {"sensors": sensors}, "by a smoother that knows the stated mounts")
     kept = replace(
-        record, samples={n: v for n, v in record.samples.items() if n != "a"},
+        record,
+        samples={n: v for n, v in record.samples.items() if n != "a"},
         channels={n: c for n, c in record.channels.items() if n != "a"},
-    )  # fmt: skip
+    )
     made = kept.with_channel("a", values, unit="m/s^2", source="acceleration_of_mass", noise=noise, step=step)
     unstated = "" if record.channels["a"].mount is not None else _mount_of(compared, record.fs)
     doubt = "; ".join(filter(None, [_late(compared), unstated])) or _too_loud("a", noise / float(values.std()))

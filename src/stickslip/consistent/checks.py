@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
+from stickslip.estimate import plain
+
 HOLDS, FAILS, UNTOLD = "holds", "fails", "can not be told"
 APART = 3.0  # standard deviations from which two numbers are not one
 
@@ -42,10 +44,7 @@ class Check:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not finite becomes ``None``."""
-        return {
-            key: (value if math.isfinite(value) else None) if isinstance(value, float) else value
-            for key, value in vars(self).items()
-        }
+        return dict(plain(vars(self)))
 
     def __str__(self) -> str:
         unit = "" if self.unit == "1" else f" {self.unit}"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.lines import Complex, Lines, find_lines, response_of
+from stickslip.balance.mass import Complex, Lines, find_lines, response_of
 from stickslip.consistent.checks import APART, HOLDS, UNTOLD, Amplitudes, Check, compared, judged, untold
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.record.channels import Channel

@@ -19,9 +19,9 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import smooth
-from stickslip.signals.turns import turning_points
+from stickslip.signals.interpolate import without_delays
+from stickslip.signals.pieces import turning_points
 from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]

@@ -169,7 +169,7 @@ def transition_of(ringing: Ringing, mass: Constant | None, stiffness: Constant |
         loop_stiffness=doubted(loop) if loop is not None else None,
         sticks=sticks,
         status=_status(ringing, pooled, doubt),
-    )  # fmt: skip
+    )
 
 
 def heard_mode(ringing: Ringing) -> Mode:
@@ -213,9 +213,8 @@ def _stretches(window: Window, pole: complex, fs: float) -> list[slice]:
     """The rows of a window that ring for sure."""
     cycle = 2 * math.pi / pole.imag * fs
     inner = [
-        slice(math.ceil(piece.first + AFTER * cycle), math.floor(piece.last - BEFORE * cycle))
-        for piece in window.rings
-    ]  # fmt: skip
+        slice(math.ceil(piece.first + AFTER * cycle), math.floor(piece.last - BEFORE * cycle)) for piece in window.rings
+    ]
     return [rows for rows in inner if rows.stop - rows.start >= max(8, LEAST_RING * cycle)]
 
 

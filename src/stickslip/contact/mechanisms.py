@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stickslip.contact.ringing import MISFIT, Ringing, checked_mass, find_ringing
 from stickslip.errors import EstimateError
-from stickslip.estimate import Constant
+from stickslip.estimate import Constant, plain
 from stickslip.record.record import Record
 
 QUESTION = "the mechanism"
@@ -69,10 +69,7 @@ class Mechanism:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "name": self.name, "probability": self.probability if math.isfinite(self.probability) else None,
-            "probabilities": dict(self.probabilities), "features": dict(self.features), "reason": self.reason,
-        }  # fmt: skip
+        return dict(plain(vars(self)))
 
     def __repr__(self) -> str:
         sure = f" ({100 * self.probability:.0f} %)" if math.isfinite(self.probability) else ""

@@ -15,9 +15,8 @@ from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Status
 from stickslip.record.record import Record
-from stickslip.signals.cutting import GLIDE, RING
 from stickslip.signals.noise import noise_level
-from stickslip.signals.pieces import Piece, Splitter
+from stickslip.signals.pieces import GLIDE, RING, Piece, Splitter
 
 Array = NDArray[np.float64]
 
@@ -133,12 +132,7 @@ class Ringing:
 
 
 def find_ringing(
-    record: Record,
-    channel: str,
-    *,
-    question: str,
-    mass: Constant | None = None,
-    stiffness: Constant | None = None,
+    record: Record, channel: str, *, question: str, mass: Constant | None = None, stiffness: Constant | None = None
 ) -> Ringing:
     """Cut the acceleration around each stick into glides and rings of one mode.
 
@@ -185,9 +179,10 @@ def checked_mass(mass: Constant | None, stiffness: Constant | None) -> tuple[flo
     spring = Estimate.stated("stiffness", stiffness, "N/m").value if stiffness is not None else 0.0
     if not (kilograms is None or 0 < kilograms < math.inf) or not 0 <= spring < math.inf:
         raise EstimateError(
-            f"mass = {mass}, stiffness = {stiffness}", "a mass is positive, a spring not negative",
+            f"mass = {mass}, stiffness = {stiffness}",
+            "a mass is positive, a spring not negative",
             "give the mass in kg and the spring in N/m",
-        )  # fmt: skip
+        )
     return kilograms, spring
 
 

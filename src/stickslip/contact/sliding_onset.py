@@ -318,7 +318,7 @@ def _set_going(known: Array, rig: Balance) -> float:
     if level <= 0:
         raise EstimateError(
             f"friction of {level:.3g} N before the turns", "friction opposes the motion", "check the sensors' signs"
-        )  # fmt: skip
+        )
     stiffness = math.exp(log_stiffness)
     square, decay = stiffness / rig.mass, (damping + rig.damping) / (2 * rig.mass)
     ring = math.sqrt(square - decay**2)
@@ -339,9 +339,10 @@ def _set_going(known: Array, rig: Balance) -> float:
     half = math.pi / ring
     if short(half) <= 0:
         raise EstimateError(
-            "the contact holds on after each turn", "a transition speed is that at which it begins to slide",
+            "the contact holds on after each turn",
+            "a transition speed is that at which it begins to slide",
             "see transition for how it rings",
-        )  # fmt: skip
+        )
     return float(moved(float(brentq(short, 0.0, half)))[1])
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.motion import FORCES, is_measured
-from stickslip.cycle.strokes import Stroke, Strokes, find_strokes
+from stickslip.cycle.slips import Stroke, Strokes, find_strokes
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record
@@ -27,7 +27,6 @@ FELT = 5e-4  # of a stroke: a contact that gives way by less is not told from a 
 ELASTIC = 1 / 3  # of a stroke, that friction may take to turn: one that follows the speed seems to give way over 0.44
 RIGID = 0.02  # of a stroke: where friction may take more to build up, a contact is not shown to be rigid
 BLURRED = 0.5  # of the samples over which a balance of forces blurs a jump: a quicker build-up is the blur's
-APART = 2.0  # times: compliances that differ by more between the directions are worth a word
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,9 +130,7 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     ]
     untold = verdict == "can not be told"
     slopes = [slope.unknown(evidence) if untold else slope.within(0.0, otherwise=evidence) for slope in slopes]
-    status = evidence if untold or _uneven(slopes) else "ok"
-    if _rings(strokes.strokes):
-        status = "the contact rings while friction builds up, so that a line says little: see contact_stiffness(record)"
+    status = evidence if untold else "ok"
     return Presliding(
         _inverse(_both(slopes), "presliding stiffness") if gives else None,
         sides[0], sides[1], _backlash(strokes) if gives else None, slopes[0], slopes[1], verdict, evidence, status,
@@ -158,14 +155,6 @@ def _blurred(strokes: Strokes) -> bool:
         for stroke in strokes.strokes
     ]  # fmt: skip
     return float(np.median(rows)) < BLURRED * strokes.motion.blur
-
-
-def _rings(strokes: Sequence[Stroke]) -> bool:
-    """Whether the friction passes half of its level more than once before it slips, in most strokes."""
-    passes = [
-        np.count_nonzero(np.diff(stroke.friction[: stroke.slip + 1] > stroke.level / 2)) > 1 for stroke in strokes
-    ]
-    return bool(2 * sum(passes) > len(passes))
 
 
 def _compliance(strokes: Sequence[Stroke], name: str, unit: str) -> Estimate:
@@ -214,14 +203,7 @@ def _verdict(
         return "rigid", f"{moves}; {factor * least * level:.2g} {unit} would be felt"
     if any(slope.value < least or slope.interval[0] <= 0 for slope in slopes):
         return "can not be told", f"{moves}: not in both directions"
-    small, large = sorted(slope.value for slope in slopes)
-    return "gives way", f"{moves}: {large / small:.2g} times as much one way" if _uneven(slopes) else moves
-
-
-def _uneven(compliances: Sequence[Estimate]) -> bool:
-    """Whether a contact that gives way does so by far more in one direction."""
-    small, large = sorted(compliance.value for compliance in compliances)
-    return 0 < APART * small <= large
+    return "gives way", moves
 
 
 def _both(slopes: Sequence[Estimate]) -> Estimate:
@@ -229,15 +211,12 @@ def _both(slopes: Sequence[Estimate]) -> Estimate:
     value = float(np.mean([slope.value for slope in slopes]))
     low, high = min(slope.interval[0] for slope in slopes), max(slope.interval[1] for slope in slopes)
     sd = float(np.hypot(slopes[0].sd + slopes[1].sd, slopes[0].value - slopes[1].value) / 2)
-    first = slopes[0]
-    return Estimate(first.name, value, (low, high), sd, first.unit, first.method, first.status, first.checks)
+    return replace(slopes[0], value=value, interval=(low, high), sd=sd)
 
 
 def _inverse(compliance: Estimate, name: str) -> Estimate:
     """Stiffness of a compliance; it has no upper end where the compliance may be zero."""
     low, high = compliance.interval
     over, under = compliance.unit.split("/")
-    return Estimate(
-        name, 1 / compliance.value, (1 / high, 1 / low if low > 0 else np.inf), compliance.sd / compliance.value**2,
-        f"{under}/{over}", compliance.method, compliance.status, compliance.checks,
-    )  # fmt: skip
+    interval, sd = (1 / high, 1 / low if low > 0 else np.inf), compliance.sd / compliance.value**2
+    return replace(compliance, name=name, value=1 / compliance.value, interval=interval, sd=sd, unit=f"{under}/{over}")

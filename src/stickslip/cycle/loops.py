@@ -23,7 +23,7 @@ from stickslip.balance.motion import (
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import least_squares, mean_of_cycles, mean_uncertainty, student
 
 Array = NDArray[np.float64]

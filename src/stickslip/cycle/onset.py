@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.motion import is_measured
-from stickslip.cycle.slips import ringing_of
-from stickslip.cycle.strokes import FAST, Stroke, Strokes, find_strokes
+from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, UNSTATED, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
@@ -135,15 +134,11 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     ratio = mean_of_cycles(
         "static over sliding friction",
         [friction / pair.level for pair, friction in zip(borne.strokes, borne.friction, strict=True)],
-        unit="1", method=f"{borne.method} over the median of the stroke, mean of strokes",
-    )  # fmt: skip
+        unit="1",
+        method=f"{borne.method} over the median of the stroke, mean of strokes",
+    )
     ratio = _widened(ratio, borne.below / sliding, borne.above / sliding)
     status = borne.status
-    if status == "ok" and borne.method == PULL and ratio.interval[1] < 1:
-        status = (
-            "below the sliding friction: either that grows with speed, or the mass still rings on its contact when it "
-            'slips, and the pull is not what it bears: take friction_force(record, ..., method="fusion")'
-        )
     rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
     heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
     swings = [_swing(record, [stroke for stroke in borne.strokes if stroke.way == way], side) for way, side in SIDES]

@@ -11,8 +11,8 @@ from stickslip.balance.motion import is_measured, require_fit
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import Derivative, Filter, differentiate, smooth
+from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, least_squares
 from stickslip.units import parse_value

@@ -26,7 +26,7 @@ from stickslip.cycle.holds import Hold, Trace, find_holds
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import mean_of_cycles
 from stickslip.units import parse_value
 
@@ -195,8 +195,7 @@ def find_sticks(
         share = _share_of(events, cycles, motion)
     else:
         events = _events(stuck, certain, motion)
-        stated = f"the velocity's noise is {_words(motion.noise, motion)}", *_sensitivity(motion, cycles, limit)
-        share = _share(stuck, certain, cycles, rule, stated)
+        share = _share(stuck, certain, cycles, rule, (f"the velocity's noise is {_words(motion.noise, motion)}",))
     sticks = [event for event in events if event.kind == "stick"]
     microslips = _microslips(events) if holds and any(event.whole for event in sticks) else None
     how = f"sticks begun in each cycle; {rule}"
@@ -283,16 +282,6 @@ def _share(
     low, high = max(0.0, below.interval[0]), min(1.0, above.interval[1])
     sd = (high - low) / (2 * NORMAL_95)
     return Estimate(name, above.value, (low, high), sd, "1", above.method, above.status, above.checks)
-
-
-def _sensitivity(motion: Motion, cycles: Cycles, limit: float) -> tuple[str, ...]:
-    shares = []
-    for factor in (0.5, 2.0):
-        if SLIPPED * factor * limit < cycles.peak and (factor > 1 or factor * limit > motion.noise):
-            stuck, _ = _stuck(motion, factor * limit)
-            share = float(np.mean(_per_cycle(stuck, cycles)))
-            shares.append(f"at {'half' if factor < 1 else 'twice'} the threshold the share is {share:.2f}")
-    return tuple(shares)
 
 
 def _per_cycle(stuck: NDArray[np.bool_], cycles: Cycles) -> Array:

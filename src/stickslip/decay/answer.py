@@ -1,20 +1,42 @@
-"""What a fit of viscous and dry friction to a free decay answers."""
+"""What a fit of viscous and dry friction to a free decay answers.
+
+Viscous and dry friction of one pendulum's free decay, by its whole waveform with sin x for the spring.
+
+Several releases, or noise that is not white: the likelihood of all of them together, and its profile.
+
+All releases share the first three parameters of the motion: frequency, damping ratio, dry friction. Each has its own
+rest position, amplitude and time of release, and where counts are fitted its own noise.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.decay.candidates import Fitted
+from stickslip.decay.choice import COLOURED, Candidate, lack_of_fit
+from stickslip.decay.motions import Restoring, free_decay
+from stickslip.decay.noise import Noise, Objective, extreme, minimise, solve
+from stickslip.decay.profile import last_swing
 from stickslip.decay.release import RingDown
-from stickslip.decay.which_motion import DecayMotion
+from stickslip.decay.waveform import Blocks
+from stickslip.decay.which_motion import SWING, DecayMotion, choice_of, told, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Step
 
 Array = NDArray[np.float64]
+
+PLAIN = ("both", "static")
+BEYOND = f"swings beyond {SWING:g} rad are left out"
+SURE = 3.0  # standard deviations of the noise by which a bracket is widened
+
+SHARED = 3
+WORSE = 20.0  # minus twice the log likelihood by which a number of half cycles may be worse and still count
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,3 +149,257 @@ def spring_of(known: tuple[float | None, float | None], angular_frequency: float
     """The stiffness that is stated, or that of the stated mass; None where neither is."""
     mass, stiffness = known
     return stiffness if stiffness is not None or mass is None else mass * angular_frequency**2
+
+
+def fit_pendulum(
+    ring_downs: list[RingDown],
+    *,
+    restoring: Restoring,
+    noise: str | None,
+    motions: tuple[DecayMotion, ...],
+    known: tuple[float | None, float | None],
+    notes: tuple[str, ...],
+    history: tuple[Step, ...],
+) -> DecayFit:
+    """:func:`~stickslip.decay.fit_decay.fit_decay` of a pendulum: ``x'' = -w^2 sin x - 2 zeta w v - w^2 x_k sgn v``.
+
+    Parameters
+    ----------
+    ring_downs : list of RingDown
+        One release of an angle.
+    restoring : {"pendulum"}
+        The spring's law.
+    noise : str or None
+        No kind can be asked for: the residual tells.
+    motions : tuple of DecayMotion
+        Which motion it was, where other candidates were asked for.
+    known : tuple of (float or None)
+        Moment of inertia [kg m^2] and stiffness of the small swings [N m/rad], where stated.
+    notes, history : tuple
+        What was noticed in the record, and what was done to it.
+
+    Raises
+    ------
+    EstimateError
+        Several releases, a noise that is asked for, or what :func:`choice_of` refuses.
+    """
+    ring_down = _only(ring_downs, noise)
+    choice, zero = choice_of(ring_down, restoring=restoring, candidates=PLAIN)
+    chosen = choice.chosen
+    later = zero > ring_down.release
+    large = (BEYOND,) if later and abs(ring_down.amplitude) >= SWING else ()
+    status = told(ring_down, "; ".join(filter(None, [*large, choice.seen_beside(*PLAIN) or lack_of_fit(chosen)])))
+    fitted = chosen.fitted
+    blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
+    kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"
+    choices = [each.choice for each in motions]
+    estimate = _estimator(chosen, status, kind)
+    begins, far = beginning(ring_down.held and not later)
+    damping = estimate("damping_ratio", "damping ratio", "1")
+    dry = estimate("dry_displacement", "dry friction displacement", "rad")
+    frequency = estimate("angular_frequency", "natural frequency", "Hz", 1 / (2 * math.pi))
+    spring = spring_of(known, fitted.value("angular_frequency"))
+    done = f"{fitted.half_cycles} half cycles of {frequency.value:.6g} Hz, spring sin x, noise {kind}"
+    return DecayFit(
+        damping_ratio=damping,
+        dry_displacement=dry,
+        frequency=frequency,
+        bias=estimate("rest", "rest position", "rad"),
+        release_time=estimate("release", begins, "s", offset=zero),
+        amplitude=estimate("amplitude", far, "rad"),
+        static_displacement=_static(chosen, ring_down),
+        dry_force=None if spring is None else dry.scaled(spring, "N m", "dry friction"),
+        damping_ratio_any=whichever(choices, damping, "damping_ratio") if choices else None,
+        dry_displacement_any=whichever(choices, dry, "dry_displacement") if choices else None,
+        half_cycles=(fitted.half_cycles,),
+        alternatives=(((fitted.half_cycles,), 1.0),),
+        model=model,
+        noise=kind,
+        noise_level=_level(chosen),
+        channel=ring_down.channel,
+        ring_downs=(ring_down,),
+        time=(zero + blocks.times,),
+        measured=(blocks.values,),
+        fitted=(blocks.values - fitted.residual / np.sqrt(blocks.weights),),
+        status=status,
+        notes=notes,
+        history=(*history, Step("fit_decay", {"channel": ring_down.channel, "restoring": restoring}, done)),
+        motions=motions,
+    )
+
+
+def _estimator(chosen: Candidate, status: str, noise: str) -> Callable[..., Estimate]:
+    """What makes an Estimate of a parameter, by its name."""
+    method, checks = f"whole waveform, spring sin x, noise {noise}", (f"{chosen.fitted.half_cycles} half cycles",)
+
+    def estimate(parameter: str, name: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
+        plain = chosen.estimate(parameter, name=name, unit=unit, factor=factor)
+        low, high = plain.interval
+        value, interval = plain.value + offset, (low + offset, high + offset)
+        return replace(plain, value=value, interval=interval, status=status, method=method, checks=checks)
+
+    return estimate
+
+
+def _only(ring_downs: list[RingDown], noise: str | None) -> RingDown:
+    """The one release that is fitted."""
+    if len(ring_downs) > 1:
+        raise EstimateError(
+            f"{len(ring_downs)} releases", "a pendulum's are fitted one at a time", "cut one out: record.between(a, b)"
+        )
+    if noise is not None:
+        raise EstimateError(f"noise = '{noise}'", "a pendulum's is told from its residual", "leave noise= out")
+    return ring_downs[0]
+
+
+def _level(candidate: Candidate) -> float:
+    """Standard deviation of a sample."""
+    fitted = candidate.fitted
+    return math.sqrt(fitted.cost / max(1, len(fitted.residual) - fitted.jacobian.shape[1]))
+
+
+def _static(candidate: Candidate, ring_down: RingDown) -> Estimate:
+    """Static friction lies between the pull where it stayed and the pull where it last turned, sin x each."""
+    fitted = candidate.fitted
+    error = SURE * _level(candidate) / math.sqrt(max(1.0, ring_down.fs / ring_down.frequency / 2))
+    low = max(_pull(fitted, fitted.half_cycles) - error, 0.0) if ring_down.stopped else 0.0
+    high = _pull(fitted, fitted.half_cycles - 1) + error
+    status = "ok" if ring_down.stopped else "the mass does not come to rest in the record: only an upper bound"
+    return Estimate(
+        "static friction displacement",
+        (low + high) / 2,
+        (low, high),
+        (high - low) / math.sqrt(12),
+        ring_down.unit,
+        "between where it stayed and where it last turned",
+        status,
+    )
+
+
+def _pull(fitted: Fitted, half_cycles: int) -> float:
+    """Torque over the stiffness at the turning point after so many half cycles."""
+    period = 2 * math.pi / fitted.value("angular_frequency")
+    later = fitted.value("release") + (half_cycles + 2) * period  # a half cycle below 2.5 rad takes less
+    at = free_decay([later], fitted.parameters, restoring=fitted.blocks.restoring, half_cycles=half_cycles)[0][0]
+    return abs(math.sin(float(at) - fitted.value("rest")))
+
+
+@dataclass(frozen=True, eq=False)
+class Release:
+    """One release: its blocks, its fits in white noise by number of half cycles, and its noise."""
+
+    blocks: Blocks
+    fits: Array
+    noise: Noise
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """The best fit for a number of half cycles of each release.
+
+    `p` holds the shared parameters and then those of each release, `places` where each release's are.
+    """
+
+    half_cycles: tuple[int, ...]
+    p: Array
+    value: float
+    curvature: Array
+    objective: Objective
+    places: tuple[Array, ...]
+
+    def motion(self, number: int) -> Array:
+        """The six parameters of a release's motion."""
+        return np.asarray(self.p[self.places[number]][:6])
+
+    def possible(self, p: Array) -> bool:
+        """Whether no release's last half cycle is shorter than nothing at these parameters."""
+        motions = zip(self.places, self.half_cycles, strict=True)
+        return all(n == 1 or last_swing(p[at][:6], n)[0] > 0 for at, n in motions)
+
+
+def fit_together(releases: list[Release]) -> list[Together]:
+    """The likeliest numbers of half cycles, and every one that differs in one release and is nearly as likely."""
+    best = _fitted(releases, tuple(int(each.fits[np.argmin(each.fits[:, 1]), 0]) for each in releases))
+    found = {best.half_cycles: best}
+    for number, release in enumerate(releases):
+        for n in sorted({*release.fits[:, 0].astype(int), *_neighbours(release)}):
+            tried = (*best.half_cycles[:number], int(n), *best.half_cycles[number + 1 :])
+            if n >= 1 and tried not in found:
+                found[tried] = _fitted(releases, tried, best.p)
+    possible = [each for each in found.values() if math.isfinite(each.value) and each.possible(each.p)] or [best]
+    least = min(each.value for each in possible)
+    return [each for each in possible if each.value <= least + WORSE]
+
+
+def _neighbours(release: Release) -> set[int]:
+    """Where least squares are not the likelihood, its neighbours may be the likeliest."""
+    n = int(release.fits[np.argmin(release.fits[:, 1]), 0])
+    p = release.fits[np.argmin(release.fits[:, 1]), 3:]
+    rests = p[5] + n * math.pi / (p[0] * math.sqrt(1 - p[1] ** 2)) < release.blocks.total * release.blocks.dt
+    return {n - 2, n - 1, n + 1, n + 2} if rests and release.noise.kind != "white" else set()
+
+
+def _fitted(releases: list[Release], half_cycles: tuple[int, ...], start: Array | None = None) -> Together:
+    places, size = [], SHARED
+    for each in releases:
+        own = 3 + each.noise.extra
+        places.append(np.r_[np.arange(SHARED), np.arange(size, size + own)])
+        size += own
+    fresh, farthest = np.zeros(size), np.full(size, 1.0)
+    weight = np.zeros(size)
+    for release, at in zip(releases, places, strict=True):
+        row = release.fits[np.argmin(release.fits[:, 1])]
+        own = np.r_[row[3:], [math.log(release.noise.level)] * release.noise.extra]
+        share = 1.0 / release.noise.level**2 * np.ones(len(own))
+        fresh[at] += share * own
+        weight[at] += share
+        w, span = row[3], abs(row[7])
+        farthest[at[:6]] = (0.1 * w, 0.1, 0.3 * span, span, 0.5 * span, 0.5 / w)
+    objectives = [each.noise.objective(n) for each, n in zip(releases, half_cycles, strict=True)]
+
+    def objective(p: Array) -> tuple[float, Array, Array]:
+        total, slope, curvature = 0.0, np.zeros(size), np.zeros((size, size))
+        for each, at in zip(objectives, places, strict=True):
+            value, down, bend = each(p[at])
+            if not math.isfinite(value):
+                return math.inf, slope, np.eye(size)
+            total += value
+            slope[at] += down
+            curvature[np.ix_(at, at)] += bend
+        return total, slope, curvature
+
+    p, value, curvature = minimise(objective, fresh / weight if start is None else start, farthest)
+    return Together(half_cycles, p, value, curvature, objective, tuple(places))
+
+
+def unlike(releases: list[Release], found: list[Together]) -> float:
+    """p-value of the releases sharing frequency, damping ratio and dry friction: what sharing costs is chi-square."""
+    from scipy.special import chdtrc
+
+    if len(releases) == 1:
+        return 1.0
+    alone = sum(min(each.value for each in fit_together([release])) for release in releases)
+    cost = min(each.value for each in found) - alone
+    return float(chdtrc(SHARED * (len(releases) - 1), max(cost, 0.0)))
+
+
+def ends_together(found: list[Together], level: float, count: int) -> Array:
+    """Ends (count, 2) of the profile likelihood of the first parameters, by the best candidate at each end."""
+    answer = np.empty((count, 2))
+    for which in range(count):
+        for column, side in enumerate((-1, 1)):
+            reached: list[float] = []
+            beyond: list[float] = []
+            for each in found:
+                if each.value >= level:
+                    continue
+                p = extreme(each.objective, each.p, each.value, which, side, level)
+                if p is None:
+                    aim = np.eye(len(each.p))[which]
+                    reached.append(
+                        each.p[which] + side * math.sqrt((level - each.value) * solve(each.curvature, aim)[which])
+                    )
+                else:
+                    (reached if each.possible(p) else beyond).append(p[which])
+            answer[which, column] = side * max((side * each for each in reached or beyond), default=math.inf)
+    return answer

@@ -26,6 +26,14 @@ CLEAR = 5.0  # times the noise that an extreme must stand out
 FREE = 4  # what the recursion is fitted by: first swing, beta, x_k, rest
 PERIODS = 6  # of a Hilbert envelope: one is lost at each end
 
+# what each way gets wrong
+LOGARITHMIC = "dry friction is read as viscous damping, the more the smaller the swings"
+LINEAR = "viscous damping is read as dry friction, the more the larger the swings"
+EXTREMES = (
+    "noise lengthens every extreme, and a sample seldom falls on one: some times less sure than the whole waveform"
+)
+HILBERT = "the transform's ends and the averaging bend the envelope: its interval does not hold that"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EnvelopeDecay(Result):
@@ -100,14 +108,7 @@ def log_decrement(record: Record, *, channel: str | None = None) -> EnvelopeDeca
         if excess < 0.1 * damping.value
         else "the amplitudes do not fall as a power: dry friction is read as viscous"
     )
-    return EnvelopeDecay(
-        damping,
-        None,
-        _frequency(ring_down, damping.value, method),
-        method,
-        "dry friction is read as viscous damping, the more the smaller the swings",
-        status,
-    )
+    return EnvelopeDecay(damping, None, _frequency(ring_down, damping.value, method), method, LOGARITHMIC, status)
 
 
 def linear_decrement(record: Record, *, channel: str | None = None) -> EnvelopeDecay:
@@ -151,14 +152,7 @@ def linear_decrement(record: Record, *, channel: str | None = None) -> EnvelopeD
     status = (
         "ok" if abs(bent) < 0.1 * sizes[0] else "the amplitudes do not fall on a line: viscous damping is read as dry"
     )
-    return EnvelopeDecay(
-        None,
-        dry,
-        _frequency(ring_down, 0.0, method),
-        method,
-        "viscous damping is read as dry friction, the more the larger the swings",
-        status,
-    )
+    return EnvelopeDecay(None, dry, _frequency(ring_down, 0.0, method), method, LINEAR, status)
 
 
 def extreme_decay(
@@ -215,7 +209,7 @@ def extreme_decay(
         displacement,
         _frequency(ring_down, damping.value, told["method"]),
         told["method"],
-        "noise lengthens every extreme, and a sample seldom falls on one: some times less sure than the whole waveform",
+        EXTREMES,
         Status(*([Doubt.few(len(sizes), "extreme")] if len(sizes) < 8 else [])),
     )
 
@@ -252,6 +246,8 @@ def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDeca
     >>> round(found.damping_ratio.value * 2 * np.pi, 2)
     0.1
     """
+    from scipy.signal import hilbert
+
     ring_down = _displacement(record, channel)
     size = max(3, round(ring_down.fs / ring_down.frequency))
     moved = ring_down.samples[ring_down.motion] - ring_down.rest
@@ -260,7 +256,7 @@ def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDeca
         raise EstimateError(
             f"{len(moved) // size} periods", f"an envelope needs {PERIODS}", "use log_decrement or fit_decay instead"
         )
-    envelope = np.convolve(np.abs(_analytic(moved)), np.full(size, 1 / size), mode="valid")[
+    envelope = np.convolve(np.abs(hilbert(moved)), np.full(size, 1 / size), mode="valid")[
         size // 2 : -(size // 2) or None
     ]
     fall = (envelope[size:] - envelope[:-size]) * ring_down.fs / size
@@ -276,20 +272,9 @@ def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDeca
         dry.scaled(math.pi / (2 * w), ring_down.unit),
         _frequency(ring_down, damping.value, method),
         method,
-        "the transform's ends and the averaging bend the envelope: its interval does not hold that",
+        HILBERT,
         "ok",
     )
-
-
-def _analytic(values: Array) -> NDArray[np.complex128]:
-    """The analytic signal: twice the positive frequencies, none of the negative."""
-    count = len(values)
-    weights = np.zeros(count)
-    weights[0] = 1.0
-    weights[1 : (count + 1) // 2] = 2.0
-    if count % 2 == 0:
-        weights[count // 2] = 1.0
-    return np.fft.ifft(np.fft.fft(values) * weights)
 
 
 def _fitted_swings(sizes: Array, numbers: Array, signs: Array, restoring: str) -> tuple[Array, Array]:

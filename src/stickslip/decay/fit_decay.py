@@ -8,23 +8,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.decay import joint
-from stickslip.decay.answer import DecayFit, beginning, constants, spring_of
+from stickslip.decay.answer import (
+    DecayFit,
+    Release,
+    beginning,
+    constants,
+    ends_together,
+    fit_pendulum,
+    fit_together,
+    spring_of,
+    unlike,
+)
 from stickslip.decay.choice import Choice
-from stickslip.decay.joint import Release
 from stickslip.decay.motions import Restoring
 from stickslip.decay.noise import KINDS, find_noise
-from stickslip.decay.pendulum import fit_pendulum
 from stickslip.decay.profile import last_swing
 from stickslip.decay.release import CLIPPED, LOST, Releases, RingDown, find_releases
-from stickslip.decay.search import Search, variance, weights
-from stickslip.decay.start import roughness
+from stickslip.decay.start import Search, roughness, variance, weights
 from stickslip.decay.waveform import Array
 from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Doubt, Estimate, Status
 from stickslip.record.record import Record, Step
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import student
 
 LEFT_OVER = "residual"  # the kind of doubt where the model leaves more than noise
@@ -145,9 +151,7 @@ def _releases_of(records: list[Record], channel: str | None) -> list[Releases]:
     names = {ring_down.channel for each in found for ring_down in each.ring_downs}
     if len(names) > 1:
         raise EstimateError(
-            f"channels {', '.join(sorted(names))}",
-            "releases are fitted together by one channel",
-            "choose channel=",
+            f"channels {', '.join(sorted(names))}", "releases are fitted together by one channel", "choose channel="
         )
     return found
 
@@ -225,17 +229,17 @@ def _alone(release: Release) -> _Motion:
 
 
 def _together(releases: list[Release]) -> _Motion:
-    found = joint.candidates(releases)
+    found = fit_together(releases)
     least = min(each.value for each in found)
     freedom = sum(each.blocks.freedom for each in releases)
     share = np.exp(-0.5 * np.array([each.value - least for each in found]))
     best = found[int(np.argmax(share))]
     covariance = np.asarray(np.linalg.pinv(best.curvature)[:6, :6], dtype=np.float64)
-    limits = joint.ends(found, least + student(freedom) ** 2, 6)
+    limits = ends_together(found, least + student(freedom) ** 2, 6)
     motions = [tuple(each.motion(k) for k in range(len(releases))) for each in found]
     rows = np.array([each.p[:6] for each in found])
     mean = _mean(rows, share / share.sum(), covariance, limits, [each.half_cycles for each in found], motions)
-    return replace(mean, alike=joint.unlike(releases, found))
+    return replace(mean, alike=unlike(releases, found))
 
 
 def _mean(

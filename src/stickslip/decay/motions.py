@@ -1,14 +1,28 @@
-"""The motions that a free decay may follow: one equation, and which of its terms are at work."""
+"""The motions that a free decay may follow: one equation, and which of its terms are at work.
+
+The motion of a free decay from turning point to turning point, with its sensitivities; compiled.
+
+Between two turning points every candidate's equation is smooth. In the direction of motion, with ``u`` the displacement
+from rest counted positive at the half cycle's beginning, ``A`` its value there and ``y = -u'`` the speed,
+
+    u'' = -w^2 [r(u) + h + 2 kappa ((A - u) / 2)^(1 + p)] + w^2 x_k (1 + sigma exp(-y / v_s)) + 2 zeta w y + q y^2.
+
+The term in kappa is a Masing branch of the backbone ``x - kappa x^(1 + p)`` (a joint in micro-slip, Segalman 2005);
+``h`` is what the branches before have left. Gragg's extrapolated midpoint rule (order eight) carries state and
+sensitivities; the turning point is found to rounding; samples lie on quintics through position, speed and
+acceleration.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.decay.half_cycles import decay
+from stickslip.compiled import OPTIONS, compiled
 
 Array = NDArray[np.float64]
 Restoring = Literal["linear", "pendulum"]
@@ -19,6 +33,14 @@ PARAMETERS = (
     "quadratic", "rise", "stribeck_speed", "micro_slip", "exponent", "curvature",
 )  # fmt: skip
 ALWAYS = ("angular_frequency", "rest", "amplitude", "release")
+
+FREQUENCY, DAMPING, DRY, REST, AMPLITUDE, RELEASE = range(6)
+QUADRATIC, RISE, SPEED, SLIP, EXPONENT, CURVATURE = range(6, 12)
+WIDTH = 12
+
+STEP = 0.2  # of a radian of the small motion
+ROWS = 4  # of extrapolation: midpoint rules of 2, 4, 6 and 8 steps
+LEAST = 1e-12  # of the first amplitude: where a motion that never stops is left
 
 
 @dataclass(frozen=True)
@@ -150,3 +172,242 @@ def free_decay(
     if spread is not None:
         x, jacobian = 0.5 * (x[::2] + x[1::2]), 0.5 * (jacobian[::2] + jacobian[1::2])
     return x, jacobian, int(begun)
+
+
+@compiled(**OPTIONS)
+def _rates(state, p, active, sine, branch, out):
+    """Rates of ``state = (u, u', du/dp_j, du'/dp_j, ...)``; `branch` holds A, h and their sensitivities."""
+    w, u, y = p[FREQUENCY], state[0], -state[1]
+    square = w * w
+    decay = math.exp(-y / p[SPEED]) if p[SPEED] > 0 else 0.0
+    depth = 0.5 * (branch[0] - u)
+    log = math.log(depth) if depth > 0 else 0.0
+    power = math.exp((1 + p[EXPONENT]) * log) if depth > 0 else 0.0
+    slope = p[SLIP] * (1 + p[EXPONENT]) * power / depth if depth > 0 else 0.0
+    spring = (math.sin(u) if sine else u) + p[CURVATURE] * u**3 + branch[1] + 2 * p[SLIP] * power
+    dry = p[DRY] * (1 + p[RISE] * decay)
+    fade = p[DRY] * p[RISE] * decay / p[SPEED] if p[SPEED] > 0 else 0.0
+    by_u = -square * ((math.cos(u) if sine else 1.0) + 3 * p[CURVATURE] * u * u - slope)
+    by_y = -square * fade + 2 * p[DAMPING] * w + 2 * p[QUADRATIC] * y
+    out[0] = state[1]
+    out[1] = square * (dry - spring) + 2 * p[DAMPING] * w * y + p[QUADRATIC] * y * y
+    for j in range(active.size):
+        name = active[j]
+        direct = 0.0
+        if name == FREQUENCY:
+            direct = 2 * w * (dry - spring) + 2 * p[DAMPING] * y
+        elif name == DAMPING:
+            direct = 2 * w * y
+        elif name == DRY:
+            direct = square * (1 + p[RISE] * decay)
+        elif name == QUADRATIC:
+            direct = y * y
+        elif name == RISE:
+            direct = square * p[DRY] * decay
+        elif name == SPEED:
+            direct = square * fade * y / p[SPEED] if p[SPEED] > 0 else 0.0
+        elif name == SLIP:
+            direct = -2 * square * power
+        elif name == EXPONENT:
+            direct = -2 * square * p[SLIP] * power * log
+        elif name == CURVATURE:
+            direct = -square * u**3
+        du, dv = state[2 + 2 * j], state[3 + 2 * j]
+        out[2 + 2 * j] = dv
+        out[3 + 2 * j] = (
+            by_u * du - by_y * dv + direct - square * slope * branch[2 + 2 * j] - square * branch[3 + 2 * j]
+        )
+
+
+@compiled(**OPTIONS)
+def _advance(state, length, p, active, sine, branch, rates, work, out):
+    """One step of Gragg's rule, extrapolated; `rates` holds the rates at its beginning."""
+    size = 2 + 2 * active.size
+    rows = ROWS
+    old, now, slopes = work[rows], work[rows + 1], work[rows + 2]
+    for row in range(rows):
+        count = 2 * (row + 1)
+        short = length / count
+        for i in range(size):
+            old[i] = state[i]
+            now[i] = state[i] + short * rates[i]
+        for _ in range(1, count):
+            _rates(now, p, active, sine, branch, slopes)
+            for i in range(size):
+                next_ = old[i] + 2 * short * slopes[i]
+                old[i] = now[i]
+                now[i] = next_
+        for i in range(size):
+            work[row, i] = now[i]
+    for level in range(1, rows):
+        for row in range(rows - 1, level - 1, -1):
+            ratio = ((row + 1) / (row + 1 - level)) ** 2
+            for i in range(size):
+                work[row, i] += (work[row, i] - work[row - 1, i]) / (ratio - 1)
+    for i in range(size):
+        out[i] = work[rows - 1, i]
+
+
+@compiled(**OPTIONS)
+def _quintic(s, length, begin, begin_rate, end, end_rate, k):
+    """Position number k (0 the motion, then its sensitivities) at the share s of a step."""
+    a, b, c = begin[k], begin[k + 1] * length, begin_rate[k + 1] * length * length
+    d, e, f = end[k], end[k + 1] * length, end_rate[k + 1] * length * length
+    c3 = 10 * (d - a) - 6 * b - 4 * e - 1.5 * c + 0.5 * f
+    c4 = -15 * (d - a) + 8 * b + 7 * e + 1.5 * c - f
+    c5 = 6 * (d - a) - 3 * (b + e) - 0.5 * c + 0.5 * f
+    return a + s * (b + s * (0.5 * c + s * (c3 + s * (c4 + s * c5))))
+
+
+@compiled(**OPTIONS)
+def _speed(s, length, begin, begin_rate, end, end_rate):
+    """Velocity at the share s of a step, by the quintic's slope."""
+    a, b, c = begin[0], begin[1] * length, begin_rate[1] * length * length
+    d, e, f = end[0], end[1] * length, end_rate[1] * length * length
+    c3 = 10 * (d - a) - 6 * b - 4 * e - 1.5 * c + 0.5 * f
+    c4 = -15 * (d - a) + 8 * b + 7 * e + 1.5 * c - f
+    c5 = 6 * (d - a) - 3 * (b + e) - 0.5 * c + 0.5 * f
+    return (b + s * (c + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / length
+
+
+@compiled(**OPTIONS)
+def _turning_spring(branch, p, sine):
+    """What drives the mass away from its turning point, over the stiffness."""
+    return (math.sin(branch[0]) if sine else branch[0]) + p[CURVATURE] * branch[0] ** 3 + branch[1]
+
+
+@compiled(**OPTIONS)
+def _rest(sample, p, active, side, branch, x, jacobian):
+    """A sample at rest on a turning point."""
+    x[sample] = p[REST] + side * branch[0]
+    for j in range(active.size):
+        jacobian[sample, j] = side * branch[2 + 2 * j] + (1.0 if active[j] == REST else 0.0)
+
+
+@compiled(**OPTIONS)
+def _first_branch(p, active, side, branch, moved):
+    """The branch from the first turning point, on the virgin backbone, and how its beginning moves."""
+    amplitude = abs(p[AMPLITUDE])
+    log = math.log(amplitude) if amplitude > 0 else 0.0
+    power = math.exp((1 + p[EXPONENT]) * log) if amplitude > 0 else 0.0
+    branch[0], branch[1] = amplitude, -p[SLIP] * power
+    for j in range(active.size):
+        name = active[j]
+        branch[2 + 2 * j] = side if name == AMPLITUDE else 0.0
+        branch[3 + 2 * j] = 0.0
+        if name == SLIP:
+            branch[3 + 2 * j] = -power
+        elif name == EXPONENT:
+            branch[3 + 2 * j] = -p[SLIP] * power * log
+        elif name == AMPLITUDE and amplitude > 0:
+            branch[3 + 2 * j] = -side * p[SLIP] * (1 + p[EXPONENT]) * power / amplitude
+        moved[j] = 1.0 if name == RELEASE else 0.0
+
+
+@compiled(**OPTIONS)
+def _next_branch(p, active, branch, state, rates, moved):
+    """The branch from the turning point that was reached, and how its beginning moves."""
+    depth = 0.5 * (branch[0] - state[0])
+    log = math.log(depth) if depth > 0 else 0.0
+    power = math.exp((1 + p[EXPONENT]) * log) if depth > 0 else 0.0
+    slope = p[SLIP] * (1 + p[EXPONENT]) * power / depth if depth > 0 else 0.0
+    for j in range(active.size):
+        if rates[1] > 0:
+            moved[j] -= state[3 + 2 * j] / rates[1]
+        change = slope * (branch[2 + 2 * j] - state[2 + 2 * j])
+        if active[j] == SLIP:
+            change += 2 * power
+        elif active[j] == EXPONENT:
+            change += 2 * p[SLIP] * power * log
+        branch[3 + 2 * j] = -branch[3 + 2 * j] - change
+        branch[2 + 2 * j] = -state[2 + 2 * j]
+    branch[1] = -branch[1] - 2 * p[SLIP] * power
+    branch[0] = -state[0]
+
+
+@compiled(**OPTIONS)
+def _step(p, active, sine, work):
+    """One step towards the next turning point, or onto it: its length [s], and whether it is there."""
+    branch, state, rates, end, end_rates = work[7], work[8], work[9], work[10], work[11]
+    length = STEP / p[FREQUENCY]
+    if p[SPEED] > 0:
+        length = min(length, 0.3 * (p[SPEED] + 0.3 * abs(state[1])) / abs(rates[1]))
+    _advance(state, length, p, active, sine, branch, rates, work, end)
+    _rates(end, p, active, sine, branch, end_rates)
+    if end[1] < 0:
+        return length, False
+    share = state[1] / (state[1] - end[1])
+    for _ in range(4):  # on the quintic
+        slope = rates[1] + (end_rates[1] - rates[1]) * share
+        change = _speed(share, length, state, rates, end, end_rates) / (length * slope) if slope > 0 else 0.0
+        share = min(1.0, max(0.0, share - change))
+    length *= share
+    for _ in range(2):  # on the motion itself
+        _advance(state, length, p, active, sine, branch, rates, work, end)
+        _rates(end, p, active, sine, branch, end_rates)
+        if end_rates[1] > 0:
+            length -= end[1] / end_rates[1]
+    _advance(state, length, p, active, sine, branch, rates, work, end)
+    end[1] = 0.0
+    _rates(end, p, active, sine, branch, end_rates)
+    return length, True
+
+
+@compiled(**OPTIONS)
+def _read(sample, share, length, p, active, side, work, x, jacobian):
+    """A sample at the share of a step."""
+    state, rates, end, end_rates, moved = work[8], work[9], work[10], work[11], work[12]
+    speed = _speed(share, length, state, rates, end, end_rates)
+    x[sample] = p[REST] + side * _quintic(share, length, state, rates, end, end_rates, 0)
+    for j in range(active.size):
+        change = _quintic(share, length, state, rates, end, end_rates, 2 + 2 * j)
+        jacobian[sample, j] = side * (change - speed * moved[j]) + (1.0 if active[j] == REST else 0.0)
+
+
+@compiled(**OPTIONS)
+def _leaves(p, sine, most, branch):
+    """Whether the mass leaves its turning point."""
+    pull = _turning_spring(branch, p, sine)
+    if most < 0 and (abs(pull) <= p[DRY] * (1 + p[RISE]) or branch[0] < LEAST * abs(p[AMPLITUDE])):
+        return False
+    return pull >= 0 and branch[0] > 0
+
+
+@compiled(**OPTIONS)
+def decay(times, p, active, sine, most, work, x, jacobian):
+    """Fill `x` (n,) and `jacobian` (n, active.size) at rising `times`; return the number of half cycles begun.
+
+    `most` half cycles at the most, -1 for as many as the dry friction lets it make; `work` is (13, 2 + 2 active).
+    """
+    count, size = times.size, 2 + 2 * active.size
+    branch, state, rates, end, end_rates, moved = work[7], work[8], work[9], work[10], work[11], work[12]
+    side = 1.0 if p[AMPLITUDE] >= 0 else -1.0
+    start, sample, half_cycles = p[RELEASE], 0, 0
+    _first_branch(p, active, side, branch, moved)
+    while sample < count and times[sample] <= start:
+        _rest(sample, p, active, side, branch, x, jacobian)
+        sample += 1
+    while sample < count and half_cycles != most and _leaves(p, sine, most, branch):
+        half_cycles += 1
+        for i in range(size):
+            state[i] = branch[i] if i % 2 == 0 else 0.0
+        _rates(state, p, active, sine, branch, rates)
+        if rates[1] >= 0:
+            break
+        turned = False
+        while sample < count and not turned:
+            length, turned = _step(p, active, sine, work)
+            while sample < count and times[sample] <= start + length:
+                _read(sample, (times[sample] - start) / length, length, p, active, side, work, x, jacobian)
+                sample += 1
+            start += length
+            for i in range(size):
+                state[i], rates[i] = end[i], end_rates[i]
+        if not turned:
+            break
+        side = -side
+        _next_branch(p, active, branch, state, rates, moved)
+    while sample < count:  # at rest
+        _rest(sample, p, active, side, branch, x, jacobian)
+        sample += 1
+    return half_cycles

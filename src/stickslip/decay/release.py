@@ -9,15 +9,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.decay.swings import SEEN, Run, Swings, bounds_of, free_decays
+from stickslip.decay.start import SEEN, Run, Swings, bounds_of, free_decays
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Status
 from stickslip.record.check import in_words
 from stickslip.record.flaws import clipped, spikes
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
+from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level, quantisation_step
-from stickslip.signals.turns import extreme
+from stickslip.signals.pieces import extreme
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -74,9 +74,10 @@ def require_drive(drive: object) -> None:
     """Refuse what does not drive."""
     if isinstance(drive, type) or not hasattr(drive, "motion"):
         raise ModelError(
-            f"drive = {drive!r}", "a drive says what moves",
+            f"drive = {drive!r}",
+            "a drive says what moves",
             "give one, as drive=HarmonicBase(1e-3, frequency=2.5), or leave it out",
-        ).of("drive")  # fmt: skip
+        ).of("drive")
 
 
 def _check_frequency(frequency: float) -> None:

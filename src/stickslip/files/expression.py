@@ -7,7 +7,6 @@ from __future__ import annotations
 import ast
 import difflib
 import math
-import operator
 import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -203,9 +202,6 @@ def _parsed(source: str, arithmetic: str) -> ast.expr:
             return ast.parse(source, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise _refusal(arithmetic, "it is not arithmetic; names with spaces go in backticks") from error
-
-
-_OPERATORS: dict[type, Callable[[float, float], float]] = {ast.Mult: operator.mul, ast.Div: operator.truediv}
 
 
 def _walk(node: ast.expr, arithmetic: str, named: Callable[[str], Linear]) -> Linear:

@@ -20,8 +20,8 @@ from stickslip.balance.motion import (
 from stickslip.cycle.loops import LEAST_SPREAD, Loops
 from stickslip.errors import EstimateError
 from stickslip.record.record import Record
-from stickslip.signals.delay import without_delays
 from stickslip.signals.derivatives import smooth
+from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.units import prefixed
 
@@ -119,8 +119,9 @@ def require_resisting(samples: Samples) -> None:
     if samples.drives:
         raise EstimateError(
             f"friction does {float(samples.friction @ samples.velocity) / len(samples.time):.3g} W on average",
-            "it opposes the motion", "check the sign of the force or of the displacement",
-        )  # fmt: skip
+            "it opposes the motion",
+            "check the sign of the force or of the displacement",
+        )
 
 
 def samples_of(
@@ -140,9 +141,10 @@ def samples_of(
         asked = {"contact": contact, "frequency": frequency, "normal": normal}
         if given := [f"{name}=" for name, value in asked.items() if value is not None]:
             raise EstimateError(
-                f"{' and '.join(given)} of friction_loops' answer", "its mean cycle holds a force over a known motion",
+                f"{' and '.join(given)} of friction_loops' answer",
+                "its mean cycle holds a force over a known motion",
                 "tell friction_loops, or give the record itself",
-            )  # fmt: skip
+            )
         return _of_loops(data)
     if not isinstance(data, Record):
         raise EstimateError(
@@ -205,9 +207,10 @@ def _of_loops(loops: Loops) -> tuple[Samples, Samples]:
 def _require_sliding(samples: Samples) -> Samples:
     if len(samples.friction) < LEAST:
         raise EstimateError(
-            f"{len(samples.friction)} samples slide", f"a curve of friction needs {LEAST} at least",
+            f"{len(samples.friction)} samples slide",
+            f"a curve of friction needs {LEAST} at least",
             "give a record that slides longer, or was sampled faster",
-        )  # fmt: skip
+        )
     return samples
 
 

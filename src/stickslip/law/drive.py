@@ -135,9 +135,10 @@ def _driven(record: Record, channel: str, on: str, contact: str) -> DriveFrom:
         return Tones(tones, on, contact, unsure, float(time[0] + length / 2), length)
     if on == "force":
         raise EstimateError(
-            "an applied force that is no tone with harmonics", "the force on the mass is periodic",
+            "an applied force that is no tone with harmonics",
+            "the force on the mass is periodic",
             "cut the record to where it is, drive the base, or fit a curve of friction instead (fit_curve, --curve)",
-        )  # fmt: skip
+        )
     bandwidth = best_bandwidth(values, record.fs)
     smooth = Filter("smoother", record.fs, bandwidth).apply(values - values.mean(), {0: 1.0})
     knots, rate = _knots(smooth, record.fs, noise)
@@ -173,8 +174,9 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
         def left(frequency: float, count: int = count) -> float:
             return _fitted(values, time, frequency, count)[1]
 
-        best = minimize_scalar(left, bounds=(coarse - 0.5 / span, coarse + 0.5 / span), method="bounded",
-                               options={"xatol": 1e-9 * coarse})  # fmt: skip
+        best = minimize_scalar(
+            left, bounds=(coarse - 0.5 / span, coarse + 0.5 / span), method="bounded", options={"xatol": 1e-9 * coarse}
+        )
         found, rest = _fitted(values, time, float(best.x), count)
         cosines, sines = found[1:-1:2], found[2:-1:2]
         sizes, angles = np.hypot(cosines, sines), np.arctan2(-sines, cosines)
@@ -220,8 +222,9 @@ class _Later:
         if motion.knots is not None:
             raise EstimateError(
                 "a drive with knots that starts before the record's first slide",
-                "a run begins with its drive", "give the base's motion as channel z",
-            )  # fmt: skip
+                "a run begins with its drive",
+                "give the base's motion as channel z",
+            )
         values = {name: motion.start[name] for name in motion.rates}
         turned: dict[str, float] = {}
         for cosine, sine, omega, phase in motion.tones:

@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 from stickslip.cycle.loops import LEAST_SPREAD, Loops
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result, Status
-from stickslip.law import presliding as presliding_curves
-from stickslip.law import speed as speed_curves
+from stickslip.law import curves
 from stickslip.law.data import Samples, require_resisting, require_reversals, require_speeds, samples_of
 from stickslip.law.family import Family, Member, best_member, model_error
-from stickslip.law.velocity_step import velocity_step
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.parameters import finite
@@ -203,9 +201,7 @@ def fit_curve(
     if not isinstance(elements, (int, np.integer)) or not 2 <= elements <= 50:
         raise EstimateError(f"elements = {elements}", "points of a table, or elements, are 2 to 50", "leave it at 8")
     load = None if normal is None else finite("normal", parse_value(normal, "N"), unit="N", positive=True)
-    whole, sliding = samples_of(
-        data, contact=contact, frequency=frequency, smoothed=curve in OVER_WAY, normal=load
-    )  # fmt: skip
+    whole, sliding = samples_of(data, contact=contact, frequency=frequency, smoothed=curve in OVER_WAY, normal=load)
     family, member = best_member(*CURVES[curve](Request(curve, whole, sliding, int(elements), load or 1.0)))
     return _answer(curve, family, member, filled=_filled(data))
 
@@ -220,11 +216,11 @@ def _over_speed(family: Family) -> Callable[[Request], tuple[Family, Samples]]:
 
 def _uneven(asked: Request) -> tuple[Family, Samples]:
     require_reversals(asked.sliding, asked.curve)
-    return _over_speed(speed_curves.UNEVEN)(asked)
+    return _over_speed(curves.UNEVEN)(asked)
 
 
 def _table(asked: Request) -> tuple[Family, Samples]:
-    return _over_speed(speed_curves.table(asked.sliding, asked.elements))(asked)
+    return _over_speed(curves.table(asked.sliding, asked.elements))(asked)
 
 
 def _over_way(family: Callable[[Samples, int], Family]) -> Callable[[Request], tuple[Family, Samples]]:
@@ -238,21 +234,21 @@ def _over_way(family: Callable[[Samples, int], Family]) -> Callable[[Request], t
 
 def _step(law: str) -> Callable[[Request], tuple[Family, Samples]]:
     def chosen(asked: Request) -> tuple[Family, Samples]:
-        return velocity_step(asked.whole, law=law, normal=asked.normal), asked.whole
+        return curves.velocity_step(asked.whole, law=law, normal=asked.normal), asked.whole
 
     return chosen
 
 
 CURVES: dict[str, Callable[[Request], tuple[Family, Samples]]] = {
-    "coulomb": lambda asked: (speed_curves.COULOMB, asked.sliding),
-    "viscous": _over_speed(speed_curves.VISCOUS),
-    "stribeck": _over_speed(speed_curves.STRIBECK),
+    "coulomb": lambda asked: (curves.COULOMB, asked.sliding),
+    "viscous": _over_speed(curves.VISCOUS),
+    "stribeck": _over_speed(curves.STRIBECK),
     "asymmetric": _uneven,
     "tabulated": _table,
-    "dahl": _over_way(lambda samples, elements: presliding_curves.DAHL),
-    "jenkins": _over_way(lambda samples, elements: presliding_curves.JENKINS),
-    "iwan": _over_way(lambda samples, elements: presliding_curves.iwan(elements)),
-    "maxwell": _over_way(presliding_curves.maxwell_slip),
+    "dahl": _over_way(lambda samples, elements: curves.DAHL),
+    "jenkins": _over_way(lambda samples, elements: curves.JENKINS),
+    "iwan": _over_way(lambda samples, elements: curves.iwan(elements)),
+    "maxwell": _over_way(curves.maxwell_slip),
     "aging": _step("aging"),
     "slip": _step("slip"),
 }

@@ -240,8 +240,9 @@ def fit_law(
     knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in names]
     knobs += nuisance_knobs(oscillator, nuisance, stretches)
     if profile:
-        knobs += [Knob(f"profile {j}", "profile", value, 0.01, prior=UNEVEN / 0.01)
-                  for j, value in enumerate(profile.values)]  # fmt: skip
+        knobs += [
+            Knob(f"profile {j}", "profile", value, 0.01, prior=UNEVEN / 0.01) for j, value in enumerate(profile.values)
+        ]
     problem = Problem.of(oscillator, stretches, knobs, profile)
     point = problem.begin(np.zeros(len(knobs)))
     if profile:
@@ -252,9 +253,10 @@ def fit_law(
     point = descend(problem, point, tell=tell)
     if not math.isfinite(point.chi2):
         raise EstimateError(
-            f"{oscillator.law!r} can not be simulated along this record", "the search starts from a motion that exists",
+            f"{oscillator.law!r} can not be simulated along this record",
+            "the search starts from a motion that exists",
             "start from other values of the law",
-        )  # fmt: skip
+        )
     sure = surety(problem, point, tell) if intervals else None
     if progress:
         progress(1.0)

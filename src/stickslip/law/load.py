@@ -118,9 +118,10 @@ def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | st
     weights = np.array([finite("loads", parse_value(load, "N"), unit="N") for load in loads])
     if len(levels) != len(weights) or len(levels) < 2:
         raise EstimateError(
-            f"{len(levels)} frictions, {len(weights)} loads", "a line needs a friction for each of two loads at least",
+            f"{len(levels)} frictions, {len(weights)} loads",
+            "a line needs a friction for each of two loads at least",
             "give one of each",
-        )  # fmt: skip
+        )
     if weights.min() <= 0 or weights.max() < LEAST_REACH * weights.min():
         raise EstimateError(
             f"loads from {weights.min():.3g} to {weights.max():.3g} N",

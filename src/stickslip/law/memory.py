@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 from stickslip.balance.motion import CREEP
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result, Status
+from stickslip.law.curves import deflections
 from stickslip.law.data import Samples, samples_of
-from stickslip.law.nonlinear import minimise
-from stickslip.law.presliding import deflections
+from stickslip.law.family import minimise
 from stickslip.record.record import Record
 from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]
 
-MEMORIES = ("none", "time delay", "state variable", "way", "undecided")
 LEAST_PHASE = 0.005  # rad: what smoothing leaves of a phase
 POINTS = 2000  # of a mean cycle, at most
 BLURRED = 0.25  # of the phase over which smoothing spreads the velocity's kinks: what it may shift the loop's
@@ -166,8 +165,9 @@ def _loop(samples: Samples) -> _Loop:
     if not samples.reverses:
         raise EstimateError(
             f"the velocity runs from {samples.velocity.min():.3g} to {samples.velocity.max():.3g} {samples.unit}/s",
-            "the sense of rotation is told of motion both ways", "give a record that reverses",
-        )  # fmt: skip
+            "the sense of rotation is told of motion both ways",
+            "give a record that reverses",
+        )
     count = samples.cycles
     starts = np.searchsorted(samples.cycle, np.arange(count))
     ends = np.append(starts[1:], len(samples.cycle))

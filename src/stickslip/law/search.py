@@ -130,11 +130,7 @@ class Problem:
 
     @classmethod
     def of(
-        cls,
-        oscillator: Oscillator,
-        stretches: Sequence[Stretch],
-        knobs: Sequence[Knob],
-        profile: Profile | None = None,
+        cls, oscillator: Oscillator, stretches: Sequence[Stretch], knobs: Sequence[Knob], profile: Profile | None = None
     ) -> Problem:
         """The start's memory is that of steady sliding."""
         entries, scales = [], []
@@ -165,9 +161,10 @@ class Problem:
     def sensor_knobs(self, u: Array, kind: str, j: int) -> dict[str, float]:
         """Gains or delays by channel, in stretch j."""
         return {
-            knob.channel: knob.value(c) for knob, c in zip(self.knobs, u, strict=True)
+            knob.channel: knob.value(c)
+            for knob, c in zip(self.knobs, u, strict=True)
             if knob.kind == kind and knob.stretch in (None, j)
-        }  # fmt: skip
+        }
 
     def begin(self, u: Array) -> Point:
         """The point with the starts as estimated."""
@@ -417,11 +414,6 @@ def without_starts(slopes: Sequence[Slopes]) -> list[Array]:
         basis = basis[:, np.abs(np.diag(triangle)) > 1e-9]
         left.append(a - basis @ (basis.T @ a))
     return left
-
-
-def with_knobs(problem: Problem, knobs: Sequence[Knob]) -> Problem:
-    """The same stretches, with other knobs."""
-    return replace(problem, knobs=tuple(knobs))
 
 
 def rows_of(sensors: Sequence[Sensor]) -> list[slice]:

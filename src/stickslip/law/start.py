@@ -33,9 +33,7 @@ AUDIBLE = 2.0  # times its noise that a motion must stray
 CALIBRATION = 0.005  # by which gains and springs are wrong, if nothing is known
 DELAYED = 5e-5  # s by which a stated delay is wrong
 VISCOUS = {"viscous", "slope"}  # parameters of laws that a viscous damper can not be told from
-GRID = {
-    "stiffness": (0.25, 1.0, 4.0, 64.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0),
-}  # fmt: skip
+GRID = {"stiffness": (0.25, 1.0, 4.0, 64.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0)}
 EXCESS = (0.04, 0.15, 0.25, 0.4)  # of static over kinetic friction
 BELOW = 0.99  # of a static friction that is held: where the kinetic starts at most
 SPEEDS = (0.03, 0.1, 0.3)  # of the largest speed
@@ -63,17 +61,19 @@ class Shown:
         name = next((name for name in ("x", "v") if name in record), None)
         if name is None:
             raise RecordError(
-                f"a record of {', '.join(record)}", "a law is fitted to a motion: displacement x or velocity v",
+                f"a record of {', '.join(record)}",
+                "a law is fitted to a motion: displacement x or velocity v",
                 "give one, or integrate the acceleration first",
-            )  # fmt: skip
+            )
         record.require_clean(*channels, name, question="a fitted law", samples=2 * LEAST)
         values, late = record[name], record.channels[name].delay
         noise = record.channels[name].noise or noise_level(values, record.fs)
         if not np.std(values) > AUDIBLE * noise:
             raise EstimateError(
                 f"{name} strays by {np.std(values):.3g} {record.channels[name].unit} in noise of {noise:.3g}",
-                "a law is fitted to motion above the noise", "drive harder, or measure with less noise",
-            )  # fmt: skip
+                "a law is fitted to motion above the noise",
+                "drive harder, or measure with less noise",
+            )
         if name == "x":
             velocity = differentiate(values, record.fs).values
             displacement = values - _middle(record, values, velocity)
@@ -111,9 +111,10 @@ class Shown:
         rows, velocity = self.slides(), self.velocity
         if len(rows) == 0:
             raise EstimateError(
-                "the mass does not slide away from the record's ends", "a law is fitted to sliding",
+                "the mass does not slide away from the record's ends",
+                "a law is fitted to sliding",
                 "give a longer record, or drive harder",
-            )  # fmt: skip
+            )
         cut = max(1, len(velocity) // 50)
         inner = velocity[cut:-cut]
         low, high = sorted(abs(end) for end in np.quantile(inner, (UNTURNED, 1 - UNTURNED)))
@@ -226,9 +227,10 @@ def free_names(oscillator: Oscillator, free: Sequence[str] | None) -> tuple[str,
             found.append(field.name if alone else f"law.{field.name}")
     if not found:
         raise ModelError(
-            f"{type(oscillator.law).__name__} has no number to fit", "a law is fitted by its parameters",
+            f"{type(oscillator.law).__name__} has no number to fit",
+            "a law is fitted by its parameters",
             "name those to fit in free=, or take another law",
-        )  # fmt: skip
+        )
     return tuple(found)
 
 
@@ -243,15 +245,17 @@ def require_apart(
         sensor = _of_sensor(name)
         if sensor and head not in channels:
             raise ModelError(
-                f"the {tail} of '{head}'", f"the channels that are fitted are {', '.join(channels)}",
+                f"the {tail} of '{head}'",
+                f"the channels that are fitted are {', '.join(channels)}",
                 nearest(head, channels),
-            )  # fmt: skip
+            )
         places: set[object] = {name} if sensor else set(find(oscillator, name))
         if not sensor and find(oscillator, name)[0][0] == "drive":
             raise ModelError(
-                f"'{name}' of the drive", "a law is fitted under the drive as it was measured, or as it is given",
+                f"'{name}' of the drive",
+                "a law is fitted under the drive as it was measured, or as it is given",
                 "leave it out of free= and nuisance=",
-            )  # fmt: skip
+            )
         if taken & places:
             raise ModelError(
                 f"'{name}' is named twice", "a parameter is fitted once", "leave it out of free= or nuisance="

@@ -238,9 +238,10 @@ def channels_of(record: Record, wanted: Sequence[str] | None) -> tuple[str, ...]
         record.require(*wanted, question="a fitted law")
         if strange := [name for name in wanted if name not in SENSED]:
             raise ModelError(
-                f"channels = {', '.join(wanted)}", f"a law explains {', '.join(SENSED)}; z and force drive the motion",
+                f"channels = {', '.join(wanted)}",
+                f"a law explains {', '.join(SENSED)}; z and force drive the motion",
                 f"leave {' and '.join(strange)} out",
-            )  # fmt: skip
+            )
         if not wanted:
             raise ModelError("channels = []", "a law explains one channel at least", "name one, or leave channels= out")
         return tuple(wanted)

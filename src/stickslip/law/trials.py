@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.law.choice import Evidence, Key, independent
 from stickslip.law.drive import Sampled
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
 from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
 from stickslip.law.stretch import Motion, Stretch, attempted
+from stickslip.law.surety import Evidence, Key, independent
 from stickslip.laws.guessing import STIFF, STIFFEST
 from stickslip.oscillator import Oscillator
 

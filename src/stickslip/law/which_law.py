@@ -5,20 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
-from stickslip.law.choice import CALIBRATIONS, Evidence, Misfit, Standing, standings, times, undescribed
 from stickslip.law.guess import Seen
 from stickslip.law.law import LawFit, answered
 from stickslip.law.search import descend
 from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
 from stickslip.law.stretch import Stretch, channels_of
-from stickslip.law.surety import surety
+from stickslip.law.surety import CALIBRATIONS, Evidence, Misfit, Standing, standings, surety, times, undescribed
 from stickslip.law.trials import (
     PASSES,
     Trial,
@@ -31,7 +30,7 @@ from stickslip.law.trials import (
     weighed,
     with_static,
 )
-from stickslip.laws.register import family_of, hypotheses
+from stickslip.laws.guessing import family_of, hypotheses
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, Step
 
@@ -226,70 +225,23 @@ def compare_laws(
     for each in shown:
         each.require_sliding()
     require_apart(oscillator, (), nuisance or (), shown)
-    tell = _teller(progress, len(kinds))
     known = tuple(nuisance) if nuisance is not None else usual_nuisance(oscillator, (), shown)
     systems = [oscillator, *([seen_damping(oscillator, shown)] if "damping" in known else [])]
-    seen = _seen(records, systems)
-
-    def stretch(each: Shown, number: int) -> Stretch:
-        return weighed(each, number, calibration, evidence)
-
-    def tried(names: Sequence[tuple[str, list[Any]]], passes: int, before: Mapping[str, Trial]) -> dict[str, Trial]:
-        stretches = [stretch(each, number) for number, each in enumerate(shown)]
-        found: dict[str, Trial] = {}
-        for name, given in names:
-            least = min((each.point.chi2 for each in {**before, **found}.values()), default=math.inf)
-            trial = resumed(before[name], stretches, least, passes, tell) if name in before else None
-            if trial is None:
-                begun = [replace(system, law=law) for system, told in seen for law in _guessed(name, given, told)]
-                begun += _continued(name, found)
-                trial = searched(name, begun, stretches, known, calibration, least, passes, tell)
-            if trial is not None:
-                found[name] = trial
-        return found
-
-    evidence: Evidence | None = None
-    rough, silent, stated = tried(kinds, LOOK, {}), dict[str, float](), shown
-    if rough:
-        nearest = min(rough.values(), key=lambda each: each.point.chi2)
-        silent = unexplained(nearest, shown)
-        shown = [replace(each, channels=tuple(n for n in each.channels if n not in silent)) for each in shown]
-        stated, shown = shown, tuned(shown, nearest, stretch, tell)
-        evidence = evidence_of(nearest, shown)
-    trials = tried(kinds, PASSES, {} if silent else rough)
-    if not trials:
-        raise EstimateError(
-            "no law can be simulated along these records", "a search starts from a motion that exists",
-            "check mass= and stiffness=, or give laws with their values",
-        )  # fmt: skip
-    first = min(trials.values(), key=lambda each: each.point.chi2)
-    rests = seen[-1][1].rests  # of the balance with the likelier damper
-    rigid, likely = rests.fall, rests.probabilities(calibration, CALIBRATIONS * calibration)
+    search = _Search(kinds, _seen(records, systems), known, calibration, _teller(progress, len(kinds)))
+    trials, looked = search.trials(shown)
+    rests = search.seen[-1][1].rests  # of the balance with the likelier damper
     misfits = [
         Misfit(trial.name, trial.count, squares(trial.left), trial.stiff, trial.moved) for trial in trials.values()
     ]
-    evidence = evidence_of(first, shown)
-    told, confidence = standings(misfits, evidence, likely=likely)
-    confidence = min(confidence, evidence.supported)
-    best = trials[told[0].name]
-    if best.name == "static" and rigid is not None:
-        best = with_static(best, rigid.value)
-    for _ in range(RETUNED if rough else 0):  # the mounts by the law that was found, not by the first look
-        before, shown = shown, tuned(stated, best, stretch, tell)
-        if [each.record.channels for each in before] == [each.record.channels for each in shown]:
-            break
-        again = resumed(best, [stretch(each, number) for number, each in enumerate(shown)], math.inf, PASSES, tell)
-        best = again or best
-    whole = [weighed(each, number, calibration, whole=True) for number, each in enumerate(shown)]
-    fit = _fit(best, shown, whole, tell)
-    if best.name == "static" and rigid is not None:
-        fit = _with_static(fit, rigid)
-    doubt = _doubt(fit, oscillator, calibration)
+    evidence = evidence_of(min(trials.values(), key=lambda each: each.point.chi2), looked.shown)
+    told, confidence = standings(misfits, evidence, likely=rests.probabilities(calibration, CALIBRATIONS * calibration))
+    best, final = search.settled(trials[told[0].name], looked, evidence, rests.fall)
+    fit = search.fitted(best, final, rests.fall)
+    doubt, confidence = _doubt(fit, oscillator, calibration), min(confidence, evidence.supported)
     if doubt:
         told, confidence = undescribed(told), 0.0
         fit = _flagged(fit, "none of the laws tried describes these records")
-    if told[0].name == "Stribeck":
-        rigid = _excess(fit)
+    rigid = _excess(fit) if best.name == "Stribeck" else rests.fall
     fit = _calibrated(fit, records, calibration)
     if progress:
         progress(1.0)
@@ -297,13 +249,93 @@ def compare_laws(
         Candidate(each, fit.oscillator if each is told[0] else trials[each.name].system, _left(trials[each.name]))
         for each in told
     )
-    worries: list[Doubt | str] = [
-        f"{name} is left out: the best law leaves {share:.0%} of it, and no mount or delay of its sensor is stated"
-        for name, share in silent.items()
-    ]
-    worries += filter(None, [too_few(shown, best.count), _remainder(fit)])
+    worries: list[Doubt | str] = [*looked.worries]
+    worries += filter(None, [too_few(final, best.count), _remainder(fit)])
     found = _answer(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
     return found if doubt else replace(found, verdict=" ".join([found.verdict, *_damper(fit, oscillator.damping)]))
+
+
+class _Looked(NamedTuple):
+    """The records after a first look: as they are compared, and before their mounts were moved."""
+
+    shown: Sequence[Shown]
+    stated: Sequence[Shown] | None  # None where no law could be looked at
+    worries: tuple[str, ...]
+
+
+class _Search(NamedTuple):
+    """What stays the same while laws are searched: their starts, what is fitted beside them, and who is told."""
+
+    kinds: Sequence[tuple[str, list[Any]]]
+    seen: Sequence[tuple[Oscillator, Seen]]
+    known: Sequence[str]
+    calibration: float
+    tell: Callable[[], None]
+
+    def stretch(self, evidence: Evidence | None) -> Callable[[Shown, int], Stretch]:
+        """How a record is weighed: by its noise and calibration, and by evidence where there is some."""
+        return lambda shown, number: weighed(shown, number, self.calibration, evidence)
+
+    def tried(
+        self, shown: Sequence[Shown], evidence: Evidence | None, passes: int, before: Mapping[str, Trial]
+    ) -> dict[str, Trial]:
+        """Every law searched, or its search taken up again."""
+        stretches = [self.stretch(evidence)(each, number) for number, each in enumerate(shown)]
+        found: dict[str, Trial] = {}
+        for name, given in self.kinds:
+            least = min((each.point.chi2 for each in {**before, **found}.values()), default=math.inf)
+            trial = resumed(before[name], stretches, least, passes, self.tell) if name in before else None
+            if trial is None:
+                begun = [replace(system, law=law) for system, told in self.seen for law in _guessed(name, given, told)]
+                begun += _continued(name, found)
+                trial = searched(name, begun, stretches, self.known, self.calibration, least, passes, self.tell)
+            if trial is not None:
+                found[name] = trial
+        return found
+
+    def trials(self, shown: Sequence[Shown]) -> tuple[dict[str, Trial], _Looked]:
+        """Every law at the end of its search; a first look tells which channels count, how much, and their mounts."""
+        rough, looked, evidence = self.tried(shown, None, LOOK, {}), _Looked(shown, None, ()), None
+        if rough:
+            nearest = min(rough.values(), key=lambda each: each.point.chi2)
+            silent = unexplained(nearest, shown)
+            stated = [replace(each, channels=tuple(n for n in each.channels if n not in silent)) for each in shown]
+            worries = tuple(
+                f"{name} is left out: the best law leaves {share:.0%} of it, and no mount or delay of its sensor is "
+                "stated"
+                for name, share in silent.items()
+            )
+            looked = _Looked(tuned(stated, nearest, self.stretch(None), self.tell), stated, worries)
+            evidence = evidence_of(nearest, looked.shown)
+        trials = self.tried(looked.shown, evidence, PASSES, {} if looked.worries else rough)
+        if not trials:
+            raise EstimateError(
+                "no law can be simulated along these records",
+                "a search starts from a motion that exists",
+                "check mass= and stiffness=, or give laws with their values",
+            )
+        return trials, looked
+
+    def settled(
+        self, best: Trial, looked: _Looked, evidence: Evidence, rigid: Estimate | None
+    ) -> tuple[Trial, Sequence[Shown]]:
+        """The best law, with the records' mounts by the law that was found, not by the first look."""
+        if best.name == "static" and rigid is not None:
+            best = with_static(best, rigid.value)
+        shown, stretch = looked.shown, self.stretch(evidence)
+        for _ in range(0 if looked.stated is None else RETUNED):
+            before, shown = shown, tuned(looked.stated or (), best, stretch, self.tell)
+            if [each.record.channels for each in before] == [each.record.channels for each in shown]:
+                break
+            stretches = [stretch(each, number) for number, each in enumerate(shown)]
+            best = resumed(best, stretches, math.inf, PASSES, self.tell) or best
+        return best, shown
+
+    def fitted(self, best: Trial, shown: Sequence[Shown], rigid: Estimate | None) -> LawFit:
+        """The best law's fit to all readings, with the static friction that the releases tell."""
+        whole = [weighed(each, number, self.calibration, whole=True) for number, each in enumerate(shown)]
+        fit = _fit(best, shown, whole, self.tell)
+        return fit if best.name != "static" or rigid is None else _with_static(fit, rigid)
 
 
 def _remainder(fit: LawFit) -> Doubt | str:
@@ -493,9 +525,10 @@ def _answer(
     excess_ = excess_ if told[0].family == "rigid" else None
     checks = tuple(f"{each.name}: misfit {times(each.misfit)} the least" for each in told)
     step = Step(
-        "compare_laws", {"laws": [each.name for each in candidates], "calibration": calibration},
+        "compare_laws",
+        {"laws": [each.name for each in candidates], "calibration": calibration},
         f"{', '.join(each.name for each in kept)} not rejected",
-    )  # fmt: skip
+    )
     return LawComparison(
         candidates, kept[0].name if len(kept) == 1 and not doubt else None,
         families[0] if len(families) == 1 and not doubt else None,

@@ -1,20 +1,20 @@
 from stickslip.laws.compliant import CompliantContact as CompliantContact
+from stickslip.laws.compliant import InertialContact as InertialContact
 from stickslip.laws.coulomb import Coulomb as Coulomb
-from stickslip.laws.dahl import Dahl as Dahl
-from stickslip.laws.elastoslip import ElastoSlip as ElastoSlip
 from stickslip.laws.export import export_law as export_law
-from stickslip.laws.inertial import InertialContact as InertialContact
 from stickslip.laws.linear_slope import LinearSlope as LinearSlope
+from stickslip.laws.linear_slope import PositionLoad as PositionLoad
+from stickslip.laws.lugre import Dahl as Dahl
 from stickslip.laws.lugre import LuGre as LuGre
-from stickslip.laws.position_load import PositionLoad as PositionLoad
-from stickslip.laws.rate_state import RateState as RateState
 from stickslip.laws.rough import RoughSurface as RoughSurface
+from stickslip.laws.series import ElastoSlip as ElastoSlip
 from stickslip.laws.series import InSeries as InSeries
-from stickslip.laws.smooth_state import SmoothStateVariable as SmoothStateVariable
+from stickslip.laws.state_variable import RateState as RateState
+from stickslip.laws.state_variable import SmoothStateVariable as SmoothStateVariable
 from stickslip.laws.state_variable import StateVariable as StateVariable
 from stickslip.laws.stribeck import FrictionCurve as FrictionCurve
 from stickslip.laws.stribeck import Stribeck as Stribeck
-from stickslip.laws.tabulated import Tabulated as Tabulated
+from stickslip.laws.stribeck import Tabulated as Tabulated
 from stickslip.laws.time_delay import TimeDelay as TimeDelay
 
 __all__: list[str]

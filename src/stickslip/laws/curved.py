@@ -267,7 +267,4 @@ class Sliding(Rigid):
 
 def either_side() -> tuple[tuple[str, int, Exit], ...]:
     """Name, side and exit of the two slips of a law that never holds the mass: they meet where the velocity turns."""
-    return (
-        ("back", -1, Exit({"v": 1.0}, "forward")),
-        ("forward", 1, Exit({"v": -1.0}, "back")),
-    )
+    return (("back", -1, Exit({"v": 1.0}, "forward")), ("forward", 1, Exit({"v": -1.0}, "back")))

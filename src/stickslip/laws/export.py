@@ -10,18 +10,16 @@ from xml.sax.saxutils import quoteattr
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
-from stickslip.laws.c_code import c_code, modes_of
+from stickslip.laws.c_code import c_code, modes_of, python_code
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.curved import CurvedLaw, lifted
+from stickslip.laws.formula import one_line, quoted, remark, written
+from stickslip.laws.guessing import registered
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.lugre import LuGre
-from stickslip.laws.python_code import python_code
-from stickslip.laws.register import registered
 from stickslip.laws.rough import RoughSurface
-from stickslip.laws.stribeck import FrictionCurve
-from stickslip.laws.tabulated import Tabulated
+from stickslip.laws.stribeck import FrictionCurve, Tabulated
 from stickslip.laws.time_delay import SpeedCurve
-from stickslip.laws.written import one_line, quoted, remark, written
 from stickslip.settings import nearest
 
 TABLE = 33  # points of a curve over the speed, where a program takes a table
@@ -74,9 +72,10 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
         raise ModelError(f"law = {law!r}", "a law is exported with its values", "give one, as in Coulomb(1.1)")
     if any(isinstance(part, RoughSurface) for part in _nested(law)):
         raise ModelError(
-            "a rough surface", "its friction follows a place by chance, and has no formula",
+            "a rough surface",
+            "its friction follows a place by chance, and has no formula",
             "export the contact on it, law.contact",
-        )  # fmt: skip
+        )
     return FORMATS[format](law).rstrip("\n") + "\n" * (format == "c")
 
 
@@ -168,8 +167,9 @@ def _parameter(name: str, value: Any) -> Any:
     if not all(isinstance(part, int | float) and isfinite(part) for part in (value if _listed(value) else [value])):
         raise ModelError(
             f"{name} of type {type(value).__name__}",
-            "a block of parameters holds finite numbers, lists of them, and text", "export Python or C",
-        )  # fmt: skip
+            "a block of parameters holds finite numbers, lists of them, and text",
+            "export Python or C",
+        )
     return value
 
 

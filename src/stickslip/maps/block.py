@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.maps import tally as log
+from stickslip.maps import measures as log
 from stickslip.maps.crowd import Watch, crowds, on_cpu, watched
 from stickslip.maps.measures import AT_REST, EVENTS, FAILED, LOG, MOVING, NO_SYSTEM, ORDERS, own_name
 from stickslip.maps.plan import Arrays, Plan

@@ -10,23 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.maps import tally as log
+from stickslip.maps import measures as log
 from stickslip.maps.grid import START
 from stickslip.maps.measures import FAILED, LOG, NO_SYSTEM, ORDERS
 from stickslip.maps.plan import BLOCK, Arrays, Plan
-from stickslip.maps.watch import (
-    CONSTANT,
-    LAP,
-    MARK,
-    ROOM,
-    VARIES,
-    Counted,
-    Given,
-    Look,
-    Rooms,
-    repeats,
-    watch_all,
-)
+from stickslip.maps.watch import CONSTANT, LAP, MARK, ROOM, VARIES, Counted, Given, Look, Rooms, repeats, watch_all
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
 from stickslip.solve.assembly import tables_of

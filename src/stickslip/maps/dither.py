@@ -13,7 +13,7 @@ from stickslip.contact.frequency_transition import Transition
 from stickslip.drives.kinds import Belt, Dithered
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Doubt, Estimate, Result, Status
-from stickslip.maps.attractor import Start
+from stickslip.maps.basins import Start
 from stickslip.oscillator import Oscillator
 from stickslip.solve.poincare import tables
 from stickslip.solve.simulate import simulate

@@ -1,4 +1,7 @@
-"""What can be asked of each motion of a sweep: a register of measures, and what each one leaves on the map."""
+"""What can be asked of each motion of a sweep: a register of measures, and what each one leaves on the map.
+
+Counting along an event log: what the pieces of a motion add up to. Compiled, for whole logs and piece by piece.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError
 from stickslip.settings import nearest
 
@@ -15,6 +19,12 @@ OUTCOMES = ("moving", "at_rest", "failed", "no_such_system")
 MOVING, AT_REST, FAILED, NO_SYSTEM = range(len(OUTCOMES))
 ORDERS = 8  # longest orbit looked for, in periods of the drive
 CLOSE = 1e-6  # of the motion's size: a return this near is one
+
+# What is counted, and what is remembered from piece to piece.
+NORMAL, ABNORMAL, HELD, SHORT, FASTEST, REACH, WORK, SIDE, STOPPED, LONGEST, UNDERWAY, MICRO = range(12)
+ENTRIES = 12
+PART = 0.1  # of the longest slip: a shorter one is a micro-slip
+SLIP, STICK, MICROSTICK = 0, 1, 2  # kinds of a mode
 
 
 @dataclass(frozen=True)
@@ -134,3 +144,42 @@ def _names(measure: Measure) -> tuple[str, ...]:
 def own_name(measure: Callable[..., float]) -> str:
     """What a user's function is called on the map."""
     return str(getattr(measure, "__name__", type(measure).__name__)).strip("<>")
+
+
+@compiled(**OPTIONS)
+def note(kind, side, begin, length, path, speed, sums):
+    """Add one piece: its kind and side, when it begins [s] after the measured time does, how long it lasts, how far
+    the contact slips in it [m], and how fast at its start [m/s]."""
+    counted = begin >= 0.0
+    if kind == SLIP:
+        if sums[STOPPED] > 0.0:
+            if counted and sums[SIDE] != 0.0:
+                sums[NORMAL if sums[SIDE] * side < 0.0 else ABNORMAL] += 1.0
+            if counted and sums[MICRO] > 0.0:
+                sums[FASTEST] = max(sums[FASTEST], speed)
+        elif sums[SIDE] * side < 0.0:
+            _end_slip(counted, sums)
+        sums[SIDE], sums[STOPPED], sums[MICRO] = side, 0.0, 0.0
+        sums[UNDERWAY] += path
+        return
+    if sums[STOPPED] == 0.0:
+        _end_slip(counted, sums)
+    sums[STOPPED], sums[MICRO] = 1.0, 1.0 if kind == MICROSTICK else 0.0
+    sums[HELD] += max(0.0, length + min(begin, 0.0))
+
+
+@compiled(**OPTIONS)
+def _end_slip(counted, sums):
+    if sums[UNDERWAY] > 0.0:
+        if counted and sums[UNDERWAY] < PART * sums[LONGEST]:
+            sums[SHORT] += 1.0
+        sums[LONGEST] = max(sums[LONGEST], sums[UNDERWAY])
+    sums[UNDERWAY] = 0.0
+
+
+@compiled(**OPTIONS)
+def tally(kinds, sides, modes, begins, lengths, paths, speeds, sums):
+    """Add a whole log; `kinds` and `sides` are by mode."""
+    for j in range(modes.shape[0]):
+        m = modes[j]
+        note(kinds[m], sides[m], begins[j], lengths[j], paths[j], speeds[j], sums)

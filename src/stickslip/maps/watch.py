@@ -14,8 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import OPTIONS, compiled
-from stickslip.maps.measures import AT_REST, CLOSE, FAILED, MOVING, ORDERS
-from stickslip.maps.tally import ABNORMAL, ENTRIES, HELD, NORMAL, REACH, SHORT, SLIP, WORK, note
+from stickslip.maps.measures import (
+    ABNORMAL,
+    AT_REST,
+    CLOSE,
+    ENTRIES,
+    FAILED,
+    HELD,
+    MOVING,
+    NORMAL,
+    ORDERS,
+    REACH,
+    SHORT,
+    SLIP,
+    WORK,
+    note,
+)
 from stickslip.solve.cells import Linear
 from stickslip.solve.glide import Clock, Model, Past, Pieces
 from stickslip.solve.kernel import DONE, FULL, advance, begin, follow, march, set_tones

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.maps.attractor import Attractor
-from stickslip.maps.basins import Basins
+from stickslip.maps.basins import Attractor, Basins
 from stickslip.maps.bifurcation import Bifurcation
 from stickslip.maps.boundaries import Boundary
 from stickslip.maps.dither import Dither, dithered_friction

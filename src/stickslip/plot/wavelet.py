@@ -26,7 +26,7 @@ from stickslip.plot.style import (
     strongest,
     styled,
 )
-from stickslip.signals.cutting import RING
+from stickslip.signals.pieces import RING
 from stickslip.signals.wavelet import ends, wavelet_map
 from stickslip.signals.wavelet_grid import CENTRE
 

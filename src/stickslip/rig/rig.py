@@ -33,11 +33,7 @@ def _air_track() -> tuple[Sensor, ...]:
         lvdt,
         replace(lvdt, channel="z"),
         Sensor(
-            "a",
-            mount=Mount(125.0, 0.1),
-            noise=Noise(0.04),
-            digitiser=Digitiser(limit=5 * GRAVITY),
-            sensitivity="1 V/g",
+            "a", mount=Mount(125.0, 0.1), noise=Noise(0.04), digitiser=Digitiser(limit=5 * GRAVITY), sensitivity="1 V/g"
         ),
         Sensor(
             "load",

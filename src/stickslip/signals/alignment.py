@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.signals.derivative_spectra import derivative_spectra, window
+from stickslip.signals.response import derivative_spectra, window
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

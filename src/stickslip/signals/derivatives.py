@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.signals.noise import checked_samples, local_noise
-from stickslip.signals.smoother import ROUGHNESS, end_modes, penalised
+from stickslip.signals.noise import ROUGHNESS, checked_samples, end_modes, local_noise, penalised
 from stickslip.units import parse_value
 
 Array = NDArray[np.float64]

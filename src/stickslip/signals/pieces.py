@@ -1,18 +1,31 @@
-"""Signals in pieces: here they ring, there they glide. Where does each piece begin?"""
+"""Signals in pieces: here they ring, there they glide. Where does each piece begin?
+
+The dynamic programme behind it: where signals are best cut; compiled.
+
+Where an oscillation turns, and when it passes from one turning point to the next; compiled.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.signals.cutting import GLIDE, Sums, cut
+from stickslip.compiled import FAST, OPTIONS, compiled
 
 Array = NDArray[np.float64]
 
 TOLD = 1e-13  # variance of the squared time within a stretch, below which a line explains it
+
+GLIDE, RING = 0, 1
+SHORTEST = 4  # samples of a glide: a parabola has three coefficients
+
+SHARES = (0.25, 0.5, 0.75)
+EQUAL = 1e-12  # of a swing: running means that differ by less are alike
 
 
 @dataclass(frozen=True)
@@ -104,3 +117,139 @@ def _glide_costs(values: Array) -> Array:
     resting = rest > TOLD
     extra = np.where(resting, (tty - tq * ty / tt) ** 2 / np.where(resting, rest, 1.0), 0.0)
     return np.asarray(np.maximum(_between(values**2) - n * (y**2 + ty**2 / tt + extra), 0.0))
+
+
+class Sums(NamedTuple):
+    """Sums over the samples up to each: what every ring costs is found from.
+
+    Attributes
+    ----------
+    power : ndarray, shape (m, n + 1)
+        Of the squared samples y^2 of each signal.
+    waves : ndarray, shape (3, n + 1)
+        Of c^2, c s and s^2, of the ring's cosine c and its sine s; zero where nothing rings.
+    products : ndarray, shape (2, m, n + 1)
+        Of c y and s y.
+    """
+
+    power: NDArray[np.float64]
+    waves: NDArray[np.float64]
+    products: NDArray[np.float64]
+
+
+@compiled(**OPTIONS)
+def cut(lengths, glides, sums, least, variance, penalty, best, came):
+    """Least cost of each signal's first samples by the kind of their last piece, and where that piece begins.
+
+    Parameters
+    ----------
+    lengths : ndarray of int, shape (m,)
+        Samples of each signal.
+    glides : ndarray, shape (m, n + 1, n + 1)
+        Cost of each stretch as a glide.
+    sums : Sums
+        Of the samples, and of what rings.
+    least : int
+        Samples of a ring.
+    variance, penalty : float
+        Of the noise, and for a piece.
+    best, came : ndarray, shape (m, 2, n + 1)
+        Written.
+    """
+    for k in range(lengths.shape[0]):
+        best[k] = math.inf
+        best[k, RING, 0] = 0.0  # so that a glide comes first
+        for last in range(SHORTEST, lengths[k] + 1):
+            for kind in range(2):
+                low, where = math.inf, 0
+                for first in range(last - (SHORTEST if kind == GLIDE else least) + 1):
+                    total = best[k, 1 - kind, first]
+                    if total >= low:  # no stretch costs less than nothing
+                        continue
+                    if kind == GLIDE:
+                        total += glides[k, first, last]
+                    else:
+                        total += _ring(sums, k, first, last) / variance
+                    if total < low:
+                        low, where = total, first
+                best[k, kind, last], came[k, kind, last] = low + penalty, where
+
+
+@compiled(**OPTIONS)
+def _ring(sums, k, first, last):
+    """Sum of squares that the best ring leaves of signal k from `first` up to, not including, `last`."""
+    waves, products = sums.waves, sums.products
+    cc, cs, ss = waves[0, last] - waves[0, first], waves[1, last] - waves[1, first], waves[2, last] - waves[2, first]
+    cy, sy = products[0, k, last] - products[0, k, first], products[1, k, last] - products[1, k, first]
+    determinant = max(cc * ss - cs * cs, 1e-12 * cc * ss + 1e-300)
+    explained = (ss * cy * cy - 2 * cs * cy * sy + cc * sy * sy) / determinant
+    return max(sums.power[k, last] - sums.power[k, first] - explained, 0.0)
+
+
+@compiled(**FAST)
+def turning_points(values, least, rows):
+    """Rows where `values` turn back by `least` or more, alternately up and down, with the first and last extreme.
+
+    They are written to `rows`, as many as it holds; returns how many there are.
+    """
+    count, low, high, direction = 0, 0, 0, 0
+    for row in range(values.shape[0]):
+        if count == rows.shape[0]:
+            return count
+        if direction >= 0:
+            if values[row] >= values[high]:
+                high = row
+            elif values[high] - values[row] >= least:
+                rows[count] = high
+                count += 1
+                direction, low = -1, row
+                continue
+        if direction <= 0:
+            if values[row] <= values[low]:
+                low = row
+            elif values[row] - values[low] >= least:
+                rows[count] = low
+                count += 1
+                direction, high = 1, row
+    if 0 < count < rows.shape[0]:
+        rows[count] = high if direction > 0 else low
+        count += 1
+    return count
+
+
+@compiled(**FAST)
+def crossings(values, turns, places):
+    """Rows, with fractions, where each swing passes `SHARES` of its way; the last time before it is through.
+
+    `turns` are the k + 1 turning points, `places` is (k, 3).
+    """
+    for k in range(turns.shape[0] - 1):
+        first, last = turns[k], turns[k + 1]
+        begin, length = values[first], values[last] - values[first]
+        through = first
+        while (values[through] - begin) / length < SHARES[2]:
+            through += 1
+        for j in range(3):
+            row = through
+            while row > first and (values[row] - begin) / length >= SHARES[j]:
+                row -= 1
+            rise = (values[min(row + 1, last)] - values[row]) / length
+            places[k, j] = row + ((SHARES[j] - (values[row] - begin) / length) / rise if rise > 0.0 else 0.0)
+
+
+@compiled(**FAST)
+def extreme(values, first, last, side):
+    """Row of the extreme, up (`side` 1) or down (-1), of running means over a sixth of `first` to `last`."""
+    width = max(1, (last - first + 1) // 6) | 1
+    reach, level = width // 2, values[first]
+    total, span = 0.0, 0.0
+    for row in range(first, last + 1):
+        span = max(span, abs(values[row] - level))
+    for row in range(first - reach, first + reach + 1):
+        total += side * (values[min(max(row, first), last)] - level)
+    best, best_row = total, first
+    for row in range(first + 1, last + 1):
+        total += side * (values[min(row + reach, last)] - values[max(row - reach - 1, first)])
+        if total > best + EQUAL * width * span:
+            best, best_row = total, row
+    return best_row

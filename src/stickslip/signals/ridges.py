@@ -1,4 +1,7 @@
-"""What stands out in a map over time and frequency: ridges, local maxima, and spikes across all frequencies."""
+"""What stands out in a map over time and frequency: ridges, local maxima, and spikes across all frequencies.
+
+The short-time Fourier transform, beside which wavelet maps can be held.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
+from stickslip.record.exchange import labelled_arrays
 from stickslip.record.record import Record
 from stickslip.signals.wavelet import ends, wavelet_map
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,6 +31,8 @@ OCTAVES, VOICES = (1 / 16, 1 / 4), 4  # of the rate: where spikes are looked for
 FLOOR = 1e-7  # of a row's largest modulus, below which nothing is told
 BLIND = 6.0  # wavelet frequency: one of 4.5 sees exp(-10) of the level, which may be more than a kink
 FLAT = 0.5  # of a spike's level that every frequency reaches: a tone does not
+
+LEAST = 16  # samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,3 +342,73 @@ def _refined(level: Array, rows: NDArray[np.intp], columns: NDArray[np.intp]) ->
     shift = np.where(bend < 0, 0.5 * (low - high) / np.where(bend < 0, bend, -1.0), 0.0)
     shift = np.clip(shift, -0.5, 0.5)
     return np.asarray(rows + shift, dtype=float), middle - 0.25 * (low - high) * shift
+
+
+def stft_map(record: Record, channel: str, *, nperseg: int | None = None, window: str = "hann") -> xr.DataArray:
+    """The short-time Fourier transform, for comparison: one window length for all frequencies.
+
+    Parameters
+    ----------
+    record : Record
+        At one rate.
+    channel : str
+        Which channel; its mean is taken off.
+    nperseg : int, optional
+        Samples of a window; the power of two next to a tenth of a second, or an eighth of the record.
+    window : str
+        As scipy.signal.get_window names it.
+
+    Returns
+    -------
+    xarray.DataArray
+        Complex, ``(frequency, time)``; the modulus of a tone is its amplitude.
+
+    Raises
+    ------
+    RecordError
+        A channel that is missing or not finite, a broken clock, a window longer than the record.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> record = Record.of({"a": 0.3 * np.sin(2 * np.pi * 50 * np.arange(4000) / 1000)}, fs=1000)
+    >>> found = abs(stft_map(record, "a", nperseg=200))
+    >>> round(float(found.sel(frequency=50.0, time=2.0)), 3)
+    0.3
+    """
+    from scipy.signal import ShortTimeFFT
+
+    record.require_clean(channel, question="a short-time Fourier transform", samples=LEAST)
+    count = len(record)
+    if nperseg is None:
+        nperseg = max(8, min(1 << round(math.log2(max(8, 0.1 * record.fs))), count // 8))
+    if not 4 <= nperseg <= count:
+        raise RecordError(
+            f"nperseg = {nperseg} of {count} samples",
+            "a window has 4 samples at least, and fits into the record",
+            "choose it between",
+        )
+    hop = max(1, nperseg // 8)
+    short = ShortTimeFFT.from_window(
+        window, record.fs, nperseg, nperseg - hop, scale_to="magnitude", phase_shift=None, fft_mode="onesided2X"
+    )
+    mean = float(record[channel].mean())
+    values = short.stft(record[channel] - mean)
+    times = record.start + short.t(count)
+    inside = (times >= record.start) & (times < record.start + record.duration)
+    xarray = labelled_arrays("wavelet maps")
+    result: xr.DataArray = xarray.DataArray(
+        values[:, inside],
+        dims=("frequency", "time"),
+        coords={"frequency": ("frequency", short.f, {"units": "Hz"}), "time": ("time", times[inside], {"units": "s"})},
+        attrs={
+            "units": record.channels[channel].unit,
+            "channel": channel,
+            "fs": record.fs,
+            "nperseg": nperseg,
+            "window": window,
+            "normalisation": "amplitude",
+            "mean": mean,
+        },
+    )
+    return result

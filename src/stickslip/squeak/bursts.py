@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Estimate, Result, Status
+from stickslip.estimate import Estimate, Result, Status, plain
 from stickslip.record.record import Record
 from stickslip.squeak.hearing import LASTS, PARTIALS, Hearing, Span, clipped_rows, filtered
 from stickslip.squeak.sound import REFERENCES, level
@@ -111,8 +111,7 @@ class Squeak:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not known is None."""
-        told = {**vars(self), "harmonics": [list(each) for each in self.harmonics], "loud": list(self.loud)}
-        return {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in told.items()}
+        return dict(plain(vars(self)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,17 +209,9 @@ class Squeaks(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "channel": self.channel,
-            "kind": self.kind,
-            "squeaking": self.squeaking,
-            "reference": self.reference,
-            "forcing": None if math.isnan(self.forcing) else self.forcing,
-            "threshold": None if math.isnan(self.threshold) else self.threshold,
-            "bursts": [burst.to_dict() for burst in self.bursts],
-            "notes": list(self.notes),
-            "history": [str(step) for step in self.record.history],
-        }
+        told = ("channel", "kind", "squeaking", "reference", "forcing", "threshold", "bursts", "notes")
+        history = [str(step) for step in self.record.history]
+        return {**plain({name: getattr(self, name) for name in told}), "history": history}
 
     def __repr__(self) -> str:
         rows = [
@@ -277,7 +268,7 @@ def find_squeaks(
     --------
     >>> from stickslip.solve.simulate import simulate
     >>> from stickslip.squeak.sound import squeak_record
-    >>> from stickslip.squeak.virtual_rig import squeak_rig
+    >>> from stickslip.squeak.sound import squeak_rig
     >>> found = find_squeaks(squeak_record(simulate(squeak_rig("wet", 6.13), duration=1.0), snr=30, rng=1))
     >>> found.kind, all(475 < burst.frequency < 500 for burst in found.of("squeak"))
     ('squeak', True)

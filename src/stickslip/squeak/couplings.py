@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status, plain
 from stickslip.parameters import finite
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
@@ -87,20 +87,7 @@ class Pair:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "first": self.first,
-            "second": self.second,
-            "inside": self.inside,
-            "outside": None if math.isnan(self.outside) else self.outside,
-            "significant": self.significant,
-            "coupled": self.coupled,
-            "adds": self.adds,
-            "tied": self.tied,
-            "leads": self.leads,
-            "added": None if self.added is None else self.added.to_dict(),
-            "phase": self.phase.to_dict(),
-            "delay": None if self.delay is None else self.delay.to_dict(),
-        }
+        return dict(plain({**vars(self), "coupled": self.coupled, "adds": self.adds, "leads": self.leads}))
 
 
 @dataclass(frozen=True)
@@ -152,14 +139,7 @@ class Coupling(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        energies = {name: getattr(self, name) for name in ENERGIES}
-        return {
-            "frequency": self.frequency,
-            "segments": self.segments,
-            "compared": self.compared,
-            "pairs": [pair.to_dict() for pair in self.pairs],
-            **{name: None if each is None else each.to_dict() for name, each in energies.items()},
-        }
+        return dict(plain(vars(self)))
 
     def __repr__(self) -> str:
         rows = [
@@ -214,7 +194,7 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None, lever: float | s
     --------
     >>> from stickslip.solve.simulate import simulate
     >>> from stickslip.squeak.sound import squeak_record
-    >>> from stickslip.squeak.virtual_rig import squeak_rig
+    >>> from stickslip.squeak.sound import squeak_rig
     >>> record = squeak_record(simulate(squeak_rig(), duration=1.2), snr=30, rng=1)
     >>> found = coupling(record)
     >>> found.of("normal_acceleration", "torsion_velocity").coupled

@@ -19,8 +19,7 @@ from stickslip.solve.poincare import Table, stretch, tables
 from stickslip.solve.self_excited import settled_cycle
 from stickslip.solve.simulate import opening
 from stickslip.solve.trajectory import Trajectory
-from stickslip.squeak.sliding import System
-from stickslip.squeak.stability import Stability, stability
+from stickslip.squeak.stability import Stability, System, stability
 from stickslip.structure import Structure
 
 Array = NDArray[np.float64]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, RecordError
+from stickslip.estimate import plain
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import LOWEST, chosen_channel
 from stickslip.squeak.hearing import PULSE, clipped_rows, filtered, short_time_level
@@ -61,9 +62,8 @@ class SoundQuality:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the curve over time."""
-        told = {name: getattr(self, name) for name in ("loudness", "loudest", "sharpness", "roughness", "duration")}
-        numbers = {name: None if math.isnan(value) else value for name, value in told.items()}
-        return {**numbers, "method": self.method}
+        told = ("loudness", "loudest", "sharpness", "roughness", "duration", "method")
+        return dict(plain({name: getattr(self, name) for name in told}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +94,7 @@ class Impulsiveness:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        rate = None if math.isnan(self.rate) else self.rate
-        return {**vars(self), "rate": rate, "pulses": self.pulses.tolist()}
+        return dict(plain(vars(self)))
 
 
 def sound_quality(record: Record, *, channel: str = "sound") -> SoundQuality:

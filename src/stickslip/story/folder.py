@@ -13,7 +13,7 @@ from stickslip import __version__
 from stickslip.errors import ModelError, RecordError
 from stickslip.plot.plate import Plate
 from stickslip.printing import printable
-from stickslip.squeak.listening import Clip
+from stickslip.squeak.spectra import Clip
 from stickslip.story.page import render, sections
 from stickslip.story.story import summary
 from stickslip.whole import whole_folder

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from stickslip.answers.findings import Comparison, Findings
-from stickslip.balance.pull import Pull
+from stickslip.balance.balance import Pull
 from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
 from stickslip.estimate import Estimate, stands

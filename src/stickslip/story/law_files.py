@@ -15,7 +15,7 @@ from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
 from stickslip.law.which_law import LawComparison
 from stickslip.laws.export import export_law, toml_table
-from stickslip.laws.written import quoted
+from stickslip.laws.formula import quoted
 from stickslip.record.record import Record
 
 FILES = {

@@ -13,7 +13,7 @@ from stickslip.files.write import whole
 from stickslip.plot import style
 from stickslip.plot.plate import Plate
 from stickslip.printing import printable
-from stickslip.squeak.listening import Clip
+from stickslip.squeak.spectra import Clip
 from stickslip.story.story import Story, summary
 
 if TYPE_CHECKING:

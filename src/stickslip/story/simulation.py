@@ -33,8 +33,8 @@ from stickslip.solve.energies import energy
 from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import Tables
 from stickslip.solve.trajectory import Event, Trajectory
-from stickslip.squeak.listening import write_sound
 from stickslip.squeak.sound import sound_pressure, squeak_record
+from stickslip.squeak.spectra import write_sound
 from stickslip.story.folder import check_folder
 from stickslip.story.story import Story, Table
 from stickslip.structure import Structure

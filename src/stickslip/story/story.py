@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from stickslip.plot.plate import Plate
     from stickslip.record.channels import Channel
     from stickslip.record.record import Record, Step
-    from stickslip.squeak.listening import Clip
+    from stickslip.squeak.spectra import Clip
 
 # Of each kind of result the function that tells it, in a file of this room, which is imported when it is needed.
 TELLERS = {

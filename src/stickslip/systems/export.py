@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.laws.formula import Formula
-from stickslip.laws.written import quoted
+from stickslip.laws.formula import Formula, quoted
 from stickslip.parameters import PARTS
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import nearest
@@ -164,5 +163,6 @@ def _call(part: Mapping[str, Any]) -> str:
 def _arguments(values: Mapping[str, Any], without: tuple[str, ...] = ()) -> str:
     return ", ".join(
         f"{name}={_call(value) if isinstance(value, Mapping) else repr(value)}"
-        for name, value in values.items() if name not in without
-    )  # fmt: skip
+        for name, value in values.items()
+        if name not in without
+    )

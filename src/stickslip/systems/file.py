@@ -286,9 +286,10 @@ def _case(name: str, values: dict[str, Any], source: _Source) -> Case:
     """The system of a file's tables."""
     if "law" in values and "system" not in values:
         raise ModelError(
-            f"{source.name} holds a law alone", "a law is simulated in a system",
+            f"{source.name} holds a law alone",
+            "a law is simulated in a system",
             "add [system] with mass = and stiffness =, and a [drive]; a fit that is told the mass writes them itself",
-        )  # fmt: skip
+        )
     whole = checked(_File, values, source=source.name, lines=source.lines)
     drive = _built("drive", DRIVES, whole.drive, source)
     several = whole.contacts is not None or isinstance(whole.system.get("mass"), list)
@@ -305,9 +306,10 @@ def _case(name: str, values: dict[str, Any], source: _Source) -> Case:
 def _oscillator(whole: _File, drive: Any, source: _Source) -> Oscillator:
     if whole.law is None:
         raise ModelError(
-            f"{source.name} has no law", "a mass rubs under one, a structure under one at each contact",
+            f"{source.name} has no law",
+            "a mass rubs under one, a structure under one at each contact",
             "add a table [law], or tables [[contacts]]",
-        )  # fmt: skip
+        )
     values = _part(_Oscillator, "system", whole.system, source)
     law = _built("law", LAWS, whole.law, source)
     with _placed("system", source):
