@@ -245,8 +245,8 @@ def _shown(story: Story) -> dict[str, Any]:
     return {
         "title": story.title,
         "headline": [on_the_page(sentence) for sentence in story.headline],
-        "cautions": [on_the_page(sentence) for sentence in story.cautions],
-        "lines": [[line.name, line.value, line.interval, line.status] for line in story.lines],
+        "cautions": [on_the_page(sentence) for sentence in story.notices],
+        "lines": [[line.name, line.value, line.interval, story.marks(line)] for line in story.lines],
         "notes": [on_the_page(sentence) for sentence in story.notes],
         "overlay": [],
     }

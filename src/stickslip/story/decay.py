@@ -114,7 +114,7 @@ def _headline(findings: Findings) -> Iterator[str]:
     force = decay.dry_force
     word = "torque" if findings.settings["channel"] == "theta" else "force"
     if force is not None and decay.rubs:
-        yield f"That is a dry friction {word} of {value_of(force)} (95 % sure: {interval_of(force)})."
+        yield f"That is a dry friction {word} of {value_of(force)} (95 %: {interval_of(force)})."
     elif decay.rubs:
         yield f"The dry friction {word} is that displacement times the spring's stiffness; state stiffness= or mass=."
     yield from _motion(decay)
@@ -214,7 +214,7 @@ def _both(ratio: Estimate, dry: Estimate) -> str:
 
 
 def _told(estimate: Estimate) -> str:
-    return f"a {estimate.name} of {value_of(estimate)} (95 % sure: {interval_of(estimate)})"
+    return f"a {estimate.name} of {value_of(estimate)} (95 %: {interval_of(estimate)})"
 
 
 def _hidden(estimate: Estimate, words: str) -> str:
@@ -306,7 +306,7 @@ def _together(comparison: Comparison) -> Iterator[str]:
         yield f"{way} {_both(ratio, dry)}."
     if comparison.dry_force is not None:
         force = comparison.dry_force
-        yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
+        yield f"That is a dry friction force of {value_of(force)} (95 %: {interval_of(force)})."
     either, static = comparison.dry_displacement_any, comparison.static_displacement
     if either is not None:
         yield f"Whichever motion it was, the dry friction displacement is {_reach(either)}."

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import ModelError
-from stickslip.story.words import interval_of, value_of
+from stickslip.story.words import Caution, flags, interval_of, value_of
 
 if TYPE_CHECKING:
     from stickslip.estimate import Estimate
@@ -99,7 +99,7 @@ def _nothing_more(folder: Path) -> None:
     """Of most results page, numbers and figures are all."""
 
 
-SHORT = 30  # letters of a status that may be said twice
+ABOVE = "above"  # the mark of a row whose caution the headline says already
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,8 @@ class Story:
     title : str
         The record's name.
     headline, cautions : sequence of str
-        What was found; what should keep the reader from trusting it.
+        What was found, the answer in the first sentence; what should keep the reader from trusting it. What must be
+        read before the answer is a :class:`Caution` in the headline.
     lines : sequence of Line
         The table.
     faults : sequence of str or None
@@ -134,8 +135,6 @@ class Story:
         What ``results.json`` holds.
     write : callable
         Writes the files that this kind of result has beside page, numbers, figures and sounds into a folder.
-    brief : bool
-        Whether a terminal tells the parts in a line each; the page has the rest.
     """
 
     title: str
@@ -153,17 +152,43 @@ class Story:
     listen: Callable[[], Sequence[Clip]] = tuple
     data: Callable[[], Mapping[str, Any]] = dict
     write: Callable[[Path], object] = _nothing_more
-    brief: bool = False
 
     @property
     def has_truth(self) -> bool:
         """Whether a true value is known for any row."""
         return any(line.true is not None for line in self.lines)
 
-    def how_sure(self, line: Line) -> str:
-        """A row's status; where it stands above already, that it does."""
-        said = " ".join((*self.headline, *self.cautions))
-        return "as said above" if len(line.status) > SHORT and line.status in said else line.status
+    @property
+    def answer(self) -> str:
+        """The sentence that answers; where nothing is told, none."""
+        return next((told for told in self.headline if not isinstance(told, Caution)), "")
+
+    @property
+    def urgent(self) -> list[str]:
+        """What every number hangs on, told before it."""
+        return [told for told in self.headline if isinstance(told, Caution)]
+
+    @functools.cached_property
+    def notices(self) -> list[Caution]:
+        """The cautions, each reason once: those of rows in the rows' order, which numbers them, then the others."""
+        said = " ".join(self.headline)
+        rows = [each for each in flags((line.name, line.status) for line in self.lines) if each.reason not in said]
+        reasons, kinds = {each.reason for each in rows}, {each.kind for each in rows} - {""}
+        plain = [each if isinstance(each, Caution) else Caution(each) for each in self.cautions]
+        others = [
+            each for each in plain if each.reason not in reasons and each.kind not in kinds and each.reason not in said
+        ]
+        return [*rows, *(each for each in others if not each.names), *(each for each in others if each.names)]
+
+    def marks(self, line: Line) -> str:
+        """The numbers of the cautions that concern a row; none of one that is sure."""
+        numbers = [str(place) for place, each in enumerate(self.notices, start=1) if line.name in each.names]
+        return " ".join(numbers) or ("" if line.status == "ok" else ABOVE)
+
+    def mark(self, caution: Caution) -> str:
+        """The number of a caution that rows bear; none of one that concerns the record."""
+        rows = {line.name for line in self.lines}
+        return str(self.notices.index(caution) + 1) if rows.intersection(caution.names) else ""
 
     @property
     def has_checks(self) -> bool:
