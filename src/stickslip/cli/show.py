@@ -58,9 +58,9 @@ def _print_short(story: Story) -> None:
         left, hidden = left - len(shown), hidden + len(table.rows) - len(shown)
     cautions: list[Caution] = []
     lines.append("")
-    for caution in story.notices:
+    for caution in story.concerned(rows):
         told = _caution(story, caution)
-        if _concerns(story, caution, rows) and len(lines) + len(told) <= MOST_LINES - END:
+        if len(lines) + len(told) <= MOST_LINES - END:
             lines += told
             cautions.append(caution)
     _print(story.title, lines)
@@ -125,8 +125,3 @@ def _caution(story: Story, caution: Caution) -> list[str]:
     """A caution behind its number, or in words of its own."""
     mark = story.mark(caution)
     return _lines(caution.reason, f"{mark:<3}") if mark else _lines(caution)
-
-
-def _concerns(story: Story, caution: Caution, rows: Sequence[Line]) -> bool:
-    """Whether a caution is of the record as a whole, or of a row that is shown."""
-    return not story.mark(caution) or not {line.name for line in rows}.isdisjoint(caution.names)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.lab.asked import AS_WRITTEN, PART, Asked, on_the_page
+from stickslip.story.scope import REPAIRS
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -28,10 +29,6 @@ POINTS = 2000  # pairs of least and greatest value of a channel that are drawn
 MOTION, FORCES = {"x", "v"}, {"friction", "load", "force"}
 CONSTANTS = ("mass", "stiffness", "damping")
 UNTOLD = " (no unit stated, "  # how a channel's source tells it
-_REPAIRS = {
-    "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
-    "restore_clipped": "clipping", "remove_drift": "drift",
-}  # fmt: skip
 
 
 def describe(asked: Asked) -> dict[str, Any]:
@@ -135,8 +132,8 @@ def _untold(channel: ss.record.Channel) -> bool:
 
 
 def _fault(fault: Fault) -> dict[str, Any]:
-    match = re.search(rf"\b({'|'.join(_REPAIRS)})\(record", fault.message)
-    repair = _REPAIRS[match[1]] if match else ""
+    match = re.search(rf"\b({'|'.join(REPAIRS)})\(record", fault.message)
+    repair = REPAIRS[match[1]] if match else ""
     return {"message": on_the_page(fault.message), "severity": fault.severity, "repair": repair}
 
 

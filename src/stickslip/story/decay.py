@@ -18,6 +18,7 @@ from stickslip.decay.fit_decay import LEFT_OVER
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate, kinds
 from stickslip.plot.decay import plates_of, plates_together
+from stickslip.story.scope import Scope, of_fit
 from stickslip.story.story import Line, Story, Table, tried
 from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, number, value_of
 
@@ -40,8 +41,20 @@ def of_findings(findings: Findings) -> Story:
         findings.name, list(_headline(findings)), cautions(findings),
         settings={**settings, **stated},
         tables=[*_by_other_ways([*decay.beside, *beside]), *([tried("motion", motions)] if motions else [])],
-        draw=lambda: plates_of(decay), data=lambda: _data(decay),
+        draw=lambda: plates_of(decay), data=lambda: _data(decay), look=lambda: _scope(findings),
     )  # fmt: skip
+
+
+def _scope(findings: Findings) -> Scope | None:
+    """The record with the fitted waveform over it, where there is one."""
+    fit = findings.decay.waveform
+    if fit is None:
+        return None
+    asked = ["decay", "--channel", fit.channel]
+    if findings.settings["restoring"] != "linear":
+        asked += ["--restoring", findings.settings["restoring"]]
+    time, fitted = np.concatenate(fit.time), np.concatenate(fit.fitted)
+    return of_fit(findings.record, fit.channel, time, fitted, asked, fit.model)
 
 
 def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:

@@ -15,6 +15,7 @@ from stickslip.parameters import unit
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Record
 from stickslip.story.law_files import write_law
+from stickslip.story.scope import Scope, of_fit
 from stickslip.story.story import Line, Story, Table
 from stickslip.story.words import Caution, doubts, leading, number
 
@@ -66,8 +67,19 @@ def _story(found: Fit, record: Records, headline: list[str], **told: Any) -> Sto
     title = record_name(records[0]) if len(records) == 1 else f"{len(records)} records" if records else "Fit"
     return Story(
         title, [*units, *headline], cautions, lines=list(map(Line.of, found.estimates)),
-        draw=lambda: law_plates(found), write=partial(write_law, result=found, records=records), **told,
+        draw=lambda: law_plates(found), look=lambda: _scope(found, records),
+        write=partial(write_law, result=found, records=records), **told,
     )  # fmt: skip
+
+
+def _scope(found: Fit, records: Sequence[Record]) -> Scope | None:
+    """The first record's first channel with what the law's sensor would have read."""
+    fit = found.fit if isinstance(found, LawComparison) else found
+    if not records or isinstance(fit, CurveFit) or not fit.traces:
+        return None
+    traces = fit.traces[0]
+    name = next(iter(traces.measured))
+    return of_fit(records[0], name, traces.time[name], traces.fitted[name], ["fit"], type(fit.law).__name__)
 
 
 def _ratio(misfit: float) -> str:

@@ -13,6 +13,7 @@ from stickslip.cycle.onset import Breakaway
 from stickslip.estimate import Estimate, stands
 from stickslip.plot.friction import plates_of, plates_together
 from stickslip.record.record import RIG_UNITS
+from stickslip.story import scope
 from stickslip.story.story import Line, Story
 from stickslip.story.words import cautions, interval_of, number, sentence, value_of
 
@@ -29,6 +30,7 @@ def of_findings(findings: Findings) -> Story:
     return Story(
         findings.name, list(_headline(findings)), cautions(findings, said), notes=list(_exact(findings)),
         settings=_settings(findings), draw=lambda: plates_of(findings), data=lambda: _data(findings),
+        look=lambda: scope.of_findings(findings),
     )  # fmt: skip
 
 

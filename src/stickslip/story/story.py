@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from stickslip.record.channels import Channel
     from stickslip.record.record import Record, Step
     from stickslip.squeak.listening import Clip
+    from stickslip.story.scope import Scope
 
 # Of each kind of result the function that tells it, in a file of this room, which is imported when it is needed.
 TELLERS = {
@@ -99,6 +100,11 @@ def _nothing_more(folder: Path) -> None:
     """Of most results page, numbers and figures are all."""
 
 
+def _nothing_to_look_at() -> None:
+    """Of maps and sounds the figures are all."""
+
+
+LEADING = 8  # rows that are shown first
 ABOVE = "above"  # the mark of a row whose caution the headline says already
 
 
@@ -129,8 +135,9 @@ class Story:
         What was done to the record.
     parts : sequence of Story
         Of several records, each by itself.
-    draw, listen : callable
-        The figures, and the sounds; called when they are first looked at, as :attr:`plates` and :attr:`clips`.
+    draw, listen, look : callable
+        The figures, the sounds, and what the page draws itself; called when they are first looked at, as
+        :attr:`plates`, :attr:`clips` and :attr:`scope`.
     data : callable
         What ``results.json`` holds.
     write : callable
@@ -150,6 +157,7 @@ class Story:
     parts: Sequence[Story] = ()
     draw: Callable[[], Iterable[Plate]] = tuple
     listen: Callable[[], Sequence[Clip]] = tuple
+    look: Callable[[], Scope | None] = _nothing_to_look_at
     data: Callable[[], Mapping[str, Any]] = dict
     write: Callable[[Path], object] = _nothing_more
 
@@ -162,6 +170,11 @@ class Story:
     def answer(self) -> str:
         """The sentence that answers; where nothing is told, none."""
         return next((told for told in self.headline if not isinstance(told, Caution)), "")
+
+    @property
+    def others(self) -> list[str]:
+        """The sentences behind the answer."""
+        return [told for told in self.headline if not isinstance(told, Caution)][1:]
 
     @property
     def urgent(self) -> list[str]:
@@ -191,14 +204,34 @@ class Story:
         return str(self.notices.index(caution) + 1) if rows.intersection(caution.names) else ""
 
     @property
-    def has_checks(self) -> bool:
-        """Whether anything was checked for any row."""
-        return any(line.checks for line in self.lines)
+    def leading(self) -> Sequence[Line]:
+        """The rows that are shown first."""
+        return self.lines[:LEADING]
+
+    def concerned(self, rows: Sequence[Line]) -> list[Caution]:
+        """The cautions of the record as a whole, and of these rows."""
+        names = {line.name for line in rows}
+        return [each for each in self.notices if not self.mark(each) or not names.isdisjoint(each.names)]
+
+    @property
+    def shown(self) -> list[Caution]:
+        """The cautions that stand beside the leading rows."""
+        return self.concerned(self.leading)
+
+    @property
+    def hidden(self) -> list[Caution]:
+        """The cautions of further rows alone."""
+        return [each for each in self.notices if each not in self.shown]
 
     @functools.cached_property
     def plates(self) -> tuple[Plate, ...]:
         """The figures, in reading order."""
         return tuple(self.draw())
+
+    @functools.cached_property
+    def scope(self) -> Scope | None:
+        """What the page draws itself."""
+        return self.look()
 
     @functools.cached_property
     def clips(self) -> Sequence[Clip]:
