@@ -75,8 +75,8 @@ def _list_scenarios(*, as_json: bool, everything: bool) -> None:
     if not everything:
         families = [list(group) for _, group in itertools.groupby(found, key=lambda name: name.partition(" ")[0])]
         shown = [f'"{names[0]}"' + f" and {len(names) - 1} more" * (len(names) > 1) for names in families]
-        say("\n".join(wrapped(", ".join(shown))))
-        say(f'{len(found)} scenarios, all with what is known of them by --all; run one with: stickslip simulate "NAME"')
+        more = f'{len(found)} scenarios; --all has each with what is known of it; run one: stickslip simulate "NAME"'
+        say("\n".join([*wrapped(", ".join(shown)), "", *wrapped(more)]))
         return
     cases = [(ss.systems.scenario_case(name), ", ".join(each.known).replace("_", " ")) for name, each in found.items()]
     for (about, parts, known), group in itertools.groupby(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Findings
+from stickslip.balance.motion import is_measured
 from stickslip.errors import StickslipError
 from stickslip.plot.contact import across
 from stickslip.plot.style import Array, envelope, prefixed, spelled
@@ -25,6 +26,7 @@ COLUMNS = 1_500
 LEVELS = 65_534  # of a value, in two bytes; one more is a gap
 MOST_PANELS = 4
 PANELS = ("x", "theta", "v", "a", "load", "force", "friction", "normal", "sound")
+EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
 BESIDE = {"x": "z"}  # drawn in the same panel
 ROWS = "--rows {first}:{last}"  # of a command, with the rows left open
 READING = ("channels", "units", "fs", "time", "delimiter", "decimal")  # options that read_record has too
@@ -81,6 +83,8 @@ class Scope:
         What asks about the rows from ``{first}`` to ``{last}`` again; empty where nothing can.
     first : int
         The file's row of the first sample.
+    view : tuple of float or None
+        From when to when it is shown at first [s]; None: some cycles of its middle.
     """
 
     start: float
@@ -92,19 +96,27 @@ class Scope:
     period: float = 0.0
     command: str = ""
     first: int = 0
+    view: tuple[float, float] | None = None
 
     def packed(self) -> dict[str, Any]:
         """For the page: the whole as envelopes, and of a long record its middle in detail."""
         count = len(self.panels[0].lines["measured"])
-        first = max(0, (count - DETAILED) // 2)
+        middle = count // 2 if self.view is None else round((sum(self.view) / 2 - self.start) * self.fs)
+        first = max(0, min(middle - DETAILED // 2, count - DETAILED))
         detail = slice(first, min(count, first + DETAILED))
+        cycles = [round(float(cycle), 6) for cycle in self.cycles if self._within(cycle, detail)]
         return {
             "start": self.start, "fs": self.fs, "count": count, "detail": [detail.start, detail.stop],
             "panels": [panel.packed(detail) for panel in self.panels], "model": self.model,
             "across": None if self.across is None else self.across.packed(detail),
-            "cycles": [round(float(cycle), 6) for cycle in self.cycles], "period": self.period,
-            "command": self.command, "first": self.first,
+            "cycles": cycles, "period": self.period,
+            "command": self.command, "first": self.first, "view": self.view,
         }  # fmt: skip
+
+    def _within(self, cycle: float, detail: slice) -> bool:
+        """Whether a whole cycle lies in what is held in detail."""
+        first, last = ((time - self.start) * self.fs for time in (cycle, cycle + self.period))
+        return bool(detail.start - 0.5 < first and last < detail.stop + 0.5)
 
 
 def _line(values: Array, detail: slice) -> dict[str, Any]:
@@ -129,14 +141,13 @@ def of_findings(findings: Findings) -> Scope | None:
     if record.stamps is not None:
         return None
     twin = None if trial is None else _quiet_twin(trial.belief, len(record))
-    panels = list(_panels(record, twin))
-    if not panels:
-        return None
+    panels, model = list(_panels(record, twin)), "" if trial is None or twin is None else str(trial.belief)
+    if not model and findings.regression is not None:
+        panels, model = [_explained(panel, findings) for panel in panels], EXPLAINED
     moved, cycles, period = None, (), 0.0
     if loops is not None:
         moved = _moved(findings, twin)
         cycles, period = loops.cycles, 1 / loops.frequency.value
-    model = "" if trial is None or twin is None else str(trial.belief)
     command, first = command_of(record, "analyze", *_stated(findings.settings))
     return Scope(record.start, record.fs, panels, model, moved, cycles, period, command, first)
 
@@ -156,7 +167,8 @@ def _quiet_twin(belief: Belief, count: int) -> Record | None:
 
 def _panels(record: Record, twin: Record | None) -> Iterator[Panel]:
     """The channels that tell most; friction is one of them."""
-    names = [name for name in PANELS if name in record and not (name == "v" and "x" in record)]
+    names = [name for name in PANELS if name in record and (name == "friction" or is_measured(record, name))]
+    names = [name for name in names if name != "v" or "x" not in names]
     kept = [name for name in names if name != "friction"][: MOST_PANELS - ("friction" in names)]
     for name in [*kept, *(["friction"] if "friction" in names else [])] or list(record)[:1]:
         lines = {"measured": record[name]}
@@ -166,6 +178,15 @@ def _panels(record: Record, twin: Record | None) -> Iterator[Panel]:
         if beside in record:
             lines[beside] = record[beside]
         yield Panel(name, record.channels[name].unit, lines)
+
+
+def _explained(panel: Panel, findings: Findings) -> Panel:
+    """The force that a regression explains, over what was measured of it."""
+    found, time = findings.regression, findings.record.time
+    if panel.name != found.signal:
+        return panel
+    over = np.interp(time, found.time, found.explained, left=np.nan, right=np.nan)
+    return replace(panel, lines={**panel.lines, "model": over})
 
 
 def _moved(findings: Findings, twin: Record | None) -> Panel:
@@ -187,16 +208,17 @@ def of_fit(record: Record, name: str, time: Array, fitted: Array, asked: Sequenc
     return Scope(record.start, record.fs, panels, model, command=command, first=first)
 
 
-def of_run(record: Record, period: float, constants: Mapping[str, Any], file: str) -> Scope:
+def of_run(record: Record, period: float, view: tuple[float, float], constants: Mapping[str, Any], file: str) -> Scope:
     """A simulated motion as a record, that `file` holds too, with its cycles."""
     moved = None
     if "x" in record and "friction" in record:
         base = record["z"] if constants.get("contact") == "base" and "z" in record else 0.0
         moved = Panel("displacement", record.channels["x"].unit, {"measured": record["x"] - base})
-    cycles = np.arange(record.start, record.start + record.duration - period, period)
+    cycles = np.arange(view[0], min(view[1], record.start + record.duration - period), period)
     asked = shlex.join(["stickslip", "analyze", file, *_stated(constants)])
     return Scope(
-        record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, f"{asked} {ROWS}"
+        record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, f"{asked} {ROWS}",
+        view=view,
     )  # fmt: skip
 
 

@@ -53,6 +53,7 @@ SHOWN_EVENTS = 12
 MOST_NAMED = 4  # masses in a sentence
 KINDS = ("slip", "microstick", "stick", "flight")
 TANGENTIAL_NORMAL_TORSIONAL = 3  # displacements of a squeak rig
+LOOKED_CYCLES = 8  # of a run, at first
 LOOKED = 100_000  # samples of a run that is looked at without a record
 HEARD = 10_000.0  # Hz of a sound whose rate was not asked for
 PEAKS = 4001  # instants looked at for the largest values of the last cycle
@@ -161,7 +162,7 @@ def _scope(run: Trajectory, rate: float, file: str = "record.csv") -> Scope:
     system = run.system
     constants = {key: getattr(system, key) for key in (*RIG_UNITS, "damper", "contact") if hasattr(system, key)}
     alone = {} if isinstance(system, Structure) else constants
-    return of_motion(run.record(fs=rate), cycle_of(run), alone, file)
+    return of_motion(run.record(fs=rate), cycle_of(run), last_cycles(run, LOOKED_CYCLES), alone, file)
 
 
 def _tables(result: Outcome) -> Iterator[Table]:

@@ -184,12 +184,18 @@ class Story:
     @functools.cached_property
     def notices(self) -> list[Caution]:
         """The cautions, each reason once: those of rows in the rows' order, which numbers them, then the others."""
-        said = " ".join(self.headline)
-        rows = [each for each in flags((line.name, line.status) for line in self.lines) if each.reason not in said]
+        said = " ".join(self.headline).casefold()
+        rows = [
+            each
+            for each in flags((line.name, line.status) for line in self.lines)
+            if each.reason.casefold() not in said
+        ]
         reasons, kinds = {each.reason for each in rows}, {each.kind for each in rows} - {""}
         plain = [each if isinstance(each, Caution) else Caution(each) for each in self.cautions]
         others = [
-            each for each in plain if each.reason not in reasons and each.kind not in kinds and each.reason not in said
+            each
+            for each in plain
+            if each.reason not in reasons and each.kind not in kinds and each.reason.casefold() not in said
         ]
         return [*rows, *(each for each in others if not each.names), *(each for each in others if each.names)]
 

@@ -7,7 +7,7 @@ for (const place of document.querySelectorAll(".scope")) {
   const LEFT = 52, BOTTOM = 24, GAP = 10, MOST_CYCLES = 40, NEAR = 6;
   const [near, far] = told.detail, end = told.count - 1;
   const friction = told.panels.find((panel) => panel.name === "friction");
-  const cycles = told.cycles.map((time) => [time, time + told.period]).filter(([a, b]) => row(a) >= near && row(b) <= far);
+  const cycles = told.cycles.map((time) => [time, time + told.period]);
   let view = [0, end], span = null, pointer = null, chosen = -1, drag = null, paper = false;
 
   function row(time) { return (time - told.start) * told.fs; }
@@ -136,7 +136,7 @@ for (const place of document.querySelectorAll(".scope")) {
     const { found, digits } = ticks(time(view[0]), time(view[1]), width / 90);
     pen.fillStyle = colour("soft");
     pen.textAlign = "center";
-    for (const value of found) pen.fillText(`${value.toFixed(digits)}`, x(row(value)), height - 8);
+    for (const value of found) if (x(row(value)) > LEFT + 12) pen.fillText(value.toFixed(digits), x(row(value)), height - 8);
     pen.textAlign = "right";
     pen.fillText("t [s]", LEFT - 6, height - 8);
     if (pointer !== null) {
@@ -198,6 +198,7 @@ for (const place of document.querySelectorAll(".scope")) {
     drawChart();
     drawLoop();
     one("cycle").textContent = cycles.length ? (chosen < 0 ? `${cycles.length} cycles` : `cycle ${chosen + 1} of ${cycles.length}`) : "";
+    reading.classList.toggle("idle", pointer === null);
     reading.textContent = pointer === null ? reading.dataset.rest : valuesAt(pointer);
     one("asked").hidden = !span;
     if (span) {
@@ -269,9 +270,11 @@ for (const place of document.querySelectorAll(".scope")) {
   });
 
   place.hidden = false;
-  if (told.count > far - near) view = [near, far - 1];
-  if (cycles.length > 8) view = [row(cycles[0][0]), row(cycles[5][1])];
-  chosen = cycles.length ? Math.min(2, cycles.length - 1) : -1;
+  if (told.view) view = told.view.map(row);
+  else if (cycles.length > 8) view = [row(cycles[0][0]), row(cycles[5][1])];
+  else if (told.count > far - near) view = [near, far - 1];
+  chosen = cycles.length ? cycles.length - 1 >> 1 : -1;
+  if (cycles.length > 8) chosen = Math.max(0, cycles.findIndex(([from]) => row(from) > (view[0] + view[1]) / 2 - 0.5 * told.period * told.fs));
   new ResizeObserver(show).observe(chart);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
   addEventListener("beforeprint", () => { paper = true; show(); });
