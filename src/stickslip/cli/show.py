@@ -48,25 +48,26 @@ def _print_short(story: Story) -> None:
     """At most MOST_LINES lines: the answer, the rows that lead, their cautions, and what else there is."""
     in_tables = sum(len(table.rows) for table in story.tables if not table.folded)
     rows, lines = story.lines[: MOST_ROWS - min(in_tables, OF_TABLES)], []
-    for text in (*story.urgent, story.answer, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
+    told = [story.answer, *([] if story.lines or story.tables else story.others)]  # without rows the sentences are all
+    for text in (*story.urgent, *told, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
         lines += _lines(text)
     lines += _numbers(story, rows)
     left, hidden = MOST_ROWS - len(rows), 0
     for table in story.tables:
         shown = () if table.folded else table.rows[:left]
-        lines += _table(table.title, table.headings, shown)
+        lines += [*_table(table.title, table.headings, shown), *(_lines(table.note) if shown else ())]
         left, hidden = left - len(shown), hidden + len(table.rows) - len(shown)
     cautions: list[Caution] = []
     lines.append("")
     for caution in story.concerned(rows):
-        told = _caution(story, caution)
-        if len(lines) + len(told) <= MOST_LINES - END:
-            lines += told
+        words = _caution(story, caution)
+        if len(lines) + len(words) <= MOST_LINES - END:
+            lines += words
             cautions.append(caution)
     _print(story.title, lines)
     more = {
         "quantity": len(story.lines) - len(rows), "row": hidden, "caution": len(story.notices) - len(cautions),
-        "sentence": len(story.headline) - len(story.urgent) - bool(story.answer), "note": len(story.notes),
+        "sentence": len(story.others) + 1 - len(told), "note": len(story.notes),
         "record": max(0, len(story.parts) - MOST_PARTS),
     }  # fmt: skip
     counted = [
