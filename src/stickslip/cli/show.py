@@ -51,7 +51,7 @@ def _print_short(story: Story) -> None:
     told = [story.answer, *([] if story.lines or story.tables else story.others)]  # without rows the sentences are all
     for text in (*story.urgent, *told, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
         lines += _lines(text)
-    lines += _numbers(story, rows)
+    lines += [*_remedy(story), *_numbers(story, rows)]
     left, hidden = MOST_ROWS - len(rows), 0
     for table in story.tables:
         shown = () if table.folded else table.rows[:left]
@@ -80,7 +80,7 @@ def _print_short(story: Story) -> None:
 def _print_all(story: Story) -> None:
     """Everything that the page tells in words, each sentence once."""
     lines = [line for text in story.headline for line in _lines(text)]
-    lines += [*_numbers(story, story.lines), ""]
+    lines += [*_remedy(story), *_numbers(story, story.lines), ""]
     said = {str(each) for each in (*story.headline, *story.notices)} | {each.reason for each in story.notices}
     lines += [line for caution in story.notices for line in _caution(story, caution)]
     lines += [line for fault in story.faults or () if fault not in said for line in _lines(fault, "- ")]
@@ -97,6 +97,11 @@ def _print(title: str, lines: Sequence[str]) -> None:
     for line, before in zip(lines, ["", *lines], strict=False):
         if line or before:
             say(line)
+
+
+def _remedy(story: Story) -> list[str]:
+    """The command that mends what is wrong, on a line that can be copied."""
+    return ["To read it so that they agree:", story.remedy] if story.remedy else []
 
 
 def _lines(text: object, begin: str = "") -> list[str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from stickslip.balance.balance import known_constants
 from stickslip.balance.motion import is_measured, require_change
-from stickslip.consistent.checks import FAILS, ONE_SLIP, Check, mixups
+from stickslip.consistent.checks import FAILS, ONE_SLIP, Check, Slip, mixups, slip_check
 from stickslip.consistent.forced_checks import (
     Seen,
     acceleration_check,
@@ -41,10 +41,13 @@ class Consistency(Result):
         In the order of asking.
     status : str
         "ok", or what can not all be true.
+    slips : tuple of Slip
+        What would make the channels agree, the likeliest first.
     """
 
     checks: tuple[Check, ...]
     status: str
+    slips: tuple[Slip, ...] = ()
 
     @property
     def failed(self) -> tuple[Check, ...]:
@@ -149,6 +152,8 @@ def consistency(
         sampling_check(record, seen),
         *cycle_checks(record, seen),
     )
+    slips: tuple[Slip, ...] = ()
     if any(check.verdict == FAILS for check in checks):
-        checks = (*checks, *mixups(seen.balance, checks))
-    return Consistency(checks, what_fails(checks))
+        slips = mixups(seen.balance)
+        checks = (*checks, *slip_check(seen.balance, slips))
+    return Consistency(checks, what_fails(checks), slips)

@@ -30,7 +30,7 @@ def of_findings(findings: Findings) -> Story:
     return Story(
         findings.name, list(_headline(findings)), cautions(findings, said), notes=list(_exact(findings)),
         settings=_settings(findings), draw=lambda: plates_of(findings), data=lambda: _data(findings),
-        look=lambda: scope.of_findings(findings),
+        look=lambda: scope.of_findings(findings), remedy=_remedy(findings),
     )  # fmt: skip
 
 
@@ -75,6 +75,12 @@ def _exact(findings: Findings) -> Iterator[str]:
             "The intervals hold with your constants exact, and with the sensors' gains: how sure they are is not "
             'stated. Write it as in "2.42 ± 0.02 kg", and of a channel as in "COLUMN [g] ± 1 %".'
         )
+
+
+def _remedy(findings: Findings) -> str:
+    """The command that reads the channels without the slip that would make them agree."""
+    slips = findings.consistency.slips if findings.contradiction else ()
+    return scope.corrected(findings, slips[0]) if slips else ""
 
 
 def _headline(findings: Findings) -> Iterator[str]:

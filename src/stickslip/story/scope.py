@@ -12,7 +12,9 @@ import numpy as np
 
 from stickslip.answers.findings import Findings
 from stickslip.balance.motion import is_measured
+from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
+from stickslip.files.expression import times
 from stickslip.plot.contact import across
 from stickslip.plot.style import Array, envelope, prefixed, spelled
 from stickslip.plot.traces import follows
@@ -227,19 +229,45 @@ def command_of(record: Record, question: str, *options: str) -> tuple[str, int]:
 
     Empty of a record that came from no file, or from several that were read one by one.
     """
+    words = _asked(record, question, options)
+    return (f"{shlex.join(words)} {ROWS}", _read(record).get("rows", (0,))[0] or 0) if words else ("", 0)
+
+
+def corrected(findings: Findings, slip: Slip) -> str:
+    """The command that asks again, with channels read without a slip of the hand; empty where none can."""
+    record = findings.record
+    told = _read(record).get("channels") or {
+        name: channel.source for name, channel in record.channels.items() if channel.source
+    }
+    if not told.keys() >= {of for of, _ in slip.cure.values()}:
+        return ""
+    cured = {name: times(told[of], by) for name, (of, by) in slip.cure.items()}
+    return shlex.join(_asked(record, "analyze", tuple(_stated(findings.settings)), {**told, **cured}))
+
+
+def _read(record: Record) -> Mapping[str, Any]:
+    """The arguments by which the record was read, once; none of another record."""
     reads = [step.arguments for step in record.history if step.arguments.get("files")]
-    if len(reads) != 1:
-        return "", 0
-    words = ["stickslip", question, "+".join(file["name"] for file in reads[0]["files"])]
+    return reads[0] if len(reads) == 1 else {}
+
+
+def _asked(
+    record: Record, question: str, options: Sequence[str], channels: Mapping[str, str] | None = None
+) -> list[str]:
+    """The words of a command about the record's file, with other channels where they are given."""
+    read = _read(record)
+    if not read:
+        return []
+    words = ["stickslip", question, "+".join(file["name"] for file in read["files"])]
     for option in READING:
-        told = reads[0].get(option)
+        told = channels if channels and option == "channels" else read.get(option)
         if isinstance(told, Mapping):
             words += [word for name, value in told.items() for word in (f"--{option}", f"{name}={value}")]
         elif told is not None:
             words += [f"--{option}", f"{told:.12g}" if isinstance(told, float) else str(told)]
     repairs = [REPAIRS[step.action] for step in record.history if step.action in REPAIRS]
     words += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
-    return f"{shlex.join([*words, *options])} {ROWS}", (reads[0].get("rows") or (0, None))[0] or 0
+    return [*words, *options]
 
 
 def _stated(constants: Mapping[str, Any]) -> Iterator[str]:

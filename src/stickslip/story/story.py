@@ -140,6 +140,8 @@ class Story:
         :attr:`plates`, :attr:`clips` and :attr:`scope`.
     data : callable
         What ``results.json`` holds.
+    remedy : str
+        The command that would mend what is wrong; empty where nothing is, or no command would.
     write : callable
         Writes the files that this kind of result has beside page, numbers, figures and sounds into a folder.
     """
@@ -159,6 +161,7 @@ class Story:
     listen: Callable[[], Sequence[Clip]] = tuple
     look: Callable[[], Scope | None] = _nothing_to_look_at
     data: Callable[[], Mapping[str, Any]] = dict
+    remedy: str = ""
     write: Callable[[Path], object] = _nothing_more
 
     @property
