@@ -11,8 +11,7 @@ from stickslip.cli.terminal import aligned, say, say_json, say_styled, wrapped
 from stickslip.cli.words import spoken
 
 if TYPE_CHECKING:
-    from stickslip.story import Line, Story
-    from stickslip.story.words import Caution
+    from stickslip.story import Caution, Line, Story
 
 MOST_LINES = 40  # unless --all is asked for
 MOST_ROWS = 8  # of all tables together

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from stickslip.story.scope import REPAIRS
+import stickslip as ss
 
 _SPOKEN = (
     (r"\b(the command line|the run) sets (\w+)", r"\1 sets --\2"),
@@ -34,7 +34,7 @@ def spoken(words: object) -> str:
     """A sentence with the options of the command line for what it says of Python."""
 
     def repair(call: re.Match[str]) -> str:
-        word = REPAIRS.get(call[1])
+        word = ss.story.REPAIRS.get(call[1])
         return call[0] if word is None else f"--repair {word}" + (f":{call[2]}" if call[2] else "")
 
     text = re.sub(r"\bfill_gaps\(record\) and fill_missing\(record\)", "--repair gaps,missing", str(words))

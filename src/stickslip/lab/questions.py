@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.lab.asked import AS_WRITTEN, PART, Asked, on_the_page
-from stickslip.story.scope import REPAIRS
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -132,8 +131,8 @@ def _untold(channel: ss.record.Channel) -> bool:
 
 
 def _fault(fault: Fault) -> dict[str, Any]:
-    match = re.search(rf"\b({'|'.join(REPAIRS)})\(record", fault.message)
-    repair = REPAIRS[match[1]] if match else ""
+    match = re.search(rf"\b({'|'.join(ss.story.REPAIRS)})\(record", fault.message)
+    repair = ss.story.REPAIRS[match[1]] if match else ""
     return {"message": on_the_page(fault.message), "severity": fault.severity, "repair": repair}
 
 

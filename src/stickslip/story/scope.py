@@ -21,6 +21,7 @@ from stickslip.plot.traces import follows
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
+from stickslip.story.words import REPAIRS
 from stickslip.twin.belief import Belief
 
 DETAILED = 12_000  # samples that the page holds one by one; of the others the least and the most of each column
@@ -32,10 +33,6 @@ EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
 BESIDE = {"x": "z"}  # drawn in the same panel
 ROWS = "--rows {first}:{last}"  # of a command, with the rows left open
 READING = ("channels", "units", "fs", "time", "delimiter", "decimal")  # options that read_record has too
-REPAIRS = {
-    "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
-    "restore_clipped": "clipping", "remove_drift": "drift",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

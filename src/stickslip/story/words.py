@@ -15,6 +15,11 @@ from stickslip.units import NOTHING, prefixed
 if TYPE_CHECKING:
     from stickslip.answers.findings import Findings
 
+# What a step of a record's history is called where a command asks for it.
+REPAIRS = {
+    "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
+    "restore_clipped": "clipping", "remove_drift": "drift",
+}  # fmt: skip
 WITHIN_DIGIT = "within its last digit"  # an interval narrower than the digits shown
 FIGURES = 5  # significant figures at most: what is surer than that still reads well
 
@@ -69,6 +74,15 @@ def interval_of(estimate: Estimate) -> str:
 
 class Caution(str):
     """A caution in words; behind them stand the rows that it speaks against, and the reason alone.
+
+    Attributes
+    ----------
+    reason : str
+        The words without the rows.
+    names : tuple of str
+        The quantities that it speaks against; none of one that concerns the whole record.
+    kind : str
+        The kind of doubt, where there is one.
 
     Examples
     --------
